@@ -1,0 +1,428 @@
+"""Spline-enhanced sparse regression: a noisy trajectory goes in, the governing equations come out.
+
+The objective is the paper's (Eqs. 8-9): data loss of a cubic B-spline, physics loss at collocation
+points, a price per term. What differs is how it is minimised: banded Gauss-Newton steps with the
+curve eliminated (`collocation`), a search over supports in the small algebra that remains
+(`regression`), the offset as the origin in which the law is sparsest (`frames`), and a physics
+weight that is raised until the law holds exactly. Nothing is set by hand per system.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.interpolate import BSpline, make_lsq_spline
+from tqdm import tqdm
+
+from .collocation import Collocation, Segment, State
+from .discovery import Discovery, Step, Units, inverse, report
+from .frames import FrameAlgebra, sparse_origins
+from .polynomials import closure_mask, monomial_exponents, monomials
+from .records import Record, check_record, cut, typical_step
+from .regression import subset_search
+from .smoothing import smooth
+from .splines import DEGREE, clamped_knots
+
+FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
+"""Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
+SEARCH_WEIGHT = 1e4
+"""Largest weight at which supports are searched: beyond it the algebra loses digits."""
+FINAL_WEIGHT = 1e6
+"""Weight at which the law holds exactly for all that the data can tell."""
+OFFSET_CHARGE = 0.95
+"""Price of a moved axis, in terms: of two laws that fit alike, the one with fewer terms wins."""
+CLEANEST = 1e-5
+"""Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
+GAP = 0.4
+"""A pause longer than this fraction of the time scale of the motion is a gap."""
+SHORTEST_STRETCH = 4
+"""Stretches of fewer samples tell less than their initial conditions cost."""
+
+
+def discover(
+    t: np.ndarray | Sequence[tuple[np.ndarray, np.ndarray]],
+    x: np.ndarray | None = None,
+    degree: int = 3,
+    seed: int = 0,
+    progress: bool = False,
+) -> Discovery:
+    """Discover the polynomial law of a measured trajectory (paper: Eqs. 7-11).
+
+    Parameters
+    ----------
+    t : array_like, shape (n,), or list of (t, x)
+        Increasing times, even or uneven; or several trajectories of one system.
+    x : array_like, shape (n, d), optional
+        States with d of at least 1; a row with a NaN is missing. Omitted when ``t`` is a list.
+    degree : int
+        Highest degree of the candidate terms.
+    seed : int
+        For the random probes of the noise estimate and the starts of the offset search.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    Discovery
+        The law with standard errors in the frame of the data and in its own, sparsest frame.
+
+    Raises
+    ------
+    ValueError
+        If the input has the wrong shape, times that do not increase, infinite values, a
+        coordinate that does not move, or fewer samples than unknowns.
+
+    Examples
+    --------
+    >>> t, x = vl.SYSTEMS["Lorenz"].trajectory(1500)
+    >>> print(vl.discover(t, x).equations())
+    """
+    if x is None:
+        records = [check_record(*pair) for pair in t]
+    else:
+        records = [check_record(t, x)]
+    if not records or len({values.shape[1] for _, values in records}) != 1:
+        raise ValueError(
+            "t: a list of trajectories must hold at least one, all of the same dimension, "
+            f"got shapes {[values.shape for _, values in records]}"
+        )
+    return _Search(records, degree, seed, progress).run()
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A support in a frame, with what the quadratic model says it costs."""
+
+    cost: float
+    state: State
+
+    @property
+    def key(self) -> tuple[bytes, bytes]:
+        return self.state.active.tobytes(), self.state.moving.tobytes()
+
+
+@dataclass
+class _Search:
+    """One discovery: the data in standard units, and the stages that lead to the law."""
+
+    records: list[Record]
+    degree: int
+    seed: int
+    progress: bool
+    history: list[Step] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.began = time.perf_counter()
+        self.d = self.records[0][1].shape[1]
+        self.exponents = monomial_exponents(self.d, self.degree)
+        n = sum(len(t) for t, _ in self.records)
+        unknowns = len(self.exponents) + 1
+        if n < unknowns:
+            raise ValueError(
+                f"x: must hold at least as many samples as unknowns per equation "
+                f"({unknowns} for degree {self.degree} and d = {self.d}), got {n} samples"
+            )
+        self._standardise()
+        self.charge = 2 * np.log(self.d * n)
+        self.rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(1)[0])
+
+    def _standardise(self) -> None:
+        x = np.concatenate([values for _, values in self.records])
+        centre, scale = x.mean(axis=0), x.std(axis=0)
+        if not (scale > 1e-12 * np.abs(centre)).all():
+            still = int(np.argmin(scale))
+            raise ValueError(f"x: every coordinate must move, got a constant column {still}")
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(2)[1])
+        step = typical_step(self.records)
+        records = [(t / step, (values - centre) / scale) for t, values in self.records]
+        # Where the record pauses is a gap or not depending on how fast the target moves, which
+        # a first smoothing tells; the second one then respects the gaps.
+        speed = _rms_speed(smooth(_stretches(records, 5.0), rng).splines)
+        stretches = _stretches(records, max(2.5, GAP / speed))
+        smoothed = smooth(stretches, rng)
+        speed = _rms_speed(smoothed.splines)
+        self.units = Units(centre, scale, step / speed)
+        self.step = speed
+        self.records = [(t * speed, values) for t, values in records]
+        self.stretches = [(t * speed, values) for t, values in stretches]
+        self.noise = np.maximum(smoothed.noise, CLEANEST)
+        self.curves = [
+            BSpline(spline.t * speed, spline.c, DEGREE, extrapolate=True)
+            for spline in smoothed.splines
+        ]
+        self.spacing = 1 / 8 if self.noise.max() > 0.02 else 1 / 16
+
+    # -- stages ----------------------------------------------------------------------------
+
+    def run(self) -> Discovery:
+        with tqdm(total=5, disable=not self.progress, desc="discover", leave=False) as bar:
+            segments = [_segment(stretch, self.spacing) for stretch in self.stretches]
+            control = _fit_curves(segments, self.curves)
+            self._measure_slack(segments, control)
+            bar.update()
+            candidates = []
+            for start in sorted({min(2, self.degree), self.degree}):
+                candidates += self._candidates(self._unpruned(segments, control, start), segments)
+            bar.update()
+            state = self._best(candidates, segments)
+            bar.update()
+            state, segments = self._bridge(state, segments)
+            bar.update()
+            state, problem = self._polish(state, segments)
+            bar.update()
+        return report(state, problem, self.units, self.charge, (), self.history)
+
+    def _measure_slack(self, segments: list[Segment], control: np.ndarray) -> None:
+        """Misfit of a plain regression on the smoothed curve: the scale of physics weights."""
+        problem = Collocation(segments, self.exponents, self.noise**-2, np.ones(self.d))
+        x, slope = problem.node_states(control)
+        terms = monomials(x, self.exponents)
+        misfit = slope - terms @ np.linalg.lstsq(terms, slope, rcond=None)[0]
+        self.slack = np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
+
+    def _problem(self, segments: list[Segment], weight: float) -> Collocation:
+        return Collocation(segments, self.exponents, self.noise**-2, weight / self.slack**2)
+
+    def _criterion(self, problem: Collocation, state: State) -> float:
+        price = state.active.sum() + OFFSET_CHARGE * state.moving.sum()
+        return problem.objective(state) + self.charge * price
+
+    def _log(self, stage: str, problem: Collocation, state: State, weight: float) -> None:
+        data = problem.data_loss(state.control_points)
+        self.history.append(
+            Step(
+                stage=stage,
+                seconds=time.perf_counter() - self.began,
+                physics_weight=weight,
+                data_loss=data / problem.x.size,
+                physics_loss=float((problem.physics_residual(state) ** 2).mean()),
+                terms=int(state.active.sum()),
+                offset=self.units.point(state.offset),
+            )
+        )
+
+    def _unpruned(self, segments: list[Segment], control: np.ndarray, degree: int) -> State:
+        """Fit all terms up to a degree while the physics weight rises."""
+        rows = self.exponents.sum(axis=1) <= degree
+        problem = self._problem(segments, 1.0)
+        x, slope = problem.node_states(control)
+        coefficients = np.zeros(self.exponents.shape)
+        terms = monomials(x, self.exponents[rows])
+        coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=None)[0]
+        active = np.repeat(rows[:, None], self.d, axis=1)
+        origin, still = np.zeros(self.d), np.zeros(self.d, dtype=bool)
+        state = State(control, coefficients, active, origin, still)
+        for weight in FIRST_WEIGHTS:
+            problem = self._problem(segments, weight)
+            state = problem.solve(state, tolerance=1.0, max_steps=15)
+            self._log(f"unpruned, degree {degree}", problem, state, weight)
+        return state
+
+    def _select(
+        self, state: State, segments: list[Segment], weight: float, stage: str
+    ) -> tuple[State, float]:
+        """Alternate between the subset search and Gauss-Newton until the criterion stops falling.
+
+        The search runs over all terms, active or not, on the quadratic model with the curve
+        eliminated; its proposal is kept only if the true criterion falls after a refit.
+        """
+        problem = self._problem(segments, weight)
+        size = self.exponents.size
+        state = problem.solve(state, tolerance=0.1)
+        best = self._criterion(problem, state)
+        self._log(stage, problem, state, weight)
+        for _ in range(10):
+            columns = np.concatenate([np.arange(size), size + np.flatnonzero(state.moving)])
+            model = problem.linearise(state, columns)
+            present = state.flat()[columns]
+            charge = np.where(columns < size, self.charge, -np.inf)
+            support, solution, _ = subset_search(
+                model.information,
+                model.information @ present + model.gradient,
+                charge,
+                state.free()[columns],
+            )
+            if (support == state.free()[columns]).all():
+                break
+            trial = _proposed(state, model.curve_step, model.curve_response, columns, solution)
+            trial = problem.solve(trial, tolerance=0.1)
+            value = self._criterion(problem, trial)
+            if not value < best - 1e-6:
+                break
+            state, best = trial, value
+            self._log(stage, problem, state, weight)
+        return state, best
+
+    def _candidates(self, state: State, segments: list[Segment]) -> list[_Candidate]:
+        """Supports in the frames where the law is sparsest, best first by the quadratic model."""
+        weight = FIRST_WEIGHTS[-1]
+        state, _ = self._select(state, segments, weight, "subset search, centred frame")
+        active = closure_mask(self.exponents, state.active)
+        problem = self._problem(segments, weight)
+        state = problem.solve(replace(state, active=active), tolerance=0.1)
+        columns = np.flatnonzero(state.free())
+        model = problem.linearise(state, columns)
+        information = np.diag(np.where(state.free()[: self.exponents.size], 0.0, 1e30))
+        information[np.ix_(columns, columns)] = model.information
+        algebra = FrameAlgebra(self.exponents, state.coefficients, information)
+        home = self.units.standard(np.zeros(self.d))
+        x = np.concatenate([values for _, values in self.stretches])
+        box = (x.min(axis=0), x.max(axis=0))
+        origins = sparse_origins(algebra, active, home, box, self.charge, keep=4, rng=self.rng)
+        found = [(home, np.zeros(self.d, dtype=bool))]
+        # An origin costs like a term per axis, so each is also tried with axes left at home.
+        for origin in origins:
+            for kept in itertools.product((True, False), repeat=self.d):
+                moving = np.array(kept)
+                found.append((np.where(moving, origin, home), moving))
+        unique = {tuple(np.round(origin, 2)): (origin, moving) for origin, moving in found}
+        return sorted(
+            (
+                self._candidate(algebra, state, columns, origin, moving, problem.objective(state))
+                for origin, moving in unique.values()
+            ),
+            key=lambda candidate: candidate.cost,
+        )
+
+    def _candidate(
+        self,
+        algebra: FrameAlgebra,
+        state: State,
+        columns: np.ndarray,
+        origin: np.ndarray,
+        moving: np.ndarray,
+        objective: float,
+    ) -> _Candidate:
+        coefficients, information = algebra.at(origin)
+        present = coefficients.T.ravel()[columns]
+        information = information[np.ix_(columns, columns)]
+        support, solution, value = subset_search(
+            information,
+            information @ present,
+            np.full(len(columns), self.charge),
+            np.ones(len(columns), dtype=bool),
+        )
+        cost = objective + value + present @ information @ present
+        flat = np.zeros(self.exponents.size)
+        flat[columns] = solution
+        active = np.zeros(self.exponents.size, dtype=bool)
+        active[columns] = support
+        shape = self.exponents.shape[::-1]
+        return _Candidate(
+            cost + OFFSET_CHARGE * self.charge * moving.sum(),
+            State(
+                state.control_points,
+                flat.reshape(shape).T,
+                active.reshape(shape).T,
+                origin.copy(),
+                moving,
+            ),
+        )
+
+    def _best(self, candidates: list[_Candidate], segments: list[Segment]) -> State:
+        """Refine the cheapest candidates at rising weights; the lowest criterion wins."""
+        candidates = sorted(candidates, key=lambda candidate: candidate.cost)
+        distinct = list({c.key: c for c in reversed(candidates)}.values())[::-1]
+        finalists = []
+        for candidate in distinct[:3]:
+            state = candidate.state
+            for weight in (FIRST_WEIGHTS[-1], SEARCH_WEIGHT):
+                state, value = self._select(state, segments, weight, "subset search, own frame")
+            finalists.append((value, state))
+        return min(finalists, key=lambda item: item[0])[1]
+
+    def _bridge(
+        self, state: State, segments: list[Segment]
+    ) -> tuple[State, list[Segment]]:
+        """Integrate the law across gaps; keep a bridge only where the fit stays good."""
+        return state, segments
+
+    def _polish(self, state: State, segments: list[Segment]) -> tuple[State, Collocation]:
+        """Refit with the law exact, on finer knots until that no longer matters."""
+        problem = self._problem(segments, FINAL_WEIGHT)
+        state = problem.solve(state, tolerance=1e-4)
+        columns = np.flatnonzero(state.free())
+        for _ in range(3):
+            before = state.flat()[columns]
+            segments = [_refined(segment) for segment in segments]
+            control = _fit_curves(segments, _splines(problem, state))
+            self.noise = self._residual_noise(problem, state)
+            problem = self._problem(segments, FINAL_WEIGHT)
+            state = problem.solve(replace(state, control_points=control), tolerance=1e-4)
+            spread = np.sqrt(np.diag(inverse(problem.linearise(state, columns).information)))
+            change = np.abs(state.flat()[columns] - before)
+            if (change < np.maximum(0.1 * spread, 1e-6)).all():
+                break
+        self._log("polish", problem, state, FINAL_WEIGHT)
+        return state, problem
+
+    def _residual_noise(self, problem: Collocation, state: State) -> np.ndarray:
+        """Standard deviation of the data residual, less the freedom that the fit used up."""
+        used = state.free().sum() / self.d + len(problem.segments)
+        residual = problem.curve(state.control_points) - problem.x
+        return np.maximum(
+            np.sqrt((residual**2).sum(axis=0) / max(len(residual) - used, 1.0)), CLEANEST
+        )
+
+
+def _rms_speed(splines: Sequence[BSpline]) -> float:
+    slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in splines]
+    return float(np.sqrt((np.concatenate(slopes) ** 2).mean()))
+
+
+def _stretches(records: Sequence[Record], longest_step: float) -> list[Record]:
+    pieces = [piece for record in records for piece in cut(record, longest_step)]
+    longest = max(len(t) for t, _ in pieces)
+    return [piece for piece in pieces if len(piece[0]) >= min(SHORTEST_STRETCH, longest)]
+
+
+def _segment(stretch: Record, spacing: float) -> Segment:
+    t, x = stretch
+    spans = max(1, int(np.ceil((t[-1] - t[0]) / spacing)))
+    return Segment(t, x, np.linspace(t[0], t[-1], spans + 1))
+
+
+def _refined(segment: Segment) -> Segment:
+    b = segment.breakpoints
+    return replace(segment, breakpoints=np.sort(np.concatenate([b, (b[1:] + b[:-1]) / 2])))
+
+
+def _fit_curves(
+    segments: Sequence[Segment], curves: Sequence[Callable[[np.ndarray], np.ndarray]]
+) -> np.ndarray:
+    control = []
+    for segment, curve in zip(segments, curves, strict=True):
+        b = segment.breakpoints
+        dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
+        control.append(make_lsq_spline(dense, curve(dense), clamped_knots(b), DEGREE).c)
+    return np.concatenate(control)
+
+
+def _splines(problem: Collocation, state: State) -> list[BSpline]:
+    return [BSpline(*pieces, DEGREE) for pieces in problem.splines(state.control_points)]
+
+
+def _proposed(
+    state: State,
+    curve_step: np.ndarray,
+    curve_response: np.ndarray,
+    columns: np.ndarray,
+    solution: np.ndarray,
+) -> State:
+    """The state that the quadratic model promises for a solution of the subset search."""
+    l, d = state.coefficients.shape
+    step = solution - state.flat()[columns]
+    flat = state.flat()
+    flat[columns] = solution
+    coefficients = flat[: l * d].reshape(d, l).T
+    return replace(
+        state,
+        control_points=state.control_points + curve_step + curve_response @ step,
+        coefficients=coefficients,
+        active=coefficients != 0,
+        offset=flat[l * d :],
+    )

@@ -1,0 +1,174 @@
+"""The origin in which a polynomial law is sparsest: the meaning of the paper's offset (Eq. 11).
+
+B-splines sum to one, so an offset added to the curve is redundant. It matters when the library
+is evaluated at ``x - offset``: then it is the origin of the law's own frame.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+
+from .polynomials import shift_matrix
+
+
+DRAWS = 200
+"""Random sets of coefficients that an origin is asked to make vanish."""
+
+
+class FrameAlgebra:
+    """Coefficients and information of an estimated law in shifted frames, exactly.
+
+    Parameters
+    ----------
+    exponents : ndarray of int, shape (l, d)
+        A library that holds all divisors of its monomials.
+    coefficients : ndarray, shape (l, d)
+        Estimate in the present frame.
+    information : ndarray, shape (l d, l d)
+        Its information matrix, equation by equation.
+    """
+
+    def __init__(
+        self, exponents: np.ndarray, coefficients: np.ndarray, information: np.ndarray
+    ) -> None:
+        self.exponents = exponents
+        self.l, self.d = exponents.shape
+        self.degree = exponents.sum(axis=1).max()
+        self.coefficients = coefficients
+        self.information = information
+        scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+        scaled = information * scale[:, None] * scale
+        scaled[np.diag_indices_from(scaled)] += 1e-11
+        covariance = np.linalg.inv(scaled) * scale[:, None] * scale
+        blocks = covariance.reshape(self.d, self.l, self.d, self.l)
+        self.covariances = np.stack([blocks[j, :, j, :] for j in range(self.d)])
+        # d phi / d x_i = phi N_i: the generator of shifts along axis i.
+        self.generators = np.stack(
+            [
+                np.where(
+                    (exponents[None, :, :] - exponents[:, None, :] == np.eye(self.d, dtype=int)[i])
+                    .all(axis=-1),
+                    exponents[None, :, i],
+                    0.0,
+                )
+                for i in range(self.d)
+            ]
+        )  # fmt: skip
+
+    def at(self, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients (l, d) and information (l d, l d) in monomials of ``x - origin``."""
+        forth = shift_matrix(self.exponents, -origin)
+        back = np.kron(np.eye(self.d), shift_matrix(self.exponents, origin))
+        return forth @ self.coefficients, back.T @ self.information @ back
+
+    def vanish(self, origin: np.ndarray, entries: np.ndarray) -> np.ndarray:
+        """Move an origin as little as possible so that the given coefficients vanish.
+
+        Parameters
+        ----------
+        origin : ndarray, shape (d,)
+            Where to start.
+        entries : ndarray of int, shape (k, 2)
+            Equation and term of each coefficient.
+        """
+        equations, terms = entries.T
+        for _ in range(6):
+            estimate = shift_matrix(self.exponents, -origin) @ self.coefficients
+            rates = (self.generators @ estimate)[:, terms, equations].T
+            step, *_ = np.linalg.lstsq(rates, -estimate[terms, equations], rcond=1e-6)
+            origin = origin + step
+            if not np.abs(origin).max() < 1e6:
+                return np.full(self.d, np.nan)
+        return origin
+
+    def _scores(self, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        forth = shift_matrix(self.exponents, -origin)
+        estimate = (forth @ self.coefficients).T
+        covariance = forth @ self.covariances @ forth.T
+        variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300)
+        return estimate, covariance, estimate**2 / variance
+
+    def smooth_count(
+        self, origin: np.ndarray, active: np.ndarray, charge: float
+    ) -> tuple[float, np.ndarray]:
+        """Smoothed number of significant terms at an origin, and its gradient.
+
+        Each active term with score ``z`` (estimate over standard error) counts
+        ``z^2 / (z^2 + charge)``.
+        """
+        estimate, covariance, score = self._scores(origin)
+        variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300)
+        mask = active.T
+        value = (score / (score + charge))[mask].sum()
+        weight = charge / (score + charge) ** 2
+        gradient = np.empty(self.d)
+        for i, generator in enumerate(self.generators):
+            estimate_rate = estimate @ generator.T
+            variance_rate = 2 * np.einsum("ka,jak->jk", generator, covariance)
+            rate = 2 * estimate * estimate_rate / variance - score * variance_rate / variance
+            gradient[i] = (weight * rate)[mask].sum()
+        return float(value), gradient
+
+
+def sparse_origins(
+    algebra: FrameAlgebra,
+    active: np.ndarray,
+    home: np.ndarray,
+    box: tuple[np.ndarray, np.ndarray],
+    charge: float,
+    keep: int,
+    rng: np.random.Generator,
+) -> list[np.ndarray]:
+    """Distinct origins with the smallest smoothed number of significant terms.
+
+    On clean data the count is flat but for needle-thin wells, which lie where coefficients
+    vanish together. So the starts are origins at which a few coefficients drawn at random do
+    (Newton steps of least norm, from home or a random point); a descent of the count follows.
+
+    Parameters
+    ----------
+    algebra : FrameAlgebra
+        The estimated law.
+    active : ndarray of bool, shape (l, d)
+        Terms that count.
+    home : ndarray, shape (d,)
+        The origin of the data's frame, where an offset costs nothing.
+    box : pair of ndarray, shape (d,)
+        Lower and upper bounds of the search.
+    charge : float
+        Square of the score at which a term counts one half.
+    keep : int
+        How many to return at most.
+    rng : numpy.random.Generator
+        For the draws.
+
+    Returns
+    -------
+    list of ndarray, shape (d,), best first
+    """
+    low, high = np.minimum(box[0], home), np.maximum(box[1], home)
+    droppable = np.argwhere(active.T & (algebra.exponents.sum(axis=1) < algebra.degree))
+    starts = []
+    for draw in range(DRAWS if len(droppable) else 0):
+        origin = home if draw % 2 else rng.uniform(low, high)
+        size = min(1 + draw % algebra.d, len(droppable))
+        origin = algebra.vanish(origin, droppable[rng.permutation(len(droppable))[:size]])
+        if np.isfinite(origin).all():
+            starts.append(np.clip(origin, low, high))
+    counts = [algebra.smooth_count(start, active, charge)[0] for start in starts]
+    found: list[tuple[float, np.ndarray]] = []
+    for index in np.argsort(counts)[: 4 * keep]:
+        if any(np.abs(starts[index] - origin).max() < 1e-3 for _, origin in found):
+            continue
+        result = minimize(
+            algebra.smooth_count, starts[index], args=(active, charge), jac=True,
+            method="L-BFGS-B", bounds=list(zip(low, high, strict=True)), options={"maxiter": 40},
+        )  # fmt: skip
+        found.append((float(result.fun), result.x))
+    found.sort(key=lambda item: item[0])
+    distinct: list[np.ndarray] = []
+    for _, origin in found:
+        if all(np.abs(origin - other).max() > 0.02 for other in distinct):
+            distinct.append(origin)
+    return distinct[:keep]

@@ -1,0 +1,131 @@
+"""The seven chaotic systems of the paper's Table S1, as data, and the frame they are seen in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .polynomials import PolynomialSystem
+
+REFERENCE_OFFSET = (10.0, 10.0, 0.0)
+"""Shift from a system's native frame to the paper's reference frame, in scene units.
+
+The paper never states it; it is what turns its Table S1 into the ground truths of its Table S2.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Benchmark(PolynomialSystem):
+    """A system with an initial condition and a characteristic time: a ready experiment.
+
+    Parameters
+    ----------
+    names, exponents, coefficients
+        See `PolynomialSystem`.
+    name : str
+        Name of the system.
+    x0 : tuple of float, length d
+        Initial condition, in the frame of the system.
+    period : float
+        Characteristic period, in time units (convention of the ``dysts`` collection).
+    """
+
+    name: str
+    x0: tuple[float, ...]
+    period: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.x0) != self.d or not np.isfinite(self.x0).all():
+            raise ValueError(f"x0: must be {self.d} finite numbers, got {self.x0}")
+        if not self.period > 0:
+            raise ValueError(f"period: must be positive, got {self.period}")
+
+    def shift(self, offset) -> Benchmark:
+        """The same experiment seen from a shifted origin; see `PolynomialSystem.shift`."""
+        shifted = super().shift(offset)
+        return replace(shifted, x0=tuple(float(v) for v in np.add(self.x0, offset)))
+
+    def times(self, n: int = 1500, samples_per_period: float = 100) -> np.ndarray:
+        """Times of ``n`` video frames, shape (n,), starting at 0."""
+        return np.arange(n) * (self.period / samples_per_period)
+
+    def trajectory(
+        self, n: int = 1500, samples_per_period: float = 100
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Times (n,) and states (n, d) of the motion from ``x0``, one row a video frame."""
+        t = self.times(n, samples_per_period)
+        return t, self.simulate(t, self.x0)
+
+
+def runge_kutta_4(system: PolynomialSystem, t: np.ndarray, x0, substeps: int = 10) -> np.ndarray:
+    """Integrate with the classical 4th-order Runge-Kutta method, as the paper does.
+
+    Parameters
+    ----------
+    system : PolynomialSystem
+        The law.
+    t : ndarray, shape (n,)
+        Increasing times of the returned rows.
+    x0 : array_like, shape (d,)
+        State at ``t[0]``.
+    substeps : int
+        Equal steps between two times.
+
+    Returns
+    -------
+    ndarray, shape (n, d)
+    """
+    states = [np.asarray(x0, dtype=float)]
+    for step in np.diff(t) / substeps:
+        x = states[-1]
+        for _ in range(substeps):
+            k1 = system(x)
+            k2 = system(x + step / 2 * k1)
+            k3 = system(x + step / 2 * k2)
+            k4 = system(x + step * k3)
+            x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states.append(x)
+    return np.array(states)
+
+
+def _benchmark(name: str, x0: tuple[float, ...], period: float, **equations) -> Benchmark:
+    law = PolynomialSystem.from_terms(equations, degree=3)
+    return Benchmark(law.names, law.exponents, law.coefficients, name=name, x0=x0, period=period)
+
+
+_ALL = [
+    _benchmark(
+        "Lorenz", (-8, 7, 27), 1.50,
+        x={"x": -10, "y": 10}, y={"x": 28, "xz": -1, "y": -1}, z={"xy": 1, "z": -8 / 3},
+    ),
+    _benchmark(
+        "SprottE", (-1, 1, 1), 7.63,
+        x={"yz": 1}, y={"x^2": 1, "y": -1}, z={"1": 1, "x": -4},
+    ),
+    _benchmark(
+        "RayleighBenard", (-16, -13, 27), 0.920,
+        x={"x": -30, "y": 30}, y={"y": 18, "xz": -1}, z={"xy": 1, "z": -5},
+    ),
+    _benchmark(
+        "SprottF", (-1, -1.4, 1), 19.2,
+        x={"y": 1, "z": 1}, y={"x": -1, "y": 0.5}, z={"x^2": 1, "z": -1},
+    ),
+    _benchmark(
+        "NoseHoover", (-2, 0.5, 1), 5.87,
+        x={"y": 1}, y={"x": -1, "yz": 1}, z={"1": 1.5, "y^2": -1},
+    ),
+    _benchmark(
+        "Tsucs2", (1, 1, 5), 0.345,
+        x={"x": -40, "y": 40, "xz": 0.5}, y={"x": 1, "y": 20, "xz": -1},
+        z={"z": 0.8, "xy": 1, "x^2": -0.65},
+    ),
+    _benchmark(
+        "WangSun", (1, 1, 0), 6.0,
+        x={"x": 0.5, "yz": 1}, y={"x": -1, "y": -0.5, "xz": -1}, z={"z": -1, "xy": -1},
+    ),
+]  # fmt: skip
+
+SYSTEMS: dict[str, Benchmark] = {system.name: system for system in _ALL}
+"""The systems of Table S1 in their native frame, by name; periods as in ``dysts``."""
