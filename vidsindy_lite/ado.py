@@ -18,10 +18,17 @@ import numpy as np
 from scipy.interpolate import BSpline, make_lsq_spline
 from tqdm import tqdm
 
+from .bridges import Gap, gaps, join
 from .collocation import Collocation, Segment, State
 from .discovery import Discovery, Step, Units, inverse, report
 from .frames import FrameAlgebra, sparse_origins
-from .polynomials import closure_mask, monomial_exponents, monomials
+from .polynomials import (
+    PolynomialSystem,
+    closure_mask,
+    monomial_exponents,
+    monomials,
+    variable_names,
+)
 from .records import Record, check_record, cut, typical_step
 from .regression import subset_search
 from .smoothing import smooth
@@ -141,14 +148,15 @@ class _Search:
         records = [(t / step, (values - centre) / scale) for t, values in self.records]
         # Where the record pauses is a gap or not depending on how fast the target moves, which
         # a first smoothing tells; the second one then respects the gaps.
-        speed = _rms_speed(smooth(_stretches(records, 5.0), rng).splines)
+        coarse = [piece for _, piece in _stretches(records, 5.0)]
+        speed = _rms_speed(smooth(coarse, rng).splines)
         stretches = _stretches(records, max(2.5, GAP / speed))
-        smoothed = smooth(stretches, rng)
+        smoothed = smooth([piece for _, piece in stretches], rng)
         speed = _rms_speed(smoothed.splines)
         self.units = Units(centre, scale, step / speed)
         self.step = speed
         self.records = [(t * speed, values) for t, values in records]
-        self.stretches = [(t * speed, values) for t, values in stretches]
+        self.stretches = [(i, (t * speed, values)) for i, (t, values) in stretches]
         self.noise = np.maximum(smoothed.noise, CLEANEST)
         self.curves = [
             BSpline(spline.t * speed, spline.c, DEGREE, extrapolate=True)
@@ -160,7 +168,9 @@ class _Search:
 
     def run(self) -> Discovery:
         with tqdm(total=5, disable=not self.progress, desc="discover", leave=False) as bar:
-            segments = [_segment(stretch, self.spacing) for stretch in self.stretches]
+            segments = [
+                Segment.even(t, x, self.spacing, record) for record, (t, x) in self.stretches
+            ]
             control = _fit_curves(segments, self.curves)
             self._measure_slack(segments, control)
             bar.update()
@@ -270,7 +280,7 @@ class _Search:
         information[np.ix_(columns, columns)] = model.information
         algebra = FrameAlgebra(self.exponents, state.coefficients, information)
         home = self.units.standard(np.zeros(self.d))
-        x = np.concatenate([values for _, values in self.stretches])
+        x = np.concatenate([segment.x for segment in segments])
         box = (x.min(axis=0), x.max(axis=0))
         origins = sparse_origins(algebra, active, home, box, self.charge, keep=4, rng=self.rng)
         found = [(home, np.zeros(self.d, dtype=bool))]
@@ -324,22 +334,61 @@ class _Search:
         )
 
     def _best(self, candidates: list[_Candidate], segments: list[Segment]) -> State:
-        """Refine the cheapest candidates at rising weights; the lowest criterion wins."""
+        """Refine the cheapest candidates; the lowest criterion wins."""
         candidates = sorted(candidates, key=lambda candidate: candidate.cost)
-        distinct = list({c.key: c for c in reversed(candidates)}.values())[::-1]
-        finalists = []
-        for candidate in distinct[:3]:
-            state = candidate.state
-            for weight in (FIRST_WEIGHTS[-1], SEARCH_WEIGHT):
-                state, value = self._select(state, segments, weight, "subset search, own frame")
-            finalists.append((value, state))
-        return min(finalists, key=lambda item: item[0])[1]
+        states = list({c.key: c.state for c in reversed(candidates)}.values())[::-1][:3]
+        stage = "subset search, own frame"
+        for weight in (FIRST_WEIGHTS[-1], SEARCH_WEIGHT):
+            refined = [self._select(state, segments, weight, stage) for state in states]
+            limit = min(value for _, value in refined) + self.charge
+            states = [state for state, value in refined if value <= limit]
+        return min(refined, key=lambda item: item[1])[0]
 
-    def _bridge(
-        self, state: State, segments: list[Segment]
-    ) -> tuple[State, list[Segment]]:
-        """Integrate the law across gaps; keep a bridge only where the fit stays good."""
+    def _bridge(self, state: State, segments: list[Segment]) -> tuple[State, list[Segment]]:
+        """Integrate the law across gaps and search again with the physics enforced there.
+
+        A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut
+        at gaps. Groups of gaps are tried, shortest first; a group whose bridges spoil the fit is
+        halved, down to single gaps.
+        """
+        for _ in range(3):
+            open_gaps = gaps(segments)
+            if not open_gaps:
+                break
+            before = state.active
+            state, segments = self._bridge_group(state, segments, open_gaps)
+            state, _ = self._select(state, segments, SEARCH_WEIGHT, "subset search, bridged")
+            if (state.active == before).all():
+                break
         return state, segments
+
+    def _bridge_group(
+        self, state: State, segments: list[Segment], group: list[Gap]
+    ) -> tuple[State, list[Segment]]:
+        problem = self._problem(segments, SEARCH_WEIGHT)
+        joined, curves = join(
+            segments, _splines(problem, state), group, self.records, self._law(state), self.spacing
+        )
+        trial = replace(state, control_points=_fit_curves(joined, curves))
+        bridged = self._problem(joined, SEARCH_WEIGHT)
+        if np.isfinite(trial.control_points).all():
+            for weight in (FIRST_WEIGHTS[-1], SEARCH_WEIGHT):
+                trial = self._problem(joined, weight).solve(trial, tolerance=1.0)
+            # A bridge takes away the freedom of one initial condition: so much may the fit lose.
+            freedom = self.d * len(group) + bridged.x.size - problem.x.size
+            loss = bridged.objective(trial) - problem.objective(state)
+            if loss < freedom + 4 * np.sqrt(2 * freedom):
+                return trial, joined
+        if len(group) == 1:
+            return state, segments
+        for half in (group[: len(group) // 2], group[len(group) // 2 :]):
+            state, segments = self._bridge_group(state, segments, half)
+        return state, segments
+
+    def _law(self, state: State) -> PolynomialSystem:
+        names = variable_names(self.d)
+        law = PolynomialSystem(names, self.exponents, state.coefficients)
+        return law.shift(state.offset)
 
     def _polish(self, state: State, segments: list[Segment]) -> tuple[State, Collocation]:
         """Refit with the law exact, on finer knots until that no longer matters."""
@@ -348,7 +397,7 @@ class _Search:
         columns = np.flatnonzero(state.free())
         for _ in range(3):
             before = state.flat()[columns]
-            segments = [_refined(segment) for segment in segments]
+            segments = [segment.refined() for segment in segments]
             control = _fit_curves(segments, _splines(problem, state))
             self.noise = self._residual_noise(problem, state)
             problem = self._problem(segments, FINAL_WEIGHT)
@@ -374,21 +423,10 @@ def _rms_speed(splines: Sequence[BSpline]) -> float:
     return float(np.sqrt((np.concatenate(slopes) ** 2).mean()))
 
 
-def _stretches(records: Sequence[Record], longest_step: float) -> list[Record]:
-    pieces = [piece for record in records for piece in cut(record, longest_step)]
-    longest = max(len(t) for t, _ in pieces)
-    return [piece for piece in pieces if len(piece[0]) >= min(SHORTEST_STRETCH, longest)]
-
-
-def _segment(stretch: Record, spacing: float) -> Segment:
-    t, x = stretch
-    spans = max(1, int(np.ceil((t[-1] - t[0]) / spacing)))
-    return Segment(t, x, np.linspace(t[0], t[-1], spans + 1))
-
-
-def _refined(segment: Segment) -> Segment:
-    b = segment.breakpoints
-    return replace(segment, breakpoints=np.sort(np.concatenate([b, (b[1:] + b[:-1]) / 2])))
+def _stretches(records: Sequence[Record], longest_step: float) -> list[tuple[int, Record]]:
+    pieces = [(i, piece) for i, record in enumerate(records) for piece in cut(record, longest_step)]
+    longest = max(len(t) for _, (t, _) in pieces)
+    return [piece for piece in pieces if len(piece[1][0]) >= min(SHORTEST_STRETCH, longest)]
 
 
 def _fit_curves(
@@ -398,7 +436,7 @@ def _fit_curves(
     for segment, curve in zip(segments, curves, strict=True):
         b = segment.breakpoints
         dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
-        control.append(make_lsq_spline(dense, curve(dense), clamped_knots(b), DEGREE).c)
+        control.append(make_lsq_spline(dense, curve(dense), clamped_knots(b), DEGREE, method="norm-eq").c)
     return np.concatenate(control)
 
 

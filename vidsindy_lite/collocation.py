@@ -23,11 +23,33 @@ WIDTH = DEGREE + 1
 
 @dataclass(frozen=True)
 class Segment:
-    """An uninterrupted stretch of one trajectory, with the breakpoints of its spline."""
+    """A stretch of one record of data, with the breakpoints of its spline.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+    x : ndarray, shape (n, d)
+    breakpoints : ndarray, shape (m + 1,)
+        Ends of the knot spans.
+    record : int
+        Which record the stretch is cut from.
+    """
 
     t: np.ndarray
     x: np.ndarray
     breakpoints: np.ndarray
+    record: int = 0
+
+    @classmethod
+    def even(cls, t: np.ndarray, x: np.ndarray, spacing: float, record: int) -> Segment:
+        """A segment with knots at even distances of at most ``spacing``."""
+        spans = max(1, int(np.ceil((t[-1] - t[0]) / spacing)))
+        return cls(t, x, np.linspace(t[0], t[-1], spans + 1), record)
+
+    def refined(self) -> Segment:
+        """The same stretch with every knot span halved."""
+        b = self.breakpoints
+        return replace(self, breakpoints=np.sort(np.concatenate([b, (b[1:] + b[:-1]) / 2])))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -86,10 +86,16 @@ def shift_matrix(exponents: np.ndarray, offset: np.ndarray) -> np.ndarray:
 
     The library has to be closed: with every monomial it holds all its divisors.
     """
-    lowered = exponents[None, :, :] - exponents[:, None, :]
-    factors = binomial(exponents[None, :, :], exponents[:, None, :])
-    powers = (-np.asarray(offset, dtype=float)) ** np.maximum(lowered, 0)
-    return np.prod(np.where(lowered >= 0, factors * powers, 0.0), axis=-1)
+    factors, lowered = _binomials(exponents.tobytes(), *exponents.shape)
+    return (factors * (-np.asarray(offset, dtype=float)) ** lowered).prod(axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _binomials(exponents: bytes, l: int, d: int) -> tuple[np.ndarray, np.ndarray]:
+    powers = np.frombuffer(exponents, dtype=int).reshape(l, d)
+    lowered = powers[None, :, :] - powers[:, None, :]
+    factors = np.where(lowered >= 0, binomial(powers[None, :, :], powers[:, None, :]), 0.0)
+    return factors, np.maximum(lowered, 0)
 
 
 def closure(exponents: np.ndarray) -> np.ndarray:

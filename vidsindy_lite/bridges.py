@@ -1,0 +1,120 @@
+"""Curves across gaps in the data, by integrating a law from both sides.
+
+A smoothing spline crosses a gap on whatever branch is smooth, not on the one that the motion
+took. A law found from the stretches between the gaps tells which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from .collocation import Segment
+from .polynomials import PolynomialSystem
+from .records import Record
+from .systems import runge_kutta_4
+
+Gap = tuple[int, float]
+"""A gap is named by its record and the time of the last sample before it."""
+
+
+def gaps(segments: Sequence[Segment]) -> list[Gap]:
+    """The gaps between segments of the same record, shortest first."""
+    lengths = {
+        (left.record, left.t[-1]): right.t[0] - left.t[-1]
+        for left, right in zip(segments[:-1], segments[1:], strict=True)
+        if left.record == right.record
+    }
+    return sorted(lengths, key=lengths.__getitem__)
+
+
+class Joined:
+    """A curve made of splines, with the gaps between them crossed by a law.
+
+    Parameters
+    ----------
+    splines : sequence of scipy.interpolate.BSpline
+        Pieces in the order of time, with values of shape (d,).
+    law : PolynomialSystem
+        Integrated forward from the left end and backward from the right end of each gap; the two
+        are blended linearly.
+    """
+
+    def __init__(self, splines: Sequence[BSpline], law: PolynomialSystem) -> None:
+        self.splines = splines
+        self.law = law
+        self.reversed = PolynomialSystem(law.names, law.exponents, -law.coefficients)
+
+    def __call__(self, t: np.ndarray) -> np.ndarray:
+        """Evaluate at increasing times, shape (n, d)."""
+        values = np.empty((len(t), self.law.d))
+        ends = [(spline.t[0], spline.t[-1]) for spline in self.splines]
+        for (low, high), spline in zip(ends, self.splines, strict=True):
+            inside = (t >= low) & (t <= high)
+            values[inside] = spline(t[inside])
+        for i, ((_, low), (high, _)) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+            inside = (t > low) & (t < high)
+            forward = _integrate(self.law, t[inside] - low, self.splines[i](low))
+            backward = _integrate(
+                self.reversed, high - t[inside][::-1], self.splines[i + 1](high)
+            )
+            share = ((t[inside] - low) / (high - low))[:, None]
+            values[inside] = (1 - share) * forward + share * backward[::-1]
+        return values
+
+
+def _integrate(law: PolynomialSystem, elapsed: np.ndarray, x0: np.ndarray) -> np.ndarray:
+    return runge_kutta_4(law, np.concatenate([[0.0], elapsed]), x0, substeps=1)[1:]
+
+
+def join(
+    segments: Sequence[Segment],
+    splines: Sequence[BSpline],
+    bridged: Sequence[Gap],
+    records: Sequence[Record],
+    law: PolynomialSystem,
+    spacing: float,
+) -> tuple[list[Segment], list[BSpline | Joined]]:
+    """Join segments across the named gaps.
+
+    Parameters
+    ----------
+    segments, splines
+        The present pieces and their fitted curves.
+    bridged : sequence of Gap
+        Which gaps to cross.
+    records : sequence of Record
+        All data, including samples that were too few to make a segment of their own.
+    law : PolynomialSystem
+        The law, in the frame of the records.
+    spacing : float
+        Length of a knot span.
+
+    Returns
+    -------
+    segments : list of Segment
+    curves : list of callable
+        A first curve for each of them.
+    """
+    groups: list[list[int]] = []
+    for i, segment in enumerate(segments):
+        left = segments[i - 1] if i else None
+        if left is not None and left.record == segment.record:
+            if (left.record, left.t[-1]) in set(bridged):
+                groups[-1].append(i)
+                continue
+        groups.append([i])
+    joined, curves = [], []
+    for group in groups:
+        first, last = segments[group[0]], segments[group[-1]]
+        if len(group) == 1:
+            joined.append(first)
+            curves.append(splines[group[0]])
+            continue
+        t, x = records[first.record]
+        inside = (t >= first.t[0]) & (t <= last.t[-1])
+        joined.append(Segment.even(t[inside], x[inside], spacing, first.record))
+        curves.append(Joined([splines[i] for i in group], law))
+    return joined, curves
