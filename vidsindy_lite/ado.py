@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import BSpline, make_lsq_spline
+from scipy.stats import chi2
 from tqdm import tqdm
 
 from .bridges import Gap, gaps, join
@@ -36,12 +37,14 @@ from .splines import DEGREE, clamped_knots
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
 """Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
-SEARCH_WEIGHT = 1e4
-"""Largest weight at which supports are searched: beyond it the algebra loses digits."""
-FINAL_WEIGHT = 1e6
+SEARCH_WEIGHTS = (1e2, 1e4, 1e6)
+"""Physics weights of the subset searches in the law's own frame."""
+FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
+FALSE_ALARM = 0.01
+"""Chance of a false term in a law, if all candidates were independent."""
 OFFSET_CHARGE = 0.95
-"""Price of a moved axis, in terms: of two laws that fit alike, the one with fewer terms wins."""
+"""Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
 GAP = 0.4
@@ -100,6 +103,18 @@ def discover(
     return _Search(records, degree, seed, progress).run()
 
 
+def term_charges(exponents: np.ndarray) -> np.ndarray:
+    """Price of a term of each kind: how much of the chi-square it has to explain, shape (l,).
+
+    `FALSE_ALARM` is shared equally among the degrees, and within a degree among its terms in all
+    equations (Bonferroni). So a term has to be significant among all that could have been, and
+    of two laws that fit alike the one of lower degree wins, there being fewer of those.
+    """
+    d, degrees = exponents.shape[1], exponents.sum(axis=1)
+    rivals = d * np.bincount(degrees)[degrees] * (degrees.max() + 1)
+    return chi2.isf(FALSE_ALARM / rivals, df=1)
+
+
 @dataclass(frozen=True)
 class _Candidate:
     """A support in a frame, with what the quadratic model says it costs."""
@@ -134,7 +149,8 @@ class _Search:
                 f"({unknowns} for degree {self.degree} and d = {self.d}), got {n} samples"
             )
         self._standardise()
-        self.charge = 2 * np.log(self.d * n)
+        self.charges = term_charges(self.exponents)
+        self.axis_charge = OFFSET_CHARGE * self.charges[0]
         self.rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(1)[0])
 
     def _standardise(self) -> None:
@@ -184,7 +200,7 @@ class _Search:
             bar.update()
             state, problem = self._polish(state, segments)
             bar.update()
-        return report(state, problem, self.units, self.charge, (), self.history)
+        return report(state, problem, self.units, self.charges, (), self.history)
 
     def _measure_slack(self, segments: list[Segment], control: np.ndarray) -> None:
         """Misfit of a plain regression on the smoothed curve: the scale of physics weights."""
@@ -198,8 +214,8 @@ class _Search:
         return Collocation(segments, self.exponents, self.noise**-2, weight / self.slack**2)
 
     def _criterion(self, problem: Collocation, state: State) -> float:
-        price = state.active.sum() + OFFSET_CHARGE * state.moving.sum()
-        return problem.objective(state) + self.charge * price
+        terms = self.charges @ state.active.sum(axis=1)
+        return problem.objective(state) + terms + self.axis_charge * state.moving.sum()
 
     def _log(self, stage: str, problem: Collocation, state: State, weight: float) -> None:
         data = problem.data_loss(state.control_points)
@@ -249,7 +265,7 @@ class _Search:
             columns = np.concatenate([np.arange(size), size + np.flatnonzero(state.moving)])
             model = problem.linearise(state, columns)
             present = state.flat()[columns]
-            charge = np.where(columns < size, self.charge, -np.inf)
+            charge = np.append(np.tile(self.charges, self.d), np.full(self.d, -np.inf))[columns]
             support, solution, _ = subset_search(
                 model.information,
                 model.information @ present + model.gradient,
@@ -282,7 +298,7 @@ class _Search:
         home = self.units.standard(np.zeros(self.d))
         x = np.concatenate([segment.x for segment in segments])
         box = (x.min(axis=0), x.max(axis=0))
-        origins = sparse_origins(algebra, active, home, box, self.charge, keep=4, rng=self.rng)
+        origins = sparse_origins(algebra, active, home, box, self.charges.max(), keep=4, rng=self.rng)
         found = [(home, np.zeros(self.d, dtype=bool))]
         # An origin costs like a term per axis, so each is also tried with axes left at home.
         for origin in origins:
@@ -313,7 +329,7 @@ class _Search:
         support, solution, value = subset_search(
             information,
             information @ present,
-            np.full(len(columns), self.charge),
+            np.tile(self.charges, self.d)[columns],
             np.ones(len(columns), dtype=bool),
         )
         cost = objective + value + present @ information @ present
@@ -323,7 +339,7 @@ class _Search:
         active[columns] = support
         shape = self.exponents.shape[::-1]
         return _Candidate(
-            cost + OFFSET_CHARGE * self.charge * moving.sum(),
+            cost + self.axis_charge * moving.sum(),
             State(
                 state.control_points,
                 flat.reshape(shape).T,
@@ -338,9 +354,9 @@ class _Search:
         candidates = sorted(candidates, key=lambda candidate: candidate.cost)
         states = list({c.key: c.state for c in reversed(candidates)}.values())[::-1][:3]
         stage = "subset search, own frame"
-        for weight in (FIRST_WEIGHTS[-1], SEARCH_WEIGHT):
+        for weight in SEARCH_WEIGHTS:
             refined = [self._select(state, segments, weight, stage) for state in states]
-            limit = min(value for _, value in refined) + self.charge
+            limit = min(value for _, value in refined) + self.charges.max()
             states = [state for state, value in refined if value <= limit]
         return min(refined, key=lambda item: item[1])[0]
 
@@ -357,7 +373,7 @@ class _Search:
                 break
             before = state.active
             state, segments = self._bridge_group(state, segments, open_gaps)
-            state, _ = self._select(state, segments, SEARCH_WEIGHT, "subset search, bridged")
+            state, _ = self._select(state, segments, FINAL_WEIGHT, "subset search, bridged")
             if (state.active == before).all():
                 break
         return state, segments
@@ -365,14 +381,14 @@ class _Search:
     def _bridge_group(
         self, state: State, segments: list[Segment], group: list[Gap]
     ) -> tuple[State, list[Segment]]:
-        problem = self._problem(segments, SEARCH_WEIGHT)
+        problem = self._problem(segments, FINAL_WEIGHT)
         joined, curves = join(
             segments, _splines(problem, state), group, self.records, self._law(state), self.spacing
         )
         trial = replace(state, control_points=_fit_curves(joined, curves))
-        bridged = self._problem(joined, SEARCH_WEIGHT)
+        bridged = self._problem(joined, FINAL_WEIGHT)
         if np.isfinite(trial.control_points).all():
-            for weight in (FIRST_WEIGHTS[-1], SEARCH_WEIGHT):
+            for weight in SEARCH_WEIGHTS:
                 trial = self._problem(joined, weight).solve(trial, tolerance=1.0)
             # A bridge takes away the freedom of one initial condition: so much may the fit lose.
             freedom = self.d * len(group) + bridged.x.size - problem.x.size

@@ -239,7 +239,6 @@ class Collocation:
             here = np.flatnonzero(term_columns // l == j)
             own[:, j, here] = -root[:, j, None] * terms[:, term_columns[here] % l]
         own[:, :, count:] = root[:, :, None] * jacobian[:, :, offset_columns]
-        flat = own.reshape(-1, size)
         right = np.empty((r, d, 1 + size))
         data_residual = self.curve(state.control_points) - self.x
         right[:, :, 0] = self._pull(data_residual)
@@ -251,17 +250,27 @@ class Collocation:
                 right[self.node_first[group] + a] += blocks[group, a]
 
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-        right = right.reshape(r * d, -1)
-        solved = cho_solve_banded((factor, True), right, check_finite=False)
-        reduced = right.T @ solved
+        solved = cho_solve_banded((factor, True), right.reshape(r * d, -1), check_finite=False)
+        solved = solved.reshape(r, d, 1 + size)
+
+        # What the curve cannot follow. Its Gram matrix is the Schur complement, without the
+        # cancellation between two large matrices that a large physics weight would bring.
+        near = np.stack([solved[self.node_first + a] for a in range(WIDTH)], axis=1)
+        left = unknowns - local @ near.reshape(-1, WIDTH * d, 1 + size)
+        left = left.reshape(-1, 1 + size)
+        follow = -_local(self.sample_values, self.sample_first, solved)
+        follow[:, :, 0] += data_residual
+        follow *= np.sqrt(self.data_weights)[:, None]
+        follow = follow.reshape(-1, 1 + size)
+        gram = left.T @ left + follow.T @ follow
         objective = float((data_residual**2).sum(axis=0) @ self.data_weights + (residual**2).sum())
         return Linearisation(
             objective=objective,
             columns=columns,
-            information=flat.T @ flat - reduced[1:, 1:],
-            gradient=reduced[0, 1:] - flat.T @ residual.ravel(),
-            curve_step=-solved[:, 0].reshape(r, d),
-            curve_response=-solved[:, 1:].reshape(r, d, size),
+            information=gram[1:, 1:],
+            gradient=-gram[1:, 0],
+            curve_step=-solved[:, :, 0],
+            curve_response=-solved[:, :, 1:],
         )
 
     def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> State:
@@ -327,10 +336,8 @@ class Collocation:
 
 
 def _local(values: np.ndarray, first: np.ndarray, control_points: np.ndarray) -> np.ndarray:
-    total = values[:, 0, None] * control_points[first]
-    for a in range(1, WIDTH):
-        total += values[:, a, None] * control_points[first + a]
-    return total
+    weights = values.reshape(*values.shape, *(1,) * (control_points.ndim - 1))
+    return sum(weights[:, a] * control_points[first + a] for a in range(WIDTH))
 
 
 def _solve_scaled(information: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:

@@ -177,7 +177,7 @@ def report(
     state: State,
     problem: Collocation,
     units: Units,
-    charge: float,
+    charges: np.ndarray,
     warnings: Sequence[str],
     history: Sequence[Step],
 ) -> Discovery:
@@ -189,8 +189,8 @@ def report(
         The fit, at a physics weight at which the law holds exactly.
     units : Units
         Standard units of the fit.
-    charge : float
-        Price of a term: a coefficient whose squared score is lower cannot be told from zero.
+    charges : ndarray, shape (l,)
+        Price of each term: a coefficient whose squared score is lower cannot be told from zero.
     warnings, history
         Passed on.
     """
@@ -207,7 +207,7 @@ def report(
 
     native_covariance = covariance[: l * d, : l * d]
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
-    moved, moved_covariance = _pruned(moved, moved_covariance, charge)
+    moved, moved_covariance = _pruned(moved, moved_covariance, charges)
     splines = (
         BSpline(knots * units.time, control * units.scale + units.centre, 3)
         for knots, control in problem.splines(state.control_points)
@@ -252,7 +252,7 @@ def _shifted(
 
 
 def _pruned(
-    coefficients: np.ndarray, covariance: np.ndarray, charge: float
+    coefficients: np.ndarray, covariance: np.ndarray, charges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Set what cannot be told from zero to zero, one by one, and correct the others for it.
 
@@ -273,9 +273,10 @@ def _pruned(
         if len(gone):
             flat[gone] = 0.0
             continue
-        if not len(live) or score.min() >= charge:
+        weakness = score / np.tile(charges, coefficients.shape[1])[live]
+        if not len(live) or weakness.min() >= 1:
             break
-        k = live[score.argmin()]
+        k = live[weakness.argmin()]
         gain = covariance[:, k] / covariance[k, k]
         flat -= gain * flat[k]
         covariance -= np.outer(gain, covariance[k])
