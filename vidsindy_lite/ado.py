@@ -34,6 +34,7 @@ from .records import Record, check_record, cut, typical_step
 from .regression import subset_search
 from .smoothing import smooth
 from .splines import DEGREE, clamped_knots
+from .trust import doubts
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
 """Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
@@ -173,7 +174,7 @@ class _Search:
         self.step = speed
         self.records = [(t * speed, values) for t, values in records]
         self.stretches = [(i, (t * speed, values)) for i, (t, values) in stretches]
-        self.noise = np.maximum(smoothed.noise, CLEANEST)
+        self.noise = self.smoothed_noise = np.maximum(smoothed.noise, CLEANEST)
         self.curves = [
             BSpline(spline.t * speed, spline.c, DEGREE, extrapolate=True)
             for spline in smoothed.splines
@@ -200,7 +201,9 @@ class _Search:
             bar.update()
             state, problem = self._polish(state, segments)
             bar.update()
-        return report(state, problem, self.units, self.charges, (), self.history)
+        law = PolynomialSystem(variable_names(self.d), self.exponents, state.coefficients)
+        warnings = doubts(law, state, problem, self.charges, self.records, self.smoothed_noise)
+        return report(state, problem, self.units, self.charges, warnings, self.history)
 
     def _measure_slack(self, segments: list[Segment], control: np.ndarray) -> None:
         """Misfit of a plain regression on the smoothed curve: the scale of physics weights."""

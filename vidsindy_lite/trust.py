@@ -1,0 +1,139 @@
+"""Whether a discovered law should be trusted: each doubt in words, with advice.
+
+A doubt is a necessary sign of trouble, not a sufficient one; a law without any may still be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .collocation import Collocation, State
+from .polynomials import PolynomialSystem
+from .records import Record, typical_step
+from .regression import closest_rival
+
+MISFIT = 1.5
+"""Residual over estimated noise beyond which the law does not fit."""
+NEAR_TIE = 4.0
+"""Two laws whose criteria differ by less than this (a likelihood ratio of 7) are not told apart."""
+TURNS = 1.5
+"""Turns of the motion that a record should cover."""
+COARSE = 1.0
+"""Longest typical time step, in time scales of the motion (about 6 to a turn)."""
+RESOLVED = 1e-3
+"""Residual, relative to the spread of the data, below which a misfit does not matter."""
+UNMET = 1e-2
+"""Root mean square residual of the law along the curve, relative to the speed."""
+
+
+def doubts(
+    law: PolynomialSystem,
+    state: State,
+    problem: Collocation,
+    charges: np.ndarray,
+    records: Sequence[Record],
+    noise: np.ndarray,
+) -> list[str]:
+    """Reasons not to trust a law.
+
+    Parameters
+    ----------
+    law : PolynomialSystem
+        The law, for its names.
+    state, problem
+        The final fit in standard units, the noise re-estimated from its residual.
+    charges : ndarray, shape (l,)
+        Price of each term.
+    records : sequence of Record
+        The data in standard units.
+    noise : ndarray, shape (d,)
+        Noise as the smoothing estimated it, before any law was known.
+
+    Returns
+    -------
+    list of str
+    """
+    return [
+        *_misfit(law, problem, noise),
+        *_unmet(state, problem),
+        *_standstill(law),
+        *_near_tie(law, state, problem, charges),
+        *_sampling(records),
+    ]
+
+
+def _misfit(law: PolynomialSystem, problem: Collocation, noise: np.ndarray) -> list[str]:
+    residual = problem.data_weights**-0.5
+    ratio = np.where(residual > RESOLVED, residual / noise, 0.0)
+    j = int(ratio.argmax())
+    if ratio[j] < MISFIT:
+        return []
+    return [
+        f"the curve misses the data of {law.names[j]} by {ratio[j]:.1f} times the noise estimated "
+        "beforehand: the law may lie outside the library (raise the degree), or the motion may "
+        "not be autonomous"
+    ]
+
+
+def _unmet(state: State, problem: Collocation) -> list[str]:
+    residual = float(np.sqrt((problem.physics_residual(state) ** 2).mean()))
+    if residual < UNMET:
+        return []
+    return [
+        f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit did "
+        "not converge; use more or cleaner samples, or another degree"
+    ]
+
+
+def _standstill(law: PolynomialSystem) -> list[str]:
+    return [
+        f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
+        for name, moves in zip(law.names, law.support.any(axis=0), strict=True)
+        if not moves
+    ]
+
+
+def _near_tie(
+    law: PolynomialSystem, state: State, problem: Collocation, charges: np.ndarray
+) -> list[str]:
+    # The offset stays where it is: with it free, the same law in another frame would count.
+    model = problem.linearise(state, np.arange(law.coefficients.size))
+    present = state.coefficients.T.ravel()
+    cost, dropped, added = closest_rival(
+        model.information,
+        model.information @ present + model.gradient,
+        np.tile(charges, law.d),
+        state.active.T.ravel(),
+    )
+    if cost > NEAR_TIE:
+        return []
+    out, into = (
+        " and ".join(
+            f"{law.terms[k % len(law.terms)]} in d{law.names[k // len(law.terms)]}/dt"
+            for k in entries
+        )
+        for entries in (dropped, added)
+    )
+    change = f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
+    return [
+        f"another law fits almost as well: {change} (criterion {cost:+.1f}); the data "
+        "do not settle it: use a longer or cleaner record"
+    ]
+
+
+def _sampling(records: Sequence[Record]) -> list[str]:
+    found = []
+    turns = sum(t[-1] - t[0] for t, _ in records) / (2 * np.pi)
+    if turns < TURNS:
+        found.append(
+            f"the record covers only {turns:.1f} turns of the motion: terms may be "
+            "indistinguishable on it; record longer"
+        )
+    step = typical_step(records)
+    if step > COARSE:
+        found.append(
+            f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster"
+        )
+    return found
