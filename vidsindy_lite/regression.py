@@ -36,38 +36,16 @@ def subset_search(
     value : float
         The objective with charges.
     """
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    matrix = information * scale[:, None] * scale
-    matrix[np.diag_indices_from(matrix)] += RIDGE
-    target = pull * scale
+    matrix, target, scale = _scaled(information, pull)
     support = start.copy()
     for _ in range(20 * len(target)):
-        inside, outside = np.flatnonzero(support), np.flatnonzero(~support)
-        inverse = np.linalg.inv(matrix[np.ix_(inside, inside)])
-        fitted = inverse @ target[inside]
-        spread = np.diag(inverse)
-        response = matrix[np.ix_(outside, inside)] @ inverse
-        left = target[outside] - matrix[np.ix_(outside, inside)] @ fitted
-        room = 1 - np.einsum("ak,ka->a", response, matrix[np.ix_(inside, outside)])
-        room = np.maximum(room, RIDGE)
-        loss = fitted**2 / spread - charge[inside]
-        gain = left**2 / room - charge[outside]
-        best = [(loss.min(initial=np.inf), "drop"), (-gain.max(initial=-np.inf), "add")]
-        if len(inside) and len(outside):
-            swapped_left = left[:, None] + response * (fitted / spread)
-            swapped_room = room[:, None] + response**2 / spread
-            swap = loss - (swapped_left**2 / swapped_room - charge[outside][:, None])
-            best.append((swap.min(), "swap"))
-        change, move = min(best)
+        change, drop, add = min(
+            _single_changes(matrix, target, charge, support), key=lambda item: item[0]
+        )
         if not change < -1e-9:
             break
-        if move == "drop":
-            support[inside[loss.argmin()]] = False
-        elif move == "add":
-            support[outside[gain.argmax()]] = True
-        else:
-            add, drop = np.unravel_index(swap.argmin(), swap.shape)
-            support[outside[add]], support[inside[drop]] = True, False
+        support[drop] = False
+        support[add] = True
     inside = np.flatnonzero(support)
     solution = np.zeros(len(target))
     solution[inside] = np.linalg.solve(matrix[np.ix_(inside, inside)], target[inside])
@@ -76,22 +54,85 @@ def subset_search(
     return support, solution * scale, value
 
 
+def closest_rival(
+    information: np.ndarray, pull: np.ndarray, charge: np.ndarray, support: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """The single change of a support that costs least.
+
+    Parameters
+    ----------
+    information, pull, charge
+        See `subset_search`.
+    support : ndarray of bool, shape (m,)
+        A support at which `subset_search` has stopped.
+
+    Returns
+    -------
+    cost : float
+        By how much the objective with charges rises.
+    dropped, added : ndarray of int
+        The entries that leave and enter, at most one each.
+    """
+    matrix, target, _ = _scaled(information, pull)
+    return min(_single_changes(matrix, target, charge, support), key=lambda item: item[0])
+
+
+def _scaled(
+    information: np.ndarray, pull: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    matrix = information * scale[:, None] * scale
+    matrix[np.diag_indices_from(matrix)] += RIDGE
+    return matrix, pull * scale, scale
+
+
+def _single_changes(
+    matrix: np.ndarray, target: np.ndarray, charge: np.ndarray, support: np.ndarray
+) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Best drop, add and swap: change of the objective, entries dropped, entries added."""
+    inside, outside = np.flatnonzero(support), np.flatnonzero(~support)
+    none = np.array([], dtype=int)
+    inverse = np.linalg.inv(matrix[np.ix_(inside, inside)])
+    fitted = inverse @ target[inside]
+    spread = np.diag(inverse)
+    response = matrix[np.ix_(outside, inside)] @ inverse
+    left = target[outside] - matrix[np.ix_(outside, inside)] @ fitted
+    room = 1 - np.einsum("ak,ka->a", response, matrix[np.ix_(inside, outside)])
+    room = np.maximum(room, RIDGE)
+    loss = fitted**2 / spread - charge[inside]
+    cost = charge[outside] - left**2 / room
+    changes = [(np.inf, none, none)]
+    if len(inside):
+        changes.append((loss.min(), inside[[loss.argmin()]], none))
+    if len(outside):
+        changes.append((cost.min(), none, outside[[cost.argmin()]]))
+    if len(inside) and len(outside):
+        # A drop changes what the others leave over, and the room a newcomer has, by rank one.
+        swapped_left = left[:, None] + response * (fitted / spread)
+        swapped_room = room[:, None] + response**2 / spread
+        swap = loss + charge[outside][:, None] - swapped_left**2 / swapped_room
+        add, drop = np.unravel_index(swap.argmin(), swap.shape)
+        changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
+    return changes
+
+
 def stridge(
     library: np.ndarray,
     derivative: np.ndarray,
     rng: np.random.Generator,
     ridge: float = 1e-6,
-    sparsity_weight: float = 1e-3,
+    sparsity_weight: float = 5e-3,
     step: float = 1e-2,
     trials: int = 100,
 ) -> np.ndarray:
     """Sequentially thresholded ridge regression with an adaptive threshold (paper: Eq. S12).
 
-    Ridge regression, columns below a threshold cut, again until none is cut, and a plain least
-    squares at the end. The threshold is raised while the loss on held-out rows, ``|residual| +
-    sparsity_weight cond(library) |coefficients|_0``, does not grow; when it grows the threshold
-    goes back and its step shrinks. This is the training loop of Rudy et al. (2017); so are the
-    held-out fifth of the rows and the condition number in the price of a term.
+    Ridge regression, columns below a threshold cut, again until none is cut. The threshold is
+    raised while the loss on held-out rows, ``|residual| + sparsity_weight |coefficients|_0``, does
+    not grow; when it grows the threshold goes back and its step shrinks. A plain least squares on
+    all rows ends it. This is the training loop of Rudy et al. (2017), but for the residual, here a
+    root mean square, and the condition number, left out of the price of a term: the price then
+    means the same for any number of rows and any library.
 
     Parameters
     ----------
@@ -102,11 +143,12 @@ def stridge(
     rng : numpy.random.Generator
         Draws the held-out rows.
     ridge : float
-        Ridge penalty, for columns scaled to a root mean square of 1.
+        Ridge penalty; columns and derivatives are scaled to a root mean square of 1.
     sparsity_weight : float
-        Price of a term.
+        Price of a term: what it has to save of the relative error of the derivative.
     step : float
-        First threshold and its first step, in units of the derivative: what a term contributes.
+        First threshold and its first step: root mean square of what a term contributes, over
+        that of the derivative.
     trials : int
         Number of thresholds tried.
 
@@ -136,14 +178,19 @@ def stridge(
     held_out, training = order[: n // 5], order[n // 5 :]
     if not len(held_out) or len(training) < terms:
         raise ValueError(f"library: must hold at least {terms} training rows, got {n} rows in all")
-    scale = np.sqrt((library**2).mean(axis=0))
-    scaled = library / np.where(scale > 0, scale, 1.0)
-    price = sparsity_weight * np.linalg.cond(scaled)
+    size, speed = _root_mean_square(library), _root_mean_square(derivative)
+    scaled = library / size
     columns = [
-        _stridge_column(scaled, target, training, held_out, ridge, price, step, trials)
-        for target in derivative.T
+        _stridge_column(scaled, target, training, held_out, ridge, sparsity_weight, step, trials)
+        for target in (derivative / speed).T
     ]
-    return np.stack(columns, axis=1) / np.where(scale > 0, scale, 1.0)[:, None]
+    return np.stack(columns, axis=1) * speed / size[:, None]
+
+
+def _root_mean_square(columns: np.ndarray) -> np.ndarray:
+    """Scale of each column; 1 for a column of zeros."""
+    scale = np.sqrt((columns**2).mean(axis=0))
+    return np.where(scale > 0, scale, 1.0)
 
 
 def _stridge_column(scaled, target, training, held_out, ridge, price, step, trials) -> np.ndarray:
@@ -152,7 +199,7 @@ def _stridge_column(scaled, target, training, held_out, ridge, price, step, tria
 
     def loss(coefficients):
         residual = target[held_out] - scaled[held_out] @ coefficients
-        return np.linalg.norm(residual) + price * np.count_nonzero(coefficients)
+        return np.sqrt((residual**2).mean()) + price * np.count_nonzero(coefficients)
 
     best = _thresholded(gram, pull, ridge, 0.0)
     lowest, threshold = loss(best), step
