@@ -92,10 +92,9 @@ def discover(
     >>> t, x = vl.SYSTEMS["Lorenz"].trajectory(1500)
     >>> print(vl.discover(t, x).equations())
     """
-    if x is None:
-        records = [check_record(*pair) for pair in t]
-    else:
-        records = [check_record(t, x)]
+    if int(degree) != degree or degree < 1:
+        raise ValueError(f"degree: must be an integer of at least 1, got {degree!r}")
+    records = [check_record(*pair) for pair in (t if x is None else [(t, x)])]
     if not records or len({values.shape[1] for _, values in records}) != 1:
         raise ValueError(
             "t: a list of trajectories must hold at least one, all of the same dimension, "
@@ -301,7 +300,9 @@ class _Search:
         home = self.units.standard(np.zeros(self.d))
         x = np.concatenate([segment.x for segment in segments])
         box = (x.min(axis=0), x.max(axis=0))
-        origins = sparse_origins(algebra, active, home, box, self.charges.max(), keep=4, rng=self.rng)
+        origins = sparse_origins(
+            algebra, active, home, box, self.charges.max(), keep=4, rng=self.rng
+        )
         found = [(home, np.zeros(self.d, dtype=bool))]
         # An origin costs like a term per axis, so each is also tried with axes left at home.
         for origin in origins:
@@ -390,14 +391,13 @@ class _Search:
         )
         trial = replace(state, control_points=_fit_curves(joined, curves))
         bridged = self._problem(joined, FINAL_WEIGHT)
-        if np.isfinite(trial.control_points).all():
-            for weight in SEARCH_WEIGHTS:
-                trial = self._problem(joined, weight).solve(trial, tolerance=1.0)
-            # A bridge takes away the freedom of one initial condition: so much may the fit lose.
-            freedom = self.d * len(group) + bridged.x.size - problem.x.size
-            loss = bridged.objective(trial) - problem.objective(state)
-            if loss < freedom + 4 * np.sqrt(2 * freedom):
-                return trial, joined
+        for weight in SEARCH_WEIGHTS:
+            trial = self._problem(joined, weight).solve(trial, tolerance=1.0, max_steps=10)
+        # A bridge takes away the freedom of one initial condition: so much may the fit lose.
+        freedom = self.d * len(group) + bridged.x.size - problem.x.size
+        loss = bridged.objective(trial) - problem.objective(state)
+        if loss < freedom + 4 * np.sqrt(2 * freedom):
+            return trial, joined
         if len(group) == 1:
             return state, segments
         for half in (group[: len(group) // 2], group[len(group) // 2 :]):
@@ -455,7 +455,9 @@ def _fit_curves(
     for segment, curve in zip(segments, curves, strict=True):
         b = segment.breakpoints
         dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
-        control.append(make_lsq_spline(dense, curve(dense), clamped_knots(b), DEGREE, method="norm-eq").c)
+        control.append(
+            make_lsq_spline(dense, curve(dense), clamped_knots(b), DEGREE, method="norm-eq").c
+        )
     return np.concatenate(control)
 
 

@@ -57,16 +57,18 @@ class Joined:
         for i, ((_, low), (high, _)) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
             inside = (t > low) & (t < high)
             forward = _integrate(self.law, t[inside] - low, self.splines[i](low))
-            backward = _integrate(
-                self.reversed, high - t[inside][::-1], self.splines[i + 1](high)
-            )
+            backward = _integrate(self.reversed, high - t[inside][::-1], self.splines[i + 1](high))
             share = ((t[inside] - low) / (high - low))[:, None]
-            values[inside] = (1 - share) * forward + share * backward[::-1]
+            crossing = (1 - share) * forward + share * backward[::-1]
+            if not np.isfinite(crossing).all():  # the law blows up: the fit will refuse the bridge
+                crossing = (1 - share) * self.splines[i](low) + share * self.splines[i + 1](high)
+            values[inside] = crossing
         return values
 
 
 def _integrate(law: PolynomialSystem, elapsed: np.ndarray, x0: np.ndarray) -> np.ndarray:
-    return runge_kutta_4(law, np.concatenate([[0.0], elapsed]), x0, substeps=1)[1:]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return runge_kutta_4(law, np.concatenate([[0.0], elapsed]), x0, substeps=1)[1:]
 
 
 def join(
@@ -100,12 +102,11 @@ def join(
     """
     groups: list[list[int]] = []
     for i, segment in enumerate(segments):
-        left = segments[i - 1] if i else None
-        if left is not None and left.record == segment.record:
-            if (left.record, left.t[-1]) in set(bridged):
-                groups[-1].append(i)
-                continue
-        groups.append([i])
+        left = segments[i - 1]
+        if i and left.record == segment.record and (left.record, left.t[-1]) in bridged:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
     joined, curves = [], []
     for group in groups:
         first, last = segments[group[0]], segments[group[-1]]

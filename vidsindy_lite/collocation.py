@@ -104,9 +104,9 @@ class Linearisation:
 class Collocation:
     """Data and physics loss on cubic splines, one per segment, sharing one law.
 
-    One midpoint collocation node per knot span gives one equation per control point (up to the
-    d initial conditions), so the law can hold exactly and the physics weight can be raised
-    without limit.
+    The collocation nodes are the midpoints of the knot spans and both ends of each segment: one
+    equation per control point but for the initial condition. So the law can hold exactly, and the
+    physics weight can be raised without limit.
 
     Parameters
     ----------
@@ -136,29 +136,32 @@ class Collocation:
         self.starts = np.cumsum([0] + [len(k) - WIDTH for k in self.knots])
         self.r = int(self.starts[-1])
         self.x = np.concatenate([segment.x for segment in self.segments])
-        self.sample_first, self.sample_values, _ = self._basis(lambda segment: segment.t)
+        self.sample_first, self.sample_values = self._basis([s.t for s in self.segments])
         ends = [segment.breakpoints for segment in self.segments]
-        groups = [
-            (self._basis(lambda s: (s.breakpoints[1:] + s.breakpoints[:-1]) / 2), np.concatenate([np.diff(b) for b in ends])),
-            (self._basis(lambda s: s.breakpoints[:1]), np.array([b[1] - b[0] for b in ends]) / 2),
-            (self._basis(lambda s: s.breakpoints[-1:]), np.array([b[-1] - b[-2] for b in ends]) / 2),
-        ]
-        self.node_first, self.node_values, self.node_slopes = (
-            np.concatenate(parts) for parts in zip(*(basis for basis, _ in groups), strict=True)
+        nodes = [
+            [(b[1:] + b[:-1]) / 2 for b in ends], [b[:1] for b in ends], [b[-1:] for b in ends],
+        ]  # fmt: skip
+        spans = [
+            [np.diff(b) for b in ends], [np.diff(b[:2]) / 2 for b in ends], [np.diff(b[-2:]) / 2 for b in ends],
+        ]  # fmt: skip
+        self.node_first, self.node_values = map(
+            np.concatenate, zip(*(self._basis(group) for group in nodes), strict=True)
         )
-        width = np.concatenate([w for _, w in groups])
+        self.node_slopes = np.concatenate([self._basis(group, order=1)[1] for group in nodes])
+        width = np.concatenate([np.concatenate(group) for group in spans])
         self.node_weights = width / width.sum() * len(self.x)
-        edges = np.cumsum([0] + [len(w) for _, w in groups])
+        edges = np.cumsum([0] + [sum(map(len, group)) for group in nodes])
         # Within a group no two nodes share their first control point, so slices add without clash.
         self.groups = [slice(low, high) for low, high in zip(edges[:-1], edges[1:], strict=True)]
         self._data_band = self._assemble_data_band()
 
-    def _basis(self, times) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _basis(self, times: list[np.ndarray], order: int = 0) -> tuple[np.ndarray, np.ndarray]:
         parts = []
-        for segment, knots, start in zip(self.segments, self.knots, self.starts[:-1], strict=True):
-            first, values, slopes = local_basis(knots, times(segment))
-            parts.append((first + start, values, slopes))
-        return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
+        for knots, start, t in zip(self.knots, self.starts[:-1], times, strict=True):
+            first, values = local_basis(knots, t, order)
+            parts.append((first + start, values))
+        first, values = zip(*parts, strict=True)
+        return np.concatenate(first), np.concatenate(values)
 
     def splines(self, control_points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Knots and control points of every segment."""

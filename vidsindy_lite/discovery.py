@@ -228,7 +228,7 @@ def report(
 
 def inverse(information: np.ndarray) -> np.ndarray:
     """Inverse of an information matrix whose entries differ by many orders of magnitude."""
-    scale = 1 / np.sqrt(np.diag(information))
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     return np.linalg.pinv(information * scale[:, None] * scale, hermitian=True) * (
         scale[:, None] * scale
     )

@@ -59,9 +59,7 @@ class Film:
         return [camera.project(self.x) for camera in self.rig.cameras]
 
 
-def film(
-    name: str, folder: str | Path, frames: int = 1500, seed: int = 0, **disturbances
-) -> Film:
+def film(name: str, folder: str | Path, frames: int = 1500, seed: int = 0, **disturbances) -> Film:
     """Film a benchmark with three cameras against random backgrounds.
 
     Parameters
@@ -92,9 +90,10 @@ def film(
     paths, scenes = [], []
     for number, (camera, view) in enumerate(zip(rig.cameras, views, strict=True), start=1):
         draw, disturb = view.spawn(2)
+        disturbance_seed = int(disturb.generate_state(1)[0])
         scene = Scene.random(np.random.default_rng(draw), **common | disturbances)
         path = Path(folder) / f"{name}_{number}.mkv"
-        render_video(path, camera.project(x), scene, seed=disturb)
+        render_video(path, camera.project(x), scene, seed=disturbance_seed)
         paths.append(path)
         scenes.append(scene)
     return Film(tuple(paths), rig, truth, t, x, tuple(scenes))
@@ -160,7 +159,14 @@ def discover_film(name: str, frames: int = 1500, seed: int = 0, **disturbances) 
     )
     position_error = trajectory_error(found.x, shot.x).rmse
     return Result(
-        name, seed, found, shot.truth, score(found, shot.truth), pixel_error, position_error, seconds
+        name,
+        seed,
+        found,
+        shot.truth,
+        score(found, shot.truth),
+        pixel_error,
+        position_error,
+        seconds,
     )
 
 

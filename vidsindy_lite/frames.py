@@ -34,7 +34,6 @@ class FrameAlgebra:
     ) -> None:
         self.exponents = exponents
         self.l, self.d = exponents.shape
-        self.degree = exponents.sum(axis=1).max()
         self.coefficients = coefficients
         self.information = information
         scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -148,7 +147,10 @@ def sparse_origins(
     list of ndarray, shape (d,), best first
     """
     low, high = np.minimum(box[0], home), np.maximum(box[1], home)
-    droppable = np.argwhere(active.T & (algebra.exponents.sum(axis=1) < algebra.degree))
+    # Only what divides another term of its equation can vanish by a shift.
+    divides = (algebra.exponents[:, None, :] <= algebra.exponents[None, :, :]).all(axis=-1)
+    np.fill_diagonal(divides, False)
+    droppable = np.argwhere((active & (divides @ active)).T)
     starts = []
     for draw in range(DRAWS if len(droppable) else 0):
         origin = home if draw % 2 else rng.uniform(low, high)

@@ -360,16 +360,17 @@ def _name_latex(name: str) -> str:
 
 
 def _term_latex(exponents: np.ndarray, names: tuple[str, ...]) -> str:
-    return " ".join(
-        _name_latex(name) + (f"^{{{power}}}" if power > 1 else "")
-        for name, power in zip(names, exponents, strict=True)
-        if power
-    ) or "1"
+    return (
+        " ".join(
+            _name_latex(name) + (f"^{{{power}}}" if power > 1 else "")
+            for name, power in zip(names, exponents, strict=True)
+            if power
+        )
+        or "1"
+    )
 
 
-def _sum_text(
-    coefficients: np.ndarray, terms: Sequence[str], digits: int, times: str = " "
-) -> str:
+def _sum_text(coefficients: np.ndarray, terms: Sequence[str], digits: int, times: str = " ") -> str:
     text = ""
     # The highest monomials last, the constant first in the library: print it the way it is read.
     for row in sorted(np.flatnonzero(coefficients), key=lambda r: terms[r] == "1"):

@@ -57,13 +57,13 @@ def smooth(stretches: Sequence[tuple[np.ndarray, np.ndarray]], rng: np.random.Ge
     gram, roughness = np.zeros((DEGREE + 1, r)), np.zeros((DEGREE + 1, r))
     firsts, values = [], []
     for k, start, (t, _) in zip(knots, starts[:-1], stretches, strict=True):
-        first, basis, _ = local_basis(k, t)
+        first, basis = local_basis(k, t)
         firsts.append(first + start)
         values.append(basis)
         # The second derivative is linear in a span: two Gauss points integrate its square.
         for node in (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)):
             span = np.diff(t)
-            at, bend = _second_derivatives(k, t[:-1] + node * span)
+            at, bend = local_basis(k, t[:-1] + node * span, order=2)
             _accumulate(roughness, at + start, bend * np.sqrt(span / 2)[:, None])
     first, basis = np.concatenate(firsts), np.concatenate(values)
     _accumulate(gram, first, basis)
@@ -104,21 +104,6 @@ def smooth(stretches: Sequence[tuple[np.ndarray, np.ndarray]], rng: np.random.Ge
         for k, start in zip(knots, starts[:-1], strict=True)
     )
     return Smooth(splines, noise)
-
-
-def _second_derivatives(knots: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    first = local_basis(knots, t)[0]
-    linear = BSpline.design_matrix(t, knots[2:-2], 1).data.reshape(-1, 2)
-    bend = np.zeros((len(t), DEGREE + 1))
-    for order in (2, 3):
-        width = linear.shape[1]
-        lower = first[:, None] + np.arange(DEGREE + 1 - width, DEGREE + 1)
-        rates = order * linear / (knots[lower + order] - knots[lower])
-        linear = np.zeros((len(t), width + 1))
-        linear[:, 1:] += rates
-        linear[:, :-1] -= rates
-    bend[:] = linear
-    return first, bend
 
 
 def _accumulate(band: np.ndarray, first: np.ndarray, rows: np.ndarray) -> None:

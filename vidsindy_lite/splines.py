@@ -28,14 +28,12 @@ def clamped_knots(breakpoints: np.ndarray) -> np.ndarray:
     """
     breakpoints = np.asarray(breakpoints, dtype=float)
     if breakpoints.ndim != 1 or len(breakpoints) < 2 or not (np.diff(breakpoints) > 0).all():
-        raise ValueError(
-            f"breakpoints: must be at least two increasing numbers, got {breakpoints}"
-        )
+        raise ValueError(f"breakpoints: must be at least two increasing numbers, got {breakpoints}")
     return np.concatenate([breakpoints[:1].repeat(3), breakpoints, breakpoints[-1:].repeat(3)])
 
 
-def local_basis(knots: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The four basis functions that are not zero at each time, with their slopes.
+def local_basis(knots: np.ndarray, t: np.ndarray, order: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """The four basis functions that are not zero at each time, or their derivatives.
 
     Parameters
     ----------
@@ -43,32 +41,34 @@ def local_basis(knots: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarra
         From `clamped_knots`.
     t : ndarray, shape (n,)
         Times within the knots.
+    order : int
+        Order of the derivative, 0 to 2.
 
     Returns
     -------
     first : ndarray of int, shape (n,)
         Index of the first control point that matters at each time.
-    values, slopes : ndarray, shape (n, 4)
-        ``G`` and ``dG/dt`` of control points first .. first + 3.
+    values : ndarray, shape (n, 4)
+        Derivative of that order of the basis functions of control points first .. first + 3.
     """
-    design = BSpline.design_matrix(t, knots, DEGREE)
-    values = design.data.reshape(-1, DEGREE + 1)
-    first = design.indices.reshape(-1, DEGREE + 1)[:, 0].astype(int)
-    # The derivative of a cubic basis is a difference of two quadratic ones, each over its width.
-    quadratic = BSpline.design_matrix(t, knots[1:-1], DEGREE - 1).data.reshape(-1, DEGREE)
-    lower = first[:, None] + np.arange(1, DEGREE + 1)
-    rates = DEGREE * quadratic / (knots[lower + DEGREE] - knots[lower])
-    slopes = np.zeros_like(values)
-    slopes[:, 1:] += rates
-    slopes[:, :-1] -= rates
-    return first, values, slopes
+    low = DEGREE - order
+    design = BSpline.design_matrix(t, knots[order : len(knots) - order], low)
+    values = design.data.reshape(-1, low + 1)
+    first = design.indices.reshape(-1, low + 1)[:, 0].astype(int)
+    # The derivative of a basis function is a difference of two of one degree less, each over
+    # its width (de Boor).
+    for degree in range(low + 1, DEGREE + 1):
+        lower = first[:, None] + np.arange(DEGREE + 1 - degree, DEGREE + 1)
+        rates = degree * values / (knots[lower + degree] - knots[lower])
+        values = np.zeros((len(t), degree + 1))
+        values[:, 1:] += rates
+        values[:, :-1] -= rates
+    return first, values
 
 
-def design_matrices(knots: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Dense ``G`` and ``dG/dt``, each of shape (n, r): see `local_basis`."""
-    first, values, slopes = local_basis(knots, t)
-    dense = np.zeros((2, len(t), len(knots) - DEGREE - 1))
-    columns = first[:, None] + np.arange(DEGREE + 1)
-    for matrix, entries in zip(dense, (values, slopes), strict=True):
-        np.put_along_axis(matrix, columns, entries, axis=1)
-    return dense[0], dense[1]
+def design_matrix(knots: np.ndarray, t: np.ndarray, order: int = 0) -> np.ndarray:
+    """Dense matrix of shape (n, r): ``G`` for order 0, ``dG/dt`` for order 1; see `local_basis`."""
+    first, values = local_basis(knots, t, order)
+    dense = np.zeros((len(t), len(knots) - DEGREE - 1))
+    np.put_along_axis(dense, first[:, None] + np.arange(DEGREE + 1), values, axis=1)
+    return dense

@@ -116,9 +116,11 @@ def _near_tie(
         )
         for entries in (dropped, added)
     )
-    change = f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
+    change = (
+        f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
+    )
     return [
-        f"another law fits almost as well: {change} (criterion {cost:+.1f}); the data "
+        f"another law fits almost as well: {change} (criterion {max(cost, 0.0):+.1f}); the data "
         "do not settle it: use a longer or cleaner record"
     ]
 
@@ -133,7 +135,5 @@ def _sampling(records: Sequence[Record]) -> list[str]:
         )
     step = typical_step(records)
     if step > COARSE:
-        found.append(
-            f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster"
-        )
+        found.append(f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster")
     return found

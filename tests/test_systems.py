@@ -1,0 +1,64 @@
+"""The seven systems against the paper's Tables S1 and S2."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.polynomials import PolynomialSystem
+from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS, runge_kutta_4
+
+TERMS = {
+    "Lorenz": 12, "SprottE": 8, "RayleighBenard": 11, "SprottF": 10, "NoseHoover": 9,
+    "Tsucs2": 15, "WangSun": 14,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_number_of_true_terms_in_the_reference_frame(name):
+    assert SYSTEMS[name].shift(REFERENCE_OFFSET).support.sum() == TERMS[name]
+
+
+def test_shift_gives_the_ground_truth_of_table_s2():
+    printed = PolynomialSystem.from_terms(
+        {
+            "x": {"xz": 0.5, "x": -40, "y": 40, "z": -5},
+            "y": {"xz": -1, "x": 1, "y": 20, "z": 10, "1": -210},
+            "z": {"x^2": -0.65, "xy": 1, "x": 3, "y": -10, "z": 0.8, "1": 35},
+        },
+        degree=3,
+    )
+    shifted = SYSTEMS["Tsucs2"].shift(REFERENCE_OFFSET)
+    ours = dict(zip(shifted.terms, shifted.coefficients.tolist(), strict=True))
+    for term, row in zip(printed.terms, printed.coefficients, strict=True):
+        np.testing.assert_allclose(ours.get(term, [0, 0, 0]), row, atol=1e-12)
+
+
+def test_trajectory_starts_at_the_shifted_initial_condition():
+    system = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET)
+    t, x = system.trajectory(30)
+    np.testing.assert_allclose(x[0], (2, 17, 27))
+    np.testing.assert_allclose(np.diff(t), 0.015)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_runge_kutta_agrees_with_the_adaptive_method(name):
+    system = SYSTEMS[name]
+    t, x = system.trajectory(100)
+    rk4 = runge_kutta_4(system, t, system.x0, substeps=20)
+    assert np.abs(rk4 - x).max() < 1e-5 * np.ptp(x, axis=0).max()
+
+
+def test_runge_kutta_is_of_fourth_order():
+    law = PolynomialSystem.from_terms({"x": {"x": -1}})
+    errors = [
+        abs(runge_kutta_4(law, np.array([0.0, 1.0]), [1.0], n)[-1, 0] - np.exp(-1)) for n in (4, 8)
+    ]
+    assert 14 < errors[0] / errors[1] < 18
+
+
+def test_bad_benchmarks_are_refused():
+    from dataclasses import replace
+
+    with pytest.raises(ValueError, match="period: must be positive"):
+        replace(SYSTEMS["Lorenz"], period=0)
+    with pytest.raises(ValueError, match="x0: must be 3 finite numbers"):
+        replace(SYSTEMS["Lorenz"], x0=(1, 2))
