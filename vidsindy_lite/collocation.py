@@ -139,11 +139,15 @@ class Collocation:
         self.sample_first, self.sample_values = self._basis([s.t for s in self.segments])
         ends = [segment.breakpoints for segment in self.segments]
         nodes = [
-            [(b[1:] + b[:-1]) / 2 for b in ends], [b[:1] for b in ends], [b[-1:] for b in ends],
-        ]  # fmt: skip
+            [(b[1:] + b[:-1]) / 2 for b in ends],
+            [b[:1] for b in ends],
+            [b[-1:] for b in ends],
+        ]
         spans = [
-            [np.diff(b) for b in ends], [np.diff(b[:2]) / 2 for b in ends], [np.diff(b[-2:]) / 2 for b in ends],
-        ]  # fmt: skip
+            [np.diff(b) for b in ends],
+            [np.diff(b[:2]) / 2 for b in ends],
+            [np.diff(b[-2:]) / 2 for b in ends],
+        ]
         self.node_first, self.node_values = map(
             np.concatenate, zip(*(self._basis(group) for group in nodes), strict=True)
         )

@@ -11,7 +11,6 @@ from scipy.optimize import minimize
 
 from .polynomials import shift_matrix
 
-
 DRAWS = 200
 """Random sets of coefficients that an origin is asked to make vanish."""
 

@@ -1,0 +1,77 @@
+"""The tracker's bars, on full-size clips: accuracy, frames kept, and time relative to decoding.
+
+Run with `pytest -s tests/benchmarks/bench_tracking.py` on an otherwise idle machine (some minutes).
+The trajectories are Lorenz orbits seen from random directions.
+"""
+
+import time
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from vidsindy_lite.tracking import track
+from vidsindy_lite.video import BACKGROUNDS, Scene, read_video, render_video
+
+FRAMES = 1500
+REPEATS = 3
+
+
+def lorenz_track(seed, margin=40, size=(512, 512)):
+    """A Lorenz orbit, 1/100 period a frame, projected along a random direction into the image."""
+    rng = np.random.default_rng(seed)
+    t = 5 + 0.015 * np.arange(FRAMES)
+
+    def law(_, x):
+        return [10 * (x[1] - x[0]), x[0] * (28 - x[2]) - x[1], x[0] * x[1] - 8 / 3 * x[2]]
+
+    x = solve_ivp(law, (0, t[-1]), rng.normal([0, 0, 25], 5), t_eval=t, rtol=1e-8).y.T
+    plane, _ = np.linalg.qr(rng.normal(size=(3, 2)))
+    y = x @ plane
+    y = (y - y.min(axis=0)) / (y.max(axis=0) - y.min(axis=0))
+    return margin + y * (np.array(size) - 1 - 2 * margin)
+
+
+def seconds(function):
+    start = time.perf_counter()
+    function()
+    return time.perf_counter() - start
+
+
+@pytest.mark.parametrize("background", BACKGROUNDS)
+def test_clean_textured_video(tmp_path, background):
+    truth = lorenz_track(100)
+    path = tmp_path / "clip.mkv"
+    writing = seconds(lambda: render_video(path, truth, Scene(background), seed=100))
+    decoding = min(seconds(lambda: sum(1 for _ in read_video(path))) for _ in range(REPEATS))
+    tracking = min(seconds(lambda: track(path)) for _ in range(REPEATS))
+    error = np.linalg.norm(track(path) - truth, axis=1)
+    rms = np.sqrt(np.mean(error**2))
+    print(
+        f"\n{background}: rms {rms:.4f} px, lost {np.isnan(error).sum()}; ms a frame: "
+        f"render and write {1e3 * writing / FRAMES:.2f}, decode {1e3 * decoding / FRAMES:.2f}, "
+        f"track {1e3 * tracking / FRAMES:.2f} (ratio {tracking / decoding:.2f}); "
+        f"{path.stat().st_size / FRAMES / 1e3:.1f} kB a frame"
+    )
+    assert np.isfinite(error).all()
+    assert rms <= 0.1
+    assert tracking <= 2 * decoding
+
+
+def test_unseen_random_scenes(tmp_path):
+    path = tmp_path / "clip.mkv"
+    errors = []
+    for seed in range(200, 220):
+        truth, scene = lorenz_track(seed), Scene.random(seed)
+        error = np.linalg.norm(
+            track(render_video(path, truth, scene, seed=seed)) - truth, axis=1
+        )
+        errors.append(error)
+        print(
+            f"\n{scene.background:7s} {scene.shape:9s} {scene.size:4.1f} px {scene.colour:7s} "
+            f"kept {np.isfinite(error).mean():.4f} median {np.nanmedian(error):.4f} "
+            f"max {np.nanmax(error):.4f} px", end="",
+        )
+    for error in errors:
+        assert np.isfinite(error).mean() >= 0.99
+        assert np.nanmedian(error) <= 0.15

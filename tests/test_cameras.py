@@ -1,0 +1,528 @@
+"""Cameras: the convention, files, learning, reconstruction, and what bad input is told."""
+
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidsindy_lite.cameras import (
+    Camera,
+    Rig,
+    calibration_errors,
+    learn_cameras,
+    reconstruct,
+    residuals,
+)
+from vidsindy_lite.geometry import plane_projection, rotation_to_z
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def trajectory(rng, n):
+    """A smooth 3D curve of random shape, size and place."""
+    t = np.linspace(0, 8, n)[:, None]
+    waves = sum(
+        rng.normal(size=3) / k * np.sin(k * t + rng.uniform(0, 2 * np.pi, 3)) for k in range(1, 6)
+    )
+    return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
+
+
+def random_rig(rng, x, cameras=3):
+    """Cameras anywhere around x, facing so differently that no axis is poorly seen."""
+    low, high = x.min(axis=0), x.max(axis=0)
+    reach = np.linalg.norm(high - low) / 2
+    while True:
+        normals = rng.normal(size=(cameras, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        if np.linalg.eigvalsh(cameras * np.eye(3) - normals.T @ normals)[0] > cameras / 3:
+            break
+    return Rig(
+        Camera(
+            position=(low + high) / 2 + reach * (rng.uniform(-2, 2) * n + 0.1 * rng.normal(size=3)),
+            normal=n,
+            scale=reach / rng.uniform(180, 230),
+            angle=rng.uniform(-np.pi, np.pi),
+        )
+        for n in normals
+    )
+
+
+def scene(seed, n=500, cameras=3):
+    rng = np.random.default_rng(seed)
+    x = trajectory(rng, n)
+    rig = random_rig(rng, x, cameras)
+    return x, rig, [camera.project(x) for camera in rig.cameras], rng
+
+
+def rmse_in_pixels(x, truth, rig):
+    pixel = np.sqrt(np.mean([camera.scale**2 for camera in rig.cameras]))
+    return np.sqrt(np.mean((x - truth) ** 2, axis=0)) / pixel
+
+
+@pytest.fixture
+def small():
+    return scene(7, n=40)
+
+
+class TestCamera:
+    def test_convention_by_hand(self):
+        # Looking down the z axis, unturned: x to the right, y up, so v falls as y grows.
+        camera = Camera(position=(1, 2, 50), normal=(0, 0, 1), scale=0.5, angle=0.0)
+        np.testing.assert_allclose(camera.project([[1, 2, -9]]), [[255.5, 255.5]])
+        np.testing.assert_allclose(camera.project([[2, 2, 0]]), [[257.5, 255.5]])
+        np.testing.assert_allclose(camera.project([[1, 3, 0]]), [[255.5, 253.5]])
+
+    def test_in_plane_angle_by_hand(self):
+        # T(pi/2) takes (0, 1) to (1, 0): a step along x is seen as a step up the image.
+        camera = Camera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=np.pi / 2)
+        np.testing.assert_allclose(camera.project([[1, 0, 0]]), [[255.5, 254.5]])
+
+    def test_image_size(self):
+        camera = Camera(
+            position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=0, image_size=(641, 481)
+        )
+        np.testing.assert_allclose(camera.project([[0, 0, 0]]), [[320, 240]])
+
+    @given(SEEDS)
+    @settings(max_examples=20)
+    def test_project_satisfies_the_camera_equation(self, seed):
+        x, rig, _, _ = scene(seed, n=5)
+        for camera in rig.cameras:
+            u, v = camera.project(x).T
+            x_c = np.array([u - 511 / 2, 511 / 2 - v])
+            c, s = np.cos(camera.angle), np.sin(camera.angle)
+            left = camera.scale * np.array([[c, s], [-s, c]]) @ x_c + camera.offset[:, None]
+            right = rotation_to_z(camera.normal)[:2] @ x.T
+            np.testing.assert_allclose(left, right, atol=1e-10 * np.abs(x).max())
+
+    def test_plane_coordinates_undo_project(self, small):
+        x, rig, tracks, _ = small
+        for camera, track in zip(rig.cameras, tracks, strict=True):
+            seen = camera.plane_coordinates(track)
+            np.testing.assert_allclose(seen, x @ camera.rows.T, atol=1e-10 * np.abs(x).max())
+
+    def test_depth_is_not_seen(self, small):
+        x, rig, tracks, _ = small
+        for camera, track in zip(rig.cameras, tracks, strict=True):
+            on_plane = plane_projection(x, camera.normal, -camera.normal @ camera.position)
+            np.testing.assert_allclose(camera.project(on_plane), track, atol=1e-9)
+            nearer = replace(camera, position=camera.position + 3 * camera.normal)
+            np.testing.assert_allclose(nearer.project(x), track, atol=1e-9)
+
+    def test_nan_rows_pass_through(self):
+        camera = Camera(position=(0, 0, 0), normal=(1, 1, 1), scale=1, angle=0)
+        pixels = camera.project([[np.nan, 0, 0], [0, 0, 0]])
+        assert np.isnan(pixels[0]).all()
+        np.testing.assert_allclose(pixels[1], 255.5)
+
+    def test_is_frozen_and_normalises(self):
+        camera = Camera(position=[1, 2, 3], normal=[0, 3, 4])
+        np.testing.assert_allclose(camera.normal, [0, 0.6, 0.8], rtol=1e-15)
+        assert not camera.is_calibrated
+        with pytest.raises(FrozenInstanceError):
+            camera.scale = 1.0
+        with pytest.raises(ValueError, match="read-only"):
+            camera.normal[0] = 1.0
+
+    def test_does_not_share_memory_with_its_arguments(self):
+        position = np.zeros(3)
+        camera = Camera(position=position, normal=[0, 0, 1])
+        position[0] = 9
+        assert camera.position[0] == 0
+
+    def test_equality(self):
+        camera = Camera(position=[1, 2, 3], normal=[0, 3, 4], scale=1, angle=0)
+        assert camera == replace(camera)
+        assert camera != replace(camera, scale=2)
+        assert camera != "camera"
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"position": (1, 2)}, "position: must be three finite numbers, got"),
+            ({"position": (1, 2, np.inf)}, "position: must be three finite numbers, got"),
+            ({"normal": (0, 0, 0)}, "normal: must not be the zero vector, got"),
+            ({"normal": "up"}, "normal: must be three finite numbers, got 'up'"),
+            ({"angle": None}, "scale and angle: give both .* or neither .* got scale=1.0, angle=N"),
+            ({"scale": 0}, "scale: must be positive, got 0"),
+            ({"scale": -1}, "scale: must be positive, got -1"),
+            ({"scale": np.nan}, "scale: must be a finite number, got nan"),
+            ({"angle": "left"}, "angle: must be a finite number, got 'left'"),
+            (
+                {"image_size": (512, 0)},
+                r"image_size: must be two positive integers, got \(512, 0\)",
+            ),
+            ({"image_size": (512.5, 512)}, "image_size: must be two positive integers, got"),
+            ({"image_size": 512}, "image_size: must be two positive integers, got 512"),
+        ],
+    )
+    def test_bad_camera(self, change, message):
+        good = {"position": (0, 0, 0), "normal": (0, 0, 1), "scale": 1.0, "angle": 0.0}
+        with pytest.raises(ValueError, match=message):
+            Camera(**good | change)
+
+    def test_bad_points(self, small):
+        camera = small[1].cameras[0]
+        with pytest.raises(ValueError, match=r"x: must have shape \(n, 3\), got \(4, 2\)"):
+            camera.project(np.zeros((4, 2)))
+        with pytest.raises(ValueError, match="x: must be finite or NaN, got 1 infinite values"):
+            camera.project([[0, np.inf, 0]])
+        with pytest.raises(ValueError, match=r"pixels: must have shape \(n, 2\), got \(2,\)"):
+            camera.plane_coordinates([1, 2])
+
+    def test_uncalibrated_camera_cannot_project(self):
+        camera = Camera(position=(0, 0, 0), normal=(0, 0, 1))
+        for use in (camera.project, camera.plane_coordinates):
+            with pytest.raises(ValueError, match="scale and angle must be known, got None"):
+                use(np.zeros((1, 3)))
+
+
+class TestRig:
+    @given(SEEDS, st.integers(2, 5), st.booleans())
+    @settings(max_examples=30)
+    def test_file_round_trip_is_exact(self, tmp_path_factory, seed, cameras, calibrated):
+        _, rig, _, _ = scene(seed, n=5, cameras=cameras)
+        rig = rig if calibrated else rig.uncalibrated(keep=1)
+        path = tmp_path_factory.mktemp("rig") / "rig.toml"
+        rig.save(path)
+        text = path.read_text()
+        assert Rig.load(path) == rig
+        Rig.load(path).save(path)
+        assert path.read_text() == text
+
+    def test_reads_a_file_written_by_hand(self, tmp_path):
+        path = tmp_path / "rig.toml"
+        path.write_text(
+            "[[camera]]\nposition = [0, 0, 10]\nnormal = [0, 0, 1]\nscale = 1\nangle = 0.5\n"
+            "[[camera]]\nposition = [10, 0.0, 0]\nnormal = [2, 0, 0]\nimage_size = [640, 480]\n"
+        )
+        assert Rig.load(path) == Rig(
+            [
+                Camera(position=(0, 0, 10), normal=(0, 0, 1), scale=1.0, angle=0.5),
+                Camera(position=(10, 0, 0), normal=(1, 0, 0), image_size=(640, 480)),
+            ]
+        )
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("[[camera]", "must be a TOML file"),
+            ("", r"must hold \[\[camera\]\] tables and nothing else, got \[\]"),
+            ("[camera]\nnormal = [0, 0, 1]", r"must hold \[\[camera\]\] tables"),
+            ("unit = 'mm'\n[[camera]]", r"nothing else, got \['camera', 'unit'\]"),
+            ("camera = [1, 2]", "camera 0: must be a table"),
+            ("[[camera]]\nnormal = [0, 0, 1]", "camera 0: position: must be given, got keys norm"),
+            (
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1]",
+                "camera 0: normal: must be three",
+            ),
+            (
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\nzoom = 2",
+                "camera 0: zoom: must",
+            ),
+            (
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n"
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1, 0]\nscale = -1\nangle = 0",
+                "camera 1: scale: must be positive, got -1",
+            ),
+            (
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n"
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n",
+                "cameras: must have at least two independent normals",
+            ),
+        ],
+    )
+    def test_bad_file_names_file_camera_and_key(self, tmp_path, text, message):
+        path = tmp_path / "broken.toml"
+        path.write_text(text)
+        with pytest.raises(ValueError, match=rf"broken\.toml: .*{message}"):
+            Rig.load(path)
+
+    def test_missing_file(self, tmp_path):
+        with pytest.raises(FileNotFoundError, match=r"nowhere\.toml"):
+            Rig.load(tmp_path / "nowhere.toml")
+
+    @pytest.mark.parametrize("second", [(0, 0, 1), (0, 0, -1), (1e-9, 0, 1)])
+    def test_parallel_normals(self, second):
+        cameras = [Camera(position=(0, 0, 0), normal=n) for n in ((0, 0, 1), second, (0, 0, 2))]
+        with pytest.raises(ValueError, match="cameras: must have at least two independent normals"):
+            Rig(cameras)
+
+    def test_needs_two_cameras(self, small):
+        with pytest.raises(ValueError, match="cameras: must be two or more, got 1"):
+            Rig(small[1].cameras[:1])
+        with pytest.raises(ValueError, match="cameras: must all be Camera objects, got"):
+            Rig([1, 2])
+
+    def test_uncalibrated(self, small):
+        _, rig, _, _ = small
+        start = rig.uncalibrated(keep=2)
+        assert [camera.is_calibrated for camera in start.cameras] == [False, False, True]
+        assert start.cameras[2] == rig.cameras[2]
+        with pytest.raises(ValueError, match="keep: must be an index of 3 cameras, got 3"):
+            rig.uncalibrated(keep=3)
+
+    @given(SEEDS, st.sampled_from([(512, 512), (640, 480), (100, 300)]))
+    @settings(max_examples=30)
+    def test_around_fills_the_images(self, seed, image_size):
+        x = trajectory(np.random.default_rng(seed), 200)
+        rig = Rig.around(x, image_size=image_size)
+        half = (np.array(image_size) - 1) / 2
+        for camera in rig.cameras:
+            used = np.abs(camera.project(x) - half) / half
+            assert used.max() == pytest.approx(0.85, abs=1e-6)
+        normals = np.array([camera.normal for camera in rig.cameras])
+        assert np.linalg.svd(normals, compute_uv=False)[-1] > 0.3
+        up = [np.diff(c.project([[0, 0, 0], [0, 0, 1]]), axis=0)[0] for c in rig.cameras]
+        roll = [np.rad2deg(np.arctan2(-right, -down)) for right, down in up]
+        np.testing.assert_allclose(roll, [6, -9, 14], atol=1e-9)
+
+    def test_around_needs_a_scene(self):
+        with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
+            Rig.around(np.ones((5, 3)))
+
+
+class TestLearning:
+    @pytest.mark.parametrize("method", ["joint", "paper"])
+    @given(SEEDS, st.integers(0, 2))
+    @settings(max_examples=15)
+    def test_exact_pixels_give_exact_cameras(self, method, seed, keep):
+        x, truth, tracks, _ = scene(seed)
+        learned = learn_cameras(tracks, truth.uncalibrated(keep), method)
+        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+        np.testing.assert_allclose(reconstruct(tracks, learned), x, atol=1e-9 * np.ptp(x))
+
+    @given(SEEDS, st.integers(0, 2))
+    @settings(max_examples=25)
+    def test_integer_pixels_give_a_third_of_a_pixel(self, seed, keep):
+        x, truth, tracks, _ = scene(seed)
+        tracks = [np.round(track) for track in tracks]
+        learned = learn_cameras(tracks, truth.uncalibrated(keep))
+        assert rmse_in_pixels(reconstruct(tracks, learned), x, truth).max() <= 0.35
+
+    @given(SEEDS)
+    @settings(max_examples=4)
+    def test_gradient_descends_to_the_closed_form(self, seed):
+        _, truth, tracks, rng = scene(seed, n=100)
+        tracks = [track + rng.normal(size=track.shape) for track in tracks]
+        start = truth.uncalibrated()
+        descended, closed = (learn_cameras(tracks, start, m) for m in ("gradient", "paper"))
+        assert np.abs(calibration_errors(descended, closed)).max() < 1e-6
+
+    @given(SEEDS, st.integers(2, 6), st.data())
+    @settings(max_examples=20)
+    def test_any_number_of_cameras_with_missing_views(self, seed, cameras, data):
+        x, truth, tracks, rng = scene(seed, n=60, cameras=cameras)
+        known = data.draw(st.integers(1, cameras))
+        start = Rig(
+            camera if i < known else replace(camera, scale=None, angle=None)
+            for i, camera in enumerate(truth.cameras)
+        )
+        seen = rng.random((60, cameras)) < 0.8
+        seen[:4] = True
+        for i, track in enumerate(tracks):
+            track[~seen[:, i]] = np.nan
+        learned = learn_cameras(tracks, start)
+        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+        found = reconstruct(tracks, learned)
+        enough = seen.sum(axis=1) >= 2
+        np.testing.assert_allclose(found[enough], x[enough], atol=1e-8 * np.ptp(x))
+        assert np.isnan(found[~enough]).all()
+
+    def test_every_frame_may_miss_a_view(self):
+        _, truth, tracks, _ = scene(1, n=90)
+        for i, track in enumerate(tracks):
+            track[i::3] = np.nan
+        learned = learn_cameras(tracks, truth.uncalibrated())
+        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+        with pytest.raises(ValueError, match="common views must give at least 4 equations"):
+            learn_cameras(tracks, truth.uncalibrated(), "paper")
+
+    def test_joint_is_closer_and_less_biased_than_eq_4(self):
+        errors = {"joint": [], "paper": []}
+        for seed in range(30):
+            rng = np.random.default_rng(seed)
+            x = trajectory(rng, 400)
+            truth = Rig.around(x)
+            tracks = [c.project(x) + 4 * rng.normal(size=(400, 2)) for c in truth.cameras]
+            for method, found in errors.items():
+                learned = learn_cameras(tracks, truth.uncalibrated(), method)
+                found.extend(calibration_errors(learned, truth)[1:])
+        joint, paper = np.array(errors["joint"]), np.array(errors["paper"])
+        assert (np.mean(joint**2, axis=0) < np.mean(paper**2, axis=0)).all()
+        # Noise in the regressors shrinks the scale in Eq. (4), not at the least reprojection error.
+        standard_error = joint[:, 0].std() / np.sqrt(len(joint))
+        assert abs(joint[:, 0].mean()) < 3 * standard_error
+        assert paper[:, 0].mean() < -3 * standard_error
+
+    def test_known_cameras_are_kept(self, small):
+        _, truth, tracks, _ = small
+        tracks = [np.round(track) for track in tracks]
+        assert learn_cameras(tracks, truth) == truth
+        assert learn_cameras(tracks, truth.uncalibrated(1)).cameras[1] == truth.cameras[1]
+
+    def test_unit_of_length_does_not_matter(self, small):
+        _, truth, tracks, _ = small
+        tracks = [np.round(track) for track in tracks]
+        start = truth.uncalibrated()
+        small_unit = Rig(
+            replace(
+                camera,
+                position=1e6 * camera.position,
+                scale=camera.scale and 1e6 * camera.scale,
+            )
+            for camera in start.cameras
+        )
+        for one, other in zip(
+            learn_cameras(tracks, start).cameras,
+            learn_cameras(tracks, small_unit).cameras,
+            strict=True,
+        ):
+            assert other.scale == pytest.approx(1e6 * one.scale, rel=1e-7)
+            assert other.angle == pytest.approx(one.angle, abs=1e-7)
+
+
+class TestReconstruction:
+    def test_eq_6_with_equal_scales(self, small):
+        _, rig, _, rng = small
+        rig = Rig(replace(camera, scale=0.3) for camera in rig.cameras)
+        tracks = [rng.uniform(0, 511, size=(20, 2)) for _ in rig.cameras]
+        rows = np.vstack([camera.rows for camera in rig.cameras])
+        seen = [c.plane_coordinates(track) for c, track in zip(rig.cameras, tracks, strict=True)]
+        expected = np.linalg.lstsq(rows, np.hstack(seen).T)[0].T
+        np.testing.assert_allclose(reconstruct(tracks, rig), expected, atol=1e-10)
+
+    def test_no_point_is_closer_in_pixels(self, small):
+        x, rig, tracks, rng = small
+        tracks = [track + 3 * rng.normal(size=track.shape) for track in tracks]
+        best = reconstruct(tracks, rig)
+
+        def cost(points):
+            pairs = zip(rig.cameras, tracks, strict=True)
+            return sum(((c.project(points) - track) ** 2).sum(axis=1) for c, track in pairs)
+
+        for step in 0.01 * np.ptp(x) * rng.normal(size=(10, 3)):
+            assert (cost(best + step) > cost(best)).all()
+
+    def test_two_parallel_views_are_not_enough(self, small):
+        _, rig, _, rng = small
+        twin = replace(rig.cameras[0], normal=-rig.cameras[0].normal)
+        rig = Rig([rig.cameras[0], twin, rig.cameras[1]])
+        tracks = [rng.uniform(0, 511, size=(3, 2)) for _ in range(3)]
+        tracks[2][0] = np.nan
+        assert np.isnan(reconstruct(tracks, rig)).all(axis=1).tolist() == [True, False, False]
+
+    def test_residuals(self):
+        _, rig, tracks, rng = scene(3, n=4000)
+        noisy = [track + 2 * rng.normal(size=track.shape) for track in tracks]
+        noisy[1][:10] = np.nan
+        found = residuals(noisy, rig)
+        assert np.isnan(found[1][:10]).all()
+        assert np.isfinite(found[0]).all()
+        # Three of the six numbers of a frame are free; 24000 of them give the rms to 1 %.
+        rms = np.sqrt(np.nanmean(np.hstack(found) ** 2))
+        assert rms == pytest.approx(2 / np.sqrt(2), rel=0.03)
+        np.testing.assert_allclose(np.hstack(residuals(tracks, rig)), 0, atol=1e-9)
+
+    def test_uncalibrated_rig(self, small):
+        _, rig, tracks, _ = small
+        for use in (reconstruct, residuals):
+            with pytest.raises(
+                ValueError, match=r"rig: .* got cameras\[1\] without scale and angl"
+            ):
+                use(tracks, rig.uncalibrated())
+
+
+def test_calibration_errors(small):
+    _, truth, _, _ = small
+    first, *others = truth.cameras
+    off = Rig(
+        [replace(first, scale=1.01 * first.scale, angle=first.angle - 3 * np.pi + 0.1), *others]
+    )
+    expected = [[0.01, 0.1 - np.pi], [0, 0], [0, 0]]
+    np.testing.assert_allclose(calibration_errors(off, truth), expected, atol=1e-12)
+    with pytest.raises(ValueError, match="must have as many cameras as truth, got 2 and 3"):
+        calibration_errors(Rig(others), truth)
+    with pytest.raises(
+        ValueError, match=r"truth: all cameras must be calibrated, got cameras\[1\]"
+    ):
+        calibration_errors(truth, truth.uncalibrated())
+
+
+class TestBadTracks:
+    @pytest.mark.parametrize("use", [learn_cameras, reconstruct, residuals])
+    def test_wrong_tracks(self, small, use):
+        _, rig, tracks, _ = small
+        infinite = tracks[1].copy()
+        infinite[3, 0] = np.inf
+        for bad, message in [
+            (tracks[:2], "tracks: must be one per camera, got 2 for 3 cameras"),
+            ([tracks[0], tracks[1], tracks[2][:-1]], r"same number of frames, got \[40, 40, 39\]"),
+            ([tracks[0], tracks[1].T, tracks[2]], r"tracks\[1\]: must have shape \(n, 2\), got"),
+            ([tracks[0], infinite, tracks[2]], r"tracks\[1\]: must be finite or NaN, got 1 inf"),
+            ([tracks[0], tracks[1], np.nan * tracks[2]], r"tracks\[2\]: must see the target in so"),
+        ]:
+            with pytest.raises(ValueError, match=message):
+                use(bad, rig)
+
+    def test_no_calibrated_camera(self, small):
+        _, rig, tracks, _ = small
+        rig = Rig(replace(camera, scale=None, angle=None) for camera in rig.cameras)
+        with pytest.raises(ValueError, match="at least one camera must be calibrated .* none of 3"):
+            learn_cameras(tracks, rig)
+
+    def test_unknown_method(self, small):
+        _, rig, tracks, _ = small
+        with pytest.raises(ValueError, match="method: must be one of .* got 'magic'"):
+            learn_cameras(tracks, rig, method="magic")
+
+    def test_too_few_common_frames(self, small):
+        _, rig, tracks, _ = small
+        start = rig.uncalibrated()
+        one = [track[:1] for track in tracks]
+        with pytest.raises(
+            ValueError, match=r"at least 4 equations .* of cameras\[1\] and .* got 3"
+        ):
+            learn_cameras(one, start)
+        tracks[0][20:] = np.nan
+        tracks[1][20:] = np.nan
+        tracks[2][:20] = np.nan
+        with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
+            learn_cameras(tracks, start)
+
+    @pytest.mark.parametrize("noise", [0, 0.3, 3])
+    @pytest.mark.parametrize("method", ["joint", "paper", "gradient"])
+    def test_static_target(self, small, noise, method):
+        _, rig, tracks, rng = small
+        still = [track[:1] + noise * rng.normal(size=track.shape) for track in tracks]
+        with pytest.raises(
+            ValueError, match=r"motion must determine .* cameras\[1\] and cameras\[2"
+        ):
+            learn_cameras(still, rig.uncalibrated(), method)
+
+    def test_motion_that_one_camera_does_not_see(self, small):
+        # Motion along the line of sight of camera 2 leaves it one equation short.
+        x, rig, _, _ = small
+        line = x[:1] + np.linspace(-1, 1, 40)[:, None] * rig.cameras[2].normal
+        start = Rig([*rig.cameras[:2], replace(rig.cameras[2], scale=None, angle=None)])
+        tracks = [camera.project(line) for camera in rig.cameras]
+        centre = replace(start.cameras[2], position=x[0])
+        tracks[2][:] = 255.5
+        with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
+            learn_cameras(tracks, Rig([*start.cameras[:2], centre]))
+
+    def test_eq_4_needs_independent_unknown_cameras(self, small):
+        _, rig, tracks, _ = small
+        twin = replace(rig.cameras[1], normal=-rig.cameras[1].normal)
+        rig = Rig([rig.cameras[0], rig.cameras[1], twin])
+        with pytest.raises(ValueError, match="'paper' needs two independent normals among the unc"):
+            learn_cameras(tracks, rig.uncalibrated(), "paper")
+
+    def test_joint_learns_parallel_unknown_cameras(self, small):
+        x, rig, _, _ = small
+        rig = Rig([rig.cameras[0], rig.cameras[1], replace(rig.cameras[1], angle=0.5)])
+        tracks = [camera.project(x) for camera in rig.cameras]
+        learned = learn_cameras(tracks, rig.uncalibrated())
+        assert np.abs(calibration_errors(learned, rig)).max() < 1e-9

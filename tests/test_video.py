@@ -1,0 +1,227 @@
+"""Rendering against exact geometry, and video files by round trip and bad input."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidsindy_lite.video import (
+    BACKGROUNDS,
+    COLOURS,
+    SHAPES,
+    Scene,
+    read_video,
+    render,
+    render_video,
+    video_info,
+    write_video,
+)
+
+SMALL = (96, 80)
+
+
+def drawn_centroid_and_area(frame, empty, colour):
+    """Centroid and area of the target, from the exact mixture of target and background."""
+    contrast = np.array(COLOURS[colour], float) - empty
+    alpha = ((frame.astype(float) - empty) * contrast).sum(-1) / (contrast**2).sum(-1)
+    area = alpha.sum()
+    return np.array([alpha.sum(0) @ np.arange(alpha.shape[1]),
+                     alpha.sum(1) @ np.arange(alpha.shape[0])]) / area, area
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    shape=st.sampled_from(SHAPES), size=st.floats(8, 40), u=st.floats(35, 60), v=st.floats(35, 45),
+    seed=st.integers(0, 2**20),
+)
+def test_drawn_centroid_and_area(shape, size, u, v, seed):
+    scene = Scene("plain", shape, size, tumbling=1, shape_seed=seed, image_size=SMALL)
+    empty, frame = render([[np.nan, np.nan], [u, v]], scene, seed)
+    centroid, area = drawn_centroid_and_area(frame, empty, scene.colour)
+    assert centroid == pytest.approx([u, v], abs=0.02)
+    assert area == pytest.approx(np.pi * size**2 / 4, rel=0.01)
+
+
+def test_size_variation_keeps_the_centroid():
+    track = np.tile([48.3, 40.6], (40, 1))
+    scene = Scene("plain", "irregular", 24, size_variation=0.4, image_size=SMALL)
+    empty = next(render([[np.nan, np.nan]], scene))
+    looks = [drawn_centroid_and_area(f, empty, "red") for f in render(track, scene)]
+    assert np.abs([c - track[0] for c, _ in looks]).max() < 0.02
+    areas = np.array([a for _, a in looks])
+    assert areas.max() / areas.min() > 3
+
+
+@pytest.mark.parametrize("background", BACKGROUNDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_target_stands_out_of_every_background(background, seed):
+    scene = Scene(background)
+    frame = next(render([[np.nan, np.nan]], scene, seed)).astype(float)
+    for colour in COLOURS.values():
+        distance = np.linalg.norm(frame - colour, axis=-1)
+        assert distance.min() > 60
+        assert np.median(distance) > 90
+
+
+def test_target_behind_an_occluder_and_outside_leaves_no_trace():
+    scene = Scene("wood", size=10, occluders=((40, 10, 20, 60),), image_size=SMALL)
+    empty, behind, outside, partly = render(
+        [[np.nan, np.nan], [50, 40], [-30, 400], [40, 40]], scene, 1
+    )
+    assert np.array_equal(behind, empty)
+    assert np.array_equal(outside, empty)
+    changed = np.any(partly != empty, axis=-1)
+    assert changed[:, :40].any()
+    assert not changed[:, 40:60].any()
+
+
+def test_target_across_the_border_is_clipped():
+    scene = Scene("plain", size=20, image_size=SMALL)
+    empty, corner = render([[np.nan, np.nan], [0, 0]], scene)
+    changed = np.any(corner != empty, axis=-1)
+    assert changed[0, 0]
+    assert not changed[15:].any()
+    assert not changed[:, 15:].any()
+
+
+def test_noise_has_the_variance_asked_for():
+    scene = Scene("plain", noise_variance=0.001, image_size=SMALL)
+    clean = next(render([[np.nan, np.nan]], Scene("plain", image_size=SMALL)))
+    noisy = list(render(np.full((5, 2), np.nan), scene))
+    assert np.var((np.array(noisy) - clean.astype(float)) / 255) == pytest.approx(0.001, rel=0.05)
+    assert not np.array_equal(noisy[0], noisy[1])
+
+
+def test_a_seed_gives_the_same_frames_and_another_seed_others():
+    scene = Scene.random(7, image_size=SMALL, noise_variance=0.01)
+    assert scene == Scene.random(np.random.default_rng(7), image_size=SMALL, noise_variance=0.01)
+    track = [[40.0, 40.0], [50.0, 42.0]]
+    first, again, other = (list(render(track, scene, seed)) for seed in (1, 1, 2))
+    assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
+    assert not np.array_equal(first[0], other[0])
+
+
+@pytest.mark.parametrize("suffix", [".mkv", ".avi"])
+@pytest.mark.parametrize("size", [SMALL, (128, 96), (102, 66)])
+def test_lossless_files_are_exact(tmp_path, suffix, size):
+    rng = np.random.default_rng(0)
+    frames = [rng.integers(0, 256, (size[1], size[0], 3), np.uint8) for _ in range(5)]
+    path = write_video(tmp_path / f"clip{suffix}", frames, fps=30)
+    back = list(read_video(path))
+    assert len(back) == 5
+    assert all(np.array_equal(a, b) for a, b in zip(frames, back, strict=True))
+    assert video_info(path) == (5, pytest.approx(30), size)
+
+
+@pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mp4v"), ("a.avi", "MJPG")])
+def test_lossy_files_are_close(tmp_path, name, codec):
+    frames = list(render(np.full((4, 2), 45.0), Scene("sky", image_size=SMALL)))
+    back = list(read_video(write_video(tmp_path / name, frames, codec=codec)))
+    assert len(back) == 4
+    assert 0 < np.abs(np.array(back, float) - np.array(frames, float)).mean() < 6
+
+
+def test_render_video_writes_what_render_yields(tmp_path):
+    scene = Scene("hills", turns=1, image_size=SMALL)
+    track = np.linspace([20, 20], [70, 60], 6)
+    path = render_video(tmp_path / "clip.mkv", track, scene, seed=3)
+    for a, b in zip(read_video(path), render(track, scene, 3), strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_nothing_half_written_is_left(tmp_path):
+    def frames():
+        yield np.zeros((64, 64, 3), np.uint8)
+        raise RuntimeError("interrupted")
+
+    with pytest.raises(RuntimeError, match="interrupted"):
+        write_video(tmp_path / "clip.mkv", frames())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_write_keeps_the_old_file(tmp_path):
+    path = write_video(tmp_path / "clip.mkv", [np.full((64, 64, 3), 7, np.uint8)])
+    with pytest.raises(ValueError, match="at least one frame"):
+        write_video(path, [])
+    assert next(read_video(path)).mean() == 7
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("background", "moon"), ("shape", "cube"), ("colour", "teal"), ("size", 2),
+        ("size", np.nan),
+        ("turns", np.inf), ("tumbling", -1), ("size_variation", 0.9), ("noise_variance", -0.1),
+        ("shape_seed", -1), ("image_size", (10, 10)), ("image_size", (512,)),
+        ("occluders", ((1, 2, 3),)), ("occluders", ((500, 0, 50, 50),)),
+        ("occluders", ((0, 0, 1, 50),)),
+    ],
+)
+def test_scene_rejects(field, value):
+    with pytest.raises(ValueError, match=f"^{field}: must|^{field}: each must"):
+        Scene(**{field: value})
+
+
+@pytest.mark.parametrize(
+    ("track", "message"),
+    [
+        (np.zeros((4, 3)), r"track: must have shape \(n, 2\)"),
+        (np.zeros((0, 2)), r"track: must have shape \(n, 2\)"),
+        ([[np.inf, 0]], "track: must be finite or NaN"),
+    ],
+)
+def test_render_rejects(track, message):
+    with pytest.raises(ValueError, match=message):
+        render(track, Scene())
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "error", "message"),
+    [
+        ("clip.txt", {}, ValueError, "path: must end in .mkv or .avi"),
+        ("clip.mkv", {"codec": "XVID"}, ValueError, "codec: must be one of"),
+        ("clip.mkv", {"codec": "mp4v"}, ValueError, "path: must end in .mp4"),
+        ("clip.mkv", {"fps": 0}, ValueError, "fps: must be finite and positive, got 0"),
+        ("none/clip.mkv", {}, FileNotFoundError, "path: the folder must exist"),
+    ],
+)
+def test_write_video_rejects(tmp_path, name, options, error, message):
+    with pytest.raises(error, match=message):
+        write_video(tmp_path / name, [np.zeros((64, 64, 3), np.uint8)], **options)
+
+
+@pytest.mark.parametrize(
+    "frame", [np.zeros((64, 64, 3)), np.zeros((64, 64), np.uint8), np.zeros((64, 80, 3), np.uint8)]
+)
+def test_write_video_rejects_frames(tmp_path, frame):
+    with pytest.raises(ValueError, match="^frames: .* at frame 1"):
+        write_video(tmp_path / "clip.mkv", [np.zeros((64, 64, 3), np.uint8), frame])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("shape", [(64, 65, 3), (65, 64, 3)])
+def test_write_video_rejects_odd_sizes(tmp_path, shape):
+    with pytest.raises(ValueError, match="frames: width and height must be even"):
+        write_video(tmp_path / "clip.mkv", [np.zeros(shape, np.uint8)])
+
+
+@pytest.mark.parametrize("read", [read_video, video_info])
+def test_reading_rejects(tmp_path, read):
+    with pytest.raises(FileNotFoundError, match="path: no such video file"):
+        read(tmp_path / "missing.mkv")
+    empty = tmp_path / "empty.mkv"
+    empty.touch()
+    with pytest.raises(ValueError, match="got the empty file"):
+        read(empty)
+    text = tmp_path / "text.mkv"
+    text.write_text("this is no video\n" * 100)
+    with pytest.raises(ValueError, match="path: must be a video file that OpenCV can read"):
+        read(text)
+    headers = tmp_path / "headers.avi"
+    writer = cv2.VideoWriter(
+        str(headers), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"MJPG"), 25, (64, 64)
+    )
+    writer.release()
+    with pytest.raises(ValueError, match=f"path: must .* '{headers}'"):
+        read(headers)

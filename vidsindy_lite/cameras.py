@@ -1,0 +1,697 @@
+"""Cameras: from 3D to pixels, and from several pixel tracks back to 3D.
+
+A `Camera` is scaled orthographic. With the pixel (u to the right, v down) measured from the middle
+of the image, x_c = (u - (W-1)/2, (H-1)/2 - v), it sees
+
+    s T(theta) x_c + Delta_c = R^- x,        T = [[cos, sin], [-sin, cos]],
+
+where R^- are the first two rows of the rotation that takes the unit normal to e_z and
+Delta_c = R^- position. Position and normal are measured; scale s (scene units per pixel) and
+in-plane angle theta are given for at least one camera of a `Rig` and learned for the others
+(`learn_cameras`). `reconstruct` then turns the tracks into a trajectory, and `residuals` says by
+how many pixels it misses them.
+
+A track is an (n, 2) array of pixels, one row per frame; a row holding NaN means "not seen".
+
+Paper: Section "Coordinates Transformation", Eq. (4)-(6).
+"""
+
+import tomllib
+from dataclasses import dataclass, fields, replace
+from numbers import Integral, Real
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import null_space
+from scipy.optimize import least_squares
+
+from .geometry import in_plane_offset, rotation_to_z
+
+METHODS = ("joint", "paper", "gradient")
+
+# Normals closer to parallel than this (sine of their angle) count as one.
+_PARALLEL = 1e-6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Camera:
+    """A scaled orthographic camera.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        The point of the reference frame that is seen in the middle of the image, or any other
+        point on the same line of sight. Scene units.
+    normal : array_like, shape (3,)
+        Normal of the view plane, pointing from the scene to the camera. Stored with unit length.
+    scale : float, optional
+        s, scene units per pixel. None: to be learned.
+    angle : float, optional
+        theta, in-plane angle in radians. None: to be learned, together with the scale.
+    image_size : tuple of int, default (512, 512)
+        Width and height in pixels.
+
+    Raises
+    ------
+    ValueError
+        If an argument has a wrong shape, is not finite, or only one of scale and angle is given.
+    """
+
+    position: np.ndarray
+    normal: np.ndarray
+    scale: float | None = None
+    angle: float | None = None
+    image_size: tuple[int, int] = (512, 512)
+
+    def __post_init__(self):
+        normal = _vector("normal", self.normal)
+        length = np.linalg.norm(normal)
+        if length == 0:
+            raise ValueError(f"normal: must not be the zero vector, got {self.normal}")
+        if abs(length - 1) > 1e-15:  # a unit vector stays as it is, so that files round-trip
+            normal = normal / length
+        position = _vector("position", self.position)
+        position.flags.writeable = normal.flags.writeable = False
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "normal", normal)
+
+        if (self.scale is None) != (self.angle is None):
+            raise ValueError(
+                "scale and angle: give both (calibrated) or neither (to be learned), got "
+                f"scale={self.scale}, angle={self.angle}"
+            )
+        if self.is_calibrated:
+            scale, angle = _number("scale", self.scale), _number("angle", self.angle)
+            if scale <= 0:
+                raise ValueError(f"scale: must be positive, got {scale}")
+            object.__setattr__(self, "scale", scale)
+            object.__setattr__(self, "angle", angle)
+
+        size = self.image_size
+        if np.shape(size) != (2,) or any(not isinstance(n, Integral) or n < 1 for n in size):
+            raise ValueError(f"image_size: must be two positive integers, got {size}")
+        object.__setattr__(self, "image_size", (int(size[0]), int(size[1])))
+
+    def __eq__(self, other):
+        if not isinstance(other, Camera):
+            return NotImplemented
+        return _to_table(self) == _to_table(other)
+
+    @property
+    def is_calibrated(self):
+        """Whether scale and angle are known."""
+        return self.scale is not None
+
+    @property
+    def rows(self):
+        """R^-, shape (2, 3): the plane's axes, in which R^- x are in-plane coordinates."""
+        return rotation_to_z(self.normal)[:2]
+
+    @property
+    def offset(self):
+        """Delta_c = R^- position, shape (2,), scene units."""
+        return in_plane_offset(self.position, self.normal)
+
+    def project(self, x):
+        """Pixels at which points are seen.
+
+        Parameters
+        ----------
+        x : array_like, shape (n, 3)
+            Points in the reference frame, scene units. A row holding NaN gives NaN pixels.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Pixels (u to the right, v down), the centre of the first pixel being (0, 0).
+
+        Raises
+        ------
+        ValueError
+            If the camera is not calibrated, or x has a wrong shape or an infinite value.
+        """
+        self._require_calibrated()
+        x = _rows_of("x", x, 3)
+        plane = (x @ self.rows.T - self.offset) / self.scale
+        centred = plane @ _turn(self.angle)  # row vectors: (T^-1 w)^T = w^T T
+        width, height = self.image_size
+        return np.column_stack(((width - 1) / 2 + centred[:, 0], (height - 1) / 2 - centred[:, 1]))
+
+    def plane_coordinates(self, pixels):
+        """In-plane coordinates R^- x = s T(theta) x_c + Delta_c of what is seen at the pixels.
+
+        Parameters
+        ----------
+        pixels : array_like, shape (n, 2)
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Scene units; NaN rows pass through.
+
+        Raises
+        ------
+        ValueError
+            If the camera is not calibrated, or pixels has a wrong shape or an infinite value.
+        """
+        self._require_calibrated()
+        return self.scale * self.centred(pixels) @ _turn(self.angle).T + self.offset
+
+    def centred(self, pixels):
+        """Pixels measured from the middle of the image, right and *up*: x_c, shape (n, 2)."""
+        pixels = _rows_of("pixels", pixels, 2)
+        width, height = self.image_size
+        return np.column_stack((pixels[:, 0] - (width - 1) / 2, (height - 1) / 2 - pixels[:, 1]))
+
+    def _require_calibrated(self):
+        if not self.is_calibrated:
+            raise ValueError("camera: scale and angle must be known, got None; see learn_cameras")
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Cameras that watch one scene in one reference frame.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        Two or more, with at least two normals that are not parallel.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two cameras or fewer than two independent normals.
+    """
+
+    cameras: tuple[Camera, ...]
+
+    def __post_init__(self):
+        cameras = tuple(self.cameras)
+        object.__setattr__(self, "cameras", cameras)
+        if not all(isinstance(camera, Camera) for camera in cameras):
+            raise ValueError(f"cameras: must all be Camera objects, got {cameras}")
+        if len(cameras) < 2:
+            raise ValueError(f"cameras: must be two or more, got {len(cameras)}")
+        if not _independent(cameras):
+            raise ValueError(
+                "cameras: must have at least two independent normals, got parallel ones "
+                f"{[camera.normal.tolist() for camera in cameras]}"
+            )
+
+    @classmethod
+    def around(cls, x, image_size=(512, 512)):
+        """Three calibrated cameras around a scene, which fills most of every image.
+
+        The cameras stand 120 degrees apart in azimuth, look 15 to 25 degrees down, and differ in
+        scale and in-plane angle; z is up in the images but for a roll of 6 to 14 degrees.
+
+        Parameters
+        ----------
+        x : array_like, shape (n, 3)
+            Points of the scene, e.g. a trajectory; NaN rows are ignored.
+        image_size : tuple of int, default (512, 512)
+            Width and height in pixels.
+
+        Returns
+        -------
+        Rig
+
+        Raises
+        ------
+        ValueError
+            If x has a wrong shape or all its points coincide.
+        """
+        x = _rows_of("x", x, 3)
+        low, high = np.nanmin(x, axis=0), np.nanmax(x, axis=0)
+        middle, reach = (low + high) / 2, np.linalg.norm(high - low)
+        if not reach > 0:
+            raise ValueError(f"x: must hold at least two different points, got extent {reach}")
+        half = (np.array(image_size) - 1) / 2
+        cameras = []
+        for azimuth, elevation, roll in np.deg2rad([[20, 20, 6], [140, 15, -9], [260, 25, 14]]):
+            across = np.array([np.cos(azimuth), np.sin(azimuth), 0])
+            normal = np.cos(elevation) * across + np.sin(elevation) * np.array([0, 0, 1])
+            camera = Camera(
+                position=middle + reach * normal,
+                normal=normal,
+                scale=1.0,
+                # Without the roll, R^- e_z would be straight up in the image.
+                angle=np.arctan2(-np.cos(azimuth), -np.sin(azimuth)) + roll,
+                image_size=image_size,
+            )
+            extent = np.nanmax(np.abs(camera.centred(camera.project(x))) / half)
+            # The outermost point comes to 85 % of the half image: room for the target's size.
+            cameras.append(replace(camera, scale=extent / 0.85))
+        return cls(cameras)
+
+    @classmethod
+    def load(cls, path):
+        """Read a rig from a TOML file, one [[camera]] table per camera.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Returns
+        -------
+        Rig
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file.
+        ValueError
+            If the file is not TOML or does not describe a rig; names file, camera and key.
+        """
+        try:
+            content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ValueError(f"{path}: must be a TOML file: {error}") from error
+        tables = content.pop("camera", None)
+        if content or not isinstance(tables, list):
+            found = sorted([*content, "camera"] if tables is not None else content)
+            raise ValueError(f"{path}: must hold [[camera]] tables and nothing else, got {found}")
+        try:
+            return cls([_from_table(i, table) for i, table in enumerate(tables)])
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from error
+
+    def save(self, path):
+        """Write the rig to a TOML file, from which `load` gives back exactly this rig.
+
+        Parameters
+        ----------
+        path : path-like
+            Overwritten if it exists.
+        """
+        lines = ["# Cameras of a rig; scale in scene units per pixel, angle in radians."]
+        for camera in self.cameras:
+            lines += ["", "[[camera]]"]
+            # repr of a float is its shortest exact decimal form, and valid TOML.
+            lines += [f"{key} = {value!r}" for key, value in _to_table(camera).items()]
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def uncalibrated(self, keep=0):
+        """The same rig with scale and angle forgotten in all cameras but one.
+
+        Parameters
+        ----------
+        keep : int, default 0
+            Index of the camera that stays as it is.
+
+        Returns
+        -------
+        Rig
+        """
+        if not 0 <= keep < len(self.cameras):
+            raise ValueError(f"keep: must be an index of {len(self.cameras)} cameras, got {keep}")
+        return Rig(
+            camera if i == keep else replace(camera, scale=None, angle=None)
+            for i, camera in enumerate(self.cameras)
+        )
+
+
+def learn_cameras(tracks, rig, method="joint"):
+    """Learn scale and angle of the uncalibrated cameras from tracks of one moving target.
+
+    In (s cos theta, s sin theta) of the unknown cameras, the condition that all views agree on one
+    point is linear, so no starting guess is needed.
+
+    * "paper": Eq. (4), closed form. The uncalibrated views predict the calibrated ones; uses the
+      frames in which all cameras see the target.
+    * "joint": every equation that does not hold the unknown point, among them the epipolar
+      constraint between uncalibrated cameras that Eq. (4) leaves out, and every frame with two or
+      more views; the closed form is then refined to the smallest reprojection error in pixels,
+      which removes the bias that pixel noise causes in a scale.
+    * "gradient": Eq. (4) in (s, theta) as in the paper, by L-BFGS in PyTorch; for comparison.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n, 2)
+        One track per camera of the rig, frame by frame the same instants; NaN = not seen.
+    rig : Rig
+        At least one calibrated camera. Calibrated cameras stay as they are.
+    method : {"joint", "paper", "gradient"}
+
+    Returns
+    -------
+    Rig
+        The same cameras, all calibrated.
+
+    Raises
+    ------
+    ValueError
+        If the tracks do not match the rig, no camera is calibrated, or the target's motion does
+        not determine a camera's scale and angle.
+    """
+    if method not in METHODS:
+        raise ValueError(f"method: must be one of {METHODS}, got {method!r}")
+    tracks = _check_tracks(tracks, rig)
+    calibrated = np.array([camera.is_calibrated for camera in rig.cameras])
+    unknown = np.flatnonzero(~calibrated)
+    if not calibrated.any():
+        raise ValueError(
+            "rig: at least one camera must be calibrated (scale and angle given) to learn the "
+            f"others, got none of {len(rig.cameras)}"
+        )
+    if unknown.size == 0:
+        return rig
+    if method != "joint" and not _independent([rig.cameras[i] for i in unknown]):
+        raise ValueError(
+            f"rig: method {method!r} needs two independent normals among the uncalibrated "
+            f"cameras, got {[rig.cameras[i].normal.tolist() for i in unknown]}; use 'joint'"
+        )
+    design, target = _agreement(tracks, rig, unknown, epipolar=method == "joint")
+    turned = _solve(design, target, rig, unknown)
+    if method == "joint":
+        turned = _refine(tracks, rig, unknown, turned)
+    elif method == "gradient":
+        turned = _descend(design, target, rig, unknown)
+    return _calibrate(rig, unknown, turned)
+
+
+def reconstruct(tracks, rig):
+    """3D trajectory from the tracks of a calibrated rig, by least squares in pixels.
+
+    Paper: Eq. (6), whose "inverse" of a 6 x 3 matrix is the least-squares solution; here with any
+    number of cameras, and each view weighted by 1 / scale so that all count in pixels.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n, 2)
+        One track per camera of the rig; NaN = not seen.
+    rig : Rig
+        All cameras calibrated.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Scene units; NaN where fewer than two views with independent normals see the target.
+
+    Raises
+    ------
+    ValueError
+        If the tracks do not match the rig or a camera is not calibrated.
+    """
+    tracks = _check_tracks(tracks, rig)
+    _require_all_calibrated("rig", rig.cameras)
+    x = np.full((len(tracks[0]), 3), np.nan)
+    for views, frames in _visibility(tracks):
+        cameras = [rig.cameras[i] for i in views]
+        if not _independent(cameras):
+            continue
+        rows = np.vstack([camera.rows / camera.scale for camera in cameras])
+        seen = np.hstack(
+            [
+                camera.plane_coordinates(tracks[i][frames]) / camera.scale
+                for i, camera in zip(views, cameras, strict=True)
+            ]
+        )
+        x[frames] = seen @ np.linalg.pinv(rows).T
+    return x
+
+
+def residuals(tracks, rig):
+    """Reprojection residuals: by how many pixels the reconstructed target misses each track.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n, 2)
+        One track per camera of the rig; NaN = not seen.
+    rig : Rig
+        All cameras calibrated.
+
+    Returns
+    -------
+    list of ndarray, shape (n, 2)
+        Track minus projection, pixels, one array per camera; NaN where the camera does not see
+        the target or it cannot be reconstructed. Of the six numbers of a frame three are used up
+        by the point itself, so pixel noise of standard deviation sigma leaves sigma / sqrt(2).
+
+    Raises
+    ------
+    ValueError
+        If the tracks do not match the rig or a camera is not calibrated.
+    """
+    tracks = _check_tracks(tracks, rig)
+    x = reconstruct(tracks, rig)
+    return [track - camera.project(x) for track, camera in zip(tracks, rig.cameras, strict=True)]
+
+
+def calibration_errors(rig, truth):
+    """How far learned cameras are from the true ones.
+
+    Parameters
+    ----------
+    rig, truth : Rig
+        Both with all cameras calibrated, in the same order.
+
+    Returns
+    -------
+    ndarray, shape (m, 2)
+        For each camera the relative error of its scale and the error of its angle in radians,
+        between -pi and pi.
+
+    Raises
+    ------
+    ValueError
+        If the rigs differ in length or a camera is not calibrated.
+    """
+    if len(rig.cameras) != len(truth.cameras):
+        raise ValueError(
+            f"rig: must have as many cameras as truth, got {len(rig.cameras)} "
+            f"and {len(truth.cameras)}"
+        )
+    for name, cameras in (("rig", rig.cameras), ("truth", truth.cameras)):
+        _require_all_calibrated(name, cameras)
+    return np.array(
+        [
+            (a.scale / b.scale - 1, np.angle(np.exp(1j * (a.angle - b.angle))))
+            for a, b in zip(rig.cameras, truth.cameras, strict=True)
+        ]
+    )
+
+
+def _agreement(tracks, rig, unknown, epipolar):
+    """Linear equations design @ p = target for p = (s cos theta, s sin theta) of unknown cameras.
+
+    The stacked in-plane coordinates of the views of a frame equal [R^-_1; R^-_2; ...] x. Columns Q
+    with Q^T [R^-_1; ...] = 0 take the unknown point out: `epipolar` keeps all of them, Eq. (4)
+    only those by which the unknown cameras predict the known ones.
+    """
+    designs, targets = [], []
+    for views, frames in _visibility(tracks):
+        rows = [rig.cameras[i].rows for i in views]
+        if epipolar:
+            annihilator = null_space(np.vstack(rows).T, rcond=_PARALLEL)
+        elif len(views) == len(tracks):
+            annihilator = _prediction(rows, np.isin(views, unknown))
+        else:
+            continue
+        blocks = np.split(annihilator, len(views))
+        design = np.zeros((len(frames), annihilator.shape[1], unknown.size, 2))
+        target = np.zeros(design.shape[:2])
+        for i, block in zip(views, blocks, strict=True):
+            camera, pixels = rig.cameras[i], tracks[i][frames]
+            if camera.is_calibrated:
+                target -= camera.plane_coordinates(pixels) @ block
+            else:
+                # s T(theta) (X, Y) = [[X, Y], [Y, -X]] p
+                x, y = camera.centred(pixels).T
+                matrix = np.array([[x, y], [y, -x]])
+                design[:, :, unknown == i] = np.einsum("abf,aq->fqb", matrix, block)[:, :, None]
+                target -= camera.offset @ block
+        designs.append(design.reshape(-1, 2 * unknown.size))
+        targets.append(target.ravel())
+    if not designs:
+        return np.zeros((0, 2 * unknown.size)), np.zeros(0)
+    return np.vstack(designs), np.concatenate(targets)
+
+
+def _prediction(rows, is_unknown):
+    """Columns Q of Eq. (4): R^-_known pinv(R^-_unknown) y_unknown - y_known = 0."""
+    known = np.vstack([r for r, flag in zip(rows, is_unknown, strict=True) if not flag])
+    others = np.vstack([r for r, flag in zip(rows, is_unknown, strict=True) if flag])
+    annihilator = np.zeros((2 * len(rows), len(known)))
+    flags = np.repeat(is_unknown, 2)
+    annihilator[flags] = (known @ np.linalg.pinv(others)).T
+    annihilator[~flags] = -np.eye(len(known))
+    return annihilator
+
+
+def _solve(design, target, rig, unknown):
+    """Least-squares s exp(i theta), or an error that names the cameras the tracks do not determine.
+
+    The design is in pixels: a singular value over sqrt(n) is the motion, in pixels rms, that tells
+    one combination of the parameters. Noise on a target that does not move makes 0.6-1.4 times the
+    misfit of it, so twice the misfit is asked for.
+    """
+    if len(design) < design.shape[1]:
+        raise ValueError(
+            f"tracks: frames with common views must give at least {design.shape[1]} equations "
+            f"for scale and angle of {_names(unknown)}, got {len(design)}"
+        )
+    solution = np.linalg.lstsq(design, target)[0]
+    scale = np.mean([camera.scale for camera in rig.cameras if camera.is_calibrated])
+    misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / scale
+    _, singular, right = np.linalg.svd(design, full_matrices=False)
+    motion = singular / np.sqrt(len(design))
+    weak = motion <= max(1e-9 * motion[0], 2 * misfit)
+    if weak.any():
+        share = np.linalg.norm(right[weak].reshape(weak.sum(), -1, 2), axis=(0, 2))
+        raise ValueError(
+            f"tracks: the target's motion must determine scale and angle of "
+            f"{_names(unknown[share > 0.1])}, got {motion[-1]:.2g} px rms of telling motion "
+            f"against a misfit of {misfit:.2g} px (a static target, or a wrong position or normal)"
+        )
+    return solution.view(complex)  # s exp(i theta)
+
+
+def _refine(tracks, rig, unknown, turned):
+    """Smallest reprojection error in pixels, searched in log(s exp(i theta)) = log s + i theta."""
+
+    def error(parameters):
+        candidate = _calibrate(rig, unknown, np.exp(parameters.view(complex)))
+        missed = np.hstack(residuals(tracks, candidate))
+        return missed[np.isfinite(missed)]
+
+    fit = least_squares(error, np.log(turned).view(float), ftol=1e-15, xtol=1e-15, gtol=1e-15)
+    return np.exp(fit.x.view(complex))
+
+
+def _descend(design, target, rig, unknown):
+    """Eq. (4) by gradients: L-BFGS in (s, theta) from the calibrated camera's scale and no turn."""
+    import torch  # slow to import, and only this comparison needs it
+
+    start = np.mean([camera.scale for camera in rig.cameras if camera.is_calibrated])
+    unit = np.abs(design).mean()  # makes the unknowns of order one
+    design, target = torch.tensor(design / unit), torch.tensor(target / (unit * start))
+    scale = torch.ones(unknown.size, dtype=torch.float64, requires_grad=True)
+    angle = torch.zeros(unknown.size, dtype=torch.float64, requires_grad=True)
+    optimiser = torch.optim.LBFGS(
+        [scale, angle],
+        max_iter=500,
+        tolerance_grad=1e-15,
+        tolerance_change=1e-18,
+        line_search_fn="strong_wolfe",
+    )
+
+    def loss():
+        optimiser.zero_grad()
+        turned = torch.stack((scale * torch.cos(angle), scale * torch.sin(angle)), dim=1)
+        value = torch.mean((design @ turned.ravel() - target) ** 2)
+        value.backward()
+        return value
+
+    optimiser.step(loss)
+    return start * scale.detach().numpy() * np.exp(1j * angle.detach().numpy())
+
+
+def _calibrate(rig, unknown, turned):
+    """The rig with s exp(i theta) = `turned` written into its unknown cameras."""
+    cameras = list(rig.cameras)
+    for i, value in zip(unknown, turned, strict=True):
+        cameras[i] = replace(cameras[i], scale=abs(value), angle=np.angle(value))
+    return Rig(cameras)
+
+
+def _turn(angle):
+    """T(theta) of the paper."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, s], [-s, c]])
+
+
+def _visibility(tracks):
+    """Groups of frames with the same two or more views: pairs (cameras, frames) of indices."""
+    seen = np.column_stack([np.isfinite(track).all(axis=1) for track in tracks])
+    patterns, group = np.unique(seen, axis=0, return_inverse=True)
+    return [
+        (np.flatnonzero(pattern), np.flatnonzero(group == g))
+        for g, pattern in enumerate(patterns)
+        if pattern.sum() >= 2
+    ]
+
+
+def _independent(cameras):
+    """Whether at least two of the normals are not parallel."""
+    normals = np.array([camera.normal for camera in cameras])
+    return len(normals) >= 2 and np.linalg.svd(normals, compute_uv=False)[1] > _PARALLEL
+
+
+def _require_all_calibrated(name, cameras):
+    for i, camera in enumerate(cameras):
+        if not camera.is_calibrated:
+            raise ValueError(
+                f"{name}: all cameras must be calibrated, got cameras[{i}] without scale and "
+                "angle; use learn_cameras first"
+            )
+
+
+def _check_tracks(tracks, rig):
+    if len(tracks) != len(rig.cameras):
+        raise ValueError(
+            f"tracks: must be one per camera, got {len(tracks)} for {len(rig.cameras)} cameras"
+        )
+    tracks = [_rows_of(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    lengths = [len(track) for track in tracks]
+    if len(set(lengths)) > 1:
+        raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
+    for i, track in enumerate(tracks):
+        if not np.isfinite(track).all(axis=1).any():
+            raise ValueError(f"tracks[{i}]: must see the target in some frame, got only NaN rows")
+    return tracks
+
+
+def _rows_of(name, value, width):
+    value = np.asarray(value, dtype=float)
+    if value.ndim != 2 or value.shape[1] != width:
+        raise ValueError(f"{name}: must have shape (n, {width}), got {value.shape}")
+    if np.isinf(value).any():
+        raise ValueError(
+            f"{name}: must be finite or NaN, got {np.isinf(value).sum()} infinite values"
+        )
+    return value
+
+
+def _vector(name, value):
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"{name}: must be three finite numbers, got {value!r}")
+    return array
+
+
+def _number(name, value):
+    if not isinstance(value, Real) or not np.isfinite(value):
+        raise ValueError(f"{name}: must be a finite number, got {value!r}")
+    return float(value)
+
+
+def _to_table(camera):
+    """A camera as plain numbers under the keys of the file; None is left out."""
+    table = {"position": camera.position.tolist(), "normal": camera.normal.tolist()}
+    if camera.is_calibrated:
+        table |= {"scale": camera.scale, "angle": camera.angle}
+    return table | {"image_size": list(camera.image_size)}
+
+
+def _from_table(index, table):
+    keys = [field.name for field in fields(Camera)]
+    try:
+        if not isinstance(table, dict):
+            raise ValueError(f"must be a table, got {table!r}")
+        for key in table:
+            if key not in keys:
+                raise ValueError(f"{key}: must be one of {', '.join(keys)}")
+        for key in ("position", "normal"):
+            if key not in table:
+                raise ValueError(f"{key}: must be given, got keys {', '.join(table)}")
+        return Camera(**table)
+    except ValueError as error:
+        raise ValueError(f"camera {index}: {error}") from error
+
+
+def _names(indices):
+    return " and ".join(f"cameras[{i}]" for i in indices)

@@ -1,0 +1,554 @@
+"""Synthetic videos of a moving target, and reading and writing of video files.
+
+One camera at a time: a pixel track (the centroid of the target in each frame) and a `Scene` (what
+the background, the target and the disturbances look like) become frames, and frames become a file.
+Pixel convention: u to the right, v down, pixel centres at integer coordinates, so that the centre
+of the top left pixel is (0, 0).
+
+The files are lossless unless a lossy codec is asked for, because a lossy codec moves the edges of a
+small target by more than the tracker's own error. FFV1 codes green and the differences blue - green
+and red - green; the backgrounds put their texture into the brightness and keep those differences
+constant over large areas, which costs little in looks and makes the files much smaller.
+"""
+
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+SHAPES = ("disc", "polygon", "irregular")
+
+# Vivid colours (blue, green, red), each far from every (muted) colour of every background.
+COLOURS = {
+    "red": (35, 30, 215),
+    "magenta": (185, 30, 200),
+    "yellow": (15, 225, 250),
+    "orange": (5, 115, 250),
+    "black": (22, 18, 20),
+}
+
+# Lossless codecs by file suffix (the default), and the suffixes each codec is usually kept in.
+LOSSLESS = {".mkv": "FFV1", ".avi": "HFYU"}
+CODECS = {
+    "FFV1": (".mkv", ".avi"),
+    "HFYU": (".mkv", ".avi"),
+    "mp4v": (".mp4",),
+    "MJPG": (".avi", ".mkv"),
+}
+
+_SCANLINES = 16  # per row of pixels, when the target is drawn
+
+
+# ------------------------------------------------------------------------------------- backgrounds
+
+
+def _texture(rng, size, cells, stretch=(1, 1)):
+    """Smooth random field in [0, 1], (height, width); `cells` of noise per axis, coarse first."""
+    width, height = size
+    field = np.zeros((height, width), np.float32)
+    for cell in cells:
+        grid = rng.random((cell * stretch[1] + 1, cell * stretch[0] + 1), np.float32)
+        field += cv2.resize(grid, (width, height), interpolation=cv2.INTER_CUBIC) / np.float32(cell)
+    return (field - field.min()) / (field.max() - field.min())
+
+
+def _paint(light, blue, red):
+    """Colour image from brightness (green) and the differences blue - green and red - green."""
+    green = np.rint(light)
+    image = np.stack([green + np.rint(blue), green, green + np.rint(red)], axis=-1)
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
+def _sky(rng, size):
+    width, height = size
+    row = np.linspace(0, 1, height, dtype=np.float32)[:, None]
+    clouds = np.clip(_texture(rng, size, (3, 6, 12, 24), stretch=(1, 2)) * 2.2 - 1.0, 0, 1)
+    light = 150 + 45 * row + 25 * clouds
+    return _paint(light, np.broadcast_to(48 - 34 * row, light.shape), -40 + 28 * row + 0 * light)
+
+
+def _hills(rng, size):
+    width, height = size
+    image = _sky(rng, size)
+    column = np.linspace(0, 1, width)
+    rows = np.arange(height)[:, None]
+    for depth, (horizon, light, blue, red) in enumerate(
+        [(0.45, 150, 12, -14), (0.58, 128, -12, -16), (0.74, 104, -34, -14)]
+    ):
+        waves = [np.sin(2 * np.pi * (k * column + rng.random())) / k for k in (1, 2, 4, 7)]
+        ridge = height * (horizon + 0.05 * np.sum(waves, axis=0))
+        texture = _texture(rng, size, (8, 16, 32, 64), stretch=(1, 2))
+        layer = _paint(light + (8 + 10 * depth) * (texture - 0.5), blue, red)
+        below = rows >= ridge
+        image[below] = layer[below]
+    return image
+
+
+def _sea(rng, size):
+    width, height = size
+    image = _sky(rng, size)
+    horizon = int(height * rng.uniform(0.35, 0.5))
+    depth = np.linspace(0, 1, height - horizon, dtype=np.float32)[:, None]
+    # Waves are long and thin far away and grow towards the viewer.
+    far = _texture(rng, (width, height - horizon), (6, 12), stretch=(1, 8))
+    near = _texture(rng, (width, height - horizon), (4, 8, 16), stretch=(1, 4))
+    light = 132 - 22 * depth + 30 * ((1 - depth) * far + depth * near - 0.5)
+    image[horizon:] = _paint(light, 26 + 0 * light, -44 + 0 * light)
+    return image
+
+
+def _wood(rng, size):
+    width, height = size
+    image = np.empty((height, width, 3), np.uint8)
+    edges = np.linspace(0, height, 6).astype(int)
+    for top, bottom in zip(edges[:-1], edges[1:], strict=True):
+        plank = (width, bottom - top)
+        # Grain: the level lines of a smooth field, stretched along the plank.
+        field = _texture(rng, plank, (1, 2, 4), stretch=(2, 2))
+        grain = np.sin(2 * np.pi * 6 * field) + 0.8 * (_texture(rng, plank, (8, 16), (1, 3)) - 0.5)
+        light = rng.uniform(118, 140) + 9 * grain
+        light[:2] -= 35
+        image[top:bottom] = _paint(light, -34 + 0 * light, 36 + 0 * light)
+    return image
+
+
+def _bricks(rng, size):
+    width, height = size
+    course, length, joint = 32, 64, 3
+    light = 168 + 14 * (_texture(rng, size, (16, 32, 64)) - 0.5)
+    image = _paint(light, -8, 6)
+    texture = _texture(rng, size, (16, 32, 64))
+    for i, top in enumerate(range(0, height, course)):
+        for left in range(-(i % 2) * length // 2, width, length):
+            rows = slice(top + joint, top + course)
+            columns = slice(max(left + joint, 0), max(left + length, 0))
+            light = rng.uniform(96, 122) + 22 * (texture[rows, columns] - 0.5)
+            image[rows, columns] = _paint(light, -14, rng.uniform(30, 44))
+    return image
+
+
+def _plain(rng, size):
+    width, height = size
+    column = np.linspace(0, 1, width, dtype=np.float32)
+    light = np.broadcast_to(rng.uniform(120, 170) + 20 * column, (height, width))
+    return _paint(light, 4, -4)
+
+
+BACKGROUNDS = {
+    "plain": _plain, "sky": _sky, "hills": _hills, "sea": _sea, "wood": _wood, "bricks": _bricks,
+}
+
+
+def _occluder(rng, size):
+    """A post (bark) if taller than wide, else a hedge (leaves)."""
+    width, height = size
+    if height >= width:
+        light = 66 + 40 * (_texture(rng, size, (4, 8), stretch=(3, 1)) - 0.5)
+        light -= 22 * np.linspace(-1, 1, width, dtype=np.float32) ** 2
+        return _paint(light, -16, 18)
+    return _paint(70 + 60 * (_texture(rng, size, (16, 32), stretch=(2, 1)) - 0.5), -30, -22)
+
+
+# ------------------------------------------------------------------------------------------- scene
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What one camera sees, apart from the motion: background, target and disturbances.
+
+    Parameters
+    ----------
+    background : {"plain", "sky", "hills", "sea", "wood", "bricks"}
+    shape : {"disc", "polygon", "irregular"}
+        Outline of the target; polygon and irregular outlines are drawn from `shape_seed`.
+    size : float
+        Diameter in pixels, 4 to 100; for other shapes that of the disc of equal area.
+    colour : {"red", "magenta", "yellow", "orange", "black"}
+    turns : float
+        Steady self-rotation, turns over the whole clip.
+    tumbling : float
+        Random self-rotation: standard deviation in radians of the turn over 25 frames.
+    size_variation : float
+        Relative amplitude, in [0, 0.5], of a slow change of the diameter over the clip (as of a
+        target that comes nearer and recedes).
+    noise_variance : float
+        Variance of the Gaussian image noise, for intensities in [0, 1]; the paper uses 0.01.
+    occluders : tuple of (left, top, width, height)
+        Rectangles in whole pixels in front of the target: posts if taller than wide, else hedges.
+    shape_seed : int
+        Chooses the outline, so that several cameras can look at one target.
+    image_size : (width, height)
+
+    Raises
+    ------
+    ValueError
+        If an argument breaks its rule.
+    """
+
+    background: str = "hills"
+    shape: str = "disc"
+    size: float = 20.0
+    colour: str = "red"
+    turns: float = 0.0
+    tumbling: float = 0.0
+    size_variation: float = 0.0
+    noise_variance: float = 0.0
+    occluders: tuple[tuple[int, int, int, int], ...] = ()
+    shape_seed: int = 0
+    image_size: tuple[int, int] = (512, 512)
+
+    def __post_init__(self):
+        for name, allowed in [
+            ("background", BACKGROUNDS), ("shape", SHAPES), ("colour", COLOURS),
+        ]:
+            value = getattr(self, name)
+            if value not in allowed:
+                raise ValueError(f"{name}: must be one of {', '.join(allowed)}, got {value!r}")
+        for name, low, high in [
+            ("size", 4, 100), ("turns", -np.inf, np.inf), ("tumbling", 0, np.inf),
+            ("size_variation", 0, 0.5), ("noise_variance", 0, 0.1), ("shape_seed", 0, np.inf),
+        ]:
+            value = getattr(self, name)
+            if not (np.isfinite(value) and low <= value <= high):
+                raise ValueError(f"{name}: must be finite and in [{low}, {high}], got {value}")
+        size = tuple(self.image_size)
+        if len(size) != 2 or any(s != int(s) or s < 64 for s in size):
+            raise ValueError(f"image_size: must be two whole numbers of at least 64, got {size}")
+        object.__setattr__(self, "image_size", (int(size[0]), int(size[1])))
+        occluders = tuple(tuple(o) for o in self.occluders)
+        for occluder in occluders:
+            whole = len(occluder) == 4 and all(x == int(x) for x in occluder)
+            if not whole or min(occluder[:2]) < 0 or min(occluder[2:]) < 4:
+                raise ValueError(
+                    "occluders: each must be whole pixels (left >= 0, top >= 0, width >= 4, "
+                    f"height >= 4), got {occluder}"
+                )
+            if occluder[0] + occluder[2] > size[0] or occluder[1] + occluder[3] > size[1]:
+                raise ValueError(f"occluders: must lie in the {size} image, got {occluder}")
+        object.__setattr__(self, "occluders", occluders)
+
+    @classmethod
+    def random(cls, rng, **fixed) -> "Scene":
+        """A scene drawn at random: background, shape, colour, size of 8 to 40 px and rotation.
+
+        Parameters
+        ----------
+        rng : np.random.Generator or seed
+        **fixed
+            Fields that are given instead of drawn (disturbances are never drawn).
+        """
+        rng = np.random.default_rng(rng)
+        drawn = {
+            "background": str(rng.choice(list(BACKGROUNDS))),
+            "shape": str(rng.choice(SHAPES)),
+            "size": float(rng.uniform(8, 40)),
+            "colour": str(rng.choice(list(COLOURS))),
+            "turns": float(rng.uniform(-10, 10)),
+            "tumbling": float(rng.uniform(0, 1)),
+            "shape_seed": int(rng.integers(2**31)),
+        }
+        return cls(**(drawn | fixed))
+
+    def outline(self) -> np.ndarray:
+        """Outline of the target at rest, (m, 2) pixels: centroid at 0, area that of the disc."""
+        rng = np.random.default_rng(self.shape_seed)
+        if self.shape == "disc":
+            angle = np.linspace(0, 2 * np.pi, 128, endpoint=False)
+            radius = np.ones_like(angle)
+        elif self.shape == "polygon":
+            m = int(rng.integers(3, 7))
+            angle = 2 * np.pi * (np.arange(m) + rng.uniform(-0.2, 0.2, m)) / m
+            radius = np.ones(m)
+        else:
+            angle = np.linspace(0, 2 * np.pi, 128, endpoint=False)
+            order = np.arange(2, 6)
+            amplitude = rng.uniform(0.3, 1, order.size) * 0.35 / order
+            phase = rng.uniform(0, 2 * np.pi, order.size)
+            radius = 1 + np.cos(np.outer(angle, order) + phase) @ amplitude
+        points = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        area, centroid = _area_and_centroid(points)
+        return (points - centroid) * np.sqrt(np.pi * self.size**2 / 4 / area)
+
+
+def _area_and_centroid(polygon):
+    """Area and area centroid of a simple polygon (m, 2), by the shoelace formula."""
+    x, y = polygon.T
+    x1, y1 = np.roll(polygon, -1, axis=0).T
+    cross = x * y1 - x1 * y
+    area = cross.sum() / 2
+    return area, np.array([((x + x1) * cross).sum(), ((y + y1) * cross).sum()]) / (6 * area)
+
+
+# --------------------------------------------------------------------------------------- rendering
+
+
+def _coverage(polygon):
+    """Share of each pixel covered by a polygon (m, 2) in pixels.
+
+    Along u the area is exact, along v it is the mean over 16 scan lines a pixel. (OpenCV's filled
+    polygons include their outline, which shifts small shapes by up to 0.05 px even oversampled.)
+
+    Returns
+    -------
+    alpha : (h, w) float in [0, 1]
+    corner : (2,) int
+        Column and row of the first pixel of `alpha`.
+    """
+    corner = np.floor(polygon.min(axis=0)).astype(int) - 1
+    width, height = np.ceil(polygon.max(axis=0)).astype(int) + 3 - corner
+    x0, y0 = (polygon - corner + 0.5).T  # from here on pixel i covers [i, i + 1]
+    x1, y1 = np.roll(x0, -1), np.roll(y0, -1)
+    y = (np.arange(height * _SCANLINES) + 0.5) / _SCANLINES
+    line, edge = np.nonzero((y0 <= y[:, None]) != (y1 <= y[:, None]))
+    x = x0[edge] + (y[line] - y0[edge]) * (x1 - x0)[edge] / (y1 - y0)[edge]
+    # To the right of a crossing everything is inside (or outside): its pixel gets the share right
+    # of it, the next one the rest, and the running sum along the row does the filling.
+    first = (line // _SCANLINES) * width + x.astype(int)
+    rest = x % 1
+    step = np.sign(y1 - y0)[edge] / _SCANLINES
+    change = np.bincount(first, step * (1 - rest), width * height)
+    change += np.bincount(first + 1, step * rest, width * height)
+    return np.abs(np.cumsum(change.reshape(height, width), axis=1)), corner
+
+
+def _blend(frame, background, visible, alpha, corner, colour):
+    """Blend the target into `frame` in place, over the part of its patch inside the image."""
+    height, width = visible.shape
+    left, top = np.maximum(corner, 0)
+    right, bottom = np.minimum(corner + alpha.shape[::-1], (width, height))
+    if left >= right or top >= bottom:
+        return
+    window = np.s_[top:bottom, left:right]
+    a = alpha[top - corner[1]:bottom - corner[1], left - corner[0]:right - corner[0]]
+    a = (a * visible[window])[..., None]
+    frame[window] = np.rint(background[window] * (1 - a) + a * colour)
+
+
+def _poses(scene, n, rng):
+    """Angle (rad) and relative size of the target in each of n frames."""
+    time = np.linspace(0, 1, n)
+    # A random walk of the angular speed over 25 frames keeps the tumbling smooth.
+    spin = np.convolve(rng.standard_normal(n + 24), np.full(25, 1 / 5), "valid") / 25
+    angle = 2 * np.pi * (rng.random() + scene.turns * time) + scene.tumbling * np.cumsum(spin)
+    cycles = rng.uniform(1, 3)
+    scale = 1 + scene.size_variation * np.sin(2 * np.pi * (cycles * time + rng.random()))
+    return angle, scale
+
+
+def render(track, scene, seed=0) -> Iterator[np.ndarray]:
+    """Frames of a target that moves along a pixel track through a scene.
+
+    The area centroid of the drawn target lies at the track position to better than 0.02 px.
+
+    Parameters
+    ----------
+    track : (n, 2) array
+        Centroid of the target, (u right, v down) in pixels; a row of NaN is a frame without target.
+    scene : Scene
+    seed : int
+        Draws the background, the random pose and the noise.
+
+    Yields
+    ------
+    frame : (height, width, 3) uint8, blue-green-red
+
+    Raises
+    ------
+    ValueError
+        If `track` has the wrong shape or infinite values.
+    """
+    track = np.asarray(track, float)
+    if track.ndim != 2 or track.shape[1] != 2 or len(track) == 0:
+        raise ValueError(f"track: must have shape (n, 2) with n >= 1, got {track.shape}")
+    if np.isinf(track).any():
+        count = np.isinf(track).sum()
+        raise ValueError(f"track: must be finite or NaN, got {count} infinite values")
+    return _frames(track, scene, seed)
+
+
+def _frames(track, scene, seed):
+    spawned = np.random.SeedSequence(seed).spawn(3)
+    scenery, motion, noise = (np.random.default_rng(s) for s in spawned)
+    width, height = scene.image_size
+    background = BACKGROUNDS[scene.background](scenery, scene.image_size)
+    visible = np.ones((height, width), np.float32)
+    for left, top, w, h in scene.occluders:
+        background[top:top + h, left:left + w] = _occluder(scenery, (w, h))
+        visible[top:top + h, left:left + w] = 0
+    outline = scene.outline()
+    colour = np.array(COLOURS[scene.colour], np.float32)
+    sigma = np.float32(255 * np.sqrt(scene.noise_variance))
+    for centre, angle, scale in zip(track, *_poses(scene, len(track), motion), strict=True):
+        frame = background.copy()
+        if np.isfinite(centre).all():
+            turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+            alpha, corner = _coverage(centre + scale * outline @ turn)
+            _blend(frame, background, visible, alpha, corner, colour)
+        if sigma > 0:
+            grain = sigma * noise.standard_normal(frame.shape, np.float32)
+            frame = cv2.add(frame, grain, dtype=cv2.CV_8U)
+        yield frame
+
+
+def render_video(path, track, scene, fps=25, seed=0) -> Path:
+    """Render a track in a scene (see `render`) and write it to a video file (see `write_video`)."""
+    return write_video(path, render(track, scene, seed), fps)
+
+
+# ------------------------------------------------------------------------------------------- files
+
+
+class VideoInfo(NamedTuple):
+    """Number of frames, frames per second and (width, height) of a video file."""
+
+    frames: int
+    fps: float
+    size: tuple[int, int]
+
+
+def write_video(path, frames: Iterable[np.ndarray], fps=25, codec=None) -> Path:
+    """Write frames to a video file.
+
+    The file appears under its name only when it is complete.
+
+    Parameters
+    ----------
+    path : path
+        .mkv (FFV1) or .avi (HFYU), both lossless; .mp4 only with the lossy codec "mp4v".
+    frames : iterable of (height, width, 3) uint8
+        Blue-green-red, all of one size, of even width and height.
+    fps : float
+    codec : {"FFV1", "HFYU", "mp4v", "MJPG"}, optional
+        Lossless by default; "mp4v" and "MJPG" are lossy.
+
+    Returns
+    -------
+    path : Path
+
+    Raises
+    ------
+    ValueError
+        For an unknown suffix or codec, a bad frame rate, no frame, or a frame of another type or of
+        odd or changing size.
+    OSError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if codec is None and suffix not in LOSSLESS:
+        raise ValueError(f"path: must end in .mkv or .avi unless codec is given, got '{path}'")
+    codec = codec or LOSSLESS[suffix]
+    if codec not in CODECS:
+        raise ValueError(f"codec: must be one of {', '.join(CODECS)}, got {codec!r}")
+    if suffix not in CODECS[codec]:
+        allowed = " or ".join(CODECS[codec])
+        raise ValueError(f"path: must end in {allowed} for {codec}, got '{path}'")
+    if not (np.isfinite(fps) and fps > 0):
+        raise ValueError(f"fps: must be finite and positive, got {fps}")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"path: the folder must exist, got '{path.parent}'")
+    partial = path.with_name(f".{path.stem}.{os.getpid()}{suffix}")
+    try:
+        _encode(partial, frames, fps, codec, path)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return path
+
+
+def _encode(partial, frames, fps, codec, path):
+    writer, size = None, None
+    try:
+        for i, frame in enumerate(frames):
+            frame = np.asarray(frame)
+            if frame.dtype != np.uint8 or frame.ndim != 3 or frame.shape[2] != 3:
+                raise ValueError(
+                    "frames: each must be uint8 of shape (height, width, 3), "
+                    f"got {frame.dtype} {frame.shape} at frame {i}"
+                )
+            if writer is None:
+                size = frame.shape[1::-1]
+                if size[0] % 2 or size[1] % 2:  # OpenCV would cut off a row or column, silently
+                    raise ValueError(f"frames: width and height must be even, got {size}")
+                fourcc = cv2.VideoWriter_fourcc(*codec)
+                writer = cv2.VideoWriter(str(partial), cv2.CAP_FFMPEG, fourcc, fps, size)
+                if not writer.isOpened():
+                    raise OSError(f"path: cannot write {codec} video of size {size} to '{path}'")
+            if frame.shape[1::-1] != size:
+                raise ValueError(
+                    f"frames: all must have size {size}, got {frame.shape[1::-1]} at frame {i}"
+                )
+            writer.write(frame)
+    finally:
+        if writer is not None:
+            writer.release()
+    if writer is None:
+        raise ValueError("frames: at least one frame is needed, got none")
+
+
+def open_video(path) -> cv2.VideoCapture:
+    """Open a video file for reading.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If the file is empty, is not a video, or holds no frame.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"path: no such video file, got '{path}'")
+    if path.stat().st_size == 0:
+        raise ValueError(f"path: must be a video file, got the empty file '{path}'")
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    if not capture.isOpened():
+        raise ValueError(f"path: must be a video file that OpenCV can read, got '{path}'")
+    if not capture.grab():
+        capture.release()
+        raise ValueError(f"path: must hold at least one frame, got none in '{path}'")
+    capture.open(str(path), cv2.CAP_FFMPEG)
+    return capture
+
+
+def read_video(path) -> Iterator[np.ndarray]:
+    """Frames of a video file, one at a time, as (height, width, 3) uint8 blue-green-red.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        At once, if the file is missing, empty, not a video, or holds no frame.
+    """
+    return _decode(open_video(path))
+
+
+def _decode(capture):
+    try:
+        while True:
+            more, frame = capture.read()
+            if not more:
+                return
+            yield frame
+    finally:
+        capture.release()
+
+
+def video_info(path) -> VideoInfo:
+    """Number of frames (as the file's header states it), frame rate and size of a video file.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If the file is missing, empty, not a video, or holds no frame.
+    """
+    capture = open_video(path)
+    size = int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
+    info = VideoInfo(
+        round(capture.get(cv2.CAP_PROP_FRAME_COUNT)), capture.get(cv2.CAP_PROP_FPS), size
+    )
+    capture.release()
+    return info
