@@ -6,6 +6,8 @@ import numpy as np
 
 RIDGE = 1e-11
 """Relative ridge that keeps a nearly singular information matrix solvable."""
+COLLINEAR = 1e-9
+"""Share of a column that is not a combination of others, below which it is taken to be one."""
 
 
 def subset_search(
@@ -38,7 +40,17 @@ def subset_search(
     """
     matrix, target, scale = _scaled(information, pull)
     support = start.copy()
-    for _ in range(20 * len(target)):
+    best, value = support, np.inf
+    while True:
+        inside = np.flatnonzero(support)
+        fitted = np.linalg.solve(matrix[np.ix_(inside, inside)], target[inside])
+        paid = charge[inside[np.isfinite(charge[inside])]].sum()
+        # Rounding may promise a fall that does not come: what counts is the value itself.
+        if not paid - target[inside] @ fitted < value - 1e-9:
+            break
+        best, value = support.copy(), float(paid - target[inside] @ fitted)
+        solution = np.zeros(len(target))
+        solution[inside] = fitted
         change, drop, add = min(
             _single_changes(matrix, target, charge, support), key=lambda item: item[0]
         )
@@ -46,12 +58,7 @@ def subset_search(
             break
         support[drop] = False
         support[add] = True
-    inside = np.flatnonzero(support)
-    solution = np.zeros(len(target))
-    solution[inside] = np.linalg.solve(matrix[np.ix_(inside, inside)], target[inside])
-    paid = charge[support & np.isfinite(charge)].sum()
-    value = float(paid - target @ solution)
-    return support, solution * scale, value
+    return best, solution * scale, value
 
 
 def closest_rival(
@@ -98,9 +105,8 @@ def _single_changes(
     response = matrix[np.ix_(outside, inside)] @ inverse
     left = target[outside] - matrix[np.ix_(outside, inside)] @ fitted
     room = 1 - np.einsum("ak,ka->a", response, matrix[np.ix_(inside, outside)])
-    room = np.maximum(room, RIDGE)
     loss = fitted**2 / spread - charge[inside]
-    cost = charge[outside] - left**2 / room
+    cost = charge[outside] - _gain(left, room)
     changes = [(np.inf, none, none)]
     if len(inside):
         changes.append((loss.min(), inside[[loss.argmin()]], none))
@@ -110,10 +116,15 @@ def _single_changes(
         # A drop changes what the others leave over, and the room a newcomer has, by rank one.
         swapped_left = left[:, None] + response * (fitted / spread)
         swapped_room = room[:, None] + response**2 / spread
-        swap = loss + charge[outside][:, None] - swapped_left**2 / swapped_room
+        swap = loss + charge[outside][:, None] - _gain(swapped_left, swapped_room)
         add, drop = np.unravel_index(swap.argmin(), swap.shape)
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
     return changes
+
+
+def _gain(left: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """What a newcomer explains; nothing if it is a combination of those that are in."""
+    return np.where(room > COLLINEAR, left**2 / np.maximum(room, COLLINEAR), -np.inf)
 
 
 def stridge(

@@ -1,0 +1,205 @@
+"""Sparse regression against brute force over all supports, and the paper's STRidge."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from vidsindy_lite.polynomials import monomial_exponents, monomials
+from vidsindy_lite.regression import stridge, subset_search
+from vidsindy_lite.systems import SYSTEMS
+
+
+def objective(information, pull, charge, support):
+    """Lowest value on a support, from the definition."""
+    inside = np.flatnonzero(support)
+    solution = np.linalg.solve(information[np.ix_(inside, inside)], pull[inside])
+    return charge[inside].sum() - pull[inside] @ solution
+
+
+def brute_force(information, pull, charge):
+    supports = [np.array(s, dtype=bool) for s in product([False, True], repeat=len(pull))]
+    values = [objective(information, pull, charge, s) for s in supports]
+    best = int(np.argmin(values))
+    return supports[best], values[best]
+
+
+def random_problem(seed, m, rows=40):
+    rng = np.random.default_rng(seed)
+    matrix = rng.standard_normal((rows, m)) @ rng.standard_normal((m, m))
+    truth = np.where(rng.random(m) < 0.5, rng.standard_normal(m), 0.0)
+    target = matrix @ truth + 0.1 * rng.standard_normal(rows)
+    return matrix.T @ matrix, matrix.T @ target, rng
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.floats(0.01, 100), st.booleans())
+def test_without_correlation_the_search_finds_the_global_minimum(seed, m, price, full):
+    rng = np.random.default_rng(seed)
+    information = np.diag(10.0 ** rng.uniform(-3, 3, m))
+    pull = rng.standard_normal(m) * np.sqrt(np.diag(information))
+    charge = price * rng.uniform(0.1, 1, m)
+    support, solution, value = subset_search(information, pull, charge, np.full(m, full))
+    expected, lowest = brute_force(information, pull, charge)
+    # Every term decides for itself: no local minimum. Ties are a matter of rounding.
+    worth = pull**2 / np.diag(information)
+    assume((np.abs(worth - charge) > 1e-6).all())
+    assert (support == expected).all()
+    assert value == pytest.approx(lowest, abs=1e-8)
+    np.testing.assert_allclose(solution, np.where(expected, pull / np.diag(information), 0.0))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 3), st.floats(0.01, 10))
+def test_with_three_columns_the_search_from_everything_is_rarely_off(seed, m, price):
+    information, pull, _ = random_problem(seed, m)
+    charge = np.full(m, price)
+    _, _, value = subset_search(information, pull, charge, np.ones(m, dtype=bool))
+    _, lowest = brute_force(information, pull, charge)
+    others = [
+        subset_search(information, pull, charge, np.array(s, dtype=bool))[2]
+        for s in product([False, True], repeat=m)
+    ]
+    # One of the starts is the minimum itself, where the search has to stay.
+    assert min(others) == pytest.approx(lowest, rel=1e-8, abs=1e-8)
+    assert value >= lowest - 1e-8 * (1 + abs(lowest))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.floats(0.01, 10))
+def test_no_single_move_improves_the_result(seed, m, price):
+    information, pull, rng = random_problem(seed, m)
+    charge = price * rng.uniform(0.5, 1.5, m)
+    start = rng.random(m) < 0.5
+    support, solution, value = subset_search(information, pull, charge, start)
+    tolerance = 1e-6 * (1 + abs(value))
+    assert (np.flatnonzero(solution) == np.flatnonzero(support)).all()
+    assert value == pytest.approx(objective(information, pull, charge, support), abs=tolerance)
+    assert value <= objective(information, pull, charge, start) + tolerance
+    for i in range(m):
+        flipped = support.copy()
+        flipped[i] = not flipped[i]
+        assert value <= objective(information, pull, charge, flipped) + tolerance
+        for k in np.flatnonzero(support != support[i]):
+            swapped = support.copy()
+            swapped[[i, k]] = swapped[[k, i]]
+            assert value <= objective(information, pull, charge, swapped) + tolerance
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_with_clear_data_the_true_support_is_found_from_everything_and_from_nothing(seed):
+    rng = np.random.default_rng(seed)
+    matrix = rng.standard_normal((200, 10))
+    truth = np.zeros(10)
+    truth[rng.choice(10, 3, replace=False)] = rng.choice([-1, 1], 3) * [1.0, 10.0, 100.0]
+    target = matrix @ truth + 0.01 * rng.standard_normal(200)
+    information, pull = matrix.T @ matrix, matrix.T @ target
+    charge = np.full(10, 0.01)
+    for start in (np.ones(10, dtype=bool), np.zeros(10, dtype=bool)):
+        support, solution, value = subset_search(information, pull, charge, start)
+        assert (support == (truth != 0)).all()
+        assert value == pytest.approx(brute_force(information, pull, charge)[1])
+        np.testing.assert_allclose(solution[support], truth[support], atol=0.01)
+
+
+def test_a_swap_leaves_a_support_that_drops_and_adds_cannot():
+    # Column 2 alone explains the target; columns 0 and 2 are nearly the same.
+    rng = np.random.default_rng(0)
+    matrix = rng.standard_normal((100, 3))
+    matrix[:, 0] = matrix[:, 2] + 0.05 * rng.standard_normal(100)
+    pull, information = matrix.T @ matrix[:, 2], matrix.T @ matrix
+    start = np.array([True, False, False])
+    charge = np.full(3, 1.0)
+    wrong = objective(information, pull, charge, start)
+    assert objective(information, pull, charge, [False, False, False]) > wrong
+    assert objective(information, pull, charge, [True, False, True]) > wrong
+    support, solution, _ = subset_search(information, pull, charge, start)
+    assert list(support) == [False, False, True]
+    np.testing.assert_allclose(solution, [0, 0, 1], atol=1e-6)
+
+
+def test_a_charge_of_minus_infinity_keeps_a_worthless_column():
+    information, pull = np.eye(3), np.array([5.0, 0.0, 0.1])
+    charge = np.array([1.0, -np.inf, 1.0])
+    support, solution, value = subset_search(information, pull, charge, np.ones(3, dtype=bool))
+    assert list(support) == [True, True, False]
+    np.testing.assert_allclose(solution, [5, 0, 0])
+    assert value == pytest.approx(1 - 25)
+
+
+def test_the_start_is_left_as_it_is():
+    start = np.ones(3, dtype=bool)
+    subset_search(np.eye(3), np.zeros(3), np.ones(3), start)
+    assert start.all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_scaling_a_column_scales_its_coefficient_and_changes_nothing_else(seed):
+    information, pull, rng = random_problem(seed, 5)
+    scale = 10.0 ** rng.uniform(-3, 3, 5)
+    charge, start = np.ones(5), np.ones(5, dtype=bool)
+    support, solution, value = subset_search(information, pull, charge, start)
+    scaled = subset_search(information * scale[:, None] * scale, pull * scale, charge, start)
+    assert (scaled[0] == support).all()
+    np.testing.assert_allclose(scaled[1] * scale, solution, rtol=1e-5, atol=1e-8)
+    assert scaled[2] == pytest.approx(value, rel=1e-6)
+
+
+def lorenz_rows():
+    truth = SYSTEMS["Lorenz"]
+    _, x = truth.trajectory(600)
+    return truth, monomials(x, truth.exponents), truth(x)
+
+
+def test_stridge_recovers_lorenz_from_exact_derivatives():
+    truth, library, derivative = lorenz_rows()
+    found = stridge(library, derivative, np.random.default_rng(0))
+    assert ((found != 0) == truth.support).all()
+    np.testing.assert_allclose(found, truth.coefficients, rtol=1e-8)
+
+
+def test_stridge_does_not_depend_on_units():
+    _, library, derivative = lorenz_rows()
+    rng = np.random.default_rng(1)
+    size, speed = 10.0 ** rng.uniform(-3, 3, library.shape[1]), 10.0 ** rng.uniform(-3, 3, 3)
+    found = stridge(library, derivative, np.random.default_rng(0))
+    scaled = stridge(library * size, derivative * speed, np.random.default_rng(0))
+    np.testing.assert_allclose(scaled * size[:, None] / speed, found, rtol=1e-6, atol=1e-9)
+
+
+def test_the_refit_of_stridge_is_plain_least_squares_on_all_rows():
+    truth, library, derivative = lorenz_rows()
+    rng = np.random.default_rng(0)
+    noisy = derivative + rng.standard_normal(derivative.shape)
+    found = stridge(library, noisy, rng, sparsity_weight=1e-2)
+    for column, target in zip(found.T, noisy.T, strict=True):
+        inside = np.flatnonzero(column)
+        assert 0 < len(inside) < library.shape[1]
+        expected = np.linalg.lstsq(library[:, inside], target, rcond=None)[0]
+        np.testing.assert_allclose(column[inside], expected, rtol=1e-6)
+
+
+def test_a_dearer_term_is_a_rarer_term():
+    _, library, derivative = lorenz_rows()
+    noisy = derivative + 2 * np.random.default_rng(0).standard_normal(derivative.shape)
+    weights = (0.0, 1e-3, 1e-2, 10.0)
+    counts = [
+        np.count_nonzero(stridge(library, noisy, np.random.default_rng(0), sparsity_weight=w))
+        for w in weights
+    ]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[0] > counts[-1]
+
+
+def test_stridge_copes_with_a_column_of_zeros_and_a_target_of_zeros():
+    x = np.random.default_rng(0).standard_normal((100, 2))
+    library = np.column_stack([monomials(x, monomial_exponents(2, 2)), np.zeros(100)])
+    found = stridge(library, np.zeros((100, 1)), np.random.default_rng(0))
+    np.testing.assert_array_equal(found, np.zeros((7, 1)))
+
+
+def test_stridge_rejects_bad_shapes():
+    rng = np.random.default_rng(0)
+    with pytest.raises(ValueError, match=r"library and derivative: .* got \(5, 2\) and \(4, 1\)"):
+        stridge(np.ones((5, 2)), np.ones((4, 1)), rng)
+    with pytest.raises(ValueError, match="library: must hold at least 9 training rows, got 10"):
+        stridge(np.ones((10, 9)), np.ones((10, 1)), rng)

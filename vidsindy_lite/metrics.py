@@ -1,0 +1,156 @@
+"""How good a discovered law is: the paper's scores, and the ones it promises without a formula."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .polynomials import PolynomialSystem
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """A discovered law beside the truth, term by term.
+
+    Parameters
+    ----------
+    terms_found : bool
+        Every true term was found (the paper's column "Terms Found").
+    false_positives : int
+        Terms found that are not true.
+    missing : int
+        True terms that were not found.
+    l2 : float
+        ``|Lambda_found - Lambda_true| / |Lambda_true|``, 2-norms over all coefficients.
+    precision : float
+        Fraction of the found terms that are true; 0 if nothing was found.
+    recall : float
+        Fraction of the true terms that were found.
+    coefficient_errors : ndarray, shape (l, d)
+        ``|found - true| / |true|`` of every true term, in the library of the truth; NaN off its
+        support. It is 1 for a missing term. `l2` hides a small coefficient beside a large one.
+    """
+
+    terms_found: bool
+    false_positives: int
+    missing: int
+    l2: float
+    precision: float
+    recall: float
+    coefficient_errors: np.ndarray
+
+    @property
+    def exact(self) -> bool:
+        """The support is right: no term is missing and none is false."""
+        return self.terms_found and self.false_positives == 0
+
+    @property
+    def max_coefficient_error(self) -> float:
+        """Largest of `coefficient_errors`."""
+        return float(np.nanmax(self.coefficient_errors))
+
+
+def score(found, truth: PolynomialSystem) -> Score:
+    """Compare a discovered law with the truth in the same frame (paper: evaluation metrics).
+
+    Parameters
+    ----------
+    found : PolynomialSystem or any result that has one as its ``system``
+        The discovered law.
+    truth : PolynomialSystem
+        The true law. Libraries may differ in size and order: terms are matched by monomial,
+        variables by position.
+
+    Raises
+    ------
+    ValueError
+        If the dimensions differ or the truth has no term.
+
+    Examples
+    --------
+    >>> truth = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET)
+    >>> score(truth, truth).exact
+    True
+    """
+    found = getattr(found, "system", found)
+    if found.d != truth.d:
+        raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {found.d}")
+    if not truth.support.any():
+        raise ValueError("truth: must have at least one term, got none")
+    library = np.unique(np.concatenate([found.exponents, truth.exponents]), axis=0)
+    guess, true = _coefficients(found, library), _coefficients(truth, library)
+    hits = int(((guess != 0) & (true != 0)).sum())
+    claimed, actual = int(np.count_nonzero(guess)), int(np.count_nonzero(true))
+    here = _coefficients(found, truth.exponents)
+    errors = np.full(truth.coefficients.shape, np.nan)
+    support = truth.support
+    errors[support] = np.abs(here[support] / truth.coefficients[support] - 1)
+    return Score(
+        terms_found=hits == actual,
+        false_positives=claimed - hits,
+        missing=actual - hits,
+        l2=float(np.linalg.norm(guess - true) / np.linalg.norm(true)),
+        precision=hits / claimed if claimed else 0.0,
+        recall=hits / actual,
+        coefficient_errors=errors,
+    )
+
+
+def _coefficients(system: PolynomialSystem, library: np.ndarray) -> np.ndarray:
+    """Coefficients of a system in another library; zero for monomials it does not have."""
+    rows = {tuple(powers): row for row, powers in enumerate(system.exponents)}
+    none = np.zeros(system.d)
+    return np.array(
+        [
+            system.coefficients[rows[tuple(powers)]] if tuple(powers) in rows else none
+            for powers in library
+        ]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryError:
+    """How far a measured trajectory is from the true one.
+
+    Parameters
+    ----------
+    rmse : ndarray, shape (d,)
+        Root mean square error of each axis, in scene units.
+    relative : ndarray, shape (d,)
+        The same over the standard deviation of the true trajectory along the axis; NaN along an
+        axis that does not move.
+    """
+
+    rmse: np.ndarray
+    relative: np.ndarray
+
+
+def trajectory_error(x: np.ndarray, truth: np.ndarray) -> TrajectoryError:
+    """Root mean square error of a reconstructed trajectory, axis by axis.
+
+    It separates the error of tracking and cameras from that of the regression.
+
+    Parameters
+    ----------
+    x : array_like, shape (n, d)
+        Reconstructed states; rows with a NaN are ignored.
+    truth : array_like, shape (n, d)
+        True states at the same times.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, the truth is not finite or ``x`` has no row without NaN.
+    """
+    x, truth = np.asarray(x, dtype=float), np.asarray(truth, dtype=float)
+    if truth.ndim != 2 or not np.isfinite(truth).all():
+        raise ValueError(f"truth: must be finite with shape (n, d), got shape {truth.shape}")
+    if x.shape != truth.shape:
+        raise ValueError(f"x: must have the shape of truth, {truth.shape}, got {x.shape}")
+    seen = ~np.isnan(x).any(axis=1)
+    if not seen.any():
+        raise ValueError(f"x: must hold at least one row without NaN, got {len(x)} missing rows")
+    rmse = np.sqrt(((x - truth)[seen] ** 2).mean(axis=0))
+    spread = truth.std(axis=0)
+    return TrajectoryError(rmse, rmse / np.where(spread > 0, spread, np.nan))
