@@ -20,7 +20,7 @@ from scipy.stats import chi2
 from tqdm import tqdm
 
 from .bridges import Gap, gaps, join
-from .collocation import Collocation, Segment, State
+from .collocation import CLEANEST, Collocation, Segment, State
 from .discovery import Discovery, Step, Units, inverse, report
 from .frames import FrameAlgebra, sparse_origins
 from .polynomials import (
@@ -46,8 +46,6 @@ FALSE_ALARM = 0.01
 """Chance of a false term in a law, if all candidates were independent."""
 OFFSET_CHARGE = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
-CLEANEST = 1e-5
-"""Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
 GAP = 0.4
 """A pause longer than this fraction of the time scale of the motion is a gap."""
 SHORTEST_STRETCH = 4

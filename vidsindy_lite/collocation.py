@@ -9,7 +9,7 @@ not, with the curve already eliminated.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,10 @@ from .polynomials import monomial_gradients, monomials
 from .splines import DEGREE, clamped_knots, local_basis
 
 WIDTH = DEGREE + 1
+CHUNK = 512
+"""Nodes whose local matrices are multiplied in one go."""
+CLEANEST = 1e-5
+"""Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
 
 
 @dataclass(frozen=True)
@@ -246,30 +250,34 @@ class Collocation:
             here = np.flatnonzero(term_columns // l == j)
             own[:, j, here] = -root[:, j, None] * terms[:, term_columns[here] % l]
         own[:, :, count:] = root[:, :, None] * jacobian[:, :, offset_columns]
-        right = np.empty((r, d, 1 + size))
-        data_residual = self.curve(state.control_points) - self.x
-        right[:, :, 0] = self._pull(data_residual)
-        right[:, :, 1:] = 0.0
         unknowns = np.concatenate([residual[:, :, None], own], axis=2)
-        blocks = (local.transpose(0, 2, 1) @ unknowns).reshape(-1, WIDTH, d, 1 + size)
-        for group in self.groups:
+        data_residual = self.curve(state.control_points) - self.x
+        right = np.zeros((r, d, 1 + size))
+        right[:, :, 0] = self._pull(data_residual)
+        for part in _chunks(self.groups):
+            blocks = local[part].transpose(0, 2, 1) @ unknowns[part]
+            blocks = blocks.reshape(-1, WIDTH, d, 1 + size)
             for a in range(WIDTH):
-                right[self.node_first[group] + a] += blocks[group, a]
+                right[self.node_first[part] + a] += blocks[:, a]
 
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
         solved = cho_solve_banded((factor, True), right.reshape(r * d, -1), check_finite=False)
-        solved = solved.reshape(r, d, 1 + size)
+        solved = np.ascontiguousarray(solved).reshape(r, d, 1 + size)
 
         # What the curve cannot follow. Its Gram matrix is the Schur complement, without the
         # cancellation between two large matrices that a large physics weight would bring.
-        near = np.stack([solved[self.node_first + a] for a in range(WIDTH)], axis=1)
-        left = unknowns - local @ near.reshape(-1, WIDTH * d, 1 + size)
-        left = left.reshape(-1, 1 + size)
-        follow = -_local(self.sample_values, self.sample_first, solved)
-        follow[:, :, 0] += data_residual
-        follow *= np.sqrt(self.data_weights)[:, None]
-        follow = follow.reshape(-1, 1 + size)
-        gram = left.T @ left + follow.T @ follow
+        gram = np.zeros((1 + size, 1 + size))
+        for part in _chunks(self.groups):
+            near = np.stack([solved[self.node_first[part] + a] for a in range(WIDTH)], axis=1)
+            left = unknowns[part] - local[part] @ near.reshape(-1, WIDTH * d, 1 + size)
+            left = left.reshape(-1, 1 + size)
+            gram += left.T @ left
+        for part in _chunks([slice(0, len(self.x))]):
+            follow = -_local(self.sample_values[part], self.sample_first[part], solved)
+            follow[:, :, 0] += data_residual[part]
+            follow *= np.sqrt(self.data_weights)[:, None]
+            follow = follow.reshape(-1, 1 + size)
+            gram += follow.T @ follow
         objective = float((data_residual**2).sum(axis=0) @ self.data_weights + (residual**2).sum())
         return Linearisation(
             objective=objective,
@@ -340,6 +348,13 @@ class Collocation:
                 for q in range(p + 1):
                     band[p - q, base + q] += blocks[group, p, q]
         return band
+
+
+def _chunks(slices: Sequence[slice]) -> Iterator[slice]:
+    """Pieces small enough for the processor's cache, which the products then stay in."""
+    for whole in slices:
+        for low in range(whole.start, whole.stop, CHUNK):
+            yield slice(low, min(low + CHUNK, whole.stop))
 
 
 def _local(values: np.ndarray, first: np.ndarray, control_points: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .collocation import Collocation, State
+from .collocation import CLEANEST, Collocation, State
 from .polynomials import PolynomialSystem
 from .records import Record, typical_step
 from .regression import closest_rival
@@ -98,6 +98,8 @@ def _standstill(law: PolynomialSystem) -> list[str]:
 def _near_tie(
     law: PolynomialSystem, state: State, problem: Collocation, charges: np.ndarray
 ) -> list[str]:
+    if (problem.data_weights**-0.5 <= CLEANEST).all():
+        return []  # what is left is the error of the splines, not noise: it settles nothing
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = problem.linearise(state, np.arange(law.coefficients.size))
     present = state.coefficients.T.ravel()
