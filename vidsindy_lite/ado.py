@@ -28,6 +28,7 @@ from .polynomials import (
     closure_mask,
     monomial_exponents,
     monomials,
+    shift_matrix,
     variable_names,
 )
 from .records import Record, check_record, cut, typical_step
@@ -125,6 +126,16 @@ class _Candidate:
         return self.state.active.tobytes(), self.state.moving.tobytes()
 
 
+@dataclass(frozen=True)
+class _Hull:
+    """A law in the centred frame, with every term that a shift of it may contain."""
+
+    state: State
+    columns: np.ndarray
+    algebra: FrameAlgebra
+    objective: float
+
+
 @dataclass
 class _Search:
     """One discovery: the data in standard units, and the stages that lead to the law."""
@@ -147,6 +158,7 @@ class _Search:
                 f"({unknowns} for degree {self.degree} and d = {self.d}), got {n} samples"
             )
         self._standardise()
+        self.home = self.units.standard(np.zeros(self.d))
         self.charges = term_charges(self.exponents)
         self.axis_charge = OFFSET_CHARGE * self.charges[0]
         self.rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(1)[0])
@@ -195,6 +207,7 @@ class _Search:
             state = self._best(candidates, segments)
             bar.update()
             state, segments = self._bridge(state, segments)
+            state = self._come_home(state, segments)
             bar.update()
             state, problem = self._polish(state, segments)
             bar.update()
@@ -284,72 +297,61 @@ class _Search:
         return state, best
 
     def _candidates(self, state: State, segments: list[Segment]) -> list[_Candidate]:
-        """Supports in the frames where the law is sparsest, best first by the quadratic model."""
+        """Supports in the frames where the law is sparsest, by the quadratic model."""
         weight = FIRST_WEIGHTS[-1]
         state, _ = self._select(state, segments, weight, "subset search, centred frame")
-        active = closure_mask(self.exponents, state.active)
-        problem = self._problem(segments, weight)
-        state = problem.solve(replace(state, active=active), tolerance=0.1)
-        columns = np.flatnonzero(state.free())
-        model = problem.linearise(state, columns)
-        information = np.diag(np.where(state.free()[: self.exponents.size], 0.0, 1e30))
-        information[np.ix_(columns, columns)] = model.information
-        algebra = FrameAlgebra(self.exponents, state.coefficients, information)
-        home = self.units.standard(np.zeros(self.d))
+        hull = self._hull(state, segments, weight)
         x = np.concatenate([segment.x for segment in segments])
-        box = (x.min(axis=0), x.max(axis=0))
         origins = sparse_origins(
-            algebra, active, home, box, self.charges.max(), keep=4, rng=self.rng
-        )
-        found = [(home, np.zeros(self.d, dtype=bool))]
-        # An origin costs like a term per axis, so each is also tried with axes left at home.
-        for origin in origins:
-            for kept in itertools.product((True, False), repeat=self.d):
-                moving = np.array(kept)
-                found.append((np.where(moving, origin, home), moving))
-        unique = {tuple(np.round(origin, 2)): (origin, moving) for origin, moving in found}
-        return sorted(
-            (
-                self._candidate(algebra, state, columns, origin, moving, problem.objective(state))
-                for origin, moving in unique.values()
-            ),
-            key=lambda candidate: candidate.cost,
-        )
+            hull.algebra, hull.state.active, self.home, (x.min(axis=0), x.max(axis=0)),
+            self.charges.max(), keep=4, rng=self.rng,
+        )  # fmt: skip
+        variants = [
+            variant for origin in [self.home, *origins] for variant in self._variants(origin)
+        ]
+        unique = {tuple(np.round(origin, 2)): (origin, moving) for origin, moving in variants}
+        return [self._candidate(hull, *variant) for variant in unique.values()]
 
-    def _candidate(
-        self,
-        algebra: FrameAlgebra,
-        state: State,
-        columns: np.ndarray,
-        origin: np.ndarray,
-        moving: np.ndarray,
-        objective: float,
-    ) -> _Candidate:
-        coefficients, information = algebra.at(origin)
-        present = coefficients.T.ravel()[columns]
-        information = information[np.ix_(columns, columns)]
+    def _variants(self, origin: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """An origin, and the same with some of its axes at home, where they cost nothing."""
+        masks = itertools.product(
+            *((True, False) if away else (False,) for away in origin != self.home)
+        )
+        return [(np.where(mask, origin, self.home), np.array(mask)) for mask in masks]
+
+    def _hull(self, state: State, segments: list[Segment], weight: float) -> _Hull:
+        problem = self._problem(segments, weight)
+        state = State(
+            state.control_points,
+            shift_matrix(self.exponents, state.offset) @ state.coefficients,
+            closure_mask(self.exponents, state.active),
+            np.zeros(self.d),
+            np.zeros(self.d, dtype=bool),
+        )
+        state = problem.solve(state, tolerance=0.1)
+        columns = np.flatnonzero(state.free())
+        information = np.diag(np.where(state.free()[: self.exponents.size], 0.0, 1e30))
+        information[np.ix_(columns, columns)] = problem.linearise(state, columns).information
+        algebra = FrameAlgebra(self.exponents, state.coefficients, information)
+        return _Hull(state, columns, algebra, problem.objective(state))
+
+    def _candidate(self, hull: _Hull, origin: np.ndarray, moving: np.ndarray) -> _Candidate:
+        """The cheapest support at an origin, by the quadratic model around the hull."""
+        coefficients, information = hull.algebra.at(origin)
+        present = coefficients.T.ravel()[hull.columns]
+        information = information[np.ix_(hull.columns, hull.columns)]
         support, solution, value = subset_search(
             information,
             information @ present,
-            np.tile(self.charges, self.d)[columns],
-            np.ones(len(columns), dtype=bool),
+            np.tile(self.charges, self.d)[hull.columns],
+            np.ones(len(hull.columns), dtype=bool),
         )
-        cost = objective + value + present @ information @ present
-        flat = np.zeros(self.exponents.size)
-        flat[columns] = solution
-        active = np.zeros(self.exponents.size, dtype=bool)
-        active[columns] = support
-        shape = self.exponents.shape[::-1]
-        return _Candidate(
-            cost + self.axis_charge * moving.sum(),
-            State(
-                state.control_points,
-                flat.reshape(shape).T,
-                active.reshape(shape).T,
-                origin.copy(),
-                moving,
-            ),
-        )
+        cost = hull.objective + value + present @ information @ present
+        flat = np.zeros((2, self.exponents.size))
+        flat[:, hull.columns] = solution, support
+        coefficients, active = flat.reshape(2, self.d, -1).transpose(0, 2, 1)
+        state = State(hull.state.control_points, coefficients, active != 0, origin.copy(), moving)
+        return _Candidate(cost + self.axis_charge * moving.sum(), state)
 
     def _best(self, candidates: list[_Candidate], segments: list[Segment]) -> State:
         """Refine the cheapest candidates; the lowest criterion wins."""
@@ -361,6 +363,21 @@ class _Search:
             limit = min(value for _, value in refined) + self.charges.max()
             states = [state for state, value in refined if value <= limit]
         return min(refined, key=lambda item: item[1])[0]
+
+    def _come_home(self, state: State, segments: list[Segment]) -> State:
+        """Put axes of the offset back to where they cost nothing, if the criterion falls.
+
+        The frames were compared at a small physics weight, at which weak terms do not count.
+        """
+        hull = self._hull(state, segments, FINAL_WEIGHT)
+        variants = [self._candidate(hull, *variant) for variant in self._variants(state.offset)]
+        closest = min(variants, key=lambda candidate: candidate.cost)
+        value = self._criterion(self._problem(segments, FINAL_WEIGHT), state)
+        if closest.cost < value and closest.state.moving.sum() < state.moving.sum():
+            trial, cost = self._select(closest.state, segments, FINAL_WEIGHT, "offset home")
+            if cost < value:
+                return trial
+        return state
 
     def _bridge(self, state: State, segments: list[Segment]) -> tuple[State, list[Segment]]:
         """Integrate the law across gaps and search again with the physics enforced there.

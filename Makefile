@@ -1,0 +1,50 @@
+# Thin: the work is `python -m vidsindy_lite run` and `pytest`. Every target sets up what it needs.
+
+VENV   := .venv
+BIN    := $(VENV)/bin
+READY  := $(VENV)/.installed
+PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
+
+.DEFAULT_GOAL := help
+.PHONY: help figures test test-fast bench lint lab clean
+
+help:
+	@echo "make figures          run all notebooks, regenerate figures/ and the notebooks' outputs"
+	@echo "make figures QUICK=1  the same code in its small profile, into build/quick/"
+	@echo "make test             all tests, the notebooks in the quick profile among them"
+	@echo "make test-fast        all tests but the notebook runs"
+	@echo "make bench            speed and memory, as ratios"
+	@echo "make lint             ruff"
+	@echo "make lab              JupyterLab on the notebooks"
+	@echo "make clean            remove $(VENV), build and caches"
+
+# Installed once, and again only when the requirements change.
+$(READY): requirements.txt pyproject.toml
+	@$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" || { \
+	  echo "Python 3.11 or later is needed, $(PYTHON) is $$($(PYTHON) --version 2>&1):" \
+	       "install it, or name one: make PYTHON=/path/to/python3.11"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@touch $@
+
+figures: $(READY)
+	$(BIN)/python -m vidsindy_lite run --profile $(if $(QUICK),quick,full)
+
+test: $(READY)
+	$(BIN)/python -m pytest
+
+test-fast: $(READY)
+	$(BIN)/python -m pytest -m "not notebooks"
+
+bench: $(READY)
+	$(BIN)/python -m pytest -s -o python_files="bench_*.py" tests/benchmarks
+
+lint: $(READY)
+	$(BIN)/ruff check .
+
+lab: $(READY)
+	$(BIN)/jupyter lab --ServerApp.root_dir=. --LabApp.default_url=/lab/tree/notebooks
+
+clean:
+	rm -rf $(VENV) build .pytest_cache .ruff_cache .hypothesis *.egg-info
+	find . -type d -name __pycache__ -prune -exec rm -rf {} +

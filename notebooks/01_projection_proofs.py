@@ -1,0 +1,332 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # From a point in space to a point in a view plane
+#
+# In this notebook, we present the geometry under everything else: how a camera whose view plane
+# has the normal $\mathbf n$ turns a point $\mathbf x$ of space into two in-plane coordinates.
+#
+# **What you will see**
+#
+# * Rodrigues' formula, and the one rotation that makes the projection work: *normal to* $\mathbf e_z$;
+# * why the position of the plane along its normal drops out;
+# * the in-plane offset as two *signed* distances;
+# * four places where the paper's text does not compute, each shown by a number.
+#
+# **What you need**: vectors, matrices, the cross product. Nothing is random here.
+#
+# **Covers** Eq. (1)-(2) and the appendices "Detail of Projection", "Plane Projection Proof" and
+# "Compute offset distance of a camera plane" (Fig. S1).
+
+# %% tags=["parameters"]
+profile: str = "full"  # full or quick
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from vidsindy_lite import geometry, plots
+from vidsindy_lite.artifacts import save_figure, save_table
+from vidsindy_lite.cameras import Rig
+from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+
+plt.style.use("vidsindy_lite.vidsindy")
+frames = {"full": 1500, "quick": 300}[profile]
+e_z = np.array([0.0, 0.0, 1.0])
+
+# %% [markdown]
+# A moving target to look at, and a camera that looks at it. `Rig.around` places three cameras
+# around a scene; here we take the first.
+
+# %%
+t, x = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET).trajectory(frames)
+camera = Rig.around(x).cameras[0]
+print("position", camera.position.round(2))
+print("normal  ", camera.normal.round(4))
+
+# %%
+fig = plots.plot_view_plane(camera, x)
+caption = "The view plane sees a flat copy of the 3D trajectory; depth along its normal Z' is lost."
+save_figure("figure_S1", fig, caption=caption, numbers={"t": t, "x": x})
+
+# %% [markdown]
+# *Figure S1: the plane through $C_1$ sees a flat copy of the trajectory. X' and Y' are its axes,
+# Z' is its normal; whatever happens along Z' is lost.*
+
+# %% [markdown]
+# ## Rodrigues' formula
+#
+# A rotation by the angle $\theta$ about the unit axis $\mathbf u$ is, Eq. (1)-(2),
+#
+# $$\mathbf R = \mathbf I + \sin\theta\,\mathbf U + (1-\cos\theta)\,\mathbf U^2,\qquad
+# \mathbf U\mathbf w = \mathbf u\times\mathbf w .$$
+#
+# scipy's rotation vectors are an independent implementation to compare with.
+
+# %%
+axis, angle = np.array([1.0, 2.0, 2.0]) / 3, 0.7
+R = geometry.rodrigues(axis, angle)
+assert np.allclose(R, Rotation.from_rotvec(angle * axis).as_matrix(), atol=1e-15)
+R.round(6)
+
+# %% [markdown]
+# ## Which rotation: normal to $\mathbf e_z$
+#
+# To read off in-plane coordinates we turn the plane flat: its unit normal has to become the
+# vertical,
+#
+# $$\mathbf R\,\mathbf n = \mathbf e_z,\qquad \mathbf u = \frac{\mathbf n\times\mathbf e_z}
+# {\|\mathbf n\times\mathbf e_z\|},\qquad \cos\theta = \mathbf n\cdot\mathbf e_z .$$
+#
+# The last row of $\mathbf R$ is then $\mathbf n$ itself, and the first two rows, $\mathbf R^-$, are
+# the axes X' and Y' of the plane.
+
+# %%
+n = camera.normal
+R = geometry.rotation_to_z(n)
+assert np.allclose(R @ n, e_z, atol=1e-15)
+assert np.allclose(R[2], n, atol=1e-15)
+R.round(4)
+
+# %% [markdown]
+# **The paper's text has it the other way round.** It sets $\mathbf v_0 = \mathbf e_z$ and
+# $\mathbf v_1 = \mathbf n$ and defines $\mathbf v_1 = \mathbf R\mathbf v_0$: that rotation takes
+# $\mathbf e_z$ to the normal. It is the transpose of ours, and it does not turn the plane flat.
+
+# %%
+text = R.T  # the rotation of the text
+assert np.allclose(text @ e_z, n, atol=1e-15)
+assert not np.allclose(text @ n, e_z, atol=0.1)
+print("R n        ", (R @ n).round(4))
+print("R n, text's", (text @ n).round(4))
+
+# %% [markdown]
+# ## A camera that looks along z
+#
+# For $\mathbf n = \pm\mathbf e_z$ the axis is $0/0$. Near $+\mathbf e_z$ the limit is the identity.
+# At $-\mathbf e_z$ there is no limit, every horizontal axis is equally short, so we fix one: half a
+# turn about x. The choice is harmless, since another one only adds to the camera's in-plane angle.
+
+# %%
+with np.errstate(invalid="ignore"):
+    axis = np.cross(e_z, e_z) / np.linalg.norm(np.cross(e_z, e_z))
+assert np.isnan(axis).all()
+assert np.allclose(geometry.rotation_to_z(e_z), np.eye(3))
+assert np.allclose(geometry.rotation_to_z(-e_z), np.diag([1, -1, -1]))
+print("axis as written:", axis)
+
+# %% [markdown]
+# Close to z there is a second trap: $\theta = \arccos(\mathbf n\cdot\mathbf e_z)$ loses half of its
+# digits, because the cosine is flat there. $\operatorname{atan2}$ of sine and cosine does not.
+
+
+# %%
+def as_written(normal):
+    axis = np.cross(normal, e_z)
+    return geometry.rodrigues(axis, np.arccos(normal @ e_z))
+
+
+tilt = np.logspace(-12, 0, 49)
+normals = np.column_stack([np.sin(tilt), 0 * tilt, np.cos(tilt)])
+errors = {
+    "angle by arccos, as written": [np.linalg.norm(as_written(n) @ n - e_z) for n in normals],
+    "angle by atan2, ours": [np.linalg.norm(geometry.rotation_to_z(n) @ n - e_z) for n in normals],
+}
+assert max(errors["angle by arccos, as written"]) > 1e-9 > max(errors["angle by atan2, ours"])
+
+# %%
+fig = plots.plot_rotation_accuracy(tilt, errors)
+caption = "Computed as written, the rotation is off by up to 1e-8 for a camera near the z axis."
+save_figure("projection_near_z", fig, caption=caption, numbers={"tilt": tilt, **errors})
+
+# %% [markdown]
+# *Computed as written, the rotation misses $\mathbf e_z$ by up to $10^{-8}$ for a camera near the
+# z axis; with the angle from atan2 it stays exact to rounding. (Exact results are drawn at
+# $10^{-17}$.)*
+
+# %% [markdown]
+# ## Projection on the plane, and why D drops out
+#
+# The foot of the perpendicular from $\mathbf x$ to the plane $Ax+By+Cz+D=0$ is, Eq. (S3) in one line,
+#
+# $$\mathbf x_p = \mathbf x - \mathbf n\,\frac{\mathbf n\cdot\mathbf x + D}{\mathbf n\cdot\mathbf n},
+# \qquad \mathbf n=(A,B,C)^T.$$
+#
+# Turn it flat: $\mathbf R\mathbf x_p = \mathbf R\mathbf x - \mathbf R\mathbf n\,(\dots)$. With
+# $\mathbf R\mathbf n = \|\mathbf n\|\,\mathbf e_z$ the whole correction points along
+# $\mathbf e_z$, so the first two coordinates are $\mathbf R^-\mathbf x$, **whatever D is**. That is
+# the proof of the appendix, without expanding a single product. It needs *normal to* $\mathbf e_z$.
+
+# %%
+d = np.linspace(-80, 80, 41)
+feet = np.array([geometry.plane_projection(x[0], n, value) for value in d])
+turned = {"R takes n to $e_z$": feet @ R.T, "as in the text: $e_z$ to n": feet @ text.T}
+spread = [np.ptp(values[:, :2], axis=0).max() for values in turned.values()]
+assert spread[0] < 1e-12
+assert spread[1] > 1
+print("spread of x_rp, y_rp over all D:", [f"{value:.2g}" for value in spread])
+
+# %%
+fig = plots.plot_independence(d, turned)
+caption = "Only with the rotation normal-to-e_z are the in-plane coordinates independent of D."
+save_figure("projection_independence_of_d", fig, caption=caption, numbers={"d": d, **turned})
+
+# %% [markdown]
+# *Moving the plane along its normal changes only $z_{rp}$ if R takes the normal to $\mathbf e_z$
+# (left); with the rotation of the text, the image would move, too (right).*
+
+# %% [markdown]
+# ## A sign in the proof
+#
+# The proof writes out R with the axis $(u_x,u_y,0)$, but its matrix, Eq. (S4), has $+u_x\sin\theta$ in
+# row 2, column 3, where the definition before it, Eq. (S2), has $-u_x\sin\theta$. The matrix of the
+# proof is no rotation, and its $y_{rp}$ depends on D. The published proof only expands $x_{rp}$,
+# where the entry does not occur.
+
+# %%
+proof = R.copy()
+proof[1, 2] *= -1
+print("det R        ", np.linalg.det(R).round(6))
+print("det, proof's ", np.linalg.det(proof).round(6))
+print("D in x_rp, y_rp:", -(proof @ n)[:2].round(6))
+assert abs(np.linalg.det(proof) - 1) > 1e-3
+assert abs((proof @ n)[0]) < 1e-15
+
+# %% [markdown]
+# The expansion of $x_{rp}$ collects the coefficient of D and finds zero, which is right, but for
+# the axis $\mathbf n\times\mathbf e_z$. With the axis of the text, $\mathbf e_z\times\mathbf n$, it is not.
+
+
+# %%
+def coefficient_of_d(axis):
+    (a, b, cos), (ux, uy, _) = n, axis / np.linalg.norm(axis)
+    sin = np.sqrt(1 - cos**2)
+    return -a * (cos + ux**2 * (1 - cos)) - cos * uy * sin - b * uy * ux * (1 - cos)
+
+
+print("axis n x e_z:", coefficient_of_d(np.cross(n, e_z)).round(6))
+print("axis e_z x n:", coefficient_of_d(np.cross(e_z, n)).round(6))
+assert abs(coefficient_of_d(np.cross(n, e_z))) < 1e-15
+assert abs(coefficient_of_d(np.cross(e_z, n))) > 0.1
+
+# %% [markdown]
+# ## The in-plane offset, from signed distances
+#
+# The image has its own origin: the place $C$ of the camera in its plane. In-plane coordinates
+# count from the reference origin, so the image is shifted by
+#
+# $$\Delta_c = \mathbf R^-\,C .$$
+#
+# The appendix gets the same two numbers as distances of $C$ to coordinate planes, each plane through
+# three points. The planes it needs are Y'OZ' (for $\delta_x$) and X'OZ' (for $\delta_y$); the text
+# names X'OY', the image plane itself, whose distance is the depth. And the distances carry a *sign*.
+
+# %%
+X, Y, Z = R
+origin, C = np.zeros(3), camera.position
+distance = {
+    "Y'OZ' (delta_x)": geometry.signed_distance(C, *geometry.plane_through(origin, Y, Z)),
+    "X'OZ' (delta_y)": geometry.signed_distance(C, *geometry.plane_through(origin, Z, X)),
+    "X'OY' (depth)": geometry.signed_distance(C, *geometry.plane_through(origin, X, Y)),
+}
+assert np.allclose(list(distance.values())[:2], camera.offset, atol=1e-12)
+assert min(distance.values()) < 0
+
+# %%
+rows = [
+    {"plane": plane, "signed distance": float(value), "distance": abs(float(value))}
+    for plane, value in distance.items()
+]
+caption = "Distances of the camera to the turned coordinate planes; the first two are the offset."
+save_table("projection_offset", rows, caption=caption)
+
+# %% [markdown]
+# What an unsigned distance does to the image of the trajectory:
+
+# %%
+seen = x @ camera.rows.T  # in-plane coordinates, R^- x
+on_image = seen - camera.offset  # the same from the camera's own origin
+curves = {
+    r"$R^-\,x$": seen,
+    "image + signed distances": on_image + camera.offset,
+    "image + unsigned distances": on_image + np.abs(camera.offset),
+}
+fig = plots.plot_in_plane(curves)
+caption = "Only signed distances put the image back where the trajectory is in the plane."
+save_figure("projection_offset_signs", fig, caption=caption, numbers=curves)
+
+# %% [markdown]
+# *Signed distances (blue) put the image back onto the in-plane coordinates of the trajectory (grey);
+# unsigned ones (red) miss by twice the distance along each axis where it is negative.*
+
+# %% [markdown]
+# ## All together: pixels
+#
+# With the scale $s$ and the in-plane angle $\vartheta$ of the image, the camera of this package is
+#
+# $$s\,\mathcal T(\vartheta)\,\mathbf x_c + \Delta_c = \mathbf R^-\mathbf x,\qquad
+# \mathcal T = \begin{bmatrix}\cos\vartheta & \sin\vartheta\\ -\sin\vartheta & \cos\vartheta
+# \end{bmatrix},\qquad \mathbf x_c = \bigl(u-\tfrac{W-1}{2},\ \tfrac{H-1}{2}-v\bigr).$$
+#
+# Projecting a trajectory first onto the plane, or not, makes no difference to the pixels.
+
+# %%
+pixels = camera.project(x)
+on_plane = geometry.plane_projection(x, camera.normal, -camera.normal @ camera.position)
+assert np.allclose(camera.project(on_plane), pixels, atol=1e-9)
+assert np.allclose(camera.plane_coordinates(pixels), seen, atol=1e-9)
+print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round(1))
+
+# %% [markdown]
+# ## What we learned
+#
+# * A view plane is turned flat by the rotation that takes its **normal to** $\mathbf e_z$. Then
+#   the last row of R is the normal, the first two are the axes of the plane, and the position of the
+#   plane along its normal drops out because $\mathbf R\mathbf n\parallel\mathbf e_z$.
+# * With the paper's $\mathbf v_1=\mathbf R\mathbf v_0$ this fails; the proof's own cancellation
+#   silently uses the other direction.
+# * The matrix of the proof has a wrong sign in row 2, column 3; the axis is $0/0$ along z; and the
+#   offset needs *signed* distances to Y'OZ' and X'OZ'.
+#
+# Next: [videos and tracking](02_videos_and_tracking.ipynb), where pixels come from images, and
+# [camera learning](03_camera_learning.ipynb), where $s$ and $\vartheta$ come from pixels.
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** R is not the only rotation that takes $\mathbf n$ to $\mathbf e_z$. Which are the others, and
+# what do they do to a camera?
+#
+# <details><summary>Solution</summary>
+#
+# All $\mathbf R_z(\varphi)\mathbf R$, with a turn about $\mathbf e_z$ afterwards. The in-plane
+# coordinates and the offset turn by $\varphi$ together, so
+# $s\,\mathcal T(\vartheta)\mathbf x_c+\Delta_c=\mathbf R^-\mathbf x$ still holds with
+# $\vartheta$ changed by $\varphi$. The convention is free, but every part of a program has to share
+# one: the learned angle means nothing without it.
+# </details>
+#
+# **2.** Two cameras look down with normals $(\pm 10^{-6}, 0, -1)$, nearly the same. How far apart are
+# their matrices R?
+#
+# <details><summary>Solution</summary>
+#
+# `geometry.rotation_to_z([1e-6, 0, -1]) - geometry.rotation_to_z([-1e-6, 0, -1])` is zero to about
+# $2\cdot10^{-6}$: both turn about the y axis, by nearly $\pi$, in opposite directions. But
+# `[0, 1e-6, -1]` turns about the x axis, and its X' and Y' have the opposite sign. So near
+# $-\mathbf e_z$ the in-plane angle of a camera jumps as its normal moves; learn the angle with the
+# normal at hand, do not carry it over.
+# </details>

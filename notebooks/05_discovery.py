@@ -1,0 +1,390 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Seven systems, from videos to equations
+#
+# In this notebook, we present the main result: seven chaotic systems, each discovered from three
+# videos with only the first camera calibrated, and scored as in the paper.
+#
+# **What you will see**
+#
+# * the systems as data, in two frames of reference;
+# * the equations found, term by term with standard errors, beside the truth;
+# * the discovered laws set in motion, and for how long their forecasts hold;
+# * the same from whole pixels, as in the paper;
+# * PySINDy, E-SINDy, WeakSINDy and Model-A on the same trajectories.
+#
+# **What you need**: the [tour](00_tour.ipynb); how the law is found is the subject of
+# [notebook 04](04_spline_ado.ipynb).
+#
+# **Covers** Table 1, Fig. 2, Tables S1-S3.
+
+# %% tags=["parameters"]
+profile: str = "full"  # full or quick
+seed: int = 0  # of the scenes in the videos
+jobs: int = 2  # systems at a time
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+from IPython.display import Math, display
+
+from vidsindy_lite import discover, learn_cameras, plots, reconstruct, score
+from vidsindy_lite.artifacts import save_figure, save_table
+from vidsindy_lite.baselines import BASELINES
+from vidsindy_lite.experiments import discover_films
+from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+
+plt.style.use("vidsindy_lite.vidsindy")
+names = {"full": tuple(SYSTEMS), "quick": ("SprottE", "WangSun")}[profile]
+frames = {"full": 1500, "quick": 400}[profile]
+
+# %% [markdown]
+# ## The systems (Table S1)
+#
+# A system is a table of coefficients, with an initial condition and a characteristic period. Here they are in
+# their native frame, as textbooks have them.
+
+# %%
+for name, system in SYSTEMS.items():
+    display(Math(rf"\textbf{{{name}}}\qquad {system.latex()}"))
+
+# %% [markdown]
+# The paper scores all laws in its "predefined reference coordinate system", and never says where that
+# is. Its ground truths tell: they are the native laws seen from an origin shifted by **(10, 10, 0)**. A
+# shifted polynomial is a polynomial, with more terms:
+# $\dot{\mathbf x}=\mathbf f(\mathbf x-\boldsymbol\Delta)$, multiplied out. No ground truth below was typed; each follows
+# from Table S1 by this shift.
+
+# %%
+rows = [
+    {
+        "system": name,
+        "native law": "; ".join(system.text().splitlines()),
+        "initial condition": str(system.x0),
+        "period": system.period,
+        "terms, native": int(system.support.sum()),
+        "terms, reference": int(system.shift(REFERENCE_OFFSET).support.sum()),
+    }
+    for name, system in SYSTEMS.items()
+]
+assert [row["terms, reference"] for row in rows] == [12, 8, 11, 10, 9, 15, 14]
+save_table("table_S1", rows, caption="The seven systems; initial conditions in the native frame.")
+
+# %% [markdown]
+# ## Discovery
+#
+# `discover_films` does for each system what the tour did for one: film it with three cameras against random
+# backgrounds, forget the calibration of cameras 2 and 3, track, learn the cameras, reconstruct, discover. Nothing is
+# chosen by system.
+
+# %%
+results = discover_films(names, frames, seed, jobs)
+
+# %% [markdown]
+# The paper's numbers (Table 1 and S3), to stand beside ours: relative $\ell_2$ error in $10^{-2}$, and false
+# positives.
+
+# %%
+columns = ("Lorenz", "SprottE", "RayleighBenard", "SprottF", "NoseHoover", "Tsucs2", "WangSun")
+paper_l2 = {
+    "ours": (1.50, 0.15, 2.00, 0.16, 6.22, 5.39, 0.16),
+    "PySINDy": (4.17, 3.48, 2.74, 7.51, 824.44, 12.29, 856.47),
+    "E-SINDy": (4.17, 3.26, 2.74, 7.52, 824.44, 12.29, 863.42),
+    "WeakSINDy": (2.02, 93.06, 84.66, 12.70, 12.71, 83.52, 9.56),
+}
+paper_false = {
+    "ours": (1, 0, 1, 0, 0, 1, 1), "PySINDy": (1, 3, 2, 1, 3, 1, 3),
+    "E-SINDy": (1, 1, 2, 1, 3, 1, 3), "WeakSINDy": (1, 6, 9, 6, 10, 2, 0),
+}  # fmt: skip
+paper_l2, paper_false = (
+    {method: dict(zip(columns, values, strict=True)) for method, values in table.items()}
+    for table in (paper_l2, paper_false)
+)
+
+# %%
+rows = [
+    result.row()
+    | {
+        "paper: false positives": paper_false["ours"][result.name],
+        "paper: l2 (e-2)": paper_l2["ours"][result.name],
+    }
+    for result in results
+]
+caption = "Seven systems from videos, scored in the reference frame, beside the paper's numbers."
+save_table("table_systems", rows, caption=caption)
+
+# %%
+for result in results:
+    assert result.score.exact, f"{result.name}: terms are wrong"
+    assert result.score.l2 <= 0.5e-2, f"{result.name}: l2 is {result.score.l2:.2e}"
+
+# %% [markdown]
+# All terms, no false one, and errors far below those of the paper. Where do they come from? These videos
+# are clean and lossless, and the tracker reads them to a thousandth of a pixel:
+
+# %%
+for result in results:
+    pixels = ", ".join(f"{error:.4f}" for error in result.pixel_error)
+    space = ", ".join(f"{error:.1e}" for error in result.position_error)
+    print(f"{result.name:15} pixels off by {pixels} px; path by {space} scene units (rms)")
+    assert max(result.pixel_error) < 0.1
+
+# %% [markdown]
+# ## The equations (Table S2)
+#
+# Each law as it was found, with standard errors, and the truth in the same frame.
+
+# %%
+for result in results:
+    print(f"{result.name}, found:\n{result.found.equations()}")
+    print(f"truth:\n{result.truth.text()}\n")
+
+# %% [markdown]
+# In the native frame the laws are shorter. The offset was found, too, and counts as up to three unknowns more;
+# along z it is zero by choice of the program, since shifting there would not save a term.
+
+# %%
+for result in results:
+    offset = ", ".join(f"{value:.6f}" for value in result.found.offset)
+    print(f"{result.name}, offset ({offset}):\n{result.found.equations('native')}")
+    print(f"truth, offset {REFERENCE_OFFSET}:\n{SYSTEMS[result.name].text()}\n")
+    assert np.allclose(result.found.offset, REFERENCE_OFFSET, atol=1e-2)
+
+
+# %% [markdown]
+# Are the standard errors to be trusted? If so, the distance of a coefficient from the truth is about one standard
+# error, and beyond two in few cases.
+
+
+# %%
+def pulls(result):
+    found, true = result.found, result.truth
+    rows = [found.terms.index(term) for term in true.terms]
+    errors = found.standard_errors[rows][true.support]
+    return (found.coefficients[rows] - true.coefficients)[true.support] / errors
+
+
+pulled = {result.name: pulls(result) for result in results}
+every = np.concatenate(list(pulled.values()))
+print(f"{len(every)} coefficients, {np.mean(np.abs(every) < 2):.0%} within two standard errors")
+assert np.mean(np.abs(every) < 2) > 0.7
+
+# %%
+fig = plots.plot_pulls(pulled)
+caption = "Errors of all coefficients in units of their standard errors; grey: two of them."
+save_figure("discovery_pulls", fig, caption=caption, numbers=pulled)
+
+# %% [markdown]
+# *Each point is one coefficient in the reference frame: its distance from the truth in standard errors. Those of one
+# system stray together, since they share one path and one offset.*
+
+# %%
+rows = [
+    {
+        "system": result.name, "equation": f"d{result.truth.names[equation]}/dt", "term": term,
+        "truth": result.truth.coefficients[result.truth.terms.index(term), equation],
+        "found": result.found.coefficients[row, equation],
+        "standard error": result.found.standard_errors[row, equation],
+    }
+    for result in results
+    for equation in range(3)
+    for row, term in enumerate(result.found.terms)
+    if result.found.coefficients[row, equation]
+]  # fmt: skip
+caption = "Every discovered term in the reference frame, with its standard error, and the truth."
+table = save_table("table_S2", rows, caption=caption)
+print(len(table.rows), "terms, stored as table_S2")
+
+# %% [markdown]
+# ## The laws in motion (Fig. 2)
+#
+# A law is more than its coefficients: let it run. We start each discovered law at the first point of its
+# curve and the truth at its initial condition.
+
+
+# %%
+def forecast(result, periods, rate=400):
+    t = result.truth.times(periods * rate, rate)
+    truth = result.truth.simulate(t, result.truth.x0)
+    return truth, result.found.system.simulate(t, result.found.curve(t[:1])[0])
+
+
+five = {result.name: forecast(result, 5) for result in results}
+for name, (truth, found) in five.items():
+    assert np.abs(found - truth).max() < 0.05 * truth.std(axis=0).max(), name
+
+# %%
+fig = plots.plot_attractors(five)
+caption = "Five periods of the discovered laws (blue) on the true motions (grey)."
+numbers = {name: {"truth": a[::8], "discovered": b[::8]} for name, (a, b) in five.items()}
+save_figure("fig_2", fig, caption=caption, numbers=numbers)
+
+# %% [markdown]
+# *Fig. 2: five periods of each discovered law (blue) on the true motion (grey).*
+
+# %% [markdown]
+# Why only five? The systems are chaotic, and any error grows exponentially. Here is when the distance
+# first exceeds a tenth of the spread of the motion:
+
+
+# %%
+def good_periods(result, periods=40):
+    truth, found = forecast(result, periods)
+    apart = np.linalg.norm(found - truth, axis=1) > 0.1 * truth.std(axis=0).max()
+    return (np.argmax(apart) if apart.any() else len(apart)) * periods / len(apart)
+
+
+rows = [
+    {"system": result.name, "forecast good for (periods)": good_periods(result)}
+    for result in results
+]
+caption = f"Forecast from the first frame, at most 40 periods; the videos last {frames / 100:g}."
+save_table("discovery_forecast", rows, caption=caption)
+
+# %% [markdown]
+# ## Whole pixels
+#
+# A thousandth of a pixel is a luxury of these videos. The paper says that "camera pixels can only take
+# approximate integer values", so let us throw away the digits behind the point: the same tracks, rounded to
+# whole pixels; cameras and path learned anew.
+
+
+# %%
+def from_whole_pixels(result):
+    tracks = [np.round(track) for track in result.found.tracks]
+    return reconstruct(tracks, learn_cameras(tracks, result.found.rig.uncalibrated(keep=0)))
+
+
+paths = {result.name: from_whole_pixels(result) for result in results}
+coarse = {r.name: discover(r.found.t, paths[r.name]) for r in results}
+
+# %%
+rows = []
+for result in results:
+    scored = score(coarse[result.name], result.truth)
+    rows.append({
+        "system": result.name,
+        "false positives": scored.false_positives,
+        "missing": scored.missing,
+        "l2 (e-2)": 100 * scored.l2,
+        "worst coefficient (%)": 100 * scored.max_coefficient_error,
+        "warnings": len(coarse[result.name].warnings),
+        "paper: l2 (e-2)": paper_l2["ours"][result.name],
+    })  # fmt: skip
+    assert scored.exact, result.name
+    assert scored.l2 <= 0.5e-2, result.name
+save_table("discovery_whole_pixels", rows, caption="The same from tracks rounded to whole pixels.")
+
+# %% [markdown]
+# The errors are a hundred times larger than before, the terms still right, and the errors still well
+# below the paper's.
+#
+# ## Other methods on the same trajectories (Table 1, Table S3)
+#
+# Each method of the paper's tables gets the same reconstructed path, as tracked and from whole pixels, in the
+# reference frame, with the same 20 candidate terms. The paper names no thresholds; here each method chooses its
+# own on the last fifth of the record, without the truth (`vidsindy_lite/baselines.py`).
+
+# %%
+laws = {("ours", "as tracked"): {r.name: r.found.system for r in results}}
+laws["ours", "whole pixels"] = {name: law.system for name, law in coarse.items()}
+for method, fit in BASELINES.items():
+    laws[method, "as tracked"] = {r.name: fit(r.found.t, r.found.x) for r in results}
+    laws[method, "whole pixels"] = {r.name: fit(r.found.t, paths[r.name]) for r in results}
+
+# %%
+truths = {result.name: result.truth for result in results}
+scores = {
+    key: {name: score(law, truths[name]) for name, law in by_system.items()}
+    for key, by_system in laws.items()
+}
+
+
+def table_of(methods):
+    return [
+        {
+            "system": name, "method": method, "tracks": tracks,
+            "terms found": "yes" if scored.terms_found else "no",
+            "false positives": scored.false_positives, "l2 (e-2)": 100 * scored.l2,
+            "precision (%)": 100 * scored.precision, "recall (%)": 100 * scored.recall,
+            "paper: false positives": paper_false.get(method, {}).get(name),
+            "paper: l2 (e-2)": paper_l2.get(method, {}).get(name),
+        }
+        for name in names
+        for (method, tracks), by_system in scores.items()
+        for scored in [by_system[name]]
+        if method in methods
+    ]  # fmt: skip
+
+
+# %%
+caption = "Ours and PySINDy on the same trajectories, as tracked and from whole pixels."
+save_table("table_1", table_of(("ours", "PySINDy")), caption=caption)
+
+# %%
+caption = "E-SINDy, WeakSINDy and Model-A on the same trajectories."
+save_table("table_S3", table_of(("E-SINDy", "WeakSINDy", "Model-A")), caption=caption)
+
+# %%
+fig = plots.plot_methods(scores)
+caption = "Relative error of each method on each system; open symbols: the terms are wrong."
+numbers = {
+    f"{method}, {tracks}": {name: scored.l2 for name, scored in by_system.items()}
+    for (method, tracks), by_system in scores.items()
+}
+save_figure("discovery_methods", fig, caption=caption, numbers=numbers)
+
+# %% [markdown]
+# *Relative error of each method. With paths as exact as these (left) the derivative is no problem and every
+# method finds most systems; from whole pixels (right) methods that differentiate the path before they look for the
+# law lose terms (open symbols), those that do not, ours and the weak form, keep them.*
+
+# %%
+for tracks in ("as tracked", "whole pixels"):
+    for method in ("ours", *BASELINES):
+        exact = sum(scored.exact for scored in scores[method, tracks].values())
+        print(f"{tracks:12}  {method:10} exact terms in {exact} of {len(names)}")
+for method in BASELINES:
+    theirs, ours = (scores[key, "whole pixels"] for key in (method, "ours"))
+    assert np.mean([theirs[n].l2 for n in names]) > np.mean([ours[n].l2 for n in names]), method
+
+# %% [markdown]
+# ## What we learned
+#
+# LEARNED
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** EX1
+#
+# <details><summary>Solution</summary>
+#
+# ```python
+# ```
+#
+# EXERCISE1
+# </details>
+#
+# **2.** EX2
+#
+# <details><summary>Solution</summary>
+#
+# ```python
+# ```
+#
+# EXERCISE2
+# </details>

@@ -1,0 +1,169 @@
+"""The solver: time and memory, against the paper's optimiser, baselines and the Cramer-Rao bound.
+
+Run with `make bench` on an otherwise idle machine (about 20 minutes). Every bar is a ratio taken
+in one run, or a time of the processor. The table is printed and saved to build/benchmarks/.
+"""
+
+import csv
+import time
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from vidsindy_lite.ado import discover
+from vidsindy_lite.baselines import BASELINES
+from vidsindy_lite.corruption import add_noise
+from vidsindy_lite.limits import cramer_rao
+from vidsindy_lite.metrics import score
+from vidsindy_lite.paper_ado import discover_paper
+from vidsindy_lite.polynomials import PolynomialSystem
+from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+
+TABLE = Path("build/benchmarks/solver.csv")
+ROWS: list[dict[str, object]] = []
+
+
+@pytest.fixture(scope="module", autouse=True)
+def table():
+    """Collect the rows of all benchmarks, then print and save them."""
+    torch.set_num_threads(1)
+    yield
+    columns = ["benchmark", "case", "value", "unit", "bar"]
+    TABLE.parent.mkdir(parents=True, exist_ok=True)
+    with TABLE.open("w", newline="") as file:
+        writer = csv.DictWriter(file, columns)
+        writer.writeheader()
+        writer.writerows(ROWS)
+    print()
+    for row in ROWS:
+        print(" | ".join(f"{row[column]!s:>14}" for column in columns))
+
+
+def note(benchmark, case, value, unit, bar=""):
+    ROWS.append(
+        {"benchmark": benchmark, "case": case, "value": f"{value:.4g}", "unit": unit, "bar": bar}
+    )
+
+
+def measured(name, noise, n=1500, seed=0):
+    truth = SYSTEMS[name].shift(REFERENCE_OFFSET)
+    t, x = truth.trajectory(n)
+    return truth, t, add_noise(x, noise, np.random.default_rng(seed))
+
+
+def seconds(function, *arguments, **options):
+    start = time.process_time()
+    result = function(*arguments, **options)
+    return time.process_time() - start, result
+
+
+def test_median_time_over_the_systems():
+    spent = []
+    for name in SYSTEMS:
+        _, t, x = measured(name, 0.1)
+        spent.append(seconds(discover, t, x)[0])
+        note("time, 1500 samples", name, spent[-1], "s")
+    note("time, 1500 samples", "median", np.median(spent), "s", "4")
+    assert np.median(spent) <= 4
+
+
+def test_time_and_memory_are_linear_in_the_samples():
+    spent, peaks = [], []
+    for n in (1500, 5000, 15000):
+        _, t, x = measured("Lorenz", 0.1, n)
+        spent.append(seconds(discover, t, x)[0])
+        tracemalloc.start()
+        discover(t, x)
+        peaks.append(tracemalloc.get_traced_memory()[1] / 1e9)
+        tracemalloc.stop()
+        note("samples", n, spent[-1], "s")
+        note("samples", n, peaks[-1], "GB", "1")
+    note("samples", "15000 over 1500", spent[-1] / spent[0], "ratio", "12")
+    assert spent[-1] <= 12 * spent[0]
+    assert peaks[-1] < 1
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+def test_terms(degree):
+    _, t, x = measured("Lorenz", 0.05)
+    spent, found = seconds(discover, t, x, degree=degree)
+    note("terms", f"degree {degree}: {found.coefficients.size}", spent, "s")
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 4])
+def test_dimension(d):
+    chain = {name: {name: -0.05} for name in "xyzw"[:d]}
+    for left, right in zip("xyzw"[:d], "xyzw"[1:d], strict=False):
+        chain[left][right], chain[right][left] = 1.0, -1.0
+    law = PolynomialSystem.from_terms(chain, degree=3)
+    t = np.linspace(0, 30, 1000)
+    x = add_noise(law.simulate(t, np.arange(1.0, d + 1)), 0.02, np.random.default_rng(0))
+    note("dimension", d, seconds(discover, t, x)[0], "s")
+
+
+def lorenz_exam(seed=0):
+    """The public exam of the paper's model: 401 samples at 20 Hz, noise 5 % of the RMS."""
+    law, t = SYSTEMS["Lorenz"], np.arange(401) / 20
+    x = law.simulate(t, (-8, 7, 27))
+    noise = 0.05 * np.sqrt((x**2).mean(axis=0))
+    return law, t, x + noise * np.random.default_rng(seed).normal(size=x.shape)
+
+
+def test_against_the_optimiser_of_the_paper():
+    """Time for gradient descent to meet the law as well as ours does, or to run out of budget.
+
+    Both fit the same data. The loss is that of the paper, Eq. 8: what ours reaches when it is
+    done is evaluated as mean-square data residual plus physics residual, in standard units.
+    """
+    law, t, x = lorenz_exam()
+    ours, found = seconds(discover, t, x)
+    assert score(found, law).exact
+    physics = found.history[-1].physics_loss
+    theirs, paper = seconds(discover_paper, t, x, pretraining=20000, epochs=20000)
+    reached = [h["seconds"] for h in paper.history if h["physics_loss"] <= physics]
+    note("paper's optimiser", "ours", ours, "s")
+    note("paper's optimiser", "gradient descent", theirs, "s")
+    note("paper's optimiser", "physics loss, ours", physics, "")
+    note("paper's optimiser", "physics loss, theirs", paper.history[-1]["physics_loss"], "")
+    note("paper's optimiser", "false and missing terms, theirs",
+         score(paper.system, law).false_positives + score(paper.system, law).missing, "terms")  # fmt: skip
+    ratio = (reached[0] if reached else theirs) / ours
+    note("paper's optimiser", "at least" if not reached else "ratio", ratio, "ratio", "300")
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_against_baselines(name):
+    truth, t, x = measured(name, 0.05)
+    scores = {"ours": score(discover(t, x), truth)}
+    scores |= {key: score(method(t, x), truth) for key, method in BASELINES.items()}
+    for key, result in scores.items():
+        note("5 % noise", f"{name}, {key}", 100 * result.l2, "l2 (e-2)")
+        note("5 % noise", f"{name}, {key}", result.false_positives + result.missing, "wrong terms")
+    assert scores["ours"].l2 <= min(result.l2 for result in scores.values())
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.1])
+def test_accuracy_against_the_cramer_rao_bound(noise):
+    moving, ratios, covered = np.array([True, True, False]), [], []
+    for name, system in SYSTEMS.items():
+        for seed in range(5):
+            _, t, x = measured(name, noise, seed=seed)
+            found = discover(t, x)
+            if not score(found.native, system).exact:
+                continue
+            spread = system.trajectory(1500)[1].std(axis=0)
+            bound = cramer_rao(system, t, system.x0, noise * spread, moving)
+            on = system.support
+            error = (found.native.coefficients - system.coefficients)[on]
+            ratios.append(error / bound.coefficients[on])
+            covered.append(np.abs(error) <= 1.96 * found.native_standard_errors[on])
+    ratio = np.sqrt((np.concatenate(ratios) ** 2).mean())
+    coverage = 100 * np.concatenate(covered).mean()
+    note("Cramer-Rao", f"noise {noise:.0%}", ratio, "rms ratio", "1.5")
+    note("Cramer-Rao", f"noise {noise:.0%}", coverage, "% covered", "90-99")
+    note("Cramer-Rao", f"noise {noise:.0%}", np.concatenate(covered).size, "draws", "200")
+    assert ratio <= 1.5
+    assert 90 <= coverage <= 99

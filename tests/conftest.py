@@ -1,0 +1,61 @@
+"""What all tests share: settings, and a repository of tiny notebooks."""
+
+import os
+from pathlib import Path
+
+# Before numpy is imported: results then do not depend on the number of cores.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import pytest
+from hypothesis import settings
+
+# The same examples in every run, so that a red test stays red; no deadline on a busy machine.
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
+
+HEADER = """\
+# ---
+# jupyter:
+#   jupytext:
+#     cell_metadata_filter: tags,-all
+#     formats: ipynb,py:percent
+#     notebook_metadata_filter: kernelspec,jupytext,-jupytext.text_representation.jupytext_version
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # A tiny notebook
+
+# %% tags=["parameters"]
+profile: str = "full"  # full or quick
+"""
+
+
+class TinyRepository:
+    """A folder laid out like the repository, to fill with tiny notebooks."""
+
+    def __init__(self, root: Path):
+        self.root = root
+        self.notebooks = root / "notebooks"
+        self.notebooks.mkdir(exist_ok=True)
+        (root / "vidsindy_lite").mkdir(exist_ok=True)
+        (root / "requirements.txt").write_text("numpy==2.4.6\n")
+
+    def write(self, name: str, *cells: str) -> Path:
+        """Write notebooks/<name>.py: a title, the parameters cell, and these code cells."""
+        path = self.notebooks / f"{name}.py"
+        path.write_text(HEADER + "".join(f"\n# %%\n{cell}\n" for cell in cells))
+        return path
+
+
+@pytest.fixture
+def tiny(tmp_path) -> TinyRepository:
+    """An empty `TinyRepository`."""
+    return TinyRepository(tmp_path)

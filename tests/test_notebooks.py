@@ -1,0 +1,261 @@
+"""Gates that keep the notebooks honest, each with a test in which it fails, and their quick run."""
+
+import re
+
+import jupytext
+import nbformat
+import pytest
+
+from vidsindy_lite import artifacts, runner
+
+ROOT = runner.PACKAGE.parent
+NOTEBOOKS = runner.find_notebooks(ROOT)
+LARGEST = 600_000  # bytes of an executed notebook; a code host shows no more
+RUN = "python -m vidsindy_lite run {}"
+LONGEST = 15  # lines of a code cell
+
+PARAMETER = re.compile(r"\w+: \w+ = .+  # .+")
+GLOBAL_RANDOM = re.compile(
+    r"\b(np|numpy)\.random\.(?!default_rng\b|Generator\b|SeedSequence\b)\w+"
+    r"|^\s*(import|from) random\b|\btorch\.manual_seed\b",
+    re.MULTILINE,
+)
+VOLATILE = re.compile(r"0x[0-9a-f]{6,}|/(tmp|home|root|Users)/|\\Users\\")
+
+
+# ------------------------------------------------------------------------ gates: a list of problems
+
+
+def executed_half(path):
+    """The .ipynb beside a .py; no cells if there is none, which `pair_problems` reports."""
+    executed = path.with_suffix(".ipynb")
+    return (
+        nbformat.read(executed, as_version=4) if executed.exists() else nbformat.v4.new_notebook()
+    )
+
+
+def pair_problems(path):
+    """How the two halves of a pair disagree: kind, source or tags of a cell."""
+
+    def cells(notebook):
+        return [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in notebook.cells]
+
+    ours, theirs = cells(jupytext.read(path)), cells(executed_half(path))
+    problems = [] if len(ours) == len(theirs) else [f"{len(ours)} cells beside {len(theirs)}"]
+    for index, (one, other) in enumerate(zip(ours, theirs, strict=False)):
+        if one != other:
+            problems.append(f"cell {index}: {one} beside {other}")
+    return problems
+
+
+def freshness_problems(path):
+    """Whether the executed half is that of this code, in the full profile and with its outputs."""
+    executed = executed_half(path)
+    problems = []
+    if executed.metadata.get("vidsindy_lite", {}).get("stamp") != runner.code_stamp(path, "full"):
+        problems.append("not executed with this code: " + RUN.format(path.stem))
+    for index, cell in enumerate(executed.cells):
+        if cell.cell_type == "code" and cell.execution_count is None:
+            problems.append(f"cell {index} was not executed")
+    return problems
+
+
+def anatomy_problems(path):
+    """What a notebook of ours has to have, and must not."""
+    notebook = jupytext.read(path)
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    parameters = [cell for cell in code if "parameters" in cell.metadata.get("tags", [])]
+    problems = []
+    first = notebook.cells[0]
+    if first.cell_type != "markdown" or not first.source.startswith("# "):
+        problems.append("the first cell is no title")
+    if notebook.metadata.get("kernelspec", {}).get("name") != "python3":
+        problems.append("the header does not name the kernel python3")
+    if len(parameters) != 1 or 'profile: str = "full"' not in parameters[0].source:
+        problems.append('no parameters cell with profile: str = "full"')
+    for cell in parameters:
+        for line in cell.source.splitlines():
+            if not PARAMETER.fullmatch(line):
+                problems.append(f"parameters: not `name: type = value  # help`: {line}")
+    for index, cell in enumerate(notebook.cells):
+        if cell.cell_type == "code":
+            lines = [line for line in cell.source.splitlines() if line.strip()]
+            if len(lines) > LONGEST:
+                problems.append(f"cell {index} has {len(lines)} lines, at most {LONGEST}")
+            if found := GLOBAL_RANDOM.search(cell.source):
+                problems.append(f"cell {index} uses global random state: {found[0].strip()}")
+    return problems
+
+
+def output_problems(path):
+    """What an executed half must not hold: too much, or what changes from run to run."""
+    executed = executed_half(path)
+    size = len(nbformat.writes(executed).encode())
+    problems = [f"{size} bytes, at most {LARGEST}"] if size > LARGEST else []
+    for index, cell in enumerate(executed.cells):
+        for output in cell.get("outputs", []):
+            text = output.get("text", "") + output.get("data", {}).get("text/plain", "")
+            if found := VOLATILE.search(text):
+                problems.append(f"cell {index} prints an address or a path: {found[0]}")
+    return problems
+
+
+def orphan_problems(notebooks):
+    """Executed halves without a source."""
+    sources = {path.stem for path in runner.find_notebooks(notebooks.parent)}
+    return [path.name for path in sorted(notebooks.glob("*.ipynb")) if path.stem not in sources]
+
+
+# ------------------------------------------------------------------------------ our notebooks pass
+
+
+def test_there_are_notebooks():
+    assert NOTEBOOKS
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "gate", [anatomy_problems, pair_problems, freshness_problems, output_problems]
+)
+def test_notebook(path, gate):
+    assert gate(path) == []
+
+
+def test_every_executed_half_has_its_source():
+    assert orphan_problems(ROOT / "notebooks") == []
+
+
+def test_figures_are_complete_and_of_this_code():
+    stamps = {path.stem: runner.code_stamp(path, "full") for path in NOTEBOOKS}
+    assert artifacts.check_folder(ROOT / "figures", stamps) == []
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """Where all quick runs go, one after the other, so that one may read another's tables."""
+    return tmp_path_factory.mktemp("quick")
+
+
+@pytest.mark.notebooks
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_quick_run(path, quick):
+    report = runner.run([path.stem], "quick", quick, root=ROOT)
+    assert report.ok, str(report)
+
+
+# ------------------------------------------------------------------------------ each gate can fail
+
+
+@pytest.fixture
+def pair(tiny):
+    """A pair that passes every gate; its executed half was made without running it."""
+    path = tiny.write("01_first", "x = 1", "x + 1")
+    stamp = runner.code_stamp(path, "full")
+    executed = jupytext.read(path)
+    for count, cell in enumerate((c for c in executed.cells if c.cell_type == "code"), start=1):
+        cell.execution_count = count
+    nbformat.write(runner.clean(executed, path, "full", stamp), path.with_suffix(".ipynb"))
+    return path
+
+
+def edit(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def test_a_good_pair_passes(pair):
+    for gate in (anatomy_problems, pair_problems, freshness_problems, output_problems):
+        assert gate(pair) == []
+    assert orphan_problems(pair.parent) == []
+
+
+@pytest.mark.parametrize(
+    ("half", "old", "new"),
+    [
+        (".py", "x = 1", "x = 2"),
+        (".py", "A tiny notebook", "A small notebook"),
+        (".py", '# %% tags=["parameters"]', "# %%"),
+        (".py", "# %%\nx = 1", "# %% [markdown]\n# x = 1"),
+        (".py", "# %%\nx = 1\n", ""),
+        (".ipynb", '"x = 1"', '"x = 2"'),
+    ],
+)
+def test_pair_gate_fails_on_halves_that_disagree(pair, half, old, new):
+    edit(pair.with_suffix(half), old, new)
+    assert pair_problems(pair)
+
+
+def test_gates_fail_on_a_missing_half(pair):
+    pair.with_suffix(".ipynb").unlink()
+    assert pair_problems(pair) == ["4 cells beside 0"]
+    assert freshness_problems(pair) == ["not executed with this code: " + RUN.format("01_first")]
+
+
+def test_freshness_gate_fails_on_edited_code(pair):
+    edit(pair, "x = 1", "x = 2")
+    edit(pair.with_suffix(".ipynb"), '"x = 1"', '"x = 2"')  # as `jupytext --sync` would
+    assert pair_problems(pair) == []
+    assert freshness_problems(pair) == ["not executed with this code: " + RUN.format("01_first")]
+
+
+def test_freshness_gate_fails_on_a_quick_run(pair):
+    quick = runner.code_stamp(pair, "quick")
+    edit(pair.with_suffix(".ipynb"), runner.code_stamp(pair, "full"), quick)
+    assert freshness_problems(pair)
+
+
+def test_freshness_gate_fails_on_cleared_outputs(pair):
+    edit(pair.with_suffix(".ipynb"), '"execution_count": 2', '"execution_count": null')
+    assert freshness_problems(pair) == ["cell 2 was not executed"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("# # A tiny", "# A tiny", "no title"),
+        ("name: python3", "name: other", "kernel python3"),
+        ('tags=["parameters"]', "", "no parameters cell"),
+        ("profile: str", "size: str", "no parameters cell"),
+        ("  # full or quick", "", "parameters: not"),
+        ("x = 1", "import numpy as np\nnp.random.seed(0)", "random state: np.random.seed"),
+        ("x = 1", "x = numpy.random.normal()", "random state: numpy.random.normal"),
+        ("x = 1", "import random", "random state: import random"),
+        ("x = 1", "torch.manual_seed(0)", "random state: torch.manual_seed"),
+        ("x = 1", "x = 1\n" * 16, "has 16 lines"),
+    ],
+)
+def test_anatomy_gate_fails(pair, old, new, problem):
+    edit(pair, old, new)
+    assert [found for found in anatomy_problems(pair) if problem in found]
+
+
+def test_anatomy_gate_accepts_a_generator_and_fifteen_lines(pair):
+    edit(pair, "x = 1", "rng = np.random.default_rng(0)\n" * LONGEST)
+    assert anatomy_problems(pair) == []
+
+
+@pytest.mark.parametrize("text", ["<Axes at 0x7f3a5c0d2e90>", "/tmp/abc/camera_1.mkv"])
+def test_output_gate_fails_on_what_changes_from_run_to_run(pair, text):
+    executed = nbformat.read(pair.with_suffix(".ipynb"), as_version=4)
+    executed.cells[2].outputs = [nbformat.v4.new_output("stream", text=text)]
+    nbformat.write(executed, pair.with_suffix(".ipynb"))
+    assert len(output_problems(pair)) == 1
+
+
+def test_output_gate_fails_on_a_large_notebook(pair):
+    executed = nbformat.read(pair.with_suffix(".ipynb"), as_version=4)
+    data = {"image/png": "A" * LARGEST}
+    executed.cells[2].outputs = [nbformat.v4.new_output("display_data", data=data)]
+    nbformat.write(executed, pair.with_suffix(".ipynb"))
+    assert "at most 600000" in output_problems(pair)[0]
+
+
+def test_orphan_gate_fails_on_an_executed_half_alone(pair):
+    pair.unlink()
+    assert orphan_problems(pair.parent) == ["01_first.ipynb"]
+
+
+def test_quick_run_fails_with_its_notebook(tiny):
+    tiny.write("01_bad", "assert 1 + 1 == 3")
+    assert not runner.run(["01"], "quick", tiny.root / "build", root=tiny.root).ok

@@ -1,0 +1,285 @@
+"""The runner on tiny notebooks: what it makes of a good one, how each bad one is seen to fail."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import nbformat
+import pytest
+from conftest import TinyRepository
+
+from vidsindy_lite import artifacts, runner
+from vidsindy_lite.__main__ import main
+from vidsindy_lite.runner import NotebookError
+
+PLOT = (
+    "import matplotlib.pyplot as plt\n\nfigure, axes = plt.subplots()\naxes.plot([0, 1], [0, 1]);"
+)
+SAVE = """\
+from vidsindy_lite import artifacts
+
+artifacts.save_figure("fig_1", figure, caption="A line.", numbers={"x": [0, 1]})
+artifacts.save_table(
+    "table_systems", [{"system": profile, "seconds": 1.234}], caption="The systems."
+)"""
+NOISE = """\
+import sys
+
+print("to stdout")
+print("to stderr", file=sys.stderr)
+print("again")
+{3, 1, 2} | {"b", "a"}"""
+
+
+def files(folder):
+    found = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in found}
+
+
+# ------------------------------------------------------------------------------------ a good run
+
+
+@pytest.fixture(scope="module")
+def executed_once(tmp_path_factory):
+    """A repository with one good notebook, after a full run."""
+    tiny = TinyRepository(tmp_path_factory.mktemp("executed"))
+    tiny.write("01_first", PLOT, SAVE, NOISE)
+    assert runner.run(root=tiny.root).ok
+    return tiny
+
+
+@pytest.fixture
+def good(executed_once, tmp_path):
+    """A copy of it, to change."""
+    shutil.copytree(executed_once.root, tmp_path / "repository")
+    return TinyRepository(tmp_path / "repository")
+
+
+def test_full_run_writes_into_the_repository(executed_once):
+    made = {"fig_1.png", "fig_1.svg", "fig_1.json", "README.md", "run_times.json"}
+    made |= {f"table_systems.{suffix}" for suffix in ("csv", "md", "json")}
+    assert {path.name for path in (executed_once.root / "figures").iterdir()} == made
+    assert (executed_once.notebooks / "01_first.ipynb").exists()
+
+
+def test_second_full_run_changes_no_byte(good, capsys):
+    before = files(good.root)
+    assert runner.run(root=good.root).ok
+    assert files(good.root) == before
+    assert "[1/1] 01_first" in capsys.readouterr().out
+
+
+def test_quick_run_goes_to_the_build_folder_only(good):
+    before = files(good.root)
+    report = runner.run(["01"], "quick", root=good.root)
+    assert report.ok
+    assert report.systems.rows[0]["system"] == "quick"
+    assert str(report.systems) in str(report)
+    made = files(good.root / "build" / "quick")
+    assert {"notebooks/01_first.ipynb", "figures/fig_1.png", "figures/README.md"} <= set(made)
+    shutil.rmtree(good.root / "build")
+    assert files(good.root) == before
+
+
+def test_executed_notebook_is_clean(executed_once):
+    cleaned = nbformat.read(executed_once.notebooks / "01_first.ipynb", as_version=4)
+    assert set(cleaned.metadata) == {"jupytext", "kernelspec", "vidsindy_lite"}
+    stamp = runner.code_stamp(executed_once.notebooks / "01_first.py", "full")
+    assert cleaned.metadata.vidsindy_lite == {"profile": "full", "stamp": stamp}
+    kept = [dict(cell.metadata) for cell in cleaned.cells]
+    assert kept == [{}, {"tags": ["parameters"]}, {}, {}, {}]
+    assert [cell.id for cell in cleaned.cells] == [f"cell-{i:02d}" for i in range(5)]
+    counts = [cell.execution_count for cell in cleaned.cells if cell.cell_type == "code"]
+    assert counts == [1, 2, 3, 4]
+    stream, result = cleaned.cells[-1].outputs
+    assert (stream.name, stream.text) == ("stdout", "to stdout\nagain\n")
+    assert result.execution_count == 4
+    assert "image/png" in cleaned.cells[2].outputs[0].data
+    assert "<table>" in cleaned.cells[3].outputs[0].data["text/html"]
+
+
+def test_index_has_the_run_times(executed_once):
+    figures = executed_once.root / "figures"
+    times = json.loads((figures / artifacts.RUN_TIMES).read_text())
+    stamp = runner.code_stamp(executed_once.notebooks / "01_first.py", "full")
+    assert times["01_first"]["stamp"] == stamp
+    assert "01_first.ipynb) | about " in (figures / artifacts.INDEX).read_text()
+
+
+def test_notebook_that_writes_less_than_before_leaves_nothing_behind(good):
+    good.write("01_first", "x = 1")
+    assert runner.run(root=good.root).ok
+    assert set(files(good.root / "figures")) == {"README.md", "run_times.json"}
+
+
+# ----------------------------------------------------------------------------- notebooks that fail
+
+
+def test_raising_notebook_shows_cell_and_traceback_and_the_next_one_runs(tiny, capsys):
+    tiny.write("01_bad", "x = 1", "y = x + 1\nraise ArithmeticError('seen to fail')", "z = 1")
+    tiny.write("02_good", "x = 1")
+    report = runner.run(root=tiny.root)
+    assert not report.ok
+    bad, good = report.outcomes
+    assert good.error is None
+    assert "    y = x + 1\n    raise ArithmeticError('seen to fail')" in bad.error
+    assert "ArithmeticError: seen to fail" in bad.error.splitlines()[-1]
+    assert bad.error in capsys.readouterr().out
+    assert "01_bad" in str(report)
+    assert str(report).endswith("1 failed")
+    assert [path.name for path in tiny.notebooks.glob("*.ipynb")] == ["02_good.ipynb"]
+
+
+def test_failing_notebook_leaves_the_executed_half_as_it_was(good):
+    before = files(good.root)
+    source = good.write("01_first", "raise ArithmeticError")
+    assert not runner.run(root=good.root).ok
+    changed = files(good.root)
+    assert changed.pop("notebooks/01_first.py") == source.read_bytes()
+    del before["notebooks/01_first.py"]
+    assert changed == before
+
+
+def test_early_exit_is_a_failure_though_papermill_accepts_it(tiny):
+    path = tiny.write(
+        "01_exit", "import sys\nsys.exit(0)", "raise ArithmeticError('never reached')"
+    )
+    with pytest.raises(NotebookError, match=r"01_exit, cell In \[3\](?s:.*)before the end"):
+        runner.execute(path, {"profile": "quick"})
+
+
+def test_dead_kernel_is_a_failure(tiny):
+    path = tiny.write("01_dead", "import os\nos._exit(0)")
+    with pytest.raises(NotebookError, match="01_dead: .*died"):
+        runner.execute(path, {"profile": "quick"})
+
+
+def test_endless_cell_is_a_failure(tiny):
+    path = tiny.write("01_endless", "while True:\n    pass")
+    with pytest.raises(NotebookError, match="01_endless: .*timed out"):
+        runner.execute(path, {"profile": "quick"}, timeout=2)
+
+
+def test_unknown_parameter_is_found_before_anything_runs(tiny):
+    path = tiny.write("01_first", "x = 1")
+    with pytest.raises(ValueError, match="notebook 01_first has profile .* got 'colour'"):
+        runner.execute(path, {"profile": "quick", "colour": "red"})
+    bare = tiny.write("02_bare", "x = 1")
+    bare.write_text(bare.read_text().replace("profile: str", "size: str"))
+    with pytest.raises(ValueError, match="notebook 02_bare has size .* got 'profile'"):
+        runner.run(root=tiny.root)
+    assert not list(tiny.root.rglob("*.ipynb"))
+
+
+def test_stray_figure_fails_the_run(tiny):
+    (tiny.root / "figures").mkdir()
+    (tiny.root / "figures" / "old.png").write_bytes(b"")
+    report = runner.run(root=tiny.root)
+    assert report.problems == ("old.png: nothing registers it",)
+    assert not report.ok
+
+
+# ------------------------------------------------------------------------------- which notebooks
+
+
+@pytest.mark.parametrize(
+    ("names", "chosen"),
+    [
+        ([], ["01_first", "02_second", "02_twin"]),
+        (["01"], ["01_first"]),
+        (["02_second", "01_first"], ["01_first", "02_second"]),
+        (["02"], ["02_second", "02_twin"]),
+        (["notebooks/02_twin.ipynb", "elsewhere/01_first.py"], ["01_first", "02_twin"]),
+    ],
+)
+def test_names_of_notebooks(tiny, names, chosen):
+    for name in ("01_first", "02_second", "02_twin"):
+        tiny.write(name)
+    assert [path.stem for path in runner.select_notebooks(names, tiny.root)] == chosen
+
+
+@pytest.mark.parametrize("name", ["03", "first", "01_f", "1", ""])
+def test_unknown_notebook(tiny, name):
+    tiny.write("01_first")
+    with pytest.raises(ValueError, match=f"notebook: expected one of 01_first, .* got '{name}'"):
+        runner.select_notebooks([name], tiny.root)
+
+
+def test_unknown_profile(tiny):
+    with pytest.raises(ValueError, match="profile: expected one of full, quick, got 'small'"):
+        runner.run(profile="small", root=tiny.root)
+
+
+def test_quick_run_cannot_overwrite_the_repository(tiny):
+    with pytest.raises(ValueError, match="output: the quick profile"):
+        runner.run(profile="quick", output=tiny.root, root=tiny.root)
+
+
+# ------------------------------------------------------------------------------------ the stamp
+
+
+def test_stamp_follows_code_profile_and_requirements(tiny):
+    path = tiny.write("01_first", "x = 1")
+    stamps = [runner.code_stamp(path, "full"), runner.code_stamp(path, "quick")]
+    tiny.write("01_first", "x = 2")
+    stamps.append(runner.code_stamp(path, "full"))
+    (tiny.root / "requirements.txt").write_text("numpy==1.0\n")
+    stamps.append(runner.code_stamp(path, "full"))
+    assert len(set(stamps)) == 4
+
+
+def test_stamp_follows_the_package_but_not_its_prose(tiny, tmp_path, monkeypatch):
+    path = tiny.write("01_first", "x = 1")
+    package = tmp_path / "package"
+    package.mkdir()
+    monkeypatch.setattr(runner, "PACKAGE", package)
+    module = package / "module.py"
+
+    def stamp(source):
+        module.write_text(source)
+        return runner.code_stamp(path, "full")
+
+    first = stamp('"""A module."""\ndef f(x):\n    """Add one."""\n    return x + 1\n')
+    assert stamp('"""Better prose."""\n\n\ndef f(x):  # why\n    return (x + 1)\n') == first
+    assert stamp('"""A module."""\ndef f(x):\n    """Add one."""\n    return x + 2\n') != first
+    assert stamp('"""A module."""\ndef f(x):\n    """Add one."""\n    return x - 1\n') != first
+    (package / "look.mplstyle").write_text("font.size: 11\n")
+    assert stamp('"""A module."""\ndef f(x):\n    """Add one."""\n    return x + 1\n') != first
+
+
+def test_stamp_does_not_follow_the_prose_of_a_notebook(tiny):
+    path = tiny.write("01_first", "x = 1")
+    before = runner.code_stamp(path, "full")
+    path.write_text(path.read_text().replace("A tiny notebook", "A small notebook"))
+    assert runner.code_stamp(path, "full") == before
+
+
+# ----------------------------------------------------------------------------- the command line
+
+
+def test_command_line_exit_status(tiny, monkeypatch, capsys):
+    tiny.write("01_good", "print(profile)")
+    tiny.write("02_bad", "1 / 0")
+    monkeypatch.chdir(tiny.notebooks)
+    assert main(["run", "01", "--output", str(tiny.root / "elsewhere")]) == 0
+    executed = nbformat.read(tiny.root / "elsewhere" / "notebooks" / "01_good.ipynb", as_version=4)
+    assert executed.cells[-1].outputs[0].text == "full\n"
+    assert main(["run", "02", "--profile", "quick"]) == 1
+    assert "ZeroDivisionError" in capsys.readouterr().out
+    assert main(["run", "03"]) == 2
+    assert "expected one of 01_good, 02_bad" in capsys.readouterr().err
+
+
+def test_command_line_outside_a_repository(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run"]) == 2
+    assert "repository: expected to be inside a clone" in capsys.readouterr().err
+
+
+def test_help_has_examples():
+    command = [sys.executable, "-m", "vidsindy_lite", "run", "--help"]
+    root = runner.PACKAGE.parent
+    shown = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True).stdout
+    assert "python -m vidsindy_lite run 03" in shown
+    assert "--profile {full,quick}" in shown

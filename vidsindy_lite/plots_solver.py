@@ -1,0 +1,297 @@
+"""Figures of the notebook on the solver, one function each.
+
+Every function takes what is plotted and returns a matplotlib Figure. The look is that of
+``vidsindy.mplstyle``; colours are its cycle, C0 to C6.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
+
+_AXES = "xyz"
+
+
+# ------------------------------------------------------------------------- the curve and its matrix
+
+
+def plot_basis(t, basis, point, breakpoints):
+    """B-spline basis functions, those that are not zero at one time, and their sum.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Time units.
+    basis : ndarray, shape (n, r)
+        One basis function a column.
+    point : float
+        The time at which the functions that matter are picked out.
+    breakpoints : ndarray
+        Ends of the knot spans.
+    """
+    figure, axes = plt.subplots(figsize=(8, 3.6))
+    here = basis[np.abs(t - point).argmin()] > 0
+    axes.plot(t, basis[:, ~here], color="0.75", lw=1.2)
+    axes.plot(t, basis[:, here], lw=2.2)
+    axes.plot(t, basis.sum(axis=1), "k--", label="sum of all")
+    axes.plot([], [], color="0.75", lw=1.2, label="zero at the dotted line")
+    axes.axvline(point, color="k", ls=":")
+    axes.plot(breakpoints, np.zeros_like(breakpoints), "|k", ms=12, label="knots")
+    axes.set(xlabel="time (time units)", ylabel="basis function")
+    figure.legend(loc="outside upper center", ncols=3)
+    return figure
+
+
+def plot_normal_matrix(matrix, curve, coefficients):
+    """Where the normal matrix of curve, coefficients and offset is not zero.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (m, m)
+    curve, coefficients : int
+        How many unknowns of each come first; what follows is the offset.
+    """
+    figure, axes = plt.subplots(figsize=(6.6, 5.4))
+    kind = np.ones(matrix.shape)
+    kind[curve:], kind[:, curve:] = 2, 2
+    kind[curve:, curve:] = 3
+    shown = np.where(matrix != 0, kind, 0)
+    colours = ("white", "C0", "C4", "C1")
+    axes.imshow(shown, cmap=ListedColormap(colours), vmin=0, vmax=3, interpolation="nearest")
+    for edge in (curve, curve + coefficients):
+        axes.axhline(edge - 0.5, color="k", lw=0.8)
+        axes.axvline(edge - 0.5, color="k", lw=0.8)
+    edges = np.array([0, curve, curve + coefficients, len(matrix)]) - 0.5
+    names = ("control\npoints P", r"$\Lambda$", r"$\Delta$")
+    axes.set_xticks((edges[1:] + edges[:-1]) / 2, names)
+    axes.set_yticks((edges[1:] + edges[:-1]) / 2, names)
+    axes.tick_params(length=0)
+    axes.grid(False)
+    axes.spines[:].set_visible(True)
+    labels = ("curve: banded", "border: dense", "law: small")
+    handles = [Patch(color=c, label=text) for c, text in zip(colours[1:], labels, strict=True)]
+    figure.legend(handles=handles, loc="outside right center")
+    return figure
+
+
+def plot_collocation(t, data, first, final, nodes, residual):
+    """A window of data and curves, and how well the law is met on the curve.
+
+    Parameters
+    ----------
+    t, data : ndarray, shapes (n,) and (n,)
+        Samples of one coordinate: time units and scene units.
+    first, final : pair of ndarray
+        Times and values of the smoothing spline and of the curve that obeys the law.
+    nodes : pair of ndarray
+        Collocation times and values of the final curve there.
+    residual : pair of ndarray
+        Times and residual of the law relative to the speed, finely resolved.
+    """
+    figure, (above, below) = plt.subplots(
+        2, 1, figsize=(8, 5.6), sharex=True, height_ratios=(2.2, 1)
+    )
+    above.plot(t, data, "o", color="0.55", ms=4, label="data")
+    above.plot(*first, "C1--", lw=1.6, label="smoothing spline")
+    above.plot(*final, "C0", lw=2, label="curve that obeys the law")
+    above.plot(*nodes, "|k", ms=9, label="collocation nodes")
+    above.set(ylabel="x (scene units)")
+    below.plot(*residual, "C0", lw=1.2)
+    below.plot(nodes[0], np.zeros_like(nodes[0]), "|k", ms=9)
+    below.set(ylabel="residual of the law\n/ speed", xlabel="time (time units)")
+    below.ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
+    figure.legend(*above.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    return figure
+
+
+# ------------------------------------------------------------------------------------ optimisation
+
+
+def plot_histories(histories, true_terms):
+    """Data loss, physics loss and number of terms over wall time, several optimisers.
+
+    Parameters
+    ----------
+    histories : dict of str to dict of str to sequence of float
+        ``seconds``, ``data loss``, ``physics loss`` and ``terms`` by optimiser.
+    true_terms : dict of str to int
+        How many terms the law has, by frame.
+    """
+    figure, panels = plt.subplots(3, 1, figsize=(8, 7), sharex=True)
+    labels = {
+        "data loss": "data loss\n/ noise variance",
+        "physics loss": "physics loss\n/ mean square speed",
+        "terms": "number of terms",
+    }
+    for axes, (key, label) in zip(panels, labels.items(), strict=True):
+        for (name, history), style in zip(histories.items(), ("s-C1", "o-C0"), strict=True):
+            axes.plot(history["seconds"], history[key], style, ms=4, lw=1.2, label=name)
+        axes.set(xscale="log", yscale="log", ylabel=label)
+    panels[0].axhline(1, color="k", lw=0.8, ls=":")
+    ticks = [60, 30, *true_terms.values()]
+    for frame, terms in true_terms.items():
+        panels[2].axhline(terms, color="k", lw=0.8, ls=":")
+        panels[2].annotate(
+            f"truth, {frame}", (0.01, terms), xycoords=("axes fraction", "data"),
+            xytext=(0, 2), textcoords="offset points", fontsize=9,
+        )  # fmt: skip
+    panels[2].set_yticks(ticks, [str(tick) for tick in ticks])
+    panels[2].minorticks_off()
+    panels[2].set_xlabel("wall time (s)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    return figure
+
+
+# ---------------------------------------------------------------------------------------- selection
+
+
+def plot_ranks(panels, true):
+    """Terms in order of size, the true ones marked, one panel for each measure of size.
+
+    Parameters
+    ----------
+    panels : dict of str to tuple (values, threshold)
+        Sizes of all terms, (m,), NaN or zero for one that is not in the law, and a level to draw
+        or None; by what is measured.
+    true : ndarray of bool, shape (m,)
+    """
+    figure, grid = plt.subplots(1, len(panels), figsize=(3.4 * len(panels), 4))
+    for axes, (name, (values, threshold)) in zip(grid, panels.items(), strict=True):
+        kept = np.flatnonzero(values > 0)
+        order = kept[np.argsort(-values[kept])]
+        rank = np.arange(1, len(order) + 1)
+        hit = true[order]
+        axes.plot(rank[hit], values[order][hit], "oC0", ms=7, label="true term")
+        axes.plot(rank[~hit], values[order][~hit], "xC1", ms=7, mew=2, label="false term")
+        if threshold is not None:
+            axes.axhline(threshold, color="k", ls="--", lw=1, label="charge of a linear term")
+        axes.set(yscale="log", xlabel="rank", title=name, xlim=(0, len(values) + 1))
+    handles = {}
+    for axes in grid:
+        handles |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=3)
+    return figure
+
+
+def plot_windows(thresholds, exact):
+    """Which magnitude thresholds leave exactly the true terms, system by system.
+
+    Parameters
+    ----------
+    thresholds : ndarray, shape (k,)
+    exact : dict of str to ndarray of bool, shape (k,)
+        By system.
+    """
+    figure, axes = plt.subplots(figsize=(8, 0.42 * len(exact) + 1.6))
+    for row, (name, good) in enumerate(exact.items()):
+        axes.axhline(-row, color="0.85", lw=1)
+        axes.plot(thresholds[good], np.full(good.sum(), -row), "s-C0", ms=5)
+        if not good.any():
+            middle = np.sqrt(thresholds[0] * thresholds[-1])
+            axes.text(
+                middle, -row, "no threshold", color="C1", ha="center", va="center",
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 2},
+            )  # fmt: skip
+    axes.set_yticks(-np.arange(len(exact)), exact)
+    axes.set(xscale="log", xlim=(thresholds[0], thresholds[-1]), ylim=(-len(exact) + 0.4, 0.6))
+    axes.set_xlabel("threshold (units of the coefficients)")
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
+def plot_origin_map(x_axis, y_axis, count, data, best, truth):
+    """Smoothed number of significant terms against the origin of the law's frame.
+
+    Parameters
+    ----------
+    x_axis, y_axis : ndarray, shapes (p,) and (q,)
+        Coordinates of the origin, scene units.
+    count : ndarray, shape (q, p)
+    data : ndarray, shape (n, 2)
+        The motion.
+    best, truth : array_like, shape (2,)
+        Origin with the smallest count, and the true one.
+    """
+    figure, axes = plt.subplots(figsize=(7.2, 5.2))
+    shown = axes.pcolormesh(x_axis, y_axis, count, shading="nearest", rasterized=True)
+    figure.colorbar(shown, ax=axes, label="smoothed number of terms")
+    axes.plot(*data.T, color="white", lw=0.6, alpha=0.6, label="data, smoothed")
+    axes.plot(*truth, "o", ms=15, mfc="none", mec="C1", mew=2, label="true origin")
+    axes.plot(*best, "+", color="C1", ms=12, mew=2, label="fewest terms")
+    axes.set(xlim=(x_axis[0], x_axis[-1]), ylim=(y_axis[0], y_axis[-1]), aspect="equal")
+    axes.set(xlabel="x of the origin (scene units)", ylabel="y of the origin (scene units)")
+    axes.grid(False)
+    legend = axes.legend(loc="lower right", frameon=True, facecolor="0.25", edgecolor="none")
+    for text in legend.get_texts():
+        text.set_color("white")
+    return figure
+
+
+# ----------------------------------------------------------------------------- error bars, failures
+
+
+def plot_errors_and_bound(labels, deviations, errors):
+    """Estimates of repeated trials with error bars, in units of the Cramer-Rao bound.
+
+    Parameters
+    ----------
+    labels : sequence of str, length k
+        What is estimated.
+    deviations : ndarray, shape (trials, k)
+        (estimate - truth) / bound.
+    errors : ndarray, shape (trials, k)
+        Standard errors / bound.
+    """
+    figure, axes = plt.subplots(figsize=(9, 4.2))
+    axes.axhspan(-2, 2, color="0.9", label="truth ± 2 Cramér-Rao bounds")
+    axes.axhline(0, color="k", lw=0.8)
+    spread = np.linspace(-0.36, 0.36, len(deviations) + 2)[1:-1]
+    for k in range(len(labels)):
+        near = np.abs(deviations[:, k]) <= 1.96 * errors[:, k]
+        for inside, style in ((near, "oC0"), (~near, "sC1")):
+            axes.errorbar(
+                k + spread[inside], deviations[inside, k], 1.96 * errors[inside, k],
+                fmt=style, ms=3.5, lw=0.9, capsize=0,
+            )  # fmt: skip
+    axes.errorbar([], [], [], fmt="oC0", ms=3.5, label="95 % interval holds the truth")
+    axes.errorbar([], [], [], fmt="sC1", ms=3.5, label="does not")
+    axes.set_xticks(range(len(labels)), labels, rotation=25, ha="right")
+    axes.set_ylabel("(estimate - truth) / bound")
+    axes.grid(axis="x", visible=False)
+    figure.legend(loc="outside upper center", ncols=3)
+    return figure
+
+
+VERDICTS = {
+    "exact, ok": ("C0", ""),
+    "exact, suspect": ("C5", ""),
+    "wrong, suspect": ("C4", "//"),
+    "wrong, ok": ("C1", "xx"),
+}
+"""Colour and hatch of each outcome: is the law exact, and what did the solver say of it."""
+
+
+def plot_verdicts(sweeps):
+    """How often a law is exact, and whether the solver said so, in several sweeps.
+
+    Parameters
+    ----------
+    sweeps : dict of str to dict of str to sequence of str
+        Outcomes of the trials, each a key of `VERDICTS`, by value of the setting, by the label of
+        the setting.
+    """
+    widths = [len(sweep) + 1 for sweep in sweeps.values()]
+    figure, panels = plt.subplots(1, len(sweeps), figsize=(10, 3.8), sharey=True, width_ratios=widths)
+    for axes, (label, sweep) in zip(panels, sweeps.items(), strict=True):
+        bottom = np.zeros(len(sweep))
+        for verdict, (colour, hatch) in VERDICTS.items():
+            share = [100 * np.mean([o == verdict for o in outcomes]) for outcomes in sweep.values()]
+            style = {"color": colour, "hatch": hatch, "edgecolor": "white", "label": verdict}
+            axes.bar(range(len(sweep)), share, bottom=bottom, **style)
+            bottom += share
+        axes.set_xticks(range(len(sweep)), sweep)
+        axes.set_xlabel(label)
+        axes.grid(visible=False)
+    panels[0].set_ylabel("trials (%)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    return figure

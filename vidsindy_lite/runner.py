@@ -1,0 +1,420 @@
+"""Run the notebooks: each notebooks/NN_name.py through papermill, in order, outputs cleaned.
+
+The .py half of a pair is the source. The .ipynb half is made here: executed, stripped of all that
+differs between two runs, and stamped with a hash of the code that made it. The full profile
+writes notebooks/*.ipynb and figures/ of the repository, the quick profile the same layout under
+build/quick/.
+"""
+
+import ast
+import copy
+import hashlib
+import os
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import jupytext
+import nbformat
+import papermill
+from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbformat import NotebookNode
+from papermill.exceptions import PapermillExecutionError, strip_color
+from traitlets.config import Config
+
+from vidsindy_lite import artifacts
+
+__all__ = [
+    "NotebookError",
+    "Outcome",
+    "Report",
+    "check_parameters",
+    "clean",
+    "code_stamp",
+    "execute",
+    "find_notebooks",
+    "run",
+    "select_notebooks",
+]
+
+PROFILES = ("full", "quick")
+CELL_TIMEOUT = 1800  # seconds; papermill's own default is to wait for ever
+SYSTEMS_TABLE = "table_systems"  # printed after a run that wrote it
+PACKAGE = Path(__file__).parent
+# The kernel warns on stderr that anyone on the machine could listen in otherwise.
+ENCRYPTED = Config(KernelManager={"transport_encryption": "auto"})
+
+
+class NotebookError(RuntimeError):
+    """A notebook did not run to its end; the message shows the cell and the traceback."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the run of one notebook ended: `error` is None if every cell completed."""
+
+    notebook: str
+    seconds: float
+    error: str | None = None
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a run came to: the outcome of each notebook, and what is wrong with the figures."""
+
+    outcomes: tuple[Outcome, ...]
+    problems: tuple[str, ...]
+    systems: artifacts.Table | None = None
+
+    @property
+    def ok(self) -> bool:
+        """True if every notebook ran to its end and the folder of figures adds up."""
+        return not self.problems and all(outcome.error is None for outcome in self.outcomes)
+
+    def __str__(self) -> str:
+        width = max((len(outcome.notebook) for outcome in self.outcomes), default=0)
+        lines = [] if self.systems is None else [self.systems.caption, "", str(self.systems), ""]
+        for outcome in self.outcomes:
+            verdict = "ok" if outcome.error is None else "FAILED"
+            lines.append(f"{outcome.notebook:<{width}}  {outcome.seconds:7.1f} s  {verdict}")
+        lines += [f"figures: {problem}" for problem in self.problems]
+        failed = sum(outcome.error is not None for outcome in self.outcomes)
+        total = sum(outcome.seconds for outcome in self.outcomes)
+        lines.append(f"{len(self.outcomes)} run in {total:.1f} s, {failed} failed")
+        return "\n".join(lines)
+
+
+# ----------------------------------------------------------------------------------- which, and how
+
+
+def find_notebooks(root: str | os.PathLike) -> tuple[Path, ...]:
+    """The source halves (notebooks/*.py) of a repository's notebooks, in order."""
+    return tuple(sorted((Path(root) / "notebooks").glob("*.py")))
+
+
+def select_notebooks(names: Iterable[str], root: str | os.PathLike) -> tuple[Path, ...]:
+    """The notebooks meant by names such as "03", "03_camera_learning" or a path; all for no name.
+
+    Raises
+    ------
+    ValueError
+        If a name fits no notebook; the message lists those there are.
+    """
+    known = {path.stem: path for path in find_notebooks(root)}
+    chosen = set()
+    for name in names:
+        stem = Path(name).name.removesuffix(".py").removesuffix(".ipynb")
+        fitting = [n for n in known if n == stem or n.startswith(f"{stem}_")] if stem else []
+        if not fitting:
+            raise ValueError(
+                f"notebook: expected one of {', '.join(known) or '(there are none)'}, "
+                f"its number or its path, got {str(name)!r}"
+            )
+        chosen.update(fitting)
+    return tuple(path for name, path in known.items() if name in chosen or not chosen)
+
+
+def run(
+    notebooks: Iterable[str] = (),
+    profile: str = "full",
+    output: str | os.PathLike | None = None,
+    *,
+    root: str | os.PathLike | None = None,
+) -> Report:
+    """Execute notebooks one after the other and write what they make; goes on after a failure.
+
+    Parameters
+    ----------
+    notebooks : iterable of str
+        As `select_notebooks` takes them; none means all.
+    profile : {"full", "quick"}
+        Handed to each notebook as its parameter `profile`.
+    output : path, optional
+        Folder that receives notebooks/ (executed) and figures/. By default the repository itself
+        in the full profile and build/quick in the quick one. A notebook that fails leaves its
+        executed half as it was.
+    root : path, optional
+        The repository; by default the one around the working directory.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    ValueError
+        Before anything runs: on an unknown profile or notebook, on a notebook without the
+        parameter `profile`, or if the quick profile were to overwrite the repository's outputs.
+    FileNotFoundError
+        If there is no repository around the working directory.
+    """
+    if profile not in PROFILES:
+        raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
+    root = artifacts.repository_root() if root is None else Path(root).resolve()
+    if output is None:
+        output = root if profile == "full" else root / "build" / "quick"
+    output = Path(output).resolve()
+    if profile == "quick" and output == root:
+        raise ValueError(
+            f"output: the quick profile needs a folder of its own, got {str(output)!r}"
+        )
+    chosen = select_notebooks(notebooks, root)
+    parameters = {"profile": profile}
+    for path in chosen:
+        check_parameters(path, parameters)
+
+    figures = output / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    stamps = dict.fromkeys((path.stem for path in find_notebooks(root)), None)
+    artifacts.prune(figures, stamps)  # what a notebook left that has gone
+
+    outcomes = []
+    for number, path in enumerate(chosen, start=1):
+        progress = f"[{number}/{len(chosen)}] {path.stem}"
+        print(progress, flush=True)
+        stamp, error, started = code_stamp(path, profile), None, time.perf_counter()
+        try:
+            executed = execute(
+                path,
+                parameters,
+                environment={
+                    "VIDSINDY_FIGURES": str(figures),
+                    "VIDSINDY_NOTEBOOK": path.stem,
+                    "VIDSINDY_STAMP": stamp,
+                },
+                progress=progress,
+            )
+        except NotebookError as failure:
+            error = str(failure)
+        seconds = time.perf_counter() - started
+        outcomes.append(Outcome(path.stem, seconds, error))
+        if error is None:
+            stamps[path.stem] = stamp
+            half = nbformat.writes(clean(executed, path, profile, stamp)) + "\n"
+            artifacts.write_file(output / "notebooks" / f"{path.stem}.ipynb", half.encode())
+            artifacts.record_run_time(figures, path.stem, stamp, seconds)
+        print(f"    {seconds:.1f} s" if error is None else f"    FAILED\n\n{error}\n", flush=True)
+
+    artifacts.prune(figures, stamps)  # what an earlier version of a notebook left
+    artifacts.write_index(figures)
+    problems = artifacts.check_folder(figures, stamps)
+    return Report(tuple(outcomes), tuple(problems), _systems_table(figures, outcomes))
+
+
+# --------------------------------------------------------------------------------- one notebook
+
+
+def check_parameters(path: str | os.PathLike, parameters: Iterable[str]) -> None:
+    """Check that a notebook's parameters cell has these parameters (papermill only warns).
+
+    Raises
+    ------
+    ValueError
+        Naming the unknown parameter and those there are.
+    """
+    known = papermill.inspect_notebook(jupytext.read(path))
+    for name in parameters:
+        if name not in known:
+            raise ValueError(
+                f"parameter: notebook {Path(path).stem} has {', '.join(known) or 'no parameters'} "
+                f"(one `name: type = value  # help` a line in the cell tagged parameters), "
+                f"got {name!r}"
+            )
+
+
+def execute(
+    path: str | os.PathLike,
+    parameters: Mapping[str, object],
+    *,
+    environment: Mapping[str, str] | None = None,
+    timeout: float = CELL_TIMEOUT,
+    progress: str = "",
+) -> NotebookNode:
+    """Run a notebook's source half through papermill, in its own folder.
+
+    Parameters
+    ----------
+    path : path
+        The .py half.
+    parameters : mapping
+        Values for names of the parameters cell.
+    environment : mapping of str to str, optional
+        Environment variables for the kernel, beside those of this process.
+    timeout : float
+        Seconds that one cell may take.
+    progress : str
+        Label of the progress bar over the cells, which only a terminal shows.
+
+    Returns
+    -------
+    NotebookNode
+        As papermill leaves it; see `clean`.
+
+    Raises
+    ------
+    ValueError
+        On an unknown parameter.
+    NotebookError
+        If a cell raises, takes too long, ends the kernel, or stops the run early: after
+        ``sys.exit(0)`` papermill reports success, but cells were left out.
+    """
+    path = Path(path)
+    check_parameters(path, parameters)
+    try:
+        with _kernel_environment(environment or {}):
+            executed = papermill.execute_notebook(
+                jupytext.read(path),
+                None,
+                parameters=dict(parameters),
+                kernel_name="python3",
+                cwd=path.parent,
+                execution_timeout=timeout,
+                start_timeout=120,
+                progress_bar={"desc": progress, "leave": False, "disable": None},
+                config=ENCRYPTED,
+            )
+    except PapermillExecutionError as error:
+        traceback = strip_color("\n".join(error.traceback)) or f"{error.ename}: {error.evalue}"
+        raise NotebookError(
+            _cell_message(path, error.exec_count, error.source, traceback)
+        ) from None
+    except (CellTimeoutError, DeadKernelError) as error:
+        raise NotebookError(f"{path.stem}: {error}") from None
+    for cell in executed.cells:
+        if cell.cell_type == "code" and cell.source.strip():
+            completed = cell.metadata.papermill.status == "completed"
+            if not completed or cell.execution_count is None:
+                reason = "The run ended in this cell, before the end of the notebook."
+                raise NotebookError(_cell_message(path, cell.execution_count, cell.source, reason))
+    return executed
+
+
+def clean(
+    executed: NotebookNode, path: str | os.PathLike, profile: str, stamp: str
+) -> NotebookNode:
+    """The .ipynb half of a pair: cells and metadata of the .py, outputs of the run, a stamp.
+
+    Left out is all that differs between two runs or that the source does not have: the injected
+    cell, papermill's and the kernel's metadata, what went to stderr, random cell ids, how stdout
+    was split into pieces.
+
+    Parameters
+    ----------
+    executed : NotebookNode
+        From `execute`.
+    path : path
+        The .py half.
+    profile, stamp : str
+        Recorded in the notebook's metadata, where neither jupytext nor JupyterLab removes them.
+    """
+    notebook = jupytext.read(path)
+    notebook.metadata.jupytext.pop("text_representation", None)  # is about the .py half
+    notebook.metadata["vidsindy_lite"] = {"profile": profile, "stamp": stamp}
+    ran = [c for c in executed.cells if "injected-parameters" not in c.metadata.get("tags", [])]
+    count = 0
+    for index, (cell, twin) in enumerate(zip(notebook.cells, ran, strict=True)):
+        cell.id = f"cell-{index:02d}"
+        if cell.cell_type != "code":
+            continue
+        cell.outputs = _tidy_outputs(twin.outputs)
+        if twin.execution_count is not None:
+            count += 1
+            cell.execution_count = count
+        for output in cell.outputs:
+            if output.output_type == "execute_result":
+                output.execution_count = cell.execution_count
+    nbformat.validate(notebook)
+    return notebook
+
+
+def code_stamp(path: str | os.PathLike, profile: str) -> str:
+    """Hash of what a notebook's outputs depend on.
+
+    That is the profile, the notebook's code cells, the package and requirements.txt. Prose,
+    comments and docstrings of the package, and its layout do not count: editing them does not
+    make an executed notebook stale.
+    """
+    path = Path(path)
+    digest = hashlib.sha256(profile.encode())
+    for cell in jupytext.read(path).cells:
+        if cell.cell_type == "code":
+            digest.update(b"\0" + cell.source.encode())
+    for file in sorted(PACKAGE.rglob("*")):
+        if file.is_file() and "__pycache__" not in file.parts:
+            digest.update(b"\0" + file.relative_to(PACKAGE).as_posix().encode() + b"\0")
+            is_code = file.suffix == ".py"
+            digest.update(_meaning(file.read_text("utf-8")) if is_code else file.read_bytes())
+    digest.update((path.parent.parent / "requirements.txt").read_bytes())
+    return digest.hexdigest()[:16]
+
+
+# ------------------------------------------------------------------------------------------ details
+
+
+@contextmanager
+def _kernel_environment(environment: Mapping[str, str]) -> Iterator[None]:
+    """What the kernel inherits: this very package, an order of sets, one thread per process."""
+    before = dict(os.environ)
+    os.environ.update(
+        environment,
+        PYTHONPATH=os.pathsep.join(filter(None, [str(PACKAGE.parent), before.get("PYTHONPATH")])),
+        PYTHONHASHSEED="0",  # the order of a set is then the same in every run
+        PYDEVD_DISABLE_FILE_VALIDATION="1",  # the kernel's debugger warns without it
+    )
+    # Sums then do not depend on the number of cores, and joblib's workers do not fight over them.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+def _cell_message(path: Path, count: int | None, source: str, what: str) -> str:
+    shown = "\n".join(f"    {line}" for line in source.splitlines())
+    return f"{path.stem}, cell In [{count}]:\n\n{shown}\n\n{what}"
+
+
+def _tidy_outputs(outputs: list[NotebookNode]) -> list[NotebookNode]:
+    """Outputs without stderr, with neighbouring pieces of stdout joined."""
+    tidy = []
+    for output in copy.deepcopy(outputs):
+        is_stream = output.output_type == "stream"
+        if is_stream and output.name == "stderr":
+            continue
+        if is_stream and tidy and tidy[-1].output_type == "stream":
+            tidy[-1].text += output.text
+        else:
+            tidy.append(output)
+    return tidy
+
+
+def _systems_table(figures: Path, outcomes: list[Outcome]) -> artifacts.Table | None:
+    """The table of the systems, if this run wrote it."""
+    try:
+        table = artifacts.load_table(SYSTEMS_TABLE, figures)
+    except FileNotFoundError:
+        return None
+    succeeded = {outcome.notebook for outcome in outcomes if outcome.error is None}
+    return table if table.notebook in succeeded else None
+
+
+def _meaning(source: str) -> bytes:
+    """What a Python source does, as text: its syntax tree without bare constants (docstrings)."""
+
+    def plain(node: object) -> object:
+        if isinstance(node, list):
+            return [plain(n) for n in node if not _is_bare_constant(n)]
+        if isinstance(node, ast.AST):
+            fields = [(name, plain(value)) for name, value in ast.iter_fields(node)]
+            # Empty fields differ between versions of Python.
+            return [type(node).__name__, *(f for f in fields if f[1] not in (None, []))]
+        return node
+
+    return repr(plain(ast.parse(source))).encode()
+
+
+def _is_bare_constant(node: object) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
