@@ -396,18 +396,23 @@ folder.cleanup()
 #     print(size, np.sqrt(np.nanmean(errors_of(noisy, seed) ** 2)))
 # ```
 #
-# EXERCISE1 (Run it before the folder is cleaned up.)
+# The larger one: 0.16, 0.09 and 0.06 px (150 frames). Noise enters at the rim (inside, the coverage is
+# one), in about $R$ pixels at the distance $R$, so the variance of the centroid goes as
+# $R\cdot R^2/(R^2)^2=1/R$. (Run it before the folder is cleaned up.)
 # </details>
 #
-# **2.** What if the target hardly moves? Track a circle with a radius of 5 px.
+# **2.** What if the target hardly moves? Track it on a circle with a radius of 5 px.
 #
 # <details><summary>Solution</summary>
 #
 # ```python
 # angle = np.linspace(0, 20, frames)
 # truth = 256 + 5 * np.column_stack([np.cos(angle), np.sin(angle)])
-# print(np.nanmean(errors_of(scene, seed)), np.isnan(errors_of(scene, seed)).mean())
+# print(np.nanmean(errors_of(scene, seed)))
 # ```
 #
-# EXERCISE2
+# It fails: the positions are off by 64 px on average. The target, 18 px wide, never leaves its place, so the
+# median takes its middle for background, and what differs from that are slivers. `track` says so in its
+# docstring: the target must stay away from each place for at least a fifth of the frames. A radius of 10 px
+# is enough: 0.004 px.
 # </details>

@@ -39,7 +39,7 @@ from .trust import doubts
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
 """Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
-SEARCH_WEIGHTS = (1e2, 1e4, 1e6)
+SEARCH_WEIGHTS = (1e2, 1e4, 1e6, 1e8)
 """Physics weights of the subset searches in the law's own frame."""
 FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""

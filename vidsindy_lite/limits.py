@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
-
 from .polynomials import PolynomialSystem
+
+SUBSTEPS = 8
+"""Runge-Kutta steps between two measurements."""
+VAGUE = 1e4
+"""Prior standard deviation, relative to the size of what is unknown: as good as none."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,10 @@ def cramer_rao(
 ) -> Bound:
     """Cramer-Rao bound of the coefficients, with unknown initial condition and offset.
 
-    Integrates the sensitivity equations along the true trajectory: ``dS/dt = J S + df/dp`` for
-    the coefficients and the initial condition; an offset adds to what is measured.
+    A square-root Kalman filter along the true trajectory, without process noise: between two
+    measurements the covariance of state and coefficients is carried over by the sensitivities of
+    one time step, at a measurement it shrinks. Sensitivities over the whole record would not do:
+    in a chaotic flow they grow beyond the digits that a computer has.
 
     Parameters
     ----------
@@ -58,27 +63,62 @@ def cramer_rao(
     d = system.d
     moving = np.zeros(d, dtype=bool) if moving is None else np.asarray(moving, dtype=bool)
     equations, terms = np.nonzero(system.support.T)
-    count = len(terms)
-
-    def rates(_, state):
-        x, sensitivity = state[:d], state[d:].reshape(d, count + d)
-        growth = system.gradient(x) @ sensitivity
-        growth[equations, np.arange(count)] += system.library(x[None])[0, terms]
-        return np.concatenate([system(x), growth.ravel()])
-
-    start = np.concatenate([x0, np.hstack([np.zeros((d, count)), np.eye(d)]).ravel()])
-    solution = solve_ivp(
-        rates, (t[0], t[-1]), start, method="DOP853", t_eval=t, rtol=1e-9, atol=1e-10
+    count, free = len(terms), d + len(terms) + int(moving.sum())
+    x = system.simulate(t, x0)
+    steps, responses = _sensitivities(system, t, x, equations, terms)
+    observe = np.zeros((d, free))
+    observe[:, :d] = np.eye(d)
+    observe[:, d + count :] = np.eye(d)[:, moving]
+    spread = np.ptp(x, axis=0).max() + np.abs(x).max()
+    known = np.abs(system.coefficients[terms, equations])
+    root = VAGUE * np.diag(
+        np.concatenate([np.full(d, spread), known, np.full(moving.sum(), spread)])
     )
-    sensitivity = solution.y[d:].T.reshape(len(t), d, count + d)
-    shifts = np.broadcast_to(np.eye(d)[:, moving], (len(t), d, moving.sum()))
-    jacobian = np.concatenate([sensitivity, shifts], axis=2) / np.asarray(sigma)[:, None]
-    jacobian = jacobian.reshape(len(t) * d, -1)
-    # QR keeps the digits that forming the information matrix of a chaotic flow would lose.
-    scale = np.linalg.norm(jacobian, axis=0)
-    inverse = np.linalg.inv(np.linalg.qr(jacobian / scale, mode="r"))
-    errors = np.linalg.norm(inverse, axis=1) / scale
+    root = _measured(root, observe, sigma)
+    carry = np.eye(free)
+    for step, response in zip(steps, responses, strict=True):
+        carry[:d, :d], carry[:d, d : d + count] = step, response
+        root = _measured(carry @ root, observe, sigma)
+    errors = np.linalg.norm(root, axis=1)
     coefficients, offset = np.zeros(system.coefficients.shape), np.zeros(d)
-    coefficients[terms, equations] = errors[:count]
-    offset[moving] = errors[count + d :]
+    coefficients[terms, equations] = errors[d : d + count]
+    offset[moving] = errors[d + count :]
     return Bound(coefficients, offset)
+
+
+def _measured(root: np.ndarray, observe: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Square root of the covariance after a measurement (the array form of the Kalman update)."""
+    m, free = observe.shape
+    array = np.zeros((m + free, m + free))
+    array[:m, :m] = np.diag(sigma)
+    array[:m, m:] = observe @ root
+    array[m:, m:] = root
+    return np.linalg.qr(array.T, mode="r").T[m:, m:]
+
+
+def _sensitivities(
+    system: PolynomialSystem, t: np.ndarray, x: np.ndarray, equations: np.ndarray, terms: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of each next state with respect to the state (d, d) and coefficients (d, p)."""
+    d, count = system.d, len(terms)
+    state = x[:-1]
+    sensitivity = np.zeros((len(state), d, d + count))
+    sensitivity[:, :, :d] = np.eye(d)
+    width = np.diff(t)[:, None] / SUBSTEPS
+
+    def rates(state, sensitivity):
+        growth = system.gradient(state) @ sensitivity
+        growth[:, equations, d + np.arange(count)] += system.library(state)[:, terms]
+        return system(state), growth
+
+    def moved(rate, share):
+        return state + share * width * rate[0], sensitivity + share * width[:, :, None] * rate[1]
+
+    for _ in range(SUBSTEPS):
+        k1 = rates(state, sensitivity)
+        k2 = rates(*moved(k1, 0.5))
+        k3 = rates(*moved(k2, 0.5))
+        k4 = rates(*moved(k3, 1.0))
+        mean = [(a + 2 * b + 2 * c + e) / 6 for a, b, c, e in zip(k1, k2, k3, k4, strict=True)]
+        state, sensitivity = moved(mean, 1.0)
+    return sensitivity[:, :, :d], sensitivity[:, :, d:]
