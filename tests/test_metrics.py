@@ -115,3 +115,11 @@ def test_trajectory_error_rejects_bad_input():
         trajectory_error(np.full((4, 2), np.nan), truth)
     with pytest.raises(ValueError, match="truth: must be finite"):
         trajectory_error(truth, np.full((4, 2), np.nan))
+
+
+def test_text_of_a_score():
+    truth = PolynomialSystem.from_terms({"x": {"x": -1.0, "1": 2.0}})
+    found = PolynomialSystem.from_terms({"x": {"x": -1.1, "x^2": 0.5}})
+    text = str(score(found, truth))
+    assert text.startswith("1 terms missing, 1 false; relative l2 ")
+    assert text.endswith("precision 50%, recall 50%")

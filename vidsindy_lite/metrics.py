@@ -50,6 +50,14 @@ class Score:
         """Largest of `coefficient_errors`."""
         return float(np.nanmax(self.coefficient_errors))
 
+    def __str__(self) -> str:
+        found = "all true terms found" if self.terms_found else f"{self.missing} terms missing"
+        return (
+            f"{found}, {self.false_positives} false; relative l2 {self.l2:.2g}, "
+            f"worst coefficient {self.max_coefficient_error:.2g}, "
+            f"precision {self.precision:.0%}, recall {self.recall:.0%}"
+        )
+
 
 def score(found, truth: PolynomialSystem) -> Score:
     """Compare a discovered law with the truth in the same frame (paper: evaluation metrics).
