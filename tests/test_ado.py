@@ -215,7 +215,14 @@ def test_trajectories_of_different_dimension_are_refused():
         discover([])
 
 
-@pytest.mark.parametrize("degree", [-1, 2.5, 0])
+def test_a_single_trajectory_needs_both_arrays():
+    t = np.linspace(0, 10, 100)
+    for nonsense in (t, None, [t, t, t]):
+        with pytest.raises(ValueError, match="x: must be given, unless t is a list of pairs"):
+            discover(nonsense)
+
+
+@pytest.mark.parametrize("degree", [-1, 2.5, 0, "3"])
 def test_bad_degrees_are_refused(degree):
     _, t, x = measured("Lorenz", 0.0)
     with pytest.raises(ValueError, match="degree: must be"):

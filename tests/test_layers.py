@@ -16,7 +16,7 @@ FLOORS = [
         "ado", "paper_ado", "baselines", "metrics", "limits",
     },
     {"pipeline", "experiments"},
-    {"plots", "artifacts", "runner", "__main__"},
+    {"plots", "plots_solver", "artifacts", "runner", "__main__"},
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent
 

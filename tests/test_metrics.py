@@ -123,3 +123,8 @@ def test_text_of_a_score():
     text = str(score(found, truth))
     assert text.startswith("1 terms missing, 1 false; relative l2 ")
     assert text.endswith("precision 50%, recall 50%")
+
+
+def test_what_is_no_law_is_refused():
+    with pytest.raises(ValueError, match="found: must be a law, a PolynomialSystem, got 1"):
+        score(1, SYSTEMS["Lorenz"])

@@ -17,6 +17,8 @@ def with_value(row, value):
 @pytest.mark.parametrize(
     ("t", "x", "message"),
     [
+        ("soon", X, "t: must be an array of numbers, got 'soon'"),
+        (T, [[1], [2, 3]], "x: must be an array of numbers"),
         (T, np.ones(5), r"x: must have shape \(n, d\)"),
         (T, np.ones((5, 0)), r"x: must have shape \(n, d\)"),
         (T[:4], X, r"t: must have shape \(5,\) as x has 5 rows, got \(4,\)"),

@@ -91,9 +91,12 @@ def discover(
     >>> t, x = vl.SYSTEMS["Lorenz"].trajectory(1500)
     >>> print(vl.discover(t, x).equations())
     """
-    if int(degree) != degree or degree < 1:
+    if not isinstance(degree, int | np.integer) or degree < 1:
         raise ValueError(f"degree: must be an integer of at least 1, got {degree!r}")
-    records = [check_record(*pair) for pair in (t if x is None else [(t, x)])]
+    pairs = t if x is None else [(t, x)]
+    if not isinstance(pairs, list | tuple) or any(len(pair) != 2 for pair in pairs):
+        raise ValueError("x: must be given, unless t is a list of pairs (t, x)")
+    records = [check_record(*pair) for pair in pairs]
     if not records or len({values.shape[1] for _, values in records}) != 1:
         raise ValueError(
             "t: a list of trajectories must hold at least one, all of the same dimension, "

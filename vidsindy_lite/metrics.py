@@ -82,6 +82,9 @@ def score(found, truth: PolynomialSystem) -> Score:
     True
     """
     found = getattr(found, "system", found)
+    for name, law in (("found", found), ("truth", truth)):
+        if not isinstance(law, PolynomialSystem):
+            raise ValueError(f"{name}: must be a law, a PolynomialSystem, got {law!r:.60}")
     if found.d != truth.d:
         raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {found.d}")
     if not truth.support.any():

@@ -9,9 +9,6 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-_AXES = "xyz"
-
-
 # ------------------------------------------------------------------------- the curve and its matrix
 
 
@@ -29,10 +26,11 @@ def plot_basis(t, basis, point, breakpoints):
     breakpoints : ndarray
         Ends of the knot spans.
     """
-    figure, axes = plt.subplots(figsize=(8, 3.6))
+    figure, axes = plt.subplots(figsize=(7, 3.2))
     here = basis[np.abs(t - point).argmin()] > 0
-    axes.plot(t, basis[:, ~here], color="0.75", lw=1.2)
-    axes.plot(t, basis[:, here], lw=2.2)
+    shown = np.where(basis > 0, basis, np.nan)
+    axes.plot(t, shown[:, ~here], color="0.75", lw=1.2)
+    axes.plot(t, shown[:, here], lw=2.2)
     axes.plot(t, basis.sum(axis=1), "k--", label="sum of all")
     axes.plot([], [], color="0.75", lw=1.2, label="zero at the dotted line")
     axes.axvline(point, color="k", ls=":")
@@ -88,9 +86,7 @@ def plot_collocation(t, data, first, final, nodes, residual):
     residual : pair of ndarray
         Times and residual of the law relative to the speed, finely resolved.
     """
-    figure, (above, below) = plt.subplots(
-        2, 1, figsize=(8, 5.6), sharex=True, height_ratios=(2.2, 1)
-    )
+    figure, (above, below) = plt.subplots(2, 1, figsize=(7.5, 5), sharex=True, height_ratios=(2, 1))
     above.plot(t, data, "o", color="0.55", ms=4, label="data")
     above.plot(*first, "C1--", lw=1.6, label="smoothing spline")
     above.plot(*final, "C0", lw=2, label="curve that obeys the law")
@@ -117,7 +113,7 @@ def plot_histories(histories, true_terms):
     true_terms : dict of str to int
         How many terms the law has, by frame.
     """
-    figure, panels = plt.subplots(3, 1, figsize=(8, 7), sharex=True)
+    figure, panels = plt.subplots(3, 1, figsize=(7.5, 6.2), sharex=True)
     labels = {
         "data loss": "data loss\n/ noise variance",
         "physics loss": "physics loss\n/ mean square speed",
@@ -156,6 +152,9 @@ def plot_ranks(panels, true):
     true : ndarray of bool, shape (m,)
     """
     figure, grid = plt.subplots(1, len(panels), figsize=(3.4 * len(panels), 4))
+    scored = [axes for axes, (_, level) in zip(grid, panels.values(), strict=True) if level]
+    for axes in scored[1:]:
+        axes.sharey(scored[0])
     for axes, (name, (values, threshold)) in zip(grid, panels.items(), strict=True):
         kept = np.flatnonzero(values > 0)
         order = kept[np.argsort(-values[kept])]
@@ -183,7 +182,7 @@ def plot_windows(thresholds, exact):
         By system.
     """
     figure, axes = plt.subplots(figsize=(8, 0.42 * len(exact) + 1.6))
-    for row, (name, good) in enumerate(exact.items()):
+    for row, good in enumerate(exact.values()):
         axes.axhline(-row, color="0.85", lw=1)
         axes.plot(thresholds[good], np.full(good.sum(), -row), "s-C0", ms=5)
         if not good.any():
@@ -212,10 +211,10 @@ def plot_origin_map(x_axis, y_axis, count, data, best, truth):
     best, truth : array_like, shape (2,)
         Origin with the smallest count, and the true one.
     """
-    figure, axes = plt.subplots(figsize=(7.2, 5.2))
-    shown = axes.pcolormesh(x_axis, y_axis, count, shading="nearest", rasterized=True)
+    figure, axes = plt.subplots(figsize=(6.8, 5.2), layout="compressed")
+    shown = axes.contourf(x_axis, y_axis, count, levels=14)
     figure.colorbar(shown, ax=axes, label="smoothed number of terms")
-    axes.plot(*data.T, color="white", lw=0.6, alpha=0.6, label="data, smoothed")
+    axes.plot(*data.T, color="white", lw=0.6, alpha=0.6, label="data")
     axes.plot(*truth, "o", ms=15, mfc="none", mec="C1", mew=2, label="true origin")
     axes.plot(*best, "+", color="C1", ms=12, mew=2, label="fewest terms")
     axes.set(xlim=(x_axis[0], x_axis[-1]), ylim=(y_axis[0], y_axis[-1]), aspect="equal")
@@ -281,7 +280,9 @@ def plot_verdicts(sweeps):
         the setting.
     """
     widths = [len(sweep) + 1 for sweep in sweeps.values()]
-    figure, panels = plt.subplots(1, len(sweeps), figsize=(10, 3.8), sharey=True, width_ratios=widths)
+    figure, panels = plt.subplots(
+        1, len(sweeps), figsize=(10, 3.8), sharey=True, width_ratios=widths
+    )
     for axes, (label, sweep) in zip(panels, sweeps.items(), strict=True):
         bottom = np.zeros(len(sweep))
         for verdict, (colour, hatch) in VERDICTS.items():

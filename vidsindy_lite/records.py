@@ -30,7 +30,7 @@ def check_record(t: np.ndarray, x: np.ndarray) -> Record:
     ValueError
         If shapes disagree, ``t`` does not increase, a value is infinite or nothing is left.
     """
-    t, x = np.asarray(t, dtype=float), np.asarray(x, dtype=float)
+    t, x = _numbers("t", t), _numbers("x", x)
     if x.ndim != 2 or x.shape[1] < 1:
         raise ValueError(f"x: must have shape (n, d) with d of at least 1, got {x.shape}")
     if t.shape != (len(x),):
@@ -51,6 +51,13 @@ def check_record(t: np.ndarray, x: np.ndarray) -> Record:
     if not seen.any():
         raise ValueError(f"x: must hold at least one row without NaN, got {len(x)} missing rows")
     return t[seen], x[seen]
+
+
+def _numbers(name: str, values: np.ndarray) -> np.ndarray:
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: must be an array of numbers, got {values!r:.60}") from None
 
 
 def cut(record: Record, longest_step: float) -> list[Record]:
