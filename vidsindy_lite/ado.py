@@ -443,8 +443,26 @@ class _Search:
             change = np.abs(state.flat()[columns] - before)
             if (change < np.maximum(0.1 * spread, 1e-6)).all():
                 break
+        state = self._without_remnants(problem, state)
         self._log("polish", problem, state, FINAL_WEIGHT)
         return state, problem
+
+    def _without_remnants(self, problem: Collocation, state: State) -> State:
+        """Drop, weakest first, the terms that only made up for the error of coarser splines."""
+        while True:
+            columns = np.flatnonzero(state.active.T.ravel())
+            information = problem.linearise(state, np.flatnonzero(state.free())).information
+            variance = np.diag(inverse(information))[: len(columns)]
+            significance = state.flat()[columns] ** 2 / variance
+            weakness = significance / np.tile(self.charges, self.d)[columns]
+            if not len(columns) or weakness.min() >= 1:
+                return state
+            active = state.active.T.ravel()
+            active[columns[weakness.argmin()]] = False
+            active = active.reshape(self.d, -1).T
+            coefficients = np.where(active, state.coefficients, 0.0)
+            trial = replace(state, active=active, coefficients=coefficients)
+            state = problem.solve(trial, tolerance=1e-4)
 
     def _residual_noise(self, problem: Collocation, state: State) -> np.ndarray:
         """Standard deviation of the data residual, less the freedom that the fit used up."""

@@ -86,7 +86,8 @@ def film(name: str, folder: str | Path, frames: int = 1500, seed: int = 0, **dis
     rig = Rig.around(x)
     target, *views = np.random.SeedSequence(seed).spawn(1 + len(rig.cameras))
     drawn = Scene.random(np.random.default_rng(target))
-    common = {key: getattr(drawn, key) for key in ("shape", "size", "shape_seed", "turns")}
+    same = ("shape", "colour", "size", "shape_seed", "turns")
+    common = {key: getattr(drawn, key) for key in same}
     paths, scenes = [], []
     for number, (camera, view) in enumerate(zip(rig.cameras, views, strict=True), start=1):
         draw, disturb = view.spawn(2)
