@@ -59,7 +59,7 @@ from vidsindy_lite.systems import SYSTEMS, runge_kutta_4
 from vidsindy_lite.video import BACKGROUNDS, SHAPES, Scene, render
 
 plt.style.use("vidsindy_lite.vidsindy")
-frames, long = {"full": (400, 1500), "quick": (120, 400)}[profile]
+frames, long = {"full": (300, 1500), "quick": (120, 400)}[profile]
 folder = TemporaryDirectory()
 
 # %% [markdown]
@@ -90,9 +90,9 @@ caption = "Runge-Kutta of order 4 against a tight solver: they agree until chaos
 save_figure("videos_runge_kutta", fig, caption=caption, numbers={"t": periods, **differences})
 
 # %% [markdown]
-# *Distance of the two solutions. A straight rise on this scale is chaos: a difference in the ninth digit
-# grows exponentially. Over one video the two may end up apart, and yet each is a motion of the system to
-# far better than a pixel.*
+# *Distance of the two solutions. A straight rise on this scale is chaos: a difference in the ninth
+# digit grows exponentially. Over one video the two may end up apart, and yet each is a motion of the
+# system to far better than a pixel.*
 
 # %% [markdown]
 # ## The frame rate
@@ -128,8 +128,8 @@ numbers = {name: np.column_stack(pair) for name, pair in samples.items()}
 save_figure("videos_frame_rate_tsucs2", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
-# *Four periods of Tsucs2. At a literal 25 frames per time unit (above) the frames, 8.6 a period, skip from
-# slope to slope; at 100 a period (below) they draw the curve.*
+# *Four periods of Tsucs2. At a literal 25 frames per time unit (above) the frames, 8.6 a period, skip
+# from slope to slope; at 100 a period (below) they draw the curve.*
 
 # %% [markdown]
 # ## What a camera sees
@@ -190,8 +190,8 @@ caption = "Frames of three cameras with the pixel tracks found in the videos."
 save_figure("figure_S2", fig, caption=caption, numbers=dict(zip(titles, flat, strict=True)))
 
 # %% [markdown]
-# *Figure S2: one frame of each camera $C_1$, $C_2$, $C_3$, with the track that the tracker found in the whole
-# video, and the target magnified.*
+# *Figure S2: one frame of each camera $C_1$, $C_2$, $C_3$, with the track that the tracker found in
+# the whole video, and the target magnified.*
 
 # %% [markdown]
 # ## Files that lose nothing
@@ -220,8 +220,8 @@ assert all(np.array_equal(a, b) for a, b in zip(clip, read_video(again), strict=
 background = np.median(clip[:: frames // 21], axis=0)
 
 # %% [markdown]
-# **Then the difference** from it, here in the 48 x 48 pixels around the target in one frame. Where it is
-# largest, the frame shows nothing but target, and tells its color.
+# **Then the difference** from it, here in the 48 x 48 pixels around the target in one frame. Where it
+# is largest, the frame shows nothing but target, and tells its colour.
 
 # %%
 truth = shot.tracks[0]
@@ -230,21 +230,21 @@ window = np.s_[top : top + 48, left : left + 48]
 frame, behind = clip[middle][window].astype(float), background[window]
 difference = frame - behind
 distance = np.linalg.norm(difference, axis=-1)
-color = np.median(frame[distance > 0.8 * distance.max()], axis=0)
-print("color of the target (blue, green, red):", color)
+colour = np.median(frame[distance > 0.8 * distance.max()], axis=0)
+print("colour of the target (blue, green, red):", colour)
 
 # %% [markdown]
-# **Then the coverage.** A pixel at the edge is a mixture, $(1-\alpha)$ background and $\alpha$ target; on the
-# line between the two colors,
+# **Then the coverage.** A pixel at the edge is a mixture, $(1-\alpha)$ background and $\alpha$
+# target; on the line between the two colours,
 #
 # $$\alpha=\frac{\langle\text{frame}-\text{background},\ \text{target}-\text{background}\rangle}
 # {\|\text{target}-\text{background}\|^2}.$$
 #
-# **And the centroid** is the mean position, weighted by $\alpha$. Since $\alpha$ is linear in the frame,
-# image noise does not bias it.
+# **And the centroid** is the mean position, weighted by $\alpha$. Since $\alpha$ is linear in the
+# frame, image noise does not bias it.
 
 # %%
-contrast = color - behind
+contrast = colour - behind
 coverage = np.sum(difference * contrast, axis=-1) / np.sum(contrast**2, axis=-1)
 u, v = np.meshgrid(np.arange(left, left + 48), np.arange(top, top + 48))
 centroid = np.array([np.sum(coverage * u), np.sum(coverage * v)]) / np.sum(coverage)
@@ -258,20 +258,20 @@ caption = "From the frame to the centroid (cross): background, difference, cover
 save_figure("videos_tracker_steps", fig, caption=caption, numbers={"coverage": coverage})
 
 # %% [markdown]
-# *A target of a few hundred pixels: the frame, the background learned from the clip, their difference in
-# grey levels, and the share of each pixel that the target covers, with its centroid (cross). The grey
-# pixels at the rim are what the sub-pixel accuracy comes from.*
+# *A target of a few hundred pixels: the frame, the background learned from the clip, their difference
+# in grey levels, and the share of each pixel that the target covers, with its centroid (cross). The
+# grey pixels at the rim are what the sub-pixel accuracy comes from.*
 
 # %% [markdown]
-# `track` does this in a small window that follows the motion, smooths the difference if there is noise,
-# falls back to the whole frame when it loses the target, and in the end asks for each frame whether the
-# *whole* target was seen: if part of it is hidden, the centroid of the rest is not that of the target. Then
-# the frame gets NaN rather than a guess.
+# `track` does this in a small window that follows the motion, smooths the difference if there is
+# noise, falls back to the whole frame when it loses the target, and in the end asks for each frame
+# whether the *whole* target was seen: if part of it is hidden, the centroid of the rest is not that
+# of the target. Then the frame gets NaN rather than a guess.
 #
 # ## How exact it is
 #
 # We drew the target, so that we know where it is. The same track and scene five times, and then scenes
-# drawn at random: background, shape, a size of 8 to 40 px, color and rotation.
+# drawn at random: background, shape, a size of 8 to 40 px, colour and rotation.
 
 
 # %%
@@ -313,13 +313,13 @@ caption = "Share of frames in which the tracked position is closer to the truth 
 save_figure("videos_tracker_errors", fig, caption=caption, numbers=errors)
 
 # %% [markdown]
-# *How often the tracked position is closer to the truth than a given distance: about a thousandth of a pixel in
-# clean videos, less than a tenth with noise. A post in the way costs frames, but the others are as good as
-# clean ones, unless the target lingers at its edge.*
+# *How often the tracked position is closer to the truth than a given distance: about a thousandth of
+# a pixel in clean videos, less than a tenth with noise. A post in the way costs frames, but the
+# others are as good as clean ones, unless the target lingers at its edge.*
 #
-# That last row is a limit of the tracker. Whether the whole target was seen, it judges by the area seen in
-# the frames before and after; a target that spends much of the clip half behind a post passes for a smaller
-# one now and then.
+# That last row is a limit of the tracker. Whether the whole target was seen, it judges by the area
+# seen in the frames before and after; a target that spends much of the clip half behind a post passes
+# for a smaller one now and then.
 
 # %%
 table = {row["videos"]: row for row in rows}
@@ -330,16 +330,16 @@ assert table["a post in the way"]["largest error (px)"] < 0.5
 assert np.median([np.sqrt(np.nanmean(error**2)) for error in drawn]) < 0.15
 
 # %% [markdown]
-# A word of caution: the clean numbers are the best case there is. The videos draw each pixel as the mixture
-# that the tracker assumes, and the camera has no blur. So later notebooks do not live on
+# A word of caution: the clean numbers are the best case there is. The videos draw each pixel as the
+# mixture that the tracker assumes, and the camera has no blur. So later notebooks do not live on
 # thousandths of a pixel: [06](06_robustness_and_ablation.ipynb) adds noise to the path and
 # [07](07_realistic_scene.ipynb) to the images.
 
 # %% [markdown]
 # ## Gaps
 #
-# Something in the way of all three cameras: a point in space needs two views, so the path has a gap when
-# two cameras lose sight of the target at once.
+# Something in the way of all three cameras: a point in space needs two views, so the path has a gap
+# when two cameras lose sight of the target at once.
 
 # %%
 posts = ((160, 0, 40, 512), (330, 0, 40, 512))
@@ -361,8 +361,8 @@ caption = "The reconstructed path of SprottF behind two posts; shaded: fewer tha
 save_figure("figure_S3", fig, caption=caption, numbers={"t": shot.t, "x": x, "truth": shot.x})
 
 # %% [markdown]
-# *Figure S3: the path of SprottF as three cameras see it through two posts each. Where fewer than two see the
-# target (shaded) there is no position; elsewhere it lies on the truth (dashed).*
+# *Figure S3: the path of SprottF as three cameras see it through two posts each. Where fewer than two
+# see the target (shaded) there is no position; elsewhere it lies on the truth (dashed).*
 
 # %%
 folder.cleanup()
@@ -370,16 +370,17 @@ folder.cleanup()
 # %% [markdown]
 # ## What we learned
 #
-# * The paper's integrator and a tight solver make the same videos; over many periods chaos separates any
-#   two solvers.
+# * The paper's integrator and a tight solver make the same videos; over many periods chaos separates
+#   any two solvers.
 # * "25 frames per second" needs a playback speed; 100 frames per period treat all systems alike.
-# * With the coverage of pixels, a classical tracker is good to a thousandth of a pixel on clean and a few
-#   hundredths on noisy videos. It says NaN where the target is not seen whole, unless that lasts too long.
+# * With the coverage of pixels, a classical tracker is good to a thousandth of a pixel on clean and a
+#   few hundredths on noisy videos. It says NaN where the target is not seen whole, unless that lasts
+#   too long.
 #
 # **What the paper says and what we found.** The paper tracks with YOLO-v8 and calls its pixels
 # "approximate integer values" (rounding alone is 0.29 px per coordinate). It gives no step size, no
-# playback speed and no tracking error; all three are above. Its occlusions are cut out of the tracks; ours
-# are in the images.
+# playback speed and no tracking error; all three are above. Its occlusions are cut out of the tracks;
+# ours are in the images.
 #
 # Next: [cameras from tracks](03_camera_learning.ipynb).
 
@@ -411,8 +412,8 @@ folder.cleanup()
 # print(np.nanmean(errors_of(scene, seed)))
 # ```
 #
-# It fails: the positions are off by 64 px on average. The target, 18 px wide, never leaves its place, so the
-# median takes its middle for background, and what differs from that are slivers. `track` says so in its
-# docstring: the target must stay away from each place for at least a fifth of the frames. A radius of 10 px
-# is enough: 0.004 px.
+# It fails: the positions are off by 64 px on average. The target, 18 px wide, never leaves its place,
+# so the median takes its middle for background, and what differs from that are slivers. `track` says
+# so in its docstring: the target must stay away from each place for at least a fifth of the frames. A
+# radius of 10 px is enough: 0.004 px.
 # </details>

@@ -26,7 +26,7 @@ def plot_basis(t, basis, point, breakpoints):
     breakpoints : ndarray
         Ends of the knot spans.
     """
-    figure, axes = plt.subplots(figsize=(7, 3.2))
+    figure, axes = plt.subplots(figsize=(6.4, 2.6))
     here = basis[np.abs(t - point).argmin()] > 0
     shown = np.where(basis > 0, basis, np.nan)
     axes.plot(t, shown[:, ~here], color="0.75", lw=1.2)
@@ -86,7 +86,7 @@ def plot_collocation(t, data, first, final, nodes, residual):
     residual : pair of ndarray
         Times and residual of the law relative to the speed, finely resolved.
     """
-    figure, (above, below) = plt.subplots(2, 1, figsize=(7.5, 5), sharex=True, height_ratios=(2, 1))
+    figure, (above, below) = plt.subplots(2, 1, figsize=(7, 4.4), sharex=True, height_ratios=(2, 1))
     above.plot(t, data, "o", color="0.55", ms=4, label="data")
     above.plot(*first, "C1--", lw=1.6, label="smoothing spline")
     above.plot(*final, "C0", lw=2, label="curve that obeys the law")
@@ -113,7 +113,7 @@ def plot_histories(histories, true_terms):
     true_terms : dict of str to int
         How many terms the law has, by frame.
     """
-    figure, panels = plt.subplots(3, 1, figsize=(7.5, 6.2), sharex=True)
+    figure, panels = plt.subplots(3, 1, figsize=(7, 5.4), sharex=True)
     labels = {
         "data loss": "data loss\n/ noise variance",
         "physics loss": "physics loss\n/ mean square speed",
@@ -151,7 +151,7 @@ def plot_ranks(panels, true):
         or None; by what is measured.
     true : ndarray of bool, shape (m,)
     """
-    figure, grid = plt.subplots(1, len(panels), figsize=(3.4 * len(panels), 4))
+    figure, grid = plt.subplots(1, len(panels), figsize=(3.1 * len(panels), 3.5))
     scored = [axes for axes, (_, level) in zip(grid, panels.values(), strict=True) if level]
     for axes in scored[1:]:
         axes.sharey(scored[0])
@@ -211,10 +211,10 @@ def plot_origin_map(x_axis, y_axis, count, data, best, truth):
     best, truth : array_like, shape (2,)
         Origin with the smallest count, and the true one.
     """
-    figure, axes = plt.subplots(figsize=(6.8, 5.2), layout="compressed")
-    shown = axes.contourf(x_axis, y_axis, count, levels=14)
+    figure, axes = plt.subplots(figsize=(6.2, 4.8), layout="compressed")
+    shown = axes.contourf(x_axis, y_axis, count, levels=10)
     figure.colorbar(shown, ax=axes, label="smoothed number of terms")
-    axes.plot(*data.T, color="white", lw=0.6, alpha=0.6, label="data")
+    axes.plot(*data.T, color="white", lw=0.5, label="data")
     axes.plot(*truth, "o", ms=15, mfc="none", mec="C1", mew=2, label="true origin")
     axes.plot(*best, "+", color="C1", ms=12, mew=2, label="fewest terms")
     axes.set(xlim=(x_axis[0], x_axis[-1]), ylim=(y_axis[0], y_axis[-1]), aspect="equal")
@@ -241,7 +241,7 @@ def plot_errors_and_bound(labels, deviations, errors):
     errors : ndarray, shape (trials, k)
         Standard errors / bound.
     """
-    figure, axes = plt.subplots(figsize=(9, 4.2))
+    figure, axes = plt.subplots(figsize=(8.5, 3.7))
     axes.axhspan(-2, 2, color="0.9", label="truth ± 2 Cramér-Rao bounds")
     axes.axhline(0, color="k", lw=0.8)
     spread = np.linspace(-0.36, 0.36, len(deviations) + 2)[1:-1]
@@ -281,7 +281,7 @@ def plot_verdicts(sweeps):
     """
     widths = [len(sweep) + 1 for sweep in sweeps.values()]
     figure, panels = plt.subplots(
-        1, len(sweeps), figsize=(10, 3.8), sharey=True, width_ratios=widths
+        1, len(sweeps), figsize=(9, 3.3), sharey=True, width_ratios=widths
     )
     for axes, (label, sweep) in zip(panels, sweeps.items(), strict=True):
         bottom = np.zeros(len(sweep))

@@ -7,8 +7,10 @@ build/quick/.
 """
 
 import ast
+import base64
 import copy
 import hashlib
+import io
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,6 +24,7 @@ import papermill
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbformat import NotebookNode
 from papermill.exceptions import PapermillExecutionError, strip_color
+from PIL import Image
 from traitlets.config import Config
 
 from vidsindy_lite import artifacts
@@ -298,7 +301,7 @@ def clean(
 
     Left out is all that differs between two runs or that the source does not have: the injected
     cell, papermill's and the kernel's metadata, what went to stderr, random cell ids, how stdout
-    was split into pieces.
+    was split into pieces. Images get a palette, which keeps a notebook small.
 
     Parameters
     ----------
@@ -387,8 +390,19 @@ def _tidy_outputs(outputs: list[NotebookNode]) -> list[NotebookNode]:
         if is_stream and tidy and tidy[-1].output_type == "stream":
             tidy[-1].text += output.text
         else:
+            if "image/png" in output.get("data", {}):
+                output.data["image/png"] = _with_palette(output.data["image/png"])
             tidy.append(output)
     return tidy
+
+
+def _with_palette(png: str) -> str:
+    """A PNG in base64 with 256 colours, a third of the size; as it was if that is not smaller."""
+    image = Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB")
+    small = io.BytesIO()
+    reduced = image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    reduced.save(small, "PNG", optimize=True)
+    return min(png, base64.b64encode(small.getvalue()).decode() + "\n", key=len)
 
 
 def _systems_table(figures: Path, outcomes: list[Outcome]) -> artifacts.Table | None:
