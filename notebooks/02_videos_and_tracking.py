@@ -373,14 +373,13 @@ folder.cleanup()
 # * The paper's integrator and a tight solver make the same videos; over many periods chaos separates
 #   any two solvers.
 # * "25 frames per second" needs a playback speed; 100 frames per period treat all systems alike.
-# * With the coverage of pixels, a classical tracker is good to a thousandth of a pixel on clean and a
-#   few hundredths on noisy videos. It says NaN where the target is not seen whole, unless that lasts
-#   too long.
+# * With the coverage of pixels, a classical tracker is good to a thousandth of a pixel on clean and to
+#   less than a tenth on noisy videos. It says NaN where the target is not seen whole, unless that
+#   lasts too long.
 #
 # **What the paper says and what we found.** The paper tracks with YOLO-v8 and calls its pixels
 # "approximate integer values" (rounding alone is 0.29 px per coordinate). It gives no step size, no
-# playback speed and no tracking error; all three are above. Its occlusions are cut out of the tracks;
-# ours are in the images.
+# playback speed and no tracking error; all three are above.
 #
 # Next: [cameras from tracks](03_camera_learning.ipynb).
 

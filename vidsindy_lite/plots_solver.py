@@ -113,7 +113,7 @@ def plot_histories(histories, true_terms):
     true_terms : dict of str to int
         How many terms the law has, by frame.
     """
-    figure, panels = plt.subplots(3, 1, figsize=(7, 5.4), sharex=True)
+    figure, panels = plt.subplots(3, 1, figsize=(7, 6), sharex=True)
     labels = {
         "data loss": "data loss\n/ noise variance",
         "physics loss": "physics loss\n/ mean square speed",
