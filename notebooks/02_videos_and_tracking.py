@@ -331,9 +331,9 @@ assert np.median([np.sqrt(np.nanmean(error**2)) for error in drawn]) < 0.15
 
 # %% [markdown]
 # A word of caution: the clean numbers are the best case there is. The videos draw each pixel as the
-# mixture that the tracker assumes, and the camera has no blur. So later notebooks do not live on
-# thousandths of a pixel: [06](06_robustness_and_ablation.ipynb) adds noise to the path and
-# [07](07_realistic_scene.ipynb) to the images.
+# mixture that the tracker assumes, and the camera has no blur. So nothing later lives on thousandths
+# of a pixel: [notebook 04](04_spline_ado.ipynb) adds noise to the path, and
+# [notebook 05](05_discovery.ipynb) rounds the tracks to whole pixels.
 
 # %% [markdown]
 # ## Gaps

@@ -377,9 +377,9 @@ for method in BASELINES:
 # * PySINDy's 824 % (NoseHoover) and 856 % (WangSun) are coefficients ten times too large throughout:
 #   a time step wrong by that factor. With the right step they are 1 to 15 % here.
 # * "Nine datasets" are seven, and the paper's frame of reference has to be guessed from its own
-#   ground truths. Notebook [10](10_paper_audit.ipynb) goes through the rest.
+#   ground truths.
 #
-# Next: [noise and gaps](06_robustness_and_ablation.ipynb), where it gets difficult.
+# How far noise and too few samples can be carried is the end of [notebook 04](04_spline_ado.ipynb).
 
 # %% [markdown]
 # ## Exercises
@@ -418,6 +418,5 @@ for method in BASELINES:
 # ```
 #
 # For Lorenz and 1,500 frames, ours and Model-A keep exactly the true terms, with errors of 0.2 % and
-# 0.9 %; PySINDy and E-SINDy find one false term, and WeakSINDy misses three. [Notebook
-# 06](06_robustness_and_ablation.ipynb) does this in earnest.
+# 0.9 %; PySINDy and E-SINDy find one false term, and WeakSINDy misses three.
 # </details>
