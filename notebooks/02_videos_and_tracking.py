@@ -44,6 +44,7 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
+# %%
 from vidsindy_lite import (
     learn_cameras,
     plots,
@@ -58,6 +59,7 @@ from vidsindy_lite.experiments import SAMPLES_PER_PERIOD, film
 from vidsindy_lite.systems import SYSTEMS, runge_kutta_4
 from vidsindy_lite.video import BACKGROUNDS, SHAPES, Scene, render
 
+# %%
 plt.style.use("vidsindy_lite.vidsindy")
 frames, long = {"full": (300, 1500), "quick": (120, 400)}[profile]
 folder = TemporaryDirectory()

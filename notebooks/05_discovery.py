@@ -309,6 +309,7 @@ scores = {
 }
 
 
+# %%
 def table_of(methods):
     return [
         {
