@@ -8,7 +8,7 @@ import pytest
 import vidsindy_lite
 
 FLOORS = [
-    {"polynomials", "splines", "geometry", "records"},
+    {"polynomials", "splines", "geometry", "records", "information"},
     {"systems", "cameras"},
     {"video", "tracking", "corruption"},
     {

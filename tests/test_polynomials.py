@@ -9,8 +9,10 @@ from vidsindy_lite.polynomials import (
     PolynomialSystem,
     closure,
     closure_mask,
+    divides,
     monomial_exponents,
     monomials,
+    shift_generators,
     shift_matrix,
     variable_names,
 )
@@ -122,6 +124,22 @@ def test_shift_leaves_no_remainder_where_terms_cancel():
 def test_shift_matrix_of_a_line():
     exponents = monomial_exponents(1, 2)
     np.testing.assert_allclose(shift_matrix(exponents, [2.0]), [[1, -2, 4], [0, 1, -4], [0, 0, 1]])
+
+
+def test_generators_differentiate_monomials_and_shifts():
+    exponents = monomial_exponents(2, 3)
+    x, axis, step = np.array([[0.3, -1.2]]), np.array([0.0, 1e-6]), 1e-6
+    generator = shift_generators(exponents)[1]
+    slope = (monomials(x + axis, exponents) - monomials(x - axis, exponents)) / (2 * step)
+    np.testing.assert_allclose(monomials(x, exponents) @ generator, slope, atol=1e-8)
+    rate = (shift_matrix(exponents, axis) - shift_matrix(exponents, -axis)) / (2 * step)
+    np.testing.assert_allclose(rate, -generator, atol=1e-8)
+
+
+def test_divides():
+    assert divides(np.array([[0, 0], [1, 0], [1, 1]])).tolist() == [
+        [True, True, True], [False, True, True], [False, False, True],
+    ]  # fmt: skip
 
 
 def test_closure_holds_all_divisors():

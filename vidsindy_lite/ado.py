@@ -21,8 +21,9 @@ from tqdm import tqdm
 
 from .bridges import Gap, gaps, join
 from .collocation import CLEANEST, Collocation, Segment, State
-from .discovery import Discovery, Step, Units, inverse, report
+from .discovery import Discovery, Step, Units, report
 from .frames import FrameAlgebra, sparse_origins
+from .information import inverse
 from .polynomials import (
     PolynomialSystem,
     closure_mask,
@@ -43,7 +44,7 @@ SEARCH_WEIGHTS = (1e2, 1e4, 1e6, 1e8)
 """Physics weights of the subset searches in the law's own frame."""
 FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
-FALSE_ALARM = 0.01
+FALSE_ALARM = 0.003
 """Chance of a false term in a law, if all candidates were independent."""
 OFFSET_CHARGE = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
@@ -108,12 +109,13 @@ def discover(
 def term_charges(exponents: np.ndarray) -> np.ndarray:
     """Price of a term of each kind: how much of the chi-square it has to explain, shape (l,).
 
-    `FALSE_ALARM` is shared equally among the degrees, and within a degree among its terms in all
-    equations (Bonferroni). So a term has to be significant among all that could have been, and
-    of two laws that fit alike the one of lower degree wins, there being fewer of those.
+    Half of `FALSE_ALARM` goes to the constants, half of the rest to the linear terms, and so on;
+    the terms of one degree in all equations share evenly (Bonferroni). So a term has to be
+    significant among all that could have been, and of two laws that fit alike the one of lower
+    degree wins.
     """
     d, degrees = exponents.shape[1], exponents.sum(axis=1)
-    rivals = d * np.bincount(degrees)[degrees] * (degrees.max() + 1)
+    rivals = d * np.bincount(degrees)[degrees] * 2.0 ** (degrees + 1)
     return chi2.isf(FALSE_ALARM / rivals, df=1)
 
 
@@ -123,10 +125,6 @@ class _Candidate:
 
     cost: float
     state: State
-
-    @property
-    def key(self) -> tuple[bytes, bytes]:
-        return self.state.active.tobytes(), self.state.moving.tobytes()
 
 
 @dataclass(frozen=True)
@@ -210,7 +208,6 @@ class _Search:
             state = self._best(candidates, segments)
             bar.update()
             state, segments = self._bridge(state, segments)
-            state = self._come_home(state, segments)
             bar.update()
             state, problem = self._polish(state, segments)
             bar.update()
@@ -359,28 +356,32 @@ class _Search:
     def _best(self, candidates: list[_Candidate], segments: list[Segment]) -> State:
         """Refine the cheapest candidates; the lowest criterion wins."""
         candidates = sorted(candidates, key=lambda candidate: candidate.cost)
-        states = list({c.key: c.state for c in reversed(candidates)}.values())[::-1][:3]
+        states = list({_key(c.state): c.state for c in reversed(candidates)}.values())[::-1][:3]
         stage = "subset search, own frame"
         for weight in SEARCH_WEIGHTS:
             refined = [self._select(state, segments, weight, stage) for state in states]
             limit = min(value for _, value in refined) + self.charges.max()
-            states = [state for state, value in refined if value <= limit]
-        return min(refined, key=lambda item: item[1])[0]
+            kept = {_key(state): state for state, value in refined if value <= limit}
+            states = list(kept.values())
+        settled = [self._come_home(state, segments) for state in states]
+        return min(settled, key=lambda item: item[1])[0]
 
-    def _come_home(self, state: State, segments: list[Segment]) -> State:
+    def _come_home(self, state: State, segments: list[Segment]) -> tuple[State, float]:
         """Put axes of the offset back to where they cost nothing, if the criterion falls.
 
         The frames were compared at a small physics weight, at which weak terms do not count.
         """
+        value = self._criterion(self._problem(segments, FINAL_WEIGHT), state)
+        if not state.moving.any():
+            return state, value
         hull = self._hull(state, segments, FINAL_WEIGHT)
         variants = [self._candidate(hull, *variant) for variant in self._variants(state.offset)]
         closest = min(variants, key=lambda candidate: candidate.cost)
-        value = self._criterion(self._problem(segments, FINAL_WEIGHT), state)
         if closest.cost < value and closest.state.moving.sum() < state.moving.sum():
             trial, cost = self._select(closest.state, segments, FINAL_WEIGHT, "offset home")
             if cost < value:
-                return trial
-        return state
+                return trial, cost
+        return state, value
 
     def _bridge(self, state: State, segments: list[Segment]) -> tuple[State, list[Segment]]:
         """Integrate the law across gaps and search again with the physics enforced there.
@@ -396,6 +397,7 @@ class _Search:
             before = state.active
             state, segments = self._bridge_group(state, segments, open_gaps)
             state, _ = self._select(state, segments, FINAL_WEIGHT, "subset search, bridged")
+            state, _ = self._come_home(state, segments)
             if (state.active == before).all():
                 break
         return state, segments
@@ -443,26 +445,10 @@ class _Search:
             change = np.abs(state.flat()[columns] - before)
             if (change < np.maximum(0.1 * spread, 1e-6)).all():
                 break
-        state = self._without_remnants(problem, state)
-        self._log("polish", problem, state, FINAL_WEIGHT)
-        return state, problem
-
-    def _without_remnants(self, problem: Collocation, state: State) -> State:
-        """Drop, weakest first, the terms that only made up for the error of coarser splines."""
-        while True:
-            columns = np.flatnonzero(state.active.T.ravel())
-            information = problem.linearise(state, np.flatnonzero(state.free())).information
-            variance = np.diag(inverse(information))[: len(columns)]
-            significance = state.flat()[columns] ** 2 / variance
-            weakness = significance / np.tile(self.charges, self.d)[columns]
-            if not len(columns) or weakness.min() >= 1:
-                return state
-            active = state.active.T.ravel()
-            active[columns[weakness.argmin()]] = False
-            active = active.reshape(self.d, -1).T
-            coefficients = np.where(active, state.coefficients, 0.0)
-            trial = replace(state, active=active, coefficients=coefficients)
-            state = problem.solve(trial, tolerance=1e-4)
+        # A term that only made up for the error of coarser splines goes, and the noise, known
+        # better now, may change what is worth its charge.
+        state, _ = self._select(state, segments, FINAL_WEIGHT, "polish")
+        return problem.solve(state, tolerance=1e-4), problem
 
     def _residual_noise(self, problem: Collocation, state: State) -> np.ndarray:
         """Standard deviation of the data residual, less the freedom that the fit used up."""
@@ -471,6 +457,11 @@ class _Search:
         return np.maximum(
             np.sqrt((residual**2).sum(axis=0) / max(len(residual) - used, 1.0)), CLEANEST
         )
+
+
+def _key(state: State) -> tuple[bytes, bytes]:
+    """Same for states with the same terms and axes."""
+    return state.active.tobytes(), state.moving.tobytes()
 
 
 def _rms_speed(splines: Sequence[BSpline]) -> float:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
+from .information import RIDGE, equilibrated
 from .polynomials import monomial_gradients, monomials
 from .splines import DEGREE, clamped_knots, local_basis
 
@@ -303,7 +304,7 @@ class Collocation:
             except LinAlgError:
                 damping = max(10 * damping, 1e-8)
                 continue
-            step = _solve_scaled(model.information, model.gradient, damping)
+            step = _solved(model.information, model.gradient, damping)
             for fraction in (1.0, 0.3, 0.1):
                 trial = _moved(state, model, step, fraction)
                 with np.errstate(over="ignore", invalid="ignore"):
@@ -362,13 +363,11 @@ def _local(values: np.ndarray, first: np.ndarray, control_points: np.ndarray) ->
     return sum(weights[:, a] * control_points[first + a] for a in range(WIDTH))
 
 
-def _solve_scaled(information: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:
+def _solved(information: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:
     if not len(gradient):
         return gradient
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    scaled = information * scale[:, None] * scale
-    scaled[np.diag_indices_from(scaled)] += 1e-12 + damping
-    return scale * np.linalg.solve(scaled, scale * gradient)
+    matrix, scale = equilibrated(information, RIDGE + damping)
+    return scale * np.linalg.solve(matrix, scale * gradient)
 
 
 def _moved(state: State, model: Linearisation, step: np.ndarray, fraction: float) -> State:

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from .collocation import Collocation, State
-from .polynomials import PolynomialSystem, shift_matrix, variable_names
+from .information import inverse
+from .polynomials import PolynomialSystem, shift_generators, shift_matrix, variable_names
 
 
 @dataclass(frozen=True)
@@ -226,14 +227,6 @@ def report(
     )
 
 
-def inverse(information: np.ndarray) -> np.ndarray:
-    """Inverse of an information matrix whose entries differ by many orders of magnitude."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    return np.linalg.pinv(information * scale[:, None] * scale, hermitian=True) * (
-        scale[:, None] * scale
-    )
-
-
 def _shifted(
     exponents: np.ndarray, coefficients: np.ndarray, offset: np.ndarray, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -243,10 +236,7 @@ def _shifted(
     moved = matrix @ coefficients
     jacobian = np.zeros((l * d, l * d + d))
     jacobian[:, : l * d] = np.kron(np.eye(d), matrix)
-    for i in range(d):
-        lowered = exponents[None, :, :] - exponents[:, None, :]
-        one_less = (lowered == np.eye(d, dtype=int)[i]).all(axis=-1)
-        generator = np.where(one_less, exponents[None, :, i], 0.0)
+    for i, generator in enumerate(shift_generators(exponents)):
         jacobian[:, l * d + i] = -(generator @ moved).T.ravel()
     return moved, jacobian @ covariance @ jacobian.T
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
-from .polynomials import shift_matrix
+from .information import inverse
+from .polynomials import divides, shift_generators, shift_matrix
 
 DRAWS = 200
 """Random sets of coefficients that an origin is asked to make vanish."""
@@ -35,24 +36,9 @@ class FrameAlgebra:
         self.l, self.d = exponents.shape
         self.coefficients = coefficients
         self.information = information
-        scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-        scaled = information * scale[:, None] * scale
-        scaled[np.diag_indices_from(scaled)] += 1e-11
-        covariance = np.linalg.inv(scaled) * scale[:, None] * scale
-        blocks = covariance.reshape(self.d, self.l, self.d, self.l)
+        blocks = inverse(information).reshape(self.d, self.l, self.d, self.l)
         self.covariances = np.stack([blocks[j, :, j, :] for j in range(self.d)])
-        # d phi / d x_i = phi N_i: the generator of shifts along axis i.
-        self.generators = np.stack(
-            [
-                np.where(
-                    (exponents[None, :, :] - exponents[:, None, :] == np.eye(self.d, dtype=int)[i])
-                    .all(axis=-1),
-                    exponents[None, :, i],
-                    0.0,
-                )
-                for i in range(self.d)
-            ]
-        )  # fmt: skip
+        self.generators = shift_generators(exponents)
 
     def at(self, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Coefficients (l, d) and information (l d, l d) in monomials of ``x - origin``."""
@@ -147,9 +133,8 @@ def sparse_origins(
     """
     low, high = np.minimum(box[0], home), np.maximum(box[1], home)
     # Only what divides another term of its equation can vanish by a shift.
-    divides = (algebra.exponents[:, None, :] <= algebra.exponents[None, :, :]).all(axis=-1)
-    np.fill_diagonal(divides, False)
-    droppable = np.argwhere((active & (divides @ active)).T)
+    below = divides(algebra.exponents) & ~np.eye(algebra.l, dtype=bool)
+    droppable = np.argwhere((active & (below @ active)).T)
     starts = []
     for draw in range(DRAWS if len(droppable) else 0):
         origin = home if draw % 2 else rng.uniform(low, high)

@@ -105,10 +105,29 @@ def closure(exponents: np.ndarray) -> np.ndarray:
     return np.array(ordered, dtype=int).reshape(-1, exponents.shape[1])
 
 
+def divides(exponents: np.ndarray) -> np.ndarray:
+    """Which monomial (row) divides which (column), itself included; shape (l, l)."""
+    return (exponents[:, None, :] <= exponents[None, :, :]).all(axis=-1)
+
+
 def closure_mask(exponents: np.ndarray, support: np.ndarray) -> np.ndarray:
     """Widen a support (l, d) to all divisors of its terms: what any shift of it may contain."""
-    divides = (exponents[:, None, :] <= exponents[None, :, :]).all(axis=-1)
-    return divides @ support
+    return divides(exponents) @ support
+
+
+def shift_generators(exponents: np.ndarray) -> np.ndarray:
+    """Matrices ``N_i`` with ``d phi / d x_i = phi N_i``, shape (d, l, l).
+
+    ``-N_i`` is the rate of change of `shift_matrix` with the offset along axis i.
+    """
+    d = exponents.shape[1]
+    lowered = exponents[None, :, :] - exponents[:, None, :]
+    return np.stack(
+        [
+            np.where((lowered == axis).all(axis=-1), exponents[None, :, i], 0.0)
+            for i, axis in enumerate(np.eye(d, dtype=int))
+        ]
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-RIDGE = 1e-11
-"""Relative ridge that keeps a nearly singular information matrix solvable."""
+from .information import equilibrated
+
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 
@@ -38,7 +38,8 @@ def subset_search(
     value : float
         The objective with charges.
     """
-    matrix, target, scale = _scaled(information, pull)
+    matrix, scale = equilibrated(information)
+    target = pull * scale
     support = start.copy()
     best, value = support, np.inf
     while True:
@@ -80,17 +81,8 @@ def closest_rival(
     dropped, added : ndarray of int
         The entries that leave and enter, at most one each.
     """
-    matrix, target, _ = _scaled(information, pull)
-    return min(_single_changes(matrix, target, charge, support), key=lambda item: item[0])
-
-
-def _scaled(
-    information: np.ndarray, pull: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    matrix = information * scale[:, None] * scale
-    matrix[np.diag_indices_from(matrix)] += RIDGE
-    return matrix, pull * scale, scale
+    matrix, scale = equilibrated(information)
+    return min(_single_changes(matrix, pull * scale, charge, support), key=lambda item: item[0])
 
 
 def _single_changes(

@@ -1,0 +1,22 @@
+import numpy as np
+
+from vidsindy_lite.information import equilibrated, inverse
+
+
+def test_inverse_of_badly_scaled_information():
+    scale = np.diag([1e-8, 1.0, 1e8])
+    core = np.array([[2, 1, 0], [1, 2, 1], [0, 1, 2.0]])
+    back = scale @ inverse(scale @ core @ scale) @ scale
+    np.testing.assert_allclose(back, np.linalg.inv(core), atol=1e-11)
+
+
+def test_equilibrated_has_a_unit_diagonal_and_scales_back():
+    information = np.array([[4.0, 1.0], [1.0, 9e8]])
+    matrix, scale = equilibrated(information, ridge=0.0)
+    np.testing.assert_allclose(np.diag(matrix), 1)
+    np.testing.assert_allclose(matrix / scale[:, None] / scale, information)
+
+
+def test_what_cannot_be_told_is_uncertain_not_certain():
+    dependent = np.array([[1.0, 1.0], [1.0, 1.0]])
+    assert np.diag(inverse(dependent)).min() > 1e6
