@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import chi2
 
-from .collocation import CLEANEST, Collocation, State
+from .collocation import CLEANEST, Collocation, Linearisation, State
+from .information import equilibrated
 from .polynomials import PolynomialSystem
 from .records import Record, typical_step
 from .regression import closest_rival
@@ -24,6 +26,8 @@ COARSE = 1.0
 """Longest typical time step, in time scales of the motion (about 6 to a turn)."""
 RESOLVED = 1e-3
 """Residual, relative to the spread of the data, below which a misfit does not matter."""
+CHANCE = 1e-4
+"""Probability below which what the left-out terms explain together is no chance."""
 UNMET = 1e-2
 """Root mean square residual of the law along the curve, relative to the speed."""
 
@@ -59,7 +63,7 @@ def doubts(
         *_misfit(law, problem, noise),
         *_unmet(state, problem),
         *_standstill(law),
-        *_near_tie(law, state, problem, charges),
+        *_selection(law, state, problem, charges),
         *_sampling(records),
     ]
 
@@ -95,13 +99,33 @@ def _standstill(law: PolynomialSystem) -> list[str]:
     ]
 
 
-def _near_tie(
+def _selection(
     law: PolynomialSystem, state: State, problem: Collocation, charges: np.ndarray
 ) -> list[str]:
     if (problem.data_weights**-0.5 <= CLEANEST).all():
         return []  # what is left is the error of the splines, not noise: it settles nothing
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = problem.linearise(state, np.arange(law.coefficients.size))
+    return [*_left_over(model, state), *_near_tie(model, law, state, charges)]
+
+
+def _left_over(model: Linearisation, state: State) -> list[str]:
+    """Would all candidates together explain more than chance (Rao's score test)?"""
+    matrix, scale = equilibrated(model.information)
+    pull = scale * model.gradient
+    gain = float(pull @ np.linalg.solve(matrix, pull))
+    unused = int((~state.active).sum())
+    if chi2.sf(gain, unused) > CHANCE:
+        return []
+    return [
+        f"the terms left out explain more than chance (chi-square {gain:.0f} for {unused}): a term "
+        "may be missing, or the errors of the measurements depend on each other"
+    ]
+
+
+def _near_tie(
+    model: Linearisation, law: PolynomialSystem, state: State, charges: np.ndarray
+) -> list[str]:
     present = state.coefficients.T.ravel()
     cost, dropped, added = closest_rival(
         model.information,
@@ -122,7 +146,7 @@ def _near_tie(
         f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
     )
     return [
-        f"another law fits almost as well: {change} (criterion {max(cost, 0.0):+.1f}); the data "
+        f"another law fits almost as well: {change} (criterion {cost:+.1f}); the data "
         "do not settle it: use a longer or cleaner record"
     ]
 
