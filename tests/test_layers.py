@@ -9,7 +9,7 @@ import vidsindy_lite
 
 FLOORS = [
     {"polynomials", "splines", "geometry", "records"},
-    {"systems", "cameras"},
+    {"systems", "cameras", "published"},
     {"video", "tracking", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
