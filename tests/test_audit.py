@@ -11,6 +11,7 @@ from vidsindy_lite.audit import (
     coefficient_ratios,
     could_be,
     counts_behind,
+    false_terms,
     fit_coordinates,
     rounding_reach,
     seen_in,
@@ -156,3 +157,11 @@ def test_ratios_are_those_of_the_true_terms():
     ratios = coefficient_ratios(LAWS["PySINDy", "NoseHoover"], LAWS["Ground truth", "NoseHoover"])
     assert len(ratios) == 9
     assert ratios["dx/dt: y"] == pytest.approx(10.97)
+
+
+def test_false_terms_are_those_that_the_score_counts():
+    for (_, name), law in LAWS.items():
+        truth = LAWS["Ground truth", name]
+        assert len(false_terms(law, truth)) == score(law, truth).false_positives
+    lorenz = (LAWS[method, "Lorenz"] for method in ("Ours", "Ground truth"))
+    assert false_terms(*lorenz) == {"dx/dt: 1": -0.94}

@@ -216,12 +216,26 @@ def fit_coordinates(
     )
 
 
+def coefficients_of(law: PolynomialSystem, support: PolynomialSystem) -> dict[str, float]:
+    """Coefficients of a law at the terms of another one, keyed like ``"dx/dt: yz"``."""
+    values = coefficients_in(law, support.exponents)
+    return {
+        f"d{name}/dt: {term}": float(values[row, j])
+        for j, name in enumerate(support.names)
+        for row, term in enumerate(support.terms)
+        if support.coefficients[row, j]
+    }
+
+
 def coefficient_ratios(found: PolynomialSystem, truth: PolynomialSystem) -> dict[str, float]:
     """Found over true coefficient of every true term, keyed like ``"dx/dt: yz"``."""
-    values = coefficients_in(found, truth.exponents)
+    true = coefficients_of(truth, truth)
+    return {term: value / true[term] for term, value in coefficients_of(found, truth).items()}
+
+
+def false_terms(found: PolynomialSystem, truth: PolynomialSystem) -> dict[str, float]:
+    """Coefficients of the terms found that are not true, keyed like ``"dx/dt: yz"``."""
+    true = coefficients_of(truth, truth)
     return {
-        f"d{name}/dt: {term}": float(values[row, j] / truth.coefficients[row, j])
-        for j, name in enumerate(truth.names)
-        for row, term in enumerate(truth.terms)
-        if truth.coefficients[row, j]
+        term: value for term, value in coefficients_of(found, found).items() if term not in true
     }
