@@ -162,8 +162,9 @@ paths = {
     "truth": x, "the text's rotation, normals and positions as they are": wrong,
     "the text's rotation throughout: half a turn": half_turn,
 }  # fmt: skip
+paths = {label: path[:400] for label, path in paths.items()}
 fig = plots_audit.plot_paths(paths, "xyz", columns=(0, 2))
-caption = "The rotation of the text distorts the path, or turns it by half a turn about z."
+caption = "With the rotation of the text the path is lost, or turned by half a turn about z."
 save_figure("audit_rotation", fig, caption=caption, numbers=paths)
 
 # %% [markdown]
@@ -554,26 +555,24 @@ print("equal in all columns:", same)
 assert same == ["Lorenz", "RayleighBenard", "NoseHoover", "Tsucs2"]
 
 # %% [markdown]
-# Could it be chance? On exact trajectories resampling changes least. How far apart are the two for us?
+# Could it be chance? In NoseHoover five digits agree. On an exact trajectory resampling changes least; how far
+# apart are the two there?
 
 # %%
-apart = {}
-for name in {"full": ("Lorenz", "NoseHoover"), "quick": ("NoseHoover",)}[profile]:
-    t, x = truths[name].trajectory(frames)
-    one, other = (score(law, truths[name]).l2 for law in (stlsq(t, x), ensemble(t, x, seed=seed)))
-    apart[name] = abs(other / one - 1)
-    print(f"{name}: l2 {100 * one:.3f} and {100 * other:.3f} (e-2), apart by {apart[name]:.1e}")
-
-# %%
-printed = {name: 0.5e-4 / SCORES["Table 1", "PySINDy", name].l2 for name in apart}
-print("in print, equal to", {name: float(f"{value:.1e}") for name, value in printed.items()})
-assert all(apart[name] > printed[name] for name in apart)
+t, x = truths["NoseHoover"].trajectory(frames)
+fits = stlsq(t, x), ensemble(t, x, seed=seed)
+plain, bagged = (score(fit, truths["NoseHoover"]).l2 for fit in fits)
+apart = abs(bagged / plain - 1)
+digits = 0.5e-4 / SCORES["Table 1", "PySINDy", "NoseHoover"].l2
+print(f"here {100 * plain:.3f} and {100 * bagged:.3f} (e-2), apart by {apart:.1e}")
+print(f"in print apart by at most {2 * digits:.1e}")
+assert apart > 20 * digits
 note("Table S3", "E-SINDy beside PySINDy", "equal in every column for " + ", ".join(same),
-     f"NoseHoover: {apart['NoseHoover']:.1e} apart here, at most {printed['NoseHoover']:.0e} there",
+     f"NoseHoover: {apart:.1e} apart here, at most {2 * digits:.0e} there",
      "these rows are no second baseline")  # fmt: skip
 
 # %% [markdown]
-# For Lorenz such an agreement may still be luck; 824.44 twice is not. Rows copied, or an ensemble without
+# For the other three such an agreement may be luck; 824.44 twice is hardly. Rows copied, or an ensemble without
 # resampling, would look like this.
 #
 # ## A ruler: the 6.22 % of NoseHoover
@@ -643,7 +642,7 @@ assert explained == {"SprottF", "NoseHoover", "WangSun"}
 # means the reconstructed path:
 
 # %%
-native = SYSTEMS["NoseHoover"].trajectory(frames)[1]
+native = SYSTEMS["NoseHoover"].trajectory(400)[1]
 paths = {
     "truth": native + REFERENCE_OFFSET,
     "in the coordinates that the printed law implies": fit.offset + fit.scale * native,
