@@ -9,14 +9,14 @@ import vidsindy_lite
 
 FLOORS = [
     {"polynomials", "splines", "geometry", "records", "information"},
-    {"systems", "cameras"},
+    {"systems", "cameras", "published"},
     {"video", "tracking", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
         "ado", "paper_ado", "baselines", "metrics", "limits",
     },
-    {"pipeline", "experiments"},
-    {"plots", "plots_solver", "artifacts", "runner", "__main__"},
+    {"pipeline", "experiments", "audit"},
+    {"plots", "plots_solver", "plots_audit", "artifacts", "runner", "__main__"},
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent
 

@@ -90,10 +90,10 @@ def score(found, truth: PolynomialSystem) -> Score:
     if not truth.support.any():
         raise ValueError("truth: must have at least one term, got none")
     library = np.unique(np.concatenate([found.exponents, truth.exponents]), axis=0)
-    guess, true = _coefficients(found, library), _coefficients(truth, library)
+    guess, true = coefficients_in(found, library), coefficients_in(truth, library)
     hits = int(((guess != 0) & (true != 0)).sum())
     claimed, actual = int(np.count_nonzero(guess)), int(np.count_nonzero(true))
-    here = _coefficients(found, truth.exponents)
+    here = coefficients_in(found, truth.exponents)
     errors = np.full(truth.coefficients.shape, np.nan)
     support = truth.support
     errors[support] = np.abs(here[support] / truth.coefficients[support] - 1)
@@ -108,8 +108,20 @@ def score(found, truth: PolynomialSystem) -> Score:
     )
 
 
-def _coefficients(system: PolynomialSystem, library: np.ndarray) -> np.ndarray:
-    """Coefficients of a system in another library; zero for monomials it does not have."""
+def coefficients_in(system: PolynomialSystem, library: np.ndarray) -> np.ndarray:
+    """Coefficients of a system in another library.
+
+    Parameters
+    ----------
+    system : PolynomialSystem
+    library : ndarray of int, shape (l, d)
+        Exponents, one row a monomial. Terms of the system outside it are left out.
+
+    Returns
+    -------
+    ndarray, shape (l, d)
+        Zero for monomials that the system does not have.
+    """
     rows = {tuple(powers): row for row, powers in enumerate(system.exponents)}
     none = np.zeros(system.d)
     return np.array(
