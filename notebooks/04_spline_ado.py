@@ -29,8 +29,8 @@
 # **What you need**: least squares. The trajectory is computed here, in the paper's reference frame, and
 # made noisy, so that the true law is known.
 #
-# **Covers** Section "Equation discovery", Eq. (3), (7)-(11), and the appendix "Alternate Direction
-# Optimization", Eq. (S12)-(S13).
+# **Covers** Section "Equation discovery", Eq. (3), (7)-(10), and the appendix "Alternate Direction
+# Optimization", Eq. (S8)-(S9).
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
@@ -126,7 +126,7 @@ assert np.allclose(slopes @ P, slopes @ (P + offset), atol=1e-9)
 
 # %% [markdown]
 # It means something only if the library does not see it: $\dot{\mathbf x}=\boldsymbol\phi(\mathbf x-\Delta)
-# \boldsymbol\Lambda$. Then $\Delta$ is the **origin** from which the law is written, and Eq. (11) is the
+# \boldsymbol\Lambda$. Then $\Delta$ is the **origin** from which the law is written, and Eq. (10) is the
 # exact change of origin. Any origin will do for the fit. Not for the price of the terms: Lorenz' law has
 # 7 terms at its own origin and 12 at the reference frame's.
 
@@ -275,7 +275,7 @@ save_figure("solver_curve", fig, caption=caption, numbers=samples | curves | che
 # %% [markdown]
 # ## Two optimisers
 #
-# **The paper's**, Eq. (S12)-(S13), alternates: with the curve fixed, STRidge picks terms by a hard
+# **The paper's**, Eq. (S8)-(S9), alternates: with the curve fixed, STRidge picks terms by a hard
 # threshold; with the terms fixed, gradient descent (Adam) improves curve, coefficients and offset.
 #
 # **Ours** takes banded Gauss-Newton steps, raises $\alpha$ by many decades until the law holds exactly

@@ -61,7 +61,7 @@ def discover(
     seed: int = 0,
     progress: bool = False,
 ) -> Discovery:
-    """Discover the polynomial law of a measured trajectory (paper: Eqs. 7-11).
+    """Discover the polynomial law of a measured trajectory (paper: Eqs. 7-10).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Fit a spline and a polynomial law together by banded Gauss-Newton steps (paper: Eqs. 8-9, S13).
+"""Fit a spline and a polynomial law together by banded Gauss-Newton steps (paper: Eqs. 8-9, S9).
 
 A cubic B-spline touches four control points, so the normal matrix in the control points is banded
 (half-bandwidth 4 d - 1); coefficients and offset border it densely. Banded Cholesky and a Schur

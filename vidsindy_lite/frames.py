@@ -1,4 +1,4 @@
-"""The origin in which a polynomial law is sparsest: the meaning of the paper's offset (Eq. 11).
+"""The origin in which a polynomial law is sparsest: the meaning of the paper's offset (Eq. 10).
 
 B-splines sum to one, so an offset added to the curve is redundant. It matters when the library
 is evaluated at ``x - offset``: then it is the origin of the law's own frame.

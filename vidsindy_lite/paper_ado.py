@@ -1,10 +1,10 @@
-"""The paper's own optimiser, as written: gradient descent alternating with STRidge (Eqs. S12-S13).
+"""The paper's own optimiser, as written: gradient descent alternating with STRidge (Eqs. S8-S9).
 
 It stands beside `ado.discover`, to show what the formulation gives with the optimiser that the
 paper describes. The formulation is the paper's: cubic B-splines with control points P and a
-learnable offset, data loss at the measured times (Eq. 8a), physics loss at many random
-collocation times (Eq. 8b), STRidge with an adaptive hard threshold for the coefficients, Adam on
-(P, surviving coefficients, offset), an affine elimination of the offset (Eq. 11), and a small
+learnable offset, data loss at the measured times (Eq. 9a), physics loss at many random
+collocation times (Eq. 9b), STRidge with an adaptive hard threshold for the coefficients, Adam on
+(P, surviving coefficients, offset), an affine elimination of the offset (Eq. 10), and a small
 value below which coefficients are cut at the end.
 
 Three things the paper leaves open and what is done here:
@@ -49,7 +49,7 @@ class PaperDiscovery:
     Parameters
     ----------
     system : PolynomialSystem
-        The law in the frame of the data, after the offset is eliminated (paper: Eq. 11).
+        The law in the frame of the data, after the offset is eliminated (paper: Eq. 10).
     native : PolynomialSystem
         The law as it was fitted, in coordinates that start at ``offset``.
     offset : ndarray, shape (d,)
@@ -80,7 +80,7 @@ def discover_paper(
     learning_rate: float = 0.01,
     prune: float = 0.1,
 ) -> PaperDiscovery:
-    """Discover a law with the paper's alternating direction optimisation (Eqs. 7-11, S12-S13).
+    """Discover a law with the paper's alternating direction optimisation (Eqs. 7-10, S8-S9).
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ class _Fit:
             ).numpy(force=True)
 
     def losses(self) -> tuple[torch.Tensor, torch.Tensor]:
-        """Data loss and physics loss (paper: Eqs. 8a and 8b)."""
+        """Data loss and physics loss (paper: Eqs. 9a and 9b)."""
         measured = (self.control_points[self.sample_control] * self.sample_basis).sum(dim=1)
         data_loss = ((measured + self.offset - self.data) ** 2).sum(dim=1).mean()
         curve = _curve(self.basis, self.control_points)
@@ -224,7 +224,7 @@ class _Fit:
         return data_loss, physics_loss
 
     def descend(self, steps: int, learning_rate: float) -> None:
-        """Adam on control points, surviving coefficients and offset (paper: Eq. S13)."""
+        """Adam on control points, surviving coefficients and offset (paper: Eq. S9)."""
         unknowns = [self.control_points, self.coefficients, self.offset]
         optimiser = torch.optim.Adam(unknowns, lr=learning_rate)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
@@ -249,7 +249,7 @@ class _Fit:
                 )
 
     def result(self, prune: float) -> PaperDiscovery:
-        """Back to the units of the data, without the offset (paper: Eq. 11)."""
+        """Back to the units of the data, without the offset (paper: Eq. 10)."""
         units, exponents = self.units, self.exponents
         standard = (self.coefficients * self.mask).numpy(force=True)
         offset = units.point(self.offset.numpy(force=True))

@@ -2,7 +2,7 @@
 
 The law is ``dx/dt = phi(x) Lambda`` (paper: Eq. 7), with a row ``phi`` of monomials and a sparse
 matrix ``Lambda`` of coefficients. A polynomial library is closed under a shift of the origin, so
-the law in any other frame follows exactly (paper: Eq. 11) and is never typed by hand.
+the law in any other frame follows exactly (paper: Eq. 10) and is never typed by hand.
 """
 
 from __future__ import annotations
@@ -263,7 +263,7 @@ class PolynomialSystem:
         return jacobian.reshape(*x.shape, self.d)
 
     def shift(self, offset: Sequence[float]) -> PolynomialSystem:
-        """The same motion seen from a shifted origin, exactly (paper: Eq. 11).
+        """The same motion seen from a shifted origin, exactly (paper: Eq. 10).
 
         If x(t) solves this system, x(t) + offset solves the returned one.
 

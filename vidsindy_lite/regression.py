@@ -128,7 +128,7 @@ def stridge(
     step: float = 1e-2,
     trials: int = 100,
 ) -> np.ndarray:
-    """Sequentially thresholded ridge regression with an adaptive threshold (paper: Eq. S12).
+    """Sequentially thresholded ridge regression with an adaptive threshold (paper: Eq. S8).
 
     Ridge regression, columns below a threshold cut, again until none is cut. The threshold is
     raised while the loss on held-out rows, ``|residual| + sparsity_weight |coefficients|_0``, does

@@ -1,10 +1,11 @@
 """The solver: time and memory, against the paper's optimiser, baselines and the Cramer-Rao bound.
 
-Run with `make bench` on an otherwise idle machine (about 20 minutes). Every bar is a ratio taken
+Run with `make bench` on an otherwise idle machine (about half an hour). Every bar is a ratio taken
 in one run, or a time of the processor. The table is printed and saved to build/benchmarks/.
 """
 
 import csv
+import inspect
 import time
 import tracemalloc
 from pathlib import Path
@@ -113,25 +114,38 @@ def lorenz_exam(seed=0):
 
 
 def test_against_the_optimiser_of_the_paper():
-    """Time for gradient descent to meet the law as well as ours does, or to run out of budget.
+    """Time for gradient descent to fall to the loss at which ours ends, or its whole budget.
 
-    Both fit the same data. The loss is that of the paper, Eq. 8: what ours reaches when it is
-    done is evaluated as mean-square data residual plus physics residual, in standard units.
+    The loss is Eq. 8 of the paper in standard units, with the weights that `discover_paper` uses:
+    data residual, physics residual and a price for every term. The schedule is nearer to that of
+    the public code than the default one; it lasts some 300 times as long as ours.
     """
     law, t, x = lorenz_exam()
+    weights = inspect.signature(discover_paper).parameters
+    alpha, beta = (weights[k].default for k in ("physics_weight", "sparsity_weight"))
+
+    def loss(data, physics, terms):
+        return data + alpha * physics + beta * terms
+
     ours, found = seconds(discover, t, x)
     assert score(found, law).exact
-    physics = found.history[-1].physics_loss
-    theirs, paper = seconds(discover_paper, t, x, pretraining=20000, epochs=20000)
-    reached = [h["seconds"] for h in paper.history if h["physics_loss"] <= physics]
+    misfit = (((found.curve(t) - x) / x.std(axis=0)) ** 2).sum(axis=1).mean()
+    least = loss(misfit, found.history[-1].physics_loss, found.native.support.sum())
+    theirs, paper = seconds(discover_paper, t, x, pretraining=40000, epochs=20000)
+    losses = [loss(h["data_loss"], h["physics_loss"], h["terms"]) for h in paper.history]
+    reached = [
+        h["seconds"] for h, value in zip(paper.history, losses, strict=True) if value <= least
+    ]
     note("paper's optimiser", "ours", ours, "s")
     note("paper's optimiser", "gradient descent", theirs, "s")
-    note("paper's optimiser", "physics loss, ours", physics, "")
-    note("paper's optimiser", "physics loss, theirs", paper.history[-1]["physics_loss"], "")
+    note("paper's optimiser", "loss, ours", least, "")
+    note("paper's optimiser", "loss, theirs", min(losses), "")
+    note("paper's optimiser", "terms, theirs", paper.history[-1]["terms"], "")
     result = score(paper.system, law)
     note("paper's optimiser", "theirs", result.false_positives + result.missing, "wrong terms")
     ratio = (reached[0] if reached else theirs) / ours
-    note("paper's optimiser", "at least" if not reached else "ratio", ratio, "ratio", "300")
+    note("paper's optimiser", "ratio" if reached else "at least", ratio, "ratio", "300")
+    assert ratio >= 300
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

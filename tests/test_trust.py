@@ -1,0 +1,49 @@
+"""The doubts, on fits whose support is set by hand."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.ado import term_charges
+from vidsindy_lite.collocation import Collocation, Segment, State
+from vidsindy_lite.polynomials import PolynomialSystem
+from vidsindy_lite.splines import DEGREE
+from vidsindy_lite.trust import doubts
+
+NOISE = 0.03
+
+
+@pytest.fixture(scope="module")
+def duffing():
+    """A hardening spring, measured with noise, and the control points of a first curve."""
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5}}, degree=3)
+    t = np.linspace(0, 30, 600)
+    x = law.simulate(t, (1.5, 0))
+    x += NOISE * np.random.default_rng(0).normal(size=x.shape)
+    return law, t, x
+
+
+def fitted(duffing, dropped=None):
+    law, t, x = duffing
+    segment = Segment.even(t, x, 1 / 8, 0)
+    weights = np.full(2, NOISE**-2)
+    problem = Collocation([segment], law.exponents, weights, np.full(2, 1e6))
+    nodes = np.linspace(t[0], t[-1], len(segment.breakpoints) + DEGREE - 1)
+    curve = np.stack([np.interp(nodes, t, column) for column in x.T], axis=1)
+    active = law.support.copy()
+    if dropped:
+        active[law.terms.index(dropped), 1] = False
+    origin, still = np.zeros(2), np.zeros(2, dtype=bool)
+    state = State(curve, np.where(active, law.coefficients, 0.0), active, origin, still)
+    state = problem.solve(state, tolerance=1e-4, max_steps=100)
+    found = PolynomialSystem(law.names, law.exponents, state.coefficients)
+    return doubts(
+        found, state, problem, term_charges(law.exponents), [(t, x)], np.full(2, NOISE)
+    )
+
+
+def test_the_true_law_is_not_doubted(duffing):
+    assert fitted(duffing) == []
+
+
+def test_a_missing_term_is_noticed(duffing):
+    assert any("the terms left out explain more than chance" in d for d in fitted(duffing, "x^3"))
