@@ -8,14 +8,15 @@ import pytest
 import vidsindy_lite
 
 FLOORS = [
-    {"polynomials", "splines", "geometry", "records"},
+    {"repository", "polynomials", "splines", "geometry", "records"},
     {"systems", "cameras"},
     {"video", "tracking", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
         "ado", "paper_ado", "baselines", "metrics", "limits",
     },
-    {"pipeline", "experiments"},
+    {"pipeline", "sweeps"},
+    {"experiments"},
     {"plots", "plots_solver", "artifacts", "runner", "__main__"},
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent

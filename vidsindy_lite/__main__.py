@@ -60,6 +60,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="folder for notebooks/ and figures/ (default: the repository, or build/quick)",
     )
+    run.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="scheduler of a Dask cluster, e.g. tcp://10.0.0.1:8786, that the sweeps run on",
+    )
     run.set_defaults(command=_run)
     return parser
 
@@ -67,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     from vidsindy_lite import runner  # papermill takes a second to import; --help need not wait
 
-    report = runner.run(options.notebooks, options.profile, options.output)
+    report = runner.run(options.notebooks, options.profile, options.output, dask=options.dask)
     print(f"\n{report}")
     return 0 if report.ok else 1
 

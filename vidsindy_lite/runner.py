@@ -6,7 +6,6 @@ writes notebooks/*.ipynb and figures/ of the repository, the quick profile the s
 build/quick/.
 """
 
-import ast
 import base64
 import copy
 import hashlib
@@ -28,6 +27,7 @@ from PIL import Image
 from traitlets.config import Config
 
 from vidsindy_lite import artifacts
+from vidsindy_lite.repository import PACKAGE, package_stamp, repository_root, write_file
 
 __all__ = [
     "NotebookError",
@@ -45,7 +45,6 @@ __all__ = [
 PROFILES = ("full", "quick")
 CELL_TIMEOUT = 1800  # seconds; papermill's own default is to wait for ever
 SYSTEMS_TABLE = "table_systems"  # printed after a run that wrote it
-PACKAGE = Path(__file__).parent
 # The kernel warns on stderr that anyone on the machine could listen in otherwise.
 ENCRYPTED = Config(KernelManager={"transport_encryption": "auto"})
 
@@ -124,6 +123,7 @@ def run(
     profile: str = "full",
     output: str | os.PathLike | None = None,
     *,
+    dask: str | None = None,
     root: str | os.PathLike | None = None,
 ) -> Report:
     """Execute notebooks one after the other and write what they make; goes on after a failure.
@@ -138,6 +138,8 @@ def run(
         Folder that receives notebooks/ (executed) and figures/. By default the repository itself
         in the full profile and build/quick in the quick one. A notebook that fails leaves its
         executed half as it was.
+    dask : str, optional
+        Address of a Dask scheduler: what a notebook sweeps runs on its workers (see `sweep`).
     root : path, optional
         The repository; by default the one around the working directory.
 
@@ -155,7 +157,7 @@ def run(
     """
     if profile not in PROFILES:
         raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
-    root = artifacts.repository_root() if root is None else Path(root).resolve()
+    root = repository_root() if root is None else Path(root).resolve()
     if output is None:
         output = root if profile == "full" else root / "build" / "quick"
     output = Path(output).resolve()
@@ -186,6 +188,7 @@ def run(
                     "VIDSINDY_FIGURES": str(figures),
                     "VIDSINDY_NOTEBOOK": path.stem,
                     "VIDSINDY_STAMP": stamp,
+                    **({"VIDSINDY_DASK": dask} if dask else {}),
                 },
                 progress=progress,
             )
@@ -196,7 +199,7 @@ def run(
         if error is None:
             stamps[path.stem] = stamp
             half = nbformat.writes(clean(executed, path, profile, stamp)) + "\n"
-            artifacts.write_file(output / "notebooks" / f"{path.stem}.ipynb", half.encode())
+            write_file(output / "notebooks" / f"{path.stem}.ipynb", half.encode())
             artifacts.record_run_time(figures, path.stem, stamp, seconds)
         print(f"    {seconds:.1f} s" if error is None else f"    FAILED\n\n{error}\n", flush=True)
 
@@ -335,21 +338,15 @@ def clean(
 def code_stamp(path: str | os.PathLike, profile: str) -> str:
     """Hash of what a notebook's outputs depend on.
 
-    That is the profile, the notebook's code cells, the package and requirements.txt. Prose,
-    comments and docstrings of the package, and its layout do not count: editing them does not
-    make an executed notebook stale.
+    That is the profile, the notebook's code cells, the package and requirements.txt. Prose does
+    not count (see `package_stamp`): editing it does not make an executed notebook stale.
     """
     path = Path(path)
     digest = hashlib.sha256(profile.encode())
     for cell in jupytext.read(path).cells:
         if cell.cell_type == "code":
             digest.update(b"\0" + cell.source.encode())
-    for file in sorted(PACKAGE.rglob("*")):
-        if file.is_file() and "__pycache__" not in file.parts:
-            digest.update(b"\0" + file.relative_to(PACKAGE).as_posix().encode() + b"\0")
-            is_code = file.suffix == ".py"
-            digest.update(_meaning(file.read_text("utf-8")) if is_code else file.read_bytes())
-    digest.update((path.parent.parent / "requirements.txt").read_bytes())
+    digest.update(package_stamp(path.parent.parent).encode())
     return digest.hexdigest()[:16]
 
 
@@ -413,22 +410,3 @@ def _systems_table(figures: Path, outcomes: list[Outcome]) -> artifacts.Table | 
         return None
     succeeded = {outcome.notebook for outcome in outcomes if outcome.error is None}
     return table if table.notebook in succeeded else None
-
-
-def _meaning(source: str) -> bytes:
-    """What a Python source does, as text: its syntax tree without bare constants (docstrings)."""
-
-    def plain(node: object) -> object:
-        if isinstance(node, list):
-            return [plain(n) for n in node if not _is_bare_constant(n)]
-        if isinstance(node, ast.AST):
-            fields = [(name, plain(value)) for name, value in ast.iter_fields(node)]
-            # Empty fields differ between versions of Python.
-            return [type(node).__name__, *(f for f in fields if f[1] not in (None, []))]
-        return node
-
-    return repr(plain(ast.parse(source))).encode()
-
-
-def _is_bare_constant(node: object) -> bool:
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
