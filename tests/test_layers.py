@@ -9,7 +9,7 @@ import vidsindy_lite
 
 FLOORS = [
     {"repository", "polynomials", "splines", "geometry", "records"},
-    {"systems", "cameras"},
+    {"systems", "cameras", "published"},
     {"video", "tracking", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
@@ -17,7 +17,7 @@ FLOORS = [
     },
     {"pipeline", "sweeps"},
     {"experiments"},
-    {"plots", "plots_solver", "artifacts", "runner", "__main__"},
+    {"plots", "plots_solver", "plots_study", "artifacts", "runner", "__main__"},
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent
 
