@@ -16,7 +16,7 @@ import pytest
 
 from vidsindy_lite import repository
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.sweeps import sweep
+from vidsindy_lite.sweeps import remember, sweep
 from vidsindy_lite.video import Scene, video_info
 
 # A module of the package, with a function that takes notes of its calls.
@@ -47,7 +47,7 @@ SWEEP = """\
 import json
 import sys
 
-from vidsindy_lite.sweeps import sweep
+from vidsindy_lite.sweeps import remember, sweep
 from vidsindy_lite.toy import Task, square
 
 if __name__ == "__main__":
@@ -329,3 +329,18 @@ def test_jobs_must_be_positive(cache):
 
 def test_no_tasks_no_results(cache):
     assert sweep(video_info, []) == []
+
+
+def test_one_task_is_remembered_by_whoever_asks_next(cache):
+    calls = []
+
+    def double(task):
+        calls.append(task)
+        return 2 * task.values
+
+    double.__module__, double.__qualname__ = "vidsindy_lite.toy", "double"
+    assert remember(double, Holder(3)) == 6
+    assert remember(double, Holder(3)) == 6
+    assert sweep(double, [Holder(3), Holder(4)], jobs=1) == [6, 8]
+    assert remember(double, Holder(4)) == 8
+    assert calls == [Holder(3), Holder(4)]

@@ -97,6 +97,26 @@ def sweep(
     return [results[number] for number in range(len(tasks))]
 
 
+def remember(function: Callable[[Task], Result], task: Task) -> Result:
+    """Call a function for one task in this process, or read the stored result back.
+
+    For a task that builds on the results of another sweep.
+
+    Parameters
+    ----------
+    function, task
+        As for `sweep`.
+    """
+    _check(function, [task], jobs=1)
+    files = _files(function, [task])
+    results = _stored(files)
+    if not results:
+        results[0] = function(task)
+        for file in files.values():
+            _store(file, results[0])
+    return results[0]
+
+
 def _check(function: Callable, tasks: list, jobs: int) -> None:
     home, name = getattr(function, "__module__", ""), getattr(function, "__qualname__", "")
     if home.partition(".")[0] != __package__ or not name.isidentifier():
