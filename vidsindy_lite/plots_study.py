@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import halfnorm
 
 _MARKERS = "os^vD"
-_LABELS = {"noise": "noise", "blocks": "random blocks missing", "fibers": "fibers missing"}
+_TITLES = {"noise": "noise", "blocks": "random blocks missing", "fibers": "fibers missing"}
 
 
 def plot_robustness(curves, published=None):
@@ -23,7 +23,7 @@ def plot_robustness(curves, published=None):
     published : dict of str to dict of float to float, optional
         The paper's relative errors by level, by condition.
     """
-    widths = [max(len(by_level) for by_level in methods.values()) + 1 for methods in curves.values()]
+    widths = [1 + max(map(len, methods.values())) for methods in curves.values()]
     figure, grid = plt.subplots(
         2, len(curves), figsize=(9, 5), sharex="col", sharey="row", squeeze=False,
         width_ratios=widths,
@@ -39,10 +39,9 @@ def plot_robustness(curves, published=None):
                 style = {"marker": _MARKERS[k], "color": f"C{k}", "lw": 1.4, "elinewidth": 1}
                 axes.errorbar(levels, means, reach, label=method, **style)
         if published:
-            known = published[condition]
-            style = {"marker": "*", "ms": 11, "ls": "", "color": "C1", "label": "paper (Table 2)"}
-            column[0].plot(100 * np.array(list(known)), 100 * np.array(list(known.values())), **style)
-        column[0].set_title(_LABELS[condition])
+            known = 100 * np.array(list(published[condition].items()))
+            column[0].plot(*known.T, "*C1", ms=11, label="paper (Table 2)")
+        column[0].set_title(_TITLES[condition])
         column[1].set_xlabel("level (%)" if condition == "noise" else "rate (%)")
     grid[0, 0].set(yscale="log", ylabel=r"relative $\ell_2$ error (%)")
     grid[1, 0].set(ylabel="wrong terms", ylim=(-0.5, max(3.5, grid[1, 0].get_ylim()[1])))
@@ -71,7 +70,8 @@ def plot_shares(shares):
             colour = "white" if value > 60 else "black"
             axes.text(column, row, f"{value:.0f}", ha="center", va="center", color=colour, size=9)
         axes.set_xticks(range(len(levels)), levels)
-        axes.set(title=_LABELS[condition], xlabel="level (%)" if condition == "noise" else "rate (%)")
+        axes.set_title(_TITLES[condition])
+        axes.set_xlabel("level (%)" if condition == "noise" else "rate (%)")
         axes.grid(visible=False)
     panels[0, 0].set_yticks(range(len(systems)), systems)
     return figure
