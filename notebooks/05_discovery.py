@@ -55,7 +55,7 @@ from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
 plt.style.use("vidsindy_lite.vidsindy")
 full = profile == "full"
 names = tuple(SYSTEMS) if full else ("SprottF", "Lorenz")
-frames = 1500 if full else 400
+frames = 1500 if full else 300
 trials = range(seed, seed + (5 if full else 1))
 
 # %% [markdown]
@@ -108,7 +108,7 @@ films = sweep(record, [FilmTask(name, n, frames) for name in names for n in tria
 # frame, with the same 20 candidate terms. Here are the settings of the others.
 
 # %%
-common = {"ridge": f"{baselines.RIDGE:g}", "pysindy's ridge": "0.05"}
+common = {"ridge": f"{baselines.RIDGE:g}", "pysindy's default ridge": "0.05"}
 rows = [
     {"method": "PySINDy", "derivatives": "central differences", "fit": "STLSQ", **common},
     {"method": "E-SINDy", "derivatives": "central differences",
@@ -170,9 +170,17 @@ for result in ours:
     assert result.score.exact, result.trial
     assert result.score.precision == result.score.recall == 1, result.trial
     assert result.score.l2 <= (0.1e-2 if full else 0.5e-2), result.trial
+
+# %% [markdown]
+# To the two decimals that the paper prints, no method is better than ours in any row. Beyond them,
+# where all that is left is what the tracker left, another may come out ahead by chance:
+
+# %%
 best = {row["system"]: row["l2 (e-2)"] for row in rows if row["method"] == "ours"}
-worse = [row for row in rows if row["l2 (e-2)"] < best[row["system"]]]
-print("better than ours:", [f"{row['method']} on {row['system']}" for row in worse] or "none")
+ahead = [row for row in rows if row["l2 (e-2)"] < best[row["system"]]]
+print("ahead of ours:", [f"{row['method']} on {row['system']}" for row in ahead] or "none")
+assert all(round(row["l2 (e-2)"], 2) >= round(best[row["system"]], 2) for row in rows)
+assert all(best[row["system"]] < 1e-3 for row in ahead)
 
 # %% [markdown]
 # All terms, no false one, and errors far below those of the paper. Where do they come from? These
@@ -255,8 +263,7 @@ rows = [
     if law.coefficients[row, equation]
 ]  # fmt: skip
 caption = "Every discovered term in the reference frame, with its standard error, and the truth."
-table = save_table("table_S2", rows, caption=caption)
-print(len(table.rows), "terms, stored as table_S2")
+print(len(save_table("table_S2", rows, caption=caption).rows), "terms, stored as table_S2")
 
 # %% [markdown]
 # ## The laws in motion (Fig. 2)

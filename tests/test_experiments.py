@@ -65,6 +65,11 @@ def test_whole_pixels_are_coarser_but_near(recorded):
     assert coarse < 2 * pixel
 
 
+def test_unknown_source_is_named(recorded):
+    with pytest.raises(ValueError, match="source: must be one of videos, .* got 'memory'"):
+        recorded.path("memory")
+
+
 def test_recording_is_small_enough_to_store(recorded):
     assert len(pickle.dumps(recorded)) < 200_000
 

@@ -103,8 +103,7 @@ def film(name: str, folder: str | Path, frames: int = 1500, seed: int = 0, **dis
     -------
     Film
     """
-    if name not in SYSTEMS:
-        raise ValueError(f"name: must be one of {', '.join(SYSTEMS)}, got {name!r}")
+    _check_choice("name", name, SYSTEMS)
     truth = SYSTEMS[name].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(frames, SAMPLES_PER_PERIOD)
     rig = Rig.around(x)
@@ -180,6 +179,7 @@ class Recording:
 
     def path(self, source: str = "videos") -> np.ndarray:
         """The path from one of the `SOURCES`, shape (n, 3)."""
+        _check_choice("source", source, SOURCES)
         if source == "videos":
             return self.x
         if source == "truth":
@@ -248,14 +248,10 @@ class Trial:
     frames: int = 1500
 
     def __post_init__(self) -> None:
-        for name, known in (
-            ("system", SYSTEMS), ("condition", CONDITIONS), ("method", METHODS),
-            ("source", SOURCES),
-        ):  # fmt: skip
-            if getattr(self, name) not in known:
-                raise ValueError(
-                    f"{name}: must be one of {', '.join(known)}, got {getattr(self, name)!r}"
-                )
+        _check_choice("system", self.system, SYSTEMS)
+        _check_choice("condition", self.condition, CONDITIONS)
+        _check_choice("method", self.method, METHODS)
+        _check_choice("source", self.source, SOURCES)
         if not 0 <= self.level < np.inf or (self.level == 0) != (self.condition == "clean"):
             raise ValueError(
                 "level: must be 0 in the condition 'clean' and above 0 in all others, "
@@ -299,6 +295,9 @@ class TrialResult:
     status : str or None
         ``"ok"`` or ``"suspect"``; None for the methods that do not say.
     warnings : tuple of str
+    promised_l2 : float or None
+        The relative l2 error that the standard errors of the coefficients amount to; None for the
+        methods without standard errors.
     pulls : ndarray
         See `metrics.pulls`; empty for the methods without standard errors.
     """
@@ -311,6 +310,7 @@ class TrialResult:
     native_exact: bool | None = None
     status: str | None = None
     warnings: tuple[str, ...] = ()
+    promised_l2: float | None = None
     pulls: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
@@ -345,6 +345,9 @@ def run_trial(trial: Trial) -> TrialResult:
         native_exact=score(found.native, SYSTEMS[trial.system]).exact,
         status=found.status,
         warnings=found.warnings,
+        promised_l2=float(
+            np.linalg.norm(found.standard_errors) / np.linalg.norm(source.truth.coefficients)
+        ),
         pulls=pulls(found, source.truth),
     )
 
@@ -394,3 +397,8 @@ def by_level(
     chosen += select(results, condition=condition, **fields)
     levels = sorted({r.trial.level for r in chosen})
     return {level: [r for r in chosen if r.trial.level == level] for level in levels}
+
+
+def _check_choice(name: str, value: str, known: Iterable[str]) -> None:
+    if value not in known:
+        raise ValueError(f"{name}: must be one of {', '.join(known)}, got {value!r}")

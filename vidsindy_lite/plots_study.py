@@ -25,22 +25,23 @@ def plot_robustness(curves, published=None):
     """
     widths = [1 + max(map(len, methods.values())) for methods in curves.values()]
     figure, grid = plt.subplots(
-        2, len(curves), figsize=(9, 5), sharex="col", sharey="row", squeeze=False,
-        width_ratios=widths,
+        2, len(curves), figsize=(9 if len(curves) > 1 else 6.5, 5), sharex="col", sharey="row",
+        squeeze=False, width_ratios=widths,
     )  # fmt: skip
     for column, (condition, methods) in zip(grid.T, curves.items(), strict=True):
         for k, (method, by_level) in enumerate(methods.items()):
             levels = 100 * np.array(list(by_level))
+            beside = 0.012 * np.ptp(levels) * (k - (len(methods) - 1) / 2)
             errors = [[100 * r.score.l2 for r in results] for results in by_level.values()]
             wrong = [[r.wrong_terms for r in results] for results in by_level.values()]
             for axes, values in zip(column, (errors, wrong), strict=True):
                 means = np.array([np.mean(v) for v in values])
                 reach = np.abs([[np.min(v), np.max(v)] for v in values] - means[:, None]).T
                 style = {"marker": _MARKERS[k], "color": f"C{k}", "lw": 1.4, "elinewidth": 1}
-                axes.errorbar(levels, means, reach, label=method, **style)
+                axes.errorbar(levels + beside, means, reach, label=method, capsize=2, **style)
         if published:
             known = 100 * np.array(list(published[condition].items()))
-            column[0].plot(*known.T, "*C1", ms=11, label="paper (Table 2)")
+            column[0].errorbar(*known.T, fmt="*C1", ms=11, label="paper (Table 2)")
         column[0].set_title(_TITLES[condition])
         column[1].set_xlabel("level (%)" if condition == "noise" else "rate (%)")
     grid[0, 0].set(yscale="log", ylabel=r"relative $\ell_2$ error (%)")
@@ -65,15 +66,18 @@ def plot_shares(shares):
     for axes, (condition, systems) in zip(panels[0], shares.items(), strict=True):
         values = np.array([[100 * v for v in by_level.values()] for by_level in systems.values()])
         levels = [f"{100 * level:.0f}" for level in next(iter(systems.values()))]
-        axes.imshow(values, vmin=0, vmax=100, cmap="Blues", aspect="auto")
+        axes.pcolormesh(values, vmin=0, vmax=100, cmap="Blues", edgecolors="white", lw=1.5)
         for (row, column), value in np.ndenumerate(values):
-            colour = "white" if value > 60 else "black"
-            axes.text(column, row, f"{value:.0f}", ha="center", va="center", color=colour, size=9)
-        axes.set_xticks(range(len(levels)), levels)
+            style = {"color": "white" if value > 60 else "black", "size": 9}
+            axes.text(column + 0.5, row + 0.5, f"{value:.0f}", ha="center", va="center", **style)
+        axes.set_xticks(np.arange(len(levels)) + 0.5, levels)
         axes.set_title(_TITLES[condition])
         axes.set_xlabel("level (%)" if condition == "noise" else "rate (%)")
         axes.grid(visible=False)
-    panels[0, 0].set_yticks(range(len(systems)), systems)
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+    panels[0, 0].set_yticks(np.arange(len(systems)) + 0.5, systems)
+    panels[0, 0].invert_yaxis()
     return figure
 
 
