@@ -38,6 +38,7 @@ def plot_robustness(curves, published=None):
                 means = np.array([np.mean(v) for v in values])
                 reach = np.abs([[np.min(v), np.max(v)] for v in values] - means[:, None]).T
                 style = {"marker": _MARKERS[k], "color": f"C{k}", "lw": 1.4, "elinewidth": 1}
+                style["ecolor"] = (f"C{k}", 0.45)
                 axes.errorbar(levels + beside, means, reach, label=method, capsize=2, **style)
         if published:
             known = 100 * np.array(list(published[condition].items()))
