@@ -155,6 +155,34 @@ def test_dead_kernel_is_a_failure(tiny):
         runner.execute(path, {"profile": "quick"})
 
 
+def test_kernel_that_dies_at_start_is_a_failure(tiny, tmp_path):
+    kernel = tmp_path / "jupyter" / "kernels" / "python3" / "kernel.json"
+    kernel.parent.mkdir(parents=True)
+    path = tiny.write("01_first", "x = 1")
+    for command in (sys.executable, str(tmp_path / "no_python")):
+        kernel.write_text(json.dumps({"argv": [command, "-c", "exit(1)"], "display_name": "x"}))
+        with pytest.raises(NotebookError, match="01_first: the kernel python3 did not start: .*"):
+            runner.execute(
+                path, {"profile": "quick"}, environment={"JUPYTER_PATH": str(tmp_path / "jupyter")}
+            )
+
+
+def test_kernel_that_is_slow_to_return_is_not_interrupted(tiny, capfd):
+    slow = """\
+import time
+
+handlers = get_ipython().kernel.shell_handlers
+answer = handlers["kernel_info_request"]
+
+async def answer_slowly(*arguments):
+    await answer(*arguments)
+    time.sleep(1)
+
+handlers["kernel_info_request"] = answer_slowly"""
+    runner.execute(tiny.write("01_slow", slow), {"profile": "quick"})
+    assert capfd.readouterr().err == ""
+
+
 def test_endless_cell_is_a_failure(tiny):
     path = tiny.write("01_endless", "while True:\n    pass")
     with pytest.raises(NotebookError, match="01_endless: .*timed out"):

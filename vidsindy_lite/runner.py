@@ -13,15 +13,19 @@ import io
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty
 
 import jupytext
 import nbformat
 import papermill
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbclient.util import run_sync
 from nbformat import NotebookNode
+from papermill.clientwrap import PapermillNotebookClient
+from papermill.engines import Engine, papermill_engines
 from papermill.exceptions import PapermillExecutionError, strip_color
 from PIL import Image
 from traitlets.config import Config
@@ -44,6 +48,7 @@ __all__ = [
 
 PROFILES = ("full", "quick")
 CELL_TIMEOUT = 1800  # seconds; papermill's own default is to wait for ever
+ENGINE = "vidsindy_lite"  # under which papermill knows ours
 SYSTEMS_TABLE = "table_systems"  # printed after a run that wrote it
 # The kernel warns on stderr that anyone on the machine could listen in otherwise.
 ENCRYPTED = Config(KernelManager={"transport_encryption": "auto"})
@@ -263,8 +268,9 @@ def execute(
     ValueError
         On an unknown parameter.
     NotebookError
-        If a cell raises, takes too long, ends the kernel, or stops the run early: after
-        ``sys.exit(0)`` papermill reports success, but cells were left out.
+        If the kernel does not start, or if a cell raises, takes too long, ends the kernel, or
+        stops the run early: after ``sys.exit(0)`` papermill reports success, but cells were left
+        out.
     """
     path = Path(path)
     check_parameters(path, parameters)
@@ -274,10 +280,11 @@ def execute(
                 jupytext.read(path),
                 None,
                 parameters=dict(parameters),
+                engine_name=ENGINE,
                 kernel_name="python3",
                 cwd=path.parent,
-                execution_timeout=timeout,
-                start_timeout=120,
+                timeout=timeout,
+                startup_timeout=120,
                 progress_bar={"desc": progress, "leave": False, "disable": None},
                 config=ENCRYPTED,
             )
@@ -288,6 +295,11 @@ def execute(
         ) from None
     except (CellTimeoutError, DeadKernelError) as error:
         raise NotebookError(f"{path.stem}: {error}") from None
+    except (RuntimeError, OSError) as error:
+        raise NotebookError(
+            f"{path.stem}: the kernel python3 did not start: {error}. What it wrote stands above; "
+            "`jupyter kernelspec list` shows which kernel has that name."
+        ) from error
     for cell in executed.cells:
         if cell.cell_type == "code" and cell.source.strip():
             completed = cell.metadata.papermill.status == "completed"
@@ -351,6 +363,44 @@ def code_stamp(path: str | os.PathLike, profile: str) -> str:
 
 
 # ------------------------------------------------------------------------------------------ details
+
+
+class _Client(PapermillNotebookClient):
+    """Papermill's client, which leaves the kernel when it is idle, not when it has replied.
+
+    Shutting a kernel down begins with an interrupt. One that is idle ignores it; one that still
+    returns from its last request reports it on stderr.
+    """
+
+    def wait_for_reply(self, msg_id, cell=None):
+        reply = super().wait_for_reply(msg_id, cell)
+        next_message = run_sync(self.kc.get_iopub_msg)
+        with suppress(Empty):
+            while True:
+                message = next_message(timeout=self.iopub_timeout)
+                state = message["content"].get("execution_state")
+                if (message["parent_header"].get("msg_id"), state) == (msg_id, "idle"):
+                    return reply
+        return reply
+
+
+class _Engine(Engine):
+    """Makes papermill use that client."""
+
+    @classmethod
+    def execute_managed_notebook(
+        cls, nb_man, kernel_name, *, timeout, startup_timeout, config, **_
+    ):
+        _Client(
+            nb_man,
+            kernel_name=kernel_name,
+            timeout=timeout,
+            startup_timeout=startup_timeout,
+            config=config,
+        ).execute()
+
+
+papermill_engines.register(ENGINE, _Engine)
 
 
 @contextmanager
