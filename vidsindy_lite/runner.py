@@ -4,12 +4,17 @@ The .py half of a pair is the source. The .ipynb half is made here: executed, st
 differs between two runs, and stamped with a hash of the code that made it. The full profile
 writes notebooks/*.ipynb and figures/ of the repository, the quick profile the same layout under
 build/quick/.
+
+A ledger beside them, build/ledger.json, which is never committed, keeps what was executed here. A
+notebook is not executed again if its stamp and its source are the same, its prose included, and its
+outputs are in place byte for byte.
 """
 
 import base64
 import copy
 import hashlib
 import io
+import json
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -49,6 +54,7 @@ __all__ = [
 PROFILES = ("full", "quick")
 CELL_TIMEOUT = 1800  # seconds; papermill's own default is to wait for ever
 ENGINE = "vidsindy_lite"  # under which papermill knows ours
+LEDGER = Path("build", "ledger.json")
 SYSTEMS_TABLE = "table_systems"  # printed after a run that wrote it
 # The kernel warns on stderr that anyone on the machine could listen in otherwise.
 ENCRYPTED = Config(KernelManager={"transport_encryption": "auto"})
@@ -60,11 +66,20 @@ class NotebookError(RuntimeError):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How the run of one notebook ended: `error` is None if every cell completed."""
+    """How the run of one notebook ended: `error` is None if every cell completed.
+
+    A notebook that was `up_to_date` was not executed; `seconds` is how long it took when it was.
+    """
 
     notebook: str
     seconds: float
     error: str | None = None
+    up_to_date: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """One or two words."""
+        return "up to date" if self.up_to_date else "ok" if self.error is None else "FAILED"
 
 
 @dataclass(frozen=True)
@@ -84,12 +99,15 @@ class Report:
         width = max((len(outcome.notebook) for outcome in self.outcomes), default=0)
         lines = [] if self.systems is None else [self.systems.caption, "", str(self.systems), ""]
         for outcome in self.outcomes:
-            verdict = "ok" if outcome.error is None else "FAILED"
-            lines.append(f"{outcome.notebook:<{width}}  {outcome.seconds:7.1f} s  {verdict}")
+            seconds, verdict = outcome.seconds, outcome.verdict
+            lines.append(f"{outcome.notebook:<{width}}  {seconds:7.1f} s  {verdict}")
         lines += [f"figures: {problem}" for problem in self.problems]
-        failed = sum(outcome.error is not None for outcome in self.outcomes)
-        total = sum(outcome.seconds for outcome in self.outcomes)
-        lines.append(f"{len(self.outcomes)} run in {total:.1f} s, {failed} failed")
+        executed = [outcome for outcome in self.outcomes if not outcome.up_to_date]
+        failed = sum(outcome.error is not None for outcome in executed)
+        lines.append(
+            f"{len(executed)} run in {sum(outcome.seconds for outcome in executed):.1f} s, "
+            f"{len(self.outcomes) - len(executed)} up to date, {failed} failed"
+        )
         return "\n".join(lines)
 
 
@@ -128,6 +146,7 @@ def run(
     profile: str = "full",
     output: str | os.PathLike | None = None,
     *,
+    force: bool = False,
     dask: str | None = None,
     root: str | os.PathLike | None = None,
 ) -> Report:
@@ -143,6 +162,9 @@ def run(
         Folder that receives notebooks/ (executed) and figures/. By default the repository itself
         in the full profile and build/quick in the quick one. A notebook that fails leaves its
         executed half as it was.
+    force : bool
+        Execute also what is up to date: executed here by the same code, with all its outputs in
+        place. (A notebook that reads another's tables is always executed.)
     dask : str, optional
         Address of a Dask scheduler: what a notebook sweeps runs on its workers (see `sweep`).
     root : path, optional
@@ -185,6 +207,13 @@ def run(
         progress = f"[{number}/{len(chosen)}] {path.stem}"
         print(progress, flush=True)
         stamp, error, started = code_stamp(path, profile), None, time.perf_counter()
+        known = None if force or _reads_tables(path) else _ledger(output).get(path.stem)
+        if known and known == _ledger_entry(output, path, stamp, known["seconds"]):
+            stamps[path.stem] = stamp
+            outcomes.append(Outcome(path.stem, known["seconds"], up_to_date=True))
+            artifacts.record_run_time(figures, path.stem, stamp, known["seconds"])
+            print(f"    up to date ({known['seconds']:.1f} s when it ran)", flush=True)
+            continue
         try:
             executed = execute(
                 path,
@@ -205,10 +234,11 @@ def run(
             stamps[path.stem] = stamp
             half = nbformat.writes(clean(executed, path, profile, stamp)) + "\n"
             write_file(output / "notebooks" / f"{path.stem}.ipynb", half.encode())
+            artifacts.prune(figures, stamps)  # what an earlier version of it left
             artifacts.record_run_time(figures, path.stem, stamp, seconds)
+            _enter(output, path, stamp, seconds)
         print(f"    {seconds:.1f} s" if error is None else f"    FAILED\n\n{error}\n", flush=True)
 
-    artifacts.prune(figures, stamps)  # what an earlier version of a notebook left
     artifacts.write_index(figures)
     problems = artifacts.check_folder(figures, stamps)
     return Report(tuple(outcomes), tuple(problems), _systems_table(figures, outcomes))
@@ -360,6 +390,41 @@ def code_stamp(path: str | os.PathLike, profile: str) -> str:
             digest.update(b"\0" + cell.source.encode())
     digest.update(package_stamp(path.parent.parent).encode())
     return digest.hexdigest()[:16]
+
+
+# --------------------------------------------------------------------------------------- the ledger
+
+
+def _ledger(output: Path) -> dict[str, dict]:
+    """What was executed into a folder, by notebook."""
+    path = output / LEDGER
+    return json.loads(path.read_text("utf-8")) if path.exists() else {}
+
+
+def _enter(output: Path, path: Path, stamp: str, seconds: float) -> None:
+    entries = _ledger(output) | {path.stem: _ledger_entry(output, path, stamp, seconds)}
+    write_file(output / LEDGER, json.dumps(entries, indent=1).encode())
+
+
+def _ledger_entry(output: Path, path: Path, stamp: str, seconds: float) -> dict:
+    """What there is of a notebook now: stamp, run time, hashes of its source and what it made."""
+    figures = output / "figures"
+    made = [figures / name for name in artifacts.files_of(figures, path.stem)]
+    files = [path, output / "notebooks" / f"{path.stem}.ipynb", *made]
+    return {
+        "stamp": stamp,
+        "seconds": seconds,
+        "files": {
+            file.name: hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else None
+            for file in files
+        },
+    }
+
+
+def _reads_tables(path: Path) -> bool:
+    """Whether a notebook depends on what another wrote, which its stamp does not cover."""
+    code = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
+    return any("load_table" in source for source in code)
 
 
 # ------------------------------------------------------------------------------------------ details
