@@ -36,6 +36,15 @@ def test_same_seed_same_film(tmp_path):
         assert all((a == b).all() for a, b in pairs)
 
 
+def test_fast_files_hold_the_same_film(shot, tmp_path):
+    fast = film("Lorenz", tmp_path, frames=200, seed=3, suffix=".avi")
+    for ours, theirs in zip(fast.paths, shot.paths, strict=True):
+        assert ours.suffix == ".avi"
+        pairs = zip(vl.read_video(ours), vl.read_video(theirs), strict=True)
+        assert all((a == b).all() for a, b in pairs)
+    np.testing.assert_array_equal(vl.track(fast.paths[0]), vl.track(shot.paths[0]))
+
+
 def test_unknown_benchmark_is_named(tmp_path):
     with pytest.raises(ValueError, match="name: must be one of Lorenz, .* got 'Lorentz'"):
         film("Lorentz", tmp_path)

@@ -25,7 +25,9 @@ import os
 import time
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+from threadpoolctl import threadpool_info
 
 
 @dataclass(frozen=True)
@@ -41,19 +43,23 @@ def square(task):
     time.sleep(task.pause)
     if task.number < 0:
         raise ArithmeticError("below zero")
-    return task.number**2, np.random.default_rng(task.number).normal(size=3)
+    return task.number**2, np.random.default_rng(task.number).normal(size=3).tolist()
+
+
+def threads(task):
+    """Threads of BLAS (OpenMP) and OpenCV in the process of this task."""
+    return [cv2.getNumThreads(), *(pool["num_threads"] for pool in threadpool_info())]
 '''
 SWEEP = """\
 import json
 import sys
 
-from vidsindy_lite.sweeps import remember, sweep
-from vidsindy_lite.toy import Task, square
+from vidsindy_lite import toy
+from vidsindy_lite.sweeps import sweep
 
 if __name__ == "__main__":
-    tasks = [Task(*task) for task in json.loads(sys.argv[1])]
-    results = sweep(square, tasks, desc="toy")
-    print(json.dumps([[square, list(noise)] for square, noise in results]))
+    function, tasks = getattr(toy, sys.argv[1]), json.loads(sys.argv[2])
+    print(json.dumps(sweep(function, [toy.Task(*task) for task in tasks], desc="toy")))
 """
 
 
@@ -72,12 +78,12 @@ class Clone:
         for module in ("repository.py", "sweeps.py"):
             (self.package / module).write_bytes((repository.PACKAGE / module).read_bytes())
 
-    def start(self, tasks, **environment):
+    def start(self, tasks, function="square", **environment):
         """A process that sweeps over tasks, each a list of a number and a pause in seconds."""
         self.calls.write_text("")
         here = {"PYTHONPATH": str(self.root), "CALLS": str(self.calls)}
         return subprocess.Popen(
-            [sys.executable, str(self.root / "sweep.py"), json.dumps(tasks)],
+            [sys.executable, str(self.root / "sweep.py"), function, json.dumps(tasks)],
             env=os.environ | here | environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -85,9 +91,9 @@ class Clone:
             start_new_session=True,
         )
 
-    def sweep(self, tasks, **environment):
+    def sweep(self, tasks, function="square", **environment):
         """Results of a sweep to its end."""
-        process = self.start(tasks, **environment)
+        process = self.start(tasks, function, **environment)
         output, errors = process.communicate(timeout=120)
         assert process.returncode == 0, errors
         return json.loads(output)
@@ -161,6 +167,12 @@ def test_progress_starts_at_what_is_stored(clone):
     _, errors = process.communicate(timeout=120)
     percent = re.findall(r"toy: +(\d+)%", errors)
     assert (percent[0], percent[-1]) == ("50", "100")
+
+
+def test_a_process_has_one_thread(clone):
+    pools = clone.sweep([[1], [2]], "threads", OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2")
+    assert all(len(pool) > 1 for pool in pools)
+    assert {count for pool in pools for count in pool} == {1}
 
 
 @pytest.mark.parametrize(

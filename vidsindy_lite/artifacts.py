@@ -39,6 +39,7 @@ __all__ = [
     "Table",
     "check_folder",
     "figures_folder",
+    "files_of",
     "load_table",
     "prune",
     "record_run_time",
@@ -241,6 +242,12 @@ def load_table(table_id: str, folder: str | os.PathLike | None = None) -> Table:
             f"got {table_id!r}"
         )
     return _table(tables[table_id])
+
+
+def files_of(folder: str | os.PathLike, notebook: str) -> list[str]:
+    """Names of the files that a notebook's figures and tables consist of."""
+    records = [r for r in _records(Path(folder)).values() if r["notebook"] == notebook]
+    return [name for record in records for name in (f"{record['id']}.json", *record["files"])]
 
 
 def record_run_time(folder: str | os.PathLike, notebook: str, stamp: str, seconds: float) -> None:

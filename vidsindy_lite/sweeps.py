@@ -23,6 +23,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+import cv2
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
@@ -157,7 +158,12 @@ def _call(function: Callable, number: int, task: object) -> tuple[int, object]:
 def _workers(jobs: int, address: str | None, needed: bool) -> Iterator[None]:
     """Where joblib runs its tasks: processes of this machine, or the cluster if it is needed."""
     if not (address and needed):
-        with parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
+        one_thread = {
+            "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
+            "initializer": cv2.setNumThreads,
+            "initargs": (1,),
+        }
+        with parallel_config("loky", n_jobs=jobs, **one_thread):
             yield
         return
     try:
