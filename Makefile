@@ -11,6 +11,7 @@ PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python
 help:
 	@echo "make figures          run all notebooks, regenerate figures/ and the notebooks' outputs"
 	@echo "make figures QUICK=1  the same code in its small profile, into build/quick/"
+	@echo "make figures FORCE=1  also those that this clone has executed and nothing has changed"
 	@echo "make test             all tests, the notebooks in the quick profile among them"
 	@echo "make test-fast        all tests but the notebook runs"
 	@echo "make bench            speed and memory, as ratios"
@@ -28,7 +29,7 @@ $(READY): requirements.txt pyproject.toml
 	@touch $@
 
 figures: $(READY)
-	$(BIN)/python -m vidsindy_lite run --profile $(if $(QUICK),quick,full)
+	$(BIN)/python -m vidsindy_lite run --profile $(if $(QUICK),quick,full) $(if $(FORCE),--force)
 
 test: $(READY)
 	$(BIN)/python -m pytest

@@ -126,11 +126,6 @@ def test_without_a_run_results_go_to_the_repository(tiny, monkeypatch):
     assert load_table("table_1", tiny.root / "figures").notebook == "interactive"
 
 
-def test_outside_a_repository(tmp_path):
-    with pytest.raises(FileNotFoundError, match="repository: .* got"):
-        artifacts.repository_root(tmp_path)
-
-
 # ------------------------------------------------------------------------------------- wall times
 
 

@@ -8,15 +8,16 @@ import pytest
 import vidsindy_lite
 
 FLOORS = [
-    {"polynomials", "splines", "geometry", "records", "information"},
+    {"repository", "polynomials", "splines", "geometry", "records", "information"},
     {"systems", "cameras", "published"},
     {"video", "tracking", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
         "ado", "paper_ado", "baselines", "metrics", "limits",
     },
-    {"pipeline", "experiments", "audit"},
-    {"plots", "plots_solver", "plots_audit", "artifacts", "runner", "__main__"},
+    {"pipeline", "sweeps"},
+    {"experiments", "audit"},
+    {"plots", "plots_solver", "plots_study", "plots_audit", "artifacts", "runner", "__main__"},
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vidsindy_lite.metrics import score, trajectory_error
+from vidsindy_lite.metrics import pulls, score, summary, term_errors, trajectory_error
 from vidsindy_lite.polynomials import PolynomialSystem
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
 
@@ -128,3 +128,32 @@ def test_text_of_a_score():
 def test_what_is_no_law_is_refused():
     with pytest.raises(ValueError, match="found: must be a law, a PolynomialSystem, got 1"):
         score(1, SYSTEMS["Lorenz"])
+
+
+def test_summary_is_means_in_the_papers_units():
+    right = score(TRUTH, TRUTH)
+    wrong = score(PolynomialSystem.from_terms({"x": {"x": 3, "y": 2}, "y": {"xy": -4}}), TRUTH)
+    row = summary([right, wrong])
+    l2 = 100 * np.sqrt(5 / 26)
+    assert row == {
+        "terms found": "1 of 2",
+        "false positives": 0.5,
+        "l2 (e-2)": pytest.approx(l2 / 2),
+        "spread of l2 (e-2)": pytest.approx(l2 / 2),
+        "precision (%)": pytest.approx(100 * (1 + 2 / 3) / 2),
+        "recall (%)": pytest.approx(100 * (1 + 2 / 3) / 2),
+    }
+
+
+def test_terms_that_are_missing_or_false_by_name():
+    found = PolynomialSystem.from_terms({"x": {"x": 3.3, "y": 2}, "y": {"xy": -4}}, degree=3)
+    assert term_errors(found, TRUTH) == (["1 in dy/dt"], ["y in dx/dt"])
+    assert term_errors(TRUTH, found) == (["y in dx/dt"], ["1 in dy/dt"])
+    assert term_errors(TRUTH, TRUTH) == ([], [])
+
+
+def test_pulls_of_the_true_terms_that_were_found():
+    law = PolynomialSystem.from_terms({"x": {"x": 3.3, "y": 2}, "y": {"xy": -4.2}}, degree=3)
+    errors = np.where(law.support, 0.1, 0.0)
+    found = SimpleNamespace(system=law, coefficients=law.coefficients, standard_errors=errors)
+    np.testing.assert_allclose(np.sort(pulls(found, TRUTH)), [-2, 3])

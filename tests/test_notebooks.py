@@ -7,8 +7,9 @@ import nbformat
 import pytest
 
 from vidsindy_lite import artifacts, runner
+from vidsindy_lite.repository import PACKAGE
 
-ROOT = runner.PACKAGE.parent
+ROOT = PACKAGE.parent
 NOTEBOOKS = runner.find_notebooks(ROOT)
 LARGEST = 600_000  # bytes of an executed notebook; a code host shows no more
 RUN = "python -m vidsindy_lite run {}"

@@ -9,9 +9,11 @@ import nbformat
 import pytest
 from conftest import TinyRepository
 
-from vidsindy_lite import artifacts, runner
+from vidsindy_lite import artifacts, repository, runner
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.runner import NotebookError
+
+LEDGER = runner.LEDGER.as_posix()
 
 PLOT = (
     "import matplotlib.pyplot as plt\n\nfigure, axes = plt.subplots()\naxes.plot([0, 1], [0, 1]);"
@@ -63,10 +65,12 @@ def test_full_run_writes_into_the_repository(executed_once):
     assert (executed_once.notebooks / "01_first.ipynb").exists()
 
 
-def test_second_full_run_changes_no_byte(good, capsys):
+def test_second_execution_changes_no_byte(good, capsys):
     before = files(good.root)
-    assert runner.run(root=good.root).ok
-    assert files(good.root) == before
+    assert runner.run(root=good.root, force=True).ok
+    after = files(good.root)
+    assert before.pop(LEDGER) != after.pop(LEDGER)  # the time it took
+    assert after == before
     assert "[1/1] 01_first" in capsys.readouterr().out
 
 
@@ -78,7 +82,7 @@ def test_quick_run_goes_to_the_build_folder_only(good):
     assert str(report.systems) in str(report)
     made = files(good.root / "build" / "quick")
     assert {"notebooks/01_first.ipynb", "figures/fig_1.png", "figures/README.md"} <= set(made)
-    shutil.rmtree(good.root / "build")
+    shutil.rmtree(good.root / "build" / "quick")
     assert files(good.root) == before
 
 
@@ -111,6 +115,103 @@ def test_notebook_that_writes_less_than_before_leaves_nothing_behind(good):
     good.write("01_first", "x = 1")
     assert runner.run(root=good.root).ok
     assert set(files(good.root / "figures")) == {"README.md", "run_times.json"}
+    assert runner.run(root=good.root).outcomes[0].up_to_date
+
+
+# --------------------------------------------------------------------------- what is up to date
+
+
+def executed(report):
+    """Names of the notebooks that a run executed."""
+    assert report.ok, str(report)
+    return [outcome.notebook for outcome in report.outcomes if not outcome.up_to_date]
+
+
+def test_what_is_up_to_date_is_kept(good, capsys):
+    before = files(good.root)
+    report = runner.run(root=good.root)
+    assert executed(report) == []
+    assert files(good.root) == before
+    seconds = json.loads(before[LEDGER])["01_first"]["seconds"]
+    assert report.outcomes[0].seconds == seconds > 0
+    assert f"up to date ({seconds:.1f} s when it ran)" in capsys.readouterr().out
+    assert str(report).endswith("0 run in 0.0 s, 1 up to date, 0 failed")
+    assert str(report.systems) in str(report)
+
+
+def test_only_what_has_changed_is_executed(good):
+    good.write("02_second", "x = 1")
+    assert executed(runner.run(root=good.root)) == ["02_second"]
+    good.write("02_second", "x = 2")
+    assert executed(runner.run(root=good.root)) == ["02_second"]
+    assert executed(runner.run(root=good.root)) == []
+
+
+def test_edited_prose_gets_into_the_executed_half(good):
+    path = good.notebooks / "01_first.py"
+    path.write_text(path.read_text().replace("A tiny notebook", "A small notebook"))
+    assert executed(runner.run(root=good.root)) == ["01_first"]
+    assert "A small notebook" in path.with_suffix(".ipynb").read_text()
+
+
+def test_force_executes_what_is_up_to_date(good):
+    assert executed(runner.run(root=good.root, force=True)) == ["01_first"]
+
+
+def test_other_package_or_requirements_are_a_change(good, tmp_path, monkeypatch):
+    (good.root / "requirements.txt").write_text("numpy==1.0\n")
+    assert executed(runner.run(root=good.root)) == ["01_first"]
+    package = tmp_path / "elsewhere" / "vidsindy_lite"
+    shutil.copytree(repository.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(repository, "PACKAGE", package)
+    assert executed(runner.run(root=good.root)) == []
+    (package / "systems.py").write_text("x = 1\n" + (package / "systems.py").read_text())
+    assert executed(runner.run(root=good.root)) == ["01_first"]
+
+
+@pytest.mark.parametrize("name", ["figures/fig_1.svg", "figures/table_systems.csv"])
+@pytest.mark.parametrize("tamper", [lambda path: path.unlink(), lambda path: path.write_text("x")])
+def test_tampered_or_missing_output_is_made_again(good, name, tamper):
+    before = files(good.root)
+    tamper(good.root / name)
+    assert executed(runner.run(root=good.root)) == ["01_first"]
+    assert files(good.root)[name] == before[name]
+
+
+def test_tampered_notebook_or_record_is_made_again(good):
+    for name in ("notebooks/01_first.ipynb", "figures/fig_1.json"):
+        before = files(good.root)
+        path = good.root / name
+        path.write_text(path.read_text().replace("A line", "No line"))
+        assert files(good.root) != before
+        assert executed(runner.run(root=good.root)) == ["01_first"]
+        assert files(good.root)[name] == before[name]
+
+
+def test_clean_clone_executes_everything(good):
+    shutil.rmtree(good.root / "build")
+    assert executed(runner.run(root=good.root)) == ["01_first"]
+
+
+def test_profiles_and_folders_have_their_own_ledgers(good, tmp_path):
+    assert executed(runner.run(profile="quick", root=good.root)) == ["01_first"]
+    assert executed(runner.run(profile="quick", root=good.root)) == []
+    assert executed(runner.run(output=tmp_path / "other", root=good.root)) == ["01_first"]
+    assert executed(runner.run(root=good.root)) == []
+
+
+def test_notebook_that_reads_tables_of_another_is_always_executed(good):
+    read = "from vidsindy_lite import artifacts\nartifacts.load_table('table_systems')"
+    good.write("02_second", read)
+    for _ in range(2):
+        assert executed(runner.run(root=good.root)) == ["02_second"]
+
+
+def test_failed_notebook_is_not_up_to_date(good):
+    good.write("02_bad", "1 / 0")
+    for _ in range(2):
+        first, second = runner.run(root=good.root).outcomes
+        assert (first.verdict, second.verdict) == ("up to date", "FAILED")
 
 
 # ----------------------------------------------------------------------------- notebooks that fail
@@ -153,6 +254,34 @@ def test_dead_kernel_is_a_failure(tiny):
     path = tiny.write("01_dead", "import os\nos._exit(0)")
     with pytest.raises(NotebookError, match="01_dead: .*died"):
         runner.execute(path, {"profile": "quick"})
+
+
+def test_kernel_that_dies_at_start_is_a_failure(tiny, tmp_path):
+    kernel = tmp_path / "jupyter" / "kernels" / "python3" / "kernel.json"
+    kernel.parent.mkdir(parents=True)
+    path = tiny.write("01_first", "x = 1")
+    for command in (sys.executable, str(tmp_path / "no_python")):
+        kernel.write_text(json.dumps({"argv": [command, "-c", "exit(1)"], "display_name": "x"}))
+        with pytest.raises(NotebookError, match="01_first: the kernel python3 did not start: .*"):
+            runner.execute(
+                path, {"profile": "quick"}, environment={"JUPYTER_PATH": str(tmp_path / "jupyter")}
+            )
+
+
+def test_kernel_that_is_slow_to_return_is_not_interrupted(tiny, capfd):
+    slow = """\
+import time
+
+handlers = get_ipython().kernel.shell_handlers
+answer = handlers["kernel_info_request"]
+
+async def answer_slowly(*arguments):
+    await answer(*arguments)
+    time.sleep(1)
+
+handlers["kernel_info_request"] = answer_slowly"""
+    runner.execute(tiny.write("01_slow", slow), {"profile": "quick"})
+    assert capfd.readouterr().err == ""
 
 
 def test_endless_cell_is_a_failure(tiny):
@@ -229,23 +358,13 @@ def test_stamp_follows_code_profile_and_requirements(tiny):
     assert len(set(stamps)) == 4
 
 
-def test_stamp_follows_the_package_but_not_its_prose(tiny, tmp_path, monkeypatch):
+def test_stamp_follows_the_package(tiny, tmp_path, monkeypatch):
     path = tiny.write("01_first", "x = 1")
+    before = runner.code_stamp(path, "full")
     package = tmp_path / "package"
     package.mkdir()
-    monkeypatch.setattr(runner, "PACKAGE", package)
-    module = package / "module.py"
-
-    def stamp(source):
-        module.write_text(source)
-        return runner.code_stamp(path, "full")
-
-    first = stamp('"""A module."""\ndef f(x):\n    """Add one."""\n    return x + 1\n')
-    assert stamp('"""Better prose."""\n\n\ndef f(x):  # why\n    return (x + 1)\n') == first
-    assert stamp('"""A module."""\ndef f(x):\n    """Add one."""\n    return x + 2\n') != first
-    assert stamp('"""A module."""\ndef f(x):\n    """Add one."""\n    return x - 1\n') != first
-    (package / "look.mplstyle").write_text("font.size: 11\n")
-    assert stamp('"""A module."""\ndef f(x):\n    """Add one."""\n    return x + 1\n') != first
+    monkeypatch.setattr(repository, "PACKAGE", package)
+    assert runner.code_stamp(path, "full") != before
 
 
 def test_stamp_does_not_follow_the_prose_of_a_notebook(tiny):
@@ -279,7 +398,7 @@ def test_command_line_outside_a_repository(tmp_path, monkeypatch, capsys):
 
 def test_help_has_examples():
     command = [sys.executable, "-m", "vidsindy_lite", "run", "--help"]
-    root = runner.PACKAGE.parent
+    root = repository.PACKAGE.parent
     shown = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True).stdout
     assert "python -m vidsindy_lite run 03" in shown
     assert "--profile {full,quick}" in shown

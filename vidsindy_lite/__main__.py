@@ -10,6 +10,7 @@ Execute the notebooks through papermill, in order, and regenerate their figures 
 The full profile writes the executed notebooks (notebooks/*.ipynb) and figures/ of the repository;
 the quick one is the same code on small problems and writes the same layout to build/quick/.
 A failing notebook is reported with its cell and traceback, and the run goes on with the next.
+What this clone has executed with the same code, and whose outputs are untouched, is up to date.
 """
 
 RUN_EPILOG = """\
@@ -60,6 +61,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="folder for notebooks/ and figures/ (default: the repository, or build/quick)",
     )
+    run.add_argument(
+        "--force",
+        action="store_true",
+        help="execute also what is up to date: same code, executed here, outputs in place",
+    )
+    run.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="scheduler of a Dask cluster, e.g. tcp://10.0.0.1:8786, that the sweeps run on",
+    )
     run.set_defaults(command=_run)
     return parser
 
@@ -67,7 +78,13 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     from vidsindy_lite import runner  # papermill takes a second to import; --help need not wait
 
-    report = runner.run(options.notebooks, options.profile, options.output)
+    report = runner.run(
+        options.notebooks,
+        options.profile,
+        options.output,
+        force=options.force,
+        dask=options.dask,
+    )
     print(f"\n{report}")
     return 0 if report.ok else 1
 

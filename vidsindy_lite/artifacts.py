@@ -33,17 +33,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
+from .repository import repository_root, write_file
+
 __all__ = [
     "Table",
     "check_folder",
     "figures_folder",
+    "files_of",
     "load_table",
     "prune",
     "record_run_time",
-    "repository_root",
     "save_figure",
     "save_table",
-    "write_file",
     "write_index",
 ]
 
@@ -55,41 +56,10 @@ SECONDS = "seconds"  # the column of a table that holds wall times
 # ---------------------------------------------------------------------------------------- where
 
 
-def repository_root(start: str | os.PathLike | None = None) -> Path:
-    """The repository around a folder: the nearest parent that holds notebooks/ and vidsindy_lite/.
-
-    Parameters
-    ----------
-    start : path, optional
-        Where to begin; the working directory by default.
-
-    Raises
-    ------
-    FileNotFoundError
-        If neither the folder nor one of its parents is a clone of the repository.
-    """
-    start = Path.cwd() if start is None else Path(start).resolve()
-    for folder in (start, *start.parents):
-        if (folder / "notebooks").is_dir() and (folder / "vidsindy_lite").is_dir():
-            return folder
-    raise FileNotFoundError(
-        "repository: expected to be inside a clone of vidsindy_lite (a folder with notebooks/ and "
-        f"vidsindy_lite/), got {str(start)!r}"
-    )
-
-
 def figures_folder() -> Path:
     """The folder that figures and tables go to: VIDSINDY_FIGURES, or figures/ of the repository."""
     named = os.environ.get("VIDSINDY_FIGURES")
     return Path(named) if named else repository_root() / "figures"
-
-
-def write_file(path: Path, content: bytes) -> None:
-    """Replace a file in one step, so an interrupted run leaves the old one or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.tmp")
-    beside.write_bytes(content)
-    beside.replace(path)
 
 
 # ------------------------------------------------------------------------------------- what goes in
@@ -272,6 +242,12 @@ def load_table(table_id: str, folder: str | os.PathLike | None = None) -> Table:
             f"got {table_id!r}"
         )
     return _table(tables[table_id])
+
+
+def files_of(folder: str | os.PathLike, notebook: str) -> list[str]:
+    """Names of the files that a notebook's figures and tables consist of."""
+    records = [r for r in _records(Path(folder)).values() if r["notebook"] == notebook]
+    return [name for record in records for name in (f"{record['id']}.json", *record["files"])]
 
 
 def record_run_time(folder: str | os.PathLike, notebook: str, stamp: str, seconds: float) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from .discovery import Discovery
 from .polynomials import PolynomialSystem
 
 
@@ -106,6 +108,68 @@ def score(found, truth: PolynomialSystem) -> Score:
         recall=hits / actual,
         coefficient_errors=errors,
     )
+
+
+def summary(scores: Sequence[Score]) -> dict[str, object]:
+    """Repeated trials as a row of the paper's tables, in its units: means, and one spread.
+
+    Parameters
+    ----------
+    scores : sequence of Score
+
+    Returns
+    -------
+    dict
+        In how many trials all true terms were found; means of false positives, relative l2 error
+        (with its standard deviation over the trials), precision and recall.
+    """
+    errors = np.array([100 * s.l2 for s in scores])
+    return {
+        "terms found": f"{sum(s.terms_found for s in scores)} of {len(scores)}",
+        "false positives": float(np.mean([s.false_positives for s in scores])),
+        "l2 (e-2)": float(errors.mean()),
+        "spread of l2 (e-2)": float(errors.std()),
+        "precision (%)": float(np.mean([100 * s.precision for s in scores])),
+        "recall (%)": float(np.mean([100 * s.recall for s in scores])),
+    }
+
+
+def term_errors(found: PolynomialSystem, truth: PolynomialSystem) -> tuple[list[str], list[str]]:
+    """Names of the true terms that are missing and of the false ones, e.g. "x in dy/dt"."""
+
+    def active(law: PolynomialSystem) -> dict[tuple[int, ...], str]:
+        return {
+            (equation, *law.exponents[row]): f"{law.terms[row]} in d{truth.names[equation]}/dt"
+            for row, equation in np.argwhere(law.support)
+        }
+
+    guess, true = active(found), active(truth)
+    missing = [name for place, name in true.items() if place not in guess]
+    return missing, [name for place, name in guess.items() if place not in true]
+
+
+def pulls(found: Discovery, truth: PolynomialSystem) -> np.ndarray:
+    """Errors of the true terms that were found, in units of their standard errors.
+
+    Parameters
+    ----------
+    found : Discovery
+    truth : PolynomialSystem
+        In the frame of the data.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        ``(found - true) / standard error``. If the standard errors are right, and the law is, its
+        mean square is 1; the coefficients of one law are correlated.
+    """
+    laws = (
+        PolynomialSystem(truth.names, found.system.exponents, table)
+        for table in (found.standard_errors, found.coefficients)
+    )
+    errors, values = (coefficients_in(law, truth.exponents) for law in laws)
+    seen = truth.support & (errors > 0)
+    return (values - truth.coefficients)[seen] / errors[seen]
 
 
 def coefficients_in(system: PolynomialSystem, library: np.ndarray) -> np.ndarray:

@@ -61,25 +61,6 @@ class PublishedSystem:
 
 
 @dataclass(frozen=True)
-class PublishedRobustness:
-    """What the text says of one panel of Fig. 3; its curves are printed as images only.
-
-    Parameters
-    ----------
-    levels : tuple of float
-        The levels that the text lists, as fractions; empty if it lists none.
-    robust_to : float
-        The level up to which the text calls the method robust, or nearly exact.
-    statement : str
-        In the paper's words.
-    """
-
-    levels: tuple[float, ...]
-    robust_to: float
-    statement: str
-
-
-@dataclass(frozen=True)
 class PublishedPosition:
     """The one position that the lab experiment reports, in mm.
 
@@ -125,23 +106,6 @@ DATASETS_CLAIMED = 9
 
 TRIALS = 5
 """Tables 1 and S3 and Fig. 3 are "averaged over five trials"."""
-
-ROBUSTNESS = {
-    "noise": PublishedRobustness(
-        (0.0, 0.05, 0.10, 0.15, 0.20, 0.25, 0.30),
-        0.20,
-        "up to a 20% noise interference, our method almost accurately identifies all correct "
-        "coefficients of the governing equation. However, beyond a 30% noise level, our method's "
-        "performance begins to decline.",
-    ),
-    "random block": PublishedRobustness(
-        (), 0.50, "highly robust even with up to 50% data loss due to occlusion"
-    ),
-    "fiber missing": PublishedRobustness(
-        (), 0.20, "strong stability even when the fiber missing rate is about 20%"
-    ),
-}
-"""Fig. 3, all for SprottF; a block lasts 1 % of the record, fibers are always five gaps."""
 
 LAB = PublishedPosition(found=(182.92, 291.81, 24.50), truth=(180.0, 300.0, 26.25))
 """Lab experiment; the origin is a corner of the table."""

@@ -4,30 +4,39 @@ The .py half of a pair is the source. The .ipynb half is made here: executed, st
 differs between two runs, and stamped with a hash of the code that made it. The full profile
 writes notebooks/*.ipynb and figures/ of the repository, the quick profile the same layout under
 build/quick/.
+
+A ledger beside them, build/ledger.json, which is never committed, keeps what was executed here. A
+notebook is not executed again if its stamp and its source are the same, its prose included, and its
+outputs are in place byte for byte.
 """
 
-import ast
 import base64
 import copy
 import hashlib
 import io
+import json
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty
 
 import jupytext
 import nbformat
 import papermill
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbclient.util import run_sync
 from nbformat import NotebookNode
+from papermill.clientwrap import PapermillNotebookClient
+from papermill.engines import Engine, papermill_engines
 from papermill.exceptions import PapermillExecutionError, strip_color
 from PIL import Image
 from traitlets.config import Config
 
 from vidsindy_lite import artifacts
+from vidsindy_lite.repository import PACKAGE, package_stamp, repository_root, write_file
 
 __all__ = [
     "NotebookError",
@@ -44,8 +53,9 @@ __all__ = [
 
 PROFILES = ("full", "quick")
 CELL_TIMEOUT = 1800  # seconds; papermill's own default is to wait for ever
+ENGINE = "vidsindy_lite"  # under which papermill knows ours
+LEDGER = Path("build", "ledger.json")
 SYSTEMS_TABLE = "table_systems"  # printed after a run that wrote it
-PACKAGE = Path(__file__).parent
 # The kernel warns on stderr that anyone on the machine could listen in otherwise.
 ENCRYPTED = Config(KernelManager={"transport_encryption": "auto"})
 
@@ -56,11 +66,20 @@ class NotebookError(RuntimeError):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How the run of one notebook ended: `error` is None if every cell completed."""
+    """How the run of one notebook ended: `error` is None if every cell completed.
+
+    A notebook that was `up_to_date` was not executed; `seconds` is how long it took when it was.
+    """
 
     notebook: str
     seconds: float
     error: str | None = None
+    up_to_date: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """One or two words."""
+        return "up to date" if self.up_to_date else "ok" if self.error is None else "FAILED"
 
 
 @dataclass(frozen=True)
@@ -80,12 +99,15 @@ class Report:
         width = max((len(outcome.notebook) for outcome in self.outcomes), default=0)
         lines = [] if self.systems is None else [self.systems.caption, "", str(self.systems), ""]
         for outcome in self.outcomes:
-            verdict = "ok" if outcome.error is None else "FAILED"
-            lines.append(f"{outcome.notebook:<{width}}  {outcome.seconds:7.1f} s  {verdict}")
+            seconds, verdict = outcome.seconds, outcome.verdict
+            lines.append(f"{outcome.notebook:<{width}}  {seconds:7.1f} s  {verdict}")
         lines += [f"figures: {problem}" for problem in self.problems]
-        failed = sum(outcome.error is not None for outcome in self.outcomes)
-        total = sum(outcome.seconds for outcome in self.outcomes)
-        lines.append(f"{len(self.outcomes)} run in {total:.1f} s, {failed} failed")
+        executed = [outcome for outcome in self.outcomes if not outcome.up_to_date]
+        failed = sum(outcome.error is not None for outcome in executed)
+        lines.append(
+            f"{len(executed)} run in {sum(outcome.seconds for outcome in executed):.1f} s, "
+            f"{len(self.outcomes) - len(executed)} up to date, {failed} failed"
+        )
         return "\n".join(lines)
 
 
@@ -124,6 +146,8 @@ def run(
     profile: str = "full",
     output: str | os.PathLike | None = None,
     *,
+    force: bool = False,
+    dask: str | None = None,
     root: str | os.PathLike | None = None,
 ) -> Report:
     """Execute notebooks one after the other and write what they make; goes on after a failure.
@@ -138,6 +162,11 @@ def run(
         Folder that receives notebooks/ (executed) and figures/. By default the repository itself
         in the full profile and build/quick in the quick one. A notebook that fails leaves its
         executed half as it was.
+    force : bool
+        Execute also what is up to date: executed here by the same code, with all its outputs in
+        place. (A notebook that reads another's tables is always executed.)
+    dask : str, optional
+        Address of a Dask scheduler: what a notebook sweeps runs on its workers (see `sweep`).
     root : path, optional
         The repository; by default the one around the working directory.
 
@@ -155,7 +184,7 @@ def run(
     """
     if profile not in PROFILES:
         raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
-    root = artifacts.repository_root() if root is None else Path(root).resolve()
+    root = repository_root() if root is None else Path(root).resolve()
     if output is None:
         output = root if profile == "full" else root / "build" / "quick"
     output = Path(output).resolve()
@@ -178,6 +207,13 @@ def run(
         progress = f"[{number}/{len(chosen)}] {path.stem}"
         print(progress, flush=True)
         stamp, error, started = code_stamp(path, profile), None, time.perf_counter()
+        known = None if force or _reads_tables(path) else _ledger(output).get(path.stem)
+        if known and known == _ledger_entry(output, path, stamp, known["seconds"]):
+            stamps[path.stem] = stamp
+            outcomes.append(Outcome(path.stem, known["seconds"], up_to_date=True))
+            artifacts.record_run_time(figures, path.stem, stamp, known["seconds"])
+            print(f"    up to date ({known['seconds']:.1f} s when it ran)", flush=True)
+            continue
         try:
             executed = execute(
                 path,
@@ -186,6 +222,7 @@ def run(
                     "VIDSINDY_FIGURES": str(figures),
                     "VIDSINDY_NOTEBOOK": path.stem,
                     "VIDSINDY_STAMP": stamp,
+                    **({"VIDSINDY_DASK": dask} if dask else {}),
                 },
                 progress=progress,
             )
@@ -196,11 +233,12 @@ def run(
         if error is None:
             stamps[path.stem] = stamp
             half = nbformat.writes(clean(executed, path, profile, stamp)) + "\n"
-            artifacts.write_file(output / "notebooks" / f"{path.stem}.ipynb", half.encode())
+            write_file(output / "notebooks" / f"{path.stem}.ipynb", half.encode())
+            artifacts.prune(figures, stamps)  # what an earlier version of it left
             artifacts.record_run_time(figures, path.stem, stamp, seconds)
+            _enter(output, path, stamp, seconds)
         print(f"    {seconds:.1f} s" if error is None else f"    FAILED\n\n{error}\n", flush=True)
 
-    artifacts.prune(figures, stamps)  # what an earlier version of a notebook left
     artifacts.write_index(figures)
     problems = artifacts.check_folder(figures, stamps)
     return Report(tuple(outcomes), tuple(problems), _systems_table(figures, outcomes))
@@ -260,8 +298,9 @@ def execute(
     ValueError
         On an unknown parameter.
     NotebookError
-        If a cell raises, takes too long, ends the kernel, or stops the run early: after
-        ``sys.exit(0)`` papermill reports success, but cells were left out.
+        If the kernel does not start, or if a cell raises, takes too long, ends the kernel, or
+        stops the run early: after ``sys.exit(0)`` papermill reports success, but cells were left
+        out.
     """
     path = Path(path)
     check_parameters(path, parameters)
@@ -271,10 +310,11 @@ def execute(
                 jupytext.read(path),
                 None,
                 parameters=dict(parameters),
+                engine_name=ENGINE,
                 kernel_name="python3",
                 cwd=path.parent,
-                execution_timeout=timeout,
-                start_timeout=120,
+                timeout=timeout,
+                startup_timeout=120,
                 progress_bar={"desc": progress, "leave": False, "disable": None},
                 config=ENCRYPTED,
             )
@@ -285,6 +325,11 @@ def execute(
         ) from None
     except (CellTimeoutError, DeadKernelError) as error:
         raise NotebookError(f"{path.stem}: {error}") from None
+    except (RuntimeError, OSError) as error:
+        raise NotebookError(
+            f"{path.stem}: the kernel python3 did not start: {error}. What it wrote stands above; "
+            "`jupyter kernelspec list` shows which kernel has that name."
+        ) from error
     for cell in executed.cells:
         if cell.cell_type == "code" and cell.source.strip():
             completed = cell.metadata.papermill.status == "completed"
@@ -335,25 +380,92 @@ def clean(
 def code_stamp(path: str | os.PathLike, profile: str) -> str:
     """Hash of what a notebook's outputs depend on.
 
-    That is the profile, the notebook's code cells, the package and requirements.txt. Prose,
-    comments and docstrings of the package, and its layout do not count: editing them does not
-    make an executed notebook stale.
+    That is the profile, the notebook's code cells, the package and requirements.txt. Prose does
+    not count (see `package_stamp`): editing it does not make an executed notebook stale.
     """
     path = Path(path)
     digest = hashlib.sha256(profile.encode())
     for cell in jupytext.read(path).cells:
         if cell.cell_type == "code":
             digest.update(b"\0" + cell.source.encode())
-    for file in sorted(PACKAGE.rglob("*")):
-        if file.is_file() and "__pycache__" not in file.parts:
-            digest.update(b"\0" + file.relative_to(PACKAGE).as_posix().encode() + b"\0")
-            is_code = file.suffix == ".py"
-            digest.update(_meaning(file.read_text("utf-8")) if is_code else file.read_bytes())
-    digest.update((path.parent.parent / "requirements.txt").read_bytes())
+    digest.update(package_stamp(path.parent.parent).encode())
     return digest.hexdigest()[:16]
 
 
+# --------------------------------------------------------------------------------------- the ledger
+
+
+def _ledger(output: Path) -> dict[str, dict]:
+    """What was executed into a folder, by notebook."""
+    path = output / LEDGER
+    return json.loads(path.read_text("utf-8")) if path.exists() else {}
+
+
+def _enter(output: Path, path: Path, stamp: str, seconds: float) -> None:
+    entries = _ledger(output) | {path.stem: _ledger_entry(output, path, stamp, seconds)}
+    write_file(output / LEDGER, json.dumps(entries, indent=1).encode())
+
+
+def _ledger_entry(output: Path, path: Path, stamp: str, seconds: float) -> dict:
+    """What there is of a notebook now: stamp, run time, hashes of its source and what it made."""
+    figures = output / "figures"
+    made = [figures / name for name in artifacts.files_of(figures, path.stem)]
+    files = [path, output / "notebooks" / f"{path.stem}.ipynb", *made]
+    return {
+        "stamp": stamp,
+        "seconds": seconds,
+        "files": {
+            file.name: hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else None
+            for file in files
+        },
+    }
+
+
+def _reads_tables(path: Path) -> bool:
+    """Whether a notebook depends on what another wrote, which its stamp does not cover."""
+    code = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
+    return any("load_table" in source for source in code)
+
+
 # ------------------------------------------------------------------------------------------ details
+
+
+class _Client(PapermillNotebookClient):
+    """Papermill's client, which leaves the kernel when it is idle, not when it has replied.
+
+    Shutting a kernel down begins with an interrupt. One that is idle ignores it; one that still
+    returns from its last request reports it on stderr.
+    """
+
+    def wait_for_reply(self, msg_id, cell=None):
+        reply = super().wait_for_reply(msg_id, cell)
+        next_message = run_sync(self.kc.get_iopub_msg)
+        with suppress(Empty):
+            while True:
+                message = next_message(timeout=self.iopub_timeout)
+                state = message["content"].get("execution_state")
+                if (message["parent_header"].get("msg_id"), state) == (msg_id, "idle"):
+                    return reply
+        return reply
+
+
+class _Engine(Engine):
+    """Makes papermill use that client."""
+
+    @classmethod
+    def execute_managed_notebook(
+        cls, nb_man, kernel_name, *, timeout, startup_timeout, config, **_
+    ):
+        _Client(
+            nb_man,
+            kernel_name=kernel_name,
+            timeout=timeout,
+            startup_timeout=startup_timeout,
+            config=config,
+        ).execute()
+
+
+papermill_engines.register(ENGINE, _Engine)
 
 
 @contextmanager
@@ -413,22 +525,3 @@ def _systems_table(figures: Path, outcomes: list[Outcome]) -> artifacts.Table | 
         return None
     succeeded = {outcome.notebook for outcome in outcomes if outcome.error is None}
     return table if table.notebook in succeeded else None
-
-
-def _meaning(source: str) -> bytes:
-    """What a Python source does, as text: its syntax tree without bare constants (docstrings)."""
-
-    def plain(node: object) -> object:
-        if isinstance(node, list):
-            return [plain(n) for n in node if not _is_bare_constant(n)]
-        if isinstance(node, ast.AST):
-            fields = [(name, plain(value)) for name, value in ast.iter_fields(node)]
-            # Empty fields differ between versions of Python.
-            return [type(node).__name__, *(f for f in fields if f[1] not in (None, []))]
-        return node
-
-    return repr(plain(ast.parse(source))).encode()
-
-
-def _is_bare_constant(node: object) -> bool:
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)

@@ -303,7 +303,13 @@ def _coverage(polygon):
     x0, y0 = (polygon - corner + 0.5).T  # from here on pixel i covers [i, i + 1]
     x1, y1 = np.roll(x0, -1), np.roll(y0, -1)
     y = (np.arange(height * _SCANLINES) + 0.5) / _SCANLINES
-    line, edge = np.nonzero((y0 <= y[:, None]) != (y1 <= y[:, None]))
+    # Each edge crosses the scan lines from `first` to before `end`; ordered by line, then by edge.
+    first, end = np.searchsorted(y, [np.minimum(y0, y1), np.maximum(y0, y1)])
+    count = end - first
+    edge = np.repeat(np.arange(len(polygon)), count)
+    line = np.arange(len(edge)) + np.repeat(first - np.cumsum(count) + count, count)
+    order = np.argsort(line, kind="stable")
+    line, edge = line[order], edge[order]
     x = x0[edge] + (y[line] - y0[edge]) * (x1 - x0)[edge] / (y1 - y0)[edge]
     # To the right of a crossing everything is inside (or outside): its pixel gets the share right
     # of it, the next one the rest, and the running sum along the row does the filling.

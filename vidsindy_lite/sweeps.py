@@ -1,0 +1,218 @@
+"""Many independent tasks in parallel; what is finished is kept, so a stopped sweep goes on later.
+
+A task is a frozen dataclass that says all there is to say about it, its seed included, and what is
+done with it is a function of this package:
+
+    results = sweep(trial, [Trial("Lorenz", noise, seed) for noise in levels for seed in seeds])
+
+Each result goes to a file as soon as it is there, build/cache/<stamp>/<function>/<task>.pkl in the
+repository, or in place of build/cache the folder that the environment variable VIDSINDY_CACHE
+names. The stamp is that of the package's code and requirements: other code finds no results. A
+package installed outside a clone of its repository stores nothing.
+
+The tasks run in processes of this machine, or on a Dask cluster of any size.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+from joblib import Parallel, delayed, parallel_config
+from tqdm import tqdm
+
+from .repository import PACKAGE, package_stamp, repository_root, write_file
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+class TaskError(RuntimeError):
+    """A task of a sweep raised; the message names the task."""
+
+
+def sweep(
+    function: Callable[[Task], Result],
+    tasks: Iterable[Task],
+    *,
+    jobs: int = 2,
+    desc: str = "sweep",
+    dask: str | None = None,
+) -> list[Result]:
+    """Call a function for each task, in parallel; results that are stored are read back.
+
+    Parameters
+    ----------
+    function : callable
+        A top-level function of this package, of one task. Its result must be picklable.
+    tasks : iterable
+        Frozen dataclasses of numbers, text and tuples of them: a result is stored under the repr.
+    jobs : int
+        Processes on this machine, one thread each; 1 works in this very process.
+    desc : str
+        Label of the progress bar, which starts at what is stored.
+    dask : str, optional
+        Address of a Dask scheduler whose workers run the tasks instead, e.g.
+        "tcp://10.0.0.1:8786"; by default the environment variable VIDSINDY_DASK, if set.
+
+    Returns
+    -------
+    list
+        The results in the order of the tasks.
+
+    Raises
+    ------
+    ValueError
+        If the function is not one of the package, a task is no frozen dataclass, or jobs < 1.
+    TaskError
+        If a task raises: the sweep stops, and what was finished stays stored.
+    ImportError
+        If a cluster is asked for and `distributed` is not installed.
+    RuntimeError
+        If a worker of the cluster has other code of this package.
+    """
+    tasks = list(tasks)
+    _check(function, tasks, jobs)
+    files = _files(function, tasks)
+    results = _stored(files)
+    todo = [number for number in range(len(tasks)) if number not in results]
+    with (
+        tqdm(total=len(tasks), initial=len(results), desc=desc) as bar,
+        _workers(jobs, dask or os.environ.get("VIDSINDY_DASK"), needed=bool(todo)),
+    ):
+        # One task a batch: a result is stored when it is there, not when its batch is.
+        parallel = Parallel(return_as="generator_unordered", batch_size=1)
+        for number, result in parallel(delayed(_call)(function, n, tasks[n]) for n in todo):
+            results[number] = result
+            if number in files:
+                _store(files[number], result)
+            bar.update()
+    return [results[number] for number in range(len(tasks))]
+
+
+def remember(function: Callable[[Task], Result], task: Task) -> Result:
+    """Call a function for one task in this process, or read the stored result back.
+
+    For a task that builds on the results of another sweep.
+
+    Parameters
+    ----------
+    function, task
+        As for `sweep`.
+    """
+    _check(function, [task], jobs=1)
+    files = _files(function, [task])
+    results = _stored(files)
+    if not results:
+        results[0] = function(task)
+        for file in files.values():
+            _store(file, results[0])
+    return results[0]
+
+
+def _check(function: Callable, tasks: list, jobs: int) -> None:
+    home, name = getattr(function, "__module__", ""), getattr(function, "__qualname__", "")
+    if home.partition(".")[0] != __package__ or not name.isidentifier():
+        raise ValueError(
+            f"function: must be a top-level function of {__package__}, whose code the stored "
+            f"results depend on, got {function!r}"
+        )
+    for task in tasks:
+        parameters = getattr(type(task), "__dataclass_params__", None)
+        # Hashable, hence without arrays: the repr of a large one leaves numbers out.
+        if not (parameters and parameters.frozen and _is_hashable(task)):
+            raise ValueError(
+                "tasks: each must be a frozen dataclass of numbers, text and tuples of them, "
+                f"got {task!r}"
+            )
+    if jobs < 1:
+        raise ValueError(f"jobs: must be at least 1, got {jobs}")
+
+
+def _is_hashable(task: object) -> bool:
+    try:
+        hash(task)
+    except TypeError:
+        return False
+    return True
+
+
+def _call(function: Callable, number: int, task: object) -> tuple[int, object]:
+    try:
+        return number, function(task)
+    except Exception as error:
+        raise TaskError(
+            f"{function.__name__}({task!r}) raised {type(error).__name__}: {error}"
+        ) from error
+
+
+@contextmanager
+def _workers(jobs: int, address: str | None, needed: bool) -> Iterator[None]:
+    """Where joblib runs its tasks: processes of this machine, or the cluster if it is needed."""
+    if not (address and needed):
+        one_thread = {
+            "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
+            "initializer": cv2.setNumThreads,
+            "initargs": (1,),
+        }
+        with parallel_config("loky", n_jobs=jobs, **one_thread):
+            yield
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ImportError(
+            "dask: a cluster needs the package distributed, which the extra 'cluster' installs: "
+            f'pip install "{__package__}[cluster]"'
+        ) from None
+    with Client(address, set_as_default=False) as client:
+        theirs = client.run(package_stamp)
+        differing = [worker for worker, stamp in theirs.items() if stamp != package_stamp()]
+        if differing:
+            raise RuntimeError(
+                f"dask: all workers must have this very code of {__package__}, "
+                f"got other code on {', '.join(differing)}"
+            )
+        with parallel_config("dask", client=client):
+            yield
+
+
+# ----------------------------------------------------------------------------------- stored results
+
+
+def _files(function: Callable, tasks: list) -> dict[int, Path]:
+    """The file of each task's result by number of the task; none outside a clone."""
+    try:
+        root = repository_root(PACKAGE)
+    except FileNotFoundError:
+        return {}
+    named = os.environ.get("VIDSINDY_CACHE")
+    cache = Path(named) if named else root / "build" / "cache"
+    module = function.__module__.removeprefix(f"{__package__}.")
+    folder = cache / package_stamp(root) / f"{module}.{function.__name__}"
+    names = [hashlib.sha256(repr(task).encode()).hexdigest()[:32] for task in tasks]
+    return {number: folder / f"{name}.pkl" for number, name in enumerate(names)}
+
+
+def _store(file: Path, result: object) -> None:
+    content = pickle.dumps(result)
+    write_file(file, content + hashlib.sha256(content).digest())
+
+
+def _stored(files: dict[int, Path]) -> dict[int, object]:
+    """The results that are stored as they were written: the digest at the end says so."""
+    results = {}
+    for number, file in files.items():
+        content = file.read_bytes() if file.exists() else b""
+        result, digest = content[:-_DIGEST], content[-_DIGEST:]
+        if hashlib.sha256(result).digest() == digest:
+            results[number] = pickle.loads(result)
+    return results
