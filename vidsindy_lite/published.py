@@ -104,8 +104,6 @@ class Misprint:
 DATASETS_CLAIMED = 9
 """Section "Experiments": "using nine datasets"; its footnote lists those of `SYSTEMS_S1`."""
 
-TRIALS = 5
-"""Tables 1 and S3 and Fig. 3 are "averaged over five trials"."""
 
 LAB = PublishedPosition(found=(182.92, 291.81, 24.50), truth=(180.0, 300.0, 26.25))
 """Lab experiment; the origin is a corner of the table."""
