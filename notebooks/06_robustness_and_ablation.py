@@ -198,8 +198,8 @@ caption = "PySINDy on SprottF: error and wrong terms against noise and missing d
 robustness("figure_S4", caption, results, ["PySINDy"], system="SprottF")
 
 # %% [markdown]
-# *Fig. S4: the same data through PySINDy. Gaps hardly matter, since the record is cut there and its
-# derivatives are local; noise does, because a difference of neighbours amplifies it.*
+# *Fig. S4: the same data through PySINDy. Gaps matter less than noise, since the record is cut
+# there and derivatives are local; a difference of neighbours amplifies noise.*
 
 # %%
 noisy = by_level(select(results, method="PySINDy"), "noise", system="SprottF")
@@ -396,9 +396,10 @@ for best, ablated in zip(rows[::2], rows[1::2], strict=True):
         assert best["precision (%)"] == best["recall (%)"] == 100, best
 
 # %% [markdown]
-# Under noise, the spline alone gives derivatives that are several times worse, and terms with them.
-# With exact samples and gaps, a spline between the gaps does better here than in the paper; what is
-# lost are stretches too short for it.
+# Under noise, the spline alone gives derivatives that are worse by factors, and terms with them.
+# With exact samples and gaps it depends on where the gaps fall: a stretch that is too short for a
+# spline of its own has bad derivatives, and the column "terms found" says how often that cost a
+# term.
 #
 # ## All methods on one axis
 
@@ -564,7 +565,7 @@ for row in rows:
 # * Noise is what sets the methods apart. Ours has the smallest error and the largest share of exact
 #   laws at every level, because curve and law are fitted together: all samples take part in every
 #   derivative.
-# * Gaps without noise cost little, for anybody who does not differentiate across them.
+# * Gaps in exact samples cost our method next to nothing.
 # * The limit is information, and the Cramér-Rao bound knows it in advance: Tsucs2 has one term that
 #   noise of 10 % buries.
 # * Error bars hold under noise for laws with the right terms. A law that fits as well as the truth
