@@ -8,7 +8,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import halfnorm
 
-_MARKERS = "os^vD"
+_STYLES = {
+    "ours": ("C0", "o"), "PySINDy": ("C1", "s"), "E-SINDy": ("C2", "^"),
+    "WeakSINDy": ("C3", "v"), "Model-A": ("C4", "D"),
+}  # fmt: skip
 _TITLES = {"noise": "noise", "blocks": "random blocks missing", "fibers": "fibers missing"}
 
 
@@ -30,6 +33,7 @@ def plot_robustness(curves, published=None):
     )  # fmt: skip
     for column, (condition, methods) in zip(grid.T, curves.items(), strict=True):
         for k, (method, by_level) in enumerate(methods.items()):
+            colour, marker = _STYLES[method]
             levels = 100 * np.array(list(by_level))
             beside = 0.012 * np.ptp(levels) * (k - (len(methods) - 1) / 2)
             errors = [[100 * r.score.l2 for r in results] for results in by_level.values()]
@@ -37,12 +41,12 @@ def plot_robustness(curves, published=None):
             for axes, values in zip(column, (errors, wrong), strict=True):
                 means = np.array([np.mean(v) for v in values])
                 reach = np.abs([[np.min(v), np.max(v)] for v in values] - means[:, None]).T
-                style = {"marker": _MARKERS[k], "color": f"C{k}", "lw": 1.4, "elinewidth": 1}
-                style["ecolor"] = (f"C{k}", 0.45)
-                axes.errorbar(levels + beside, means, reach, label=method, capsize=2, **style)
+                style = {"color": colour, "marker": marker, "lw": 1.4, "label": method}
+                bars = {"ecolor": (colour, 0.45), "elinewidth": 1, "capsize": 2}
+                axes.errorbar(levels + beside, means, reach, **style, **bars)
         if published:
             known = 100 * np.array(list(published[condition].items()))
-            column[0].errorbar(*known.T, fmt="*C1", ms=11, label="paper (Table 2)")
+            column[0].errorbar(*known.T, fmt="*k", ms=10, label="paper (Table 2)")
         column[0].set_title(_TITLES[condition])
         column[1].set_xlabel("level (%)" if condition == "noise" else "rate (%)")
     grid[0, 0].set(yscale="log", ylabel=r"relative $\ell_2$ error (%)")
