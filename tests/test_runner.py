@@ -118,6 +118,19 @@ def test_notebook_that_writes_less_than_before_leaves_nothing_behind(good):
     assert runner.run(root=good.root).outcomes[0].up_to_date
 
 
+def test_memory_of_the_largest_process_is_reported(tiny):
+    tiny.write("01_large", """\
+from joblib import Parallel, delayed
+
+def fill(size):
+    return len(b"x" * size)
+
+Parallel(2)(delayed(fill)(size) for size in (400_000_000, 100_000_000))""")
+    report = runner.run(root=tiny.root)
+    assert 0.4 < report.memory < 4
+    assert f"largest process: {report.memory:.2f} GB" in str(report)
+
+
 # --------------------------------------------------------------------------- what is up to date
 
 

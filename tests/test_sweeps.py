@@ -46,6 +46,12 @@ def square(task):
     return task.number**2, np.random.default_rng(task.number).normal(size=3).tolist()
 
 
+def end(task):
+    """End this very process, as a crash or the system does for want of memory."""
+    if task.number == 0:
+        os._exit(1)
+
+
 def threads(task):
     """Threads of BLAS (OpenMP) and OpenCV in the process of this task."""
     return [cv2.getNumThreads(), *(pool["num_threads"] for pool in threadpool_info())]
@@ -98,9 +104,9 @@ class Clone:
         assert process.returncode == 0, errors
         return json.loads(output)
 
-    def fail(self, tasks, **environment):
+    def fail(self, tasks, function="square", **environment):
         """The last line of the error of a sweep that fails."""
-        process = self.start(tasks, **environment)
+        process = self.start(tasks, function, **environment)
         _, errors = process.communicate(timeout=120)
         assert process.returncode == 1
         return errors.strip().splitlines()[-1]
@@ -179,7 +185,7 @@ def test_a_process_has_one_thread(clone):
     ("file", "old", "new", "computed"),
     [
         ("vidsindy_lite/toy.py", "task.number**2", "task.number * task.number", [1, 2]),
-        ("vidsindy_lite/sweeps.py", "todo = [", "todo = [] or [", [1, 2]),
+        ("vidsindy_lite/sweeps.py", "if jobs < 1", "if jobs <= 0", [1, 2]),
         ("requirements.txt", "2.4.6", "2.4.7", [1, 2]),
         ("vidsindy_lite/toy.py", "A result with", "Numbers with", []),
     ],
@@ -278,6 +284,11 @@ def test_cluster_gives_the_results_of_this_machine(clone, cluster, tmp_path):
     error = clone.fail([[5, 0.0], [-3, 1.0]], VIDSINDY_DASK=cluster)
     assert error.endswith("square(Task(number=-3, pause=1.0)) raised ArithmeticError: below zero")
     assert 5 in clone.stored()
+
+
+def test_cluster_names_the_task_that_ends_its_worker(clone, cluster):
+    error = clone.fail([[1], [0]], "end", VIDSINDY_DASK=cluster)
+    assert "KilledWorker: Attempted to run task 'end(Task(number=0, pause=0.0)) " in error
 
 
 def test_cluster_with_other_code_is_refused(clone, cluster):

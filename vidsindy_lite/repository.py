@@ -34,7 +34,7 @@ def repository_root(start: str | os.PathLike | None = None) -> Path:
 def write_file(path: Path, content: bytes) -> None:
     """Replace a file in one step, so an interrupted run leaves the old one or the new one."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.tmp")
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
     beside.write_bytes(content)
     beside.replace(path)
 

@@ -16,6 +16,7 @@ import hashlib
 import io
 import json
 import os
+import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -84,11 +85,15 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Report:
-    """What a run came to: the outcome of each notebook, and what is wrong with the figures."""
+    """What a run came to: the outcome of each notebook, and what is wrong with the figures.
+
+    `memory` is the peak of the largest process of the run in GB, where the system counts it.
+    """
 
     outcomes: tuple[Outcome, ...]
     problems: tuple[str, ...]
     systems: artifacts.Table | None = None
+    memory: float | None = None
 
     @property
     def ok(self) -> bool:
@@ -104,6 +109,8 @@ class Report:
         lines += [f"figures: {problem}" for problem in self.problems]
         executed = [outcome for outcome in self.outcomes if not outcome.up_to_date]
         failed = sum(outcome.error is not None for outcome in executed)
+        if executed and self.memory is not None:
+            lines.append(f"largest process: {self.memory:.2f} GB at its peak")
         lines.append(
             f"{len(executed)} run in {sum(outcome.seconds for outcome in executed):.1f} s, "
             f"{len(self.outcomes) - len(executed)} up to date, {failed} failed"
@@ -241,7 +248,8 @@ def run(
 
     artifacts.write_index(figures)
     problems = artifacts.check_folder(figures, stamps)
-    return Report(tuple(outcomes), tuple(problems), _systems_table(figures, outcomes))
+    table, memory = _systems_table(figures, outcomes), _largest_process()
+    return Report(tuple(outcomes), tuple(problems), table, memory)
 
 
 # --------------------------------------------------------------------------------- one notebook
@@ -515,6 +523,16 @@ def _with_palette(png: str) -> str:
     reduced = image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     reduced.save(small, "PNG", optimize=True)
     return min(png, base64.b64encode(small.getvalue()).decode() + "\n", key=len)
+
+
+def _largest_process() -> float | None:
+    """Peak memory in GB of the largest process that this one has started, kernels' own included."""
+    if sys.platform == "win32":
+        return None
+    import resource
+
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit / 1e9
 
 
 def _systems_table(figures: Path, outcomes: list[Outcome]) -> artifacts.Table | None:

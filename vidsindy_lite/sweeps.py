@@ -19,9 +19,10 @@ import hashlib
 import os
 import pickle
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
+from uuid import uuid4
 
 import cv2
 from joblib import Parallel, delayed, parallel_config
@@ -81,16 +82,13 @@ def sweep(
     """
     tasks = list(tasks)
     _check(function, tasks, jobs)
+    address = dask or os.environ.get("VIDSINDY_DASK")
     files = _files(function, tasks)
     results = _stored(files)
-    todo = [number for number in range(len(tasks)) if number not in results]
-    with (
-        tqdm(total=len(tasks), initial=len(results), desc=desc) as bar,
-        _workers(jobs, dask or os.environ.get("VIDSINDY_DASK"), needed=bool(todo)),
-    ):
-        # One task a batch: a result is stored when it is there, not when its batch is.
-        parallel = Parallel(return_as="generator_unordered", batch_size=1)
-        for number, result in parallel(delayed(_call)(function, n, tasks[n]) for n in todo):
+    todo = {number: task for number, task in enumerate(tasks) if number not in results}
+    work = _on_cluster(function, todo, address) if address else _here(function, todo, jobs)
+    with tqdm(total=len(tasks), initial=len(results), desc=desc) as bar:
+        for number, result in work if todo else ():
             results[number] = result
             if number in files:
                 _store(files[number], result)
@@ -154,26 +152,35 @@ def _call(function: Callable, number: int, task: object) -> tuple[int, object]:
         ) from error
 
 
-@contextmanager
-def _workers(jobs: int, address: str | None, needed: bool) -> Iterator[None]:
-    """Where joblib runs its tasks: processes of this machine, or the cluster if it is needed."""
-    if not (address and needed):
-        one_thread = {
-            "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
-            "initializer": cv2.setNumThreads,
-            "initargs": (1,),
-        }
-        with parallel_config("loky", n_jobs=jobs, **one_thread):
-            yield
-        return
+def _here(function: Callable, todo: dict[int, object], jobs: int) -> Iterator[tuple[int, object]]:
+    """Numbers and results of the tasks as they come, from processes of this machine."""
+    one_thread = {
+        "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
+        "initializer": cv2.setNumThreads,
+        "initargs": (1,),
+    }
+    with parallel_config("loky", n_jobs=jobs, **one_thread):
+        # One task a batch: a result comes when it is there, not when its batch is.
+        parallel = Parallel(return_as="generator_unordered", batch_size=1)
+        yield from parallel(delayed(_call)(function, *item) for item in todo.items())
+
+
+def _on_cluster(
+    function: Callable, todo: dict[int, object], address: str
+) -> Iterator[tuple[int, object]]:
+    """Numbers and results of the tasks as they come, from the workers of a Dask cluster.
+
+    Not by joblib's Dask backend: that waits for ever for a task that ends its worker.
+    """
     try:
-        from distributed import Client
+        from distributed import Client, as_completed
     except ImportError:
         raise ImportError(
             "dask: a cluster needs the package distributed, which the extra 'cluster' installs: "
             f'pip install "{__package__}[cluster]"'
         ) from None
-    with Client(address, set_as_default=False) as client:
+    with Client(address) as client:
+        client.wait_for_workers(1, timeout=60)
         theirs = client.run(package_stamp)
         differing = [worker for worker, stamp in theirs.items() if stamp != package_stamp()]
         if differing:
@@ -181,8 +188,11 @@ def _workers(jobs: int, address: str | None, needed: bool) -> Iterator[None]:
                 f"dask: all workers must have this very code of {__package__}, "
                 f"got other code on {', '.join(differing)}"
             )
-        with parallel_config("dask", client=client):
-            yield
+        # The key is what Dask calls a task, in its errors too.
+        keys = [f"{function.__name__}({task!r}) {uuid4().hex}" for task in todo.values()]
+        futures = client.map(partial(_call, function), todo, todo.values(), key=keys)
+        for _, result in as_completed(futures, with_results=True):
+            yield result
 
 
 # ----------------------------------------------------------------------------------- stored results
