@@ -44,7 +44,7 @@ SEARCH_WEIGHTS = (1e2, 1e4, 1e6, 1e8)
 """Physics weights of the subset searches in the law's own frame."""
 FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
-FALSE_ALARM = 0.005
+FALSE_ALARM = 0.004
 """Chance of a false term in a law, if all candidates were independent."""
 OFFSET_CHARGE = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
