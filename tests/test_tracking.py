@@ -3,9 +3,21 @@
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from vidsindy_lite.tracking import track
-from vidsindy_lite.video import Scene, render, render_video, write_video
+from vidsindy_lite.cameras import Rig
+from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.tracking import _shape, track
+from vidsindy_lite.video import (
+    COLOURS,
+    SHAPES,
+    Scene,
+    _coverage,
+    render,
+    render_video,
+    write_video,
+)
 
 SIZE = (256, 192)
 
@@ -95,6 +107,78 @@ def test_a_hidden_target_is_not_seen_and_a_partly_hidden_one_not_trusted(tmp_pat
     assert np.nanmax(error) < 0.5
 
 
+def shape_of(polygon, hidden=0):
+    """The shape numbers of a polygon (m, 2) of which the last `hidden` pixels to the right lack."""
+    alpha, corner = _coverage(polygon)
+    u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
+    alpha[:, u + corner[0] > polygon[:, 0].max() - hidden] = 0
+    centre = [alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v] / alpha.sum()
+    return _shape(alpha, u - centre[0], v - centre[1])
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    seed=st.integers(0, 1000),
+    form=st.sampled_from(SHAPES),
+    angle=st.floats(0, 2 * np.pi),
+    scale=st.floats(0.5, 2),
+)
+def test_whole_views_are_alike(seed, form, angle, scale):
+    outline = Scene(shape=form, size=24, shape_seed=seed).outline()
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    view = [0.3, 0.4] + scale * outline @ turn
+    assert np.linalg.norm(shape_of(view) - shape_of(outline)) < 0.6 / (18 * min(scale, 1))
+
+
+@settings(deadline=None, max_examples=50)
+@given(size=st.floats(8, 40), share=st.floats(0.1, 0.8))
+def test_a_part_of_a_disc_is_no_disc(size, share):
+    disc = Scene(size=size).outline()
+    assert np.linalg.norm(shape_of(disc, share * size) - shape_of(disc)) > 0.04
+
+
+@pytest.mark.parametrize("form", SHAPES)
+def test_a_target_that_lingers_half_hidden_is_not_trusted(tmp_path, form):
+    # It spends most of the clip across the edge of a post, and never vanishes behind it.
+    truth = winding_path(200)
+    k = np.arange(130)
+    truth[35:165] = np.column_stack([108 + 3 * np.sin(k / 9), 96 + 60 * np.sin(k / 20)])
+    post = (112, 0, 40, SIZE[1])
+    scene = Scene(
+        "bricks", shape=form, size=22, turns=3, shape_seed=5, occluders=(post,), image_size=SIZE
+    )
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=1), truth)
+    distance = distance_to_rectangle(truth, post)
+    assert np.isnan(error[distance < 8]).all()
+    assert np.isfinite(error[distance > 16]).mean() > 0.97
+    assert np.nanmax(error) < 0.3
+
+
+@pytest.mark.parametrize("frames", [200, 400])
+def test_a_chaotic_orbit_that_turns_at_the_edge_of_a_post(tmp_path, frames):
+    _, x = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET).trajectory(frames, 100)
+    truth = Rig.around(x).cameras[0].project(x)
+    post = (230, 0, 50, 512)
+    scene = Scene("hills", size=18, occluders=(post,))
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=1), truth)
+    assert np.isfinite(error[distance_to_rectangle(truth, post) > 10]).mean() > 0.97
+    assert np.nanmax(error) < 0.3
+
+
+def test_an_occluder_of_the_colour_of_the_target(tmp_path):
+    truth = winding_path(200)
+    post = (100, 0, 30, SIZE[1])
+
+    def frames():
+        for frame in render(truth, Scene("sky", size=22, image_size=SIZE), 3):
+            frame[:, post[0]:post[0] + post[2]] = COLOURS["red"]
+            yield frame
+
+    error = errors(write_video(tmp_path / "clip.mkv", frames()), truth)
+    assert np.isfinite(error[distance_to_rectangle(truth, post) > 16]).mean() > 0.97
+    assert np.nanmax(error) < 0.3
+
+
 def test_a_target_across_the_border_is_not_trusted(tmp_path):
     truth = winding_path(150, margin=0)
     scene = Scene("wood", size=20, image_size=SIZE)
@@ -125,6 +209,28 @@ def test_a_target_that_stays_for_long_leaves_no_ghost(tmp_path, share):
     )
     assert np.isfinite(error).mean() > 0.97
     assert np.nanmax(error) < 0.3
+
+
+def circle(radius, n=150):
+    angle = np.linspace(0, 20, n)
+    return [120, 90] + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+@pytest.mark.parametrize("variance", [0, 0.005])
+@pytest.mark.parametrize("radius", [0, 2, 5])
+@pytest.mark.parametrize("form", ["disc", "polygon"])
+def test_a_target_that_never_leaves_its_place_is_background(tmp_path, form, radius, variance):
+    truth = circle(radius)
+    scene = Scene("sea", form, size=18, turns=2, noise_variance=variance, image_size=SIZE)
+    assert np.isnan(track(render_video(tmp_path / "clip.mkv", truth, scene, seed=2))).all()
+
+
+def test_a_target_that_leaves_its_place_by_its_own_width_is_tracked(tmp_path):
+    truth = circle(10)
+    scene = Scene("sea", size=18, image_size=SIZE)
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=2), truth)
+    assert np.isfinite(error).mean() > 0.97
+    assert np.nanmax(error) < 0.1
 
 
 @pytest.mark.parametrize("variance", [0, 0.01])

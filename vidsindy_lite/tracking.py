@@ -10,7 +10,8 @@ is known even along an anti-aliased edge, and the centroid is the mean of the pi
 weighted with it. Being linear in the frame, it stays unbiased under image noise.
 
 A frame gets NaN where the target is not seen whole: behind an occluder or across the image border
-the visible part has another centroid than the target. The paper tracks with YOLO-v8 instead.
+the visible part has another centroid than the target. It also has another *shape*, whereas whole
+views are alike up to rotation and size. The paper tracks with YOLO-v8 instead.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from scipy import ndimage
+from scipy.spatial.distance import cdist
 
 from .video import open_video, read_video, video_info
 
@@ -28,7 +30,9 @@ _RING = 2  # pixels on both sides of the target's outline whose coverage is esti
 _BORDER = 3  # coarse pixels around a place that show how its surroundings continue
 _OFTEN = 0.1  # share of the samples that must differ from the background to cast doubt on it
 _QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
-_MEMORY = 30  # frames before and after with which the visible area is compared
+_BLIND = 0.1  # share of the target's outline that may lie on background of the same colour
+_ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
+_VIEWS = 200  # views among which the commonest one is sought
 
 
 # -------------------------------------------------------------------------------------- background
@@ -110,11 +114,15 @@ def _uncover(background, samples, floor):
 
 @dataclass(frozen=True)
 class _Blob:
-    """One look at the target: centroid (2,) in pixels, visible area, whole inside the image?"""
+    """One look at the target: centroid (2,) in pixels, visible area, clear of the image border?
+
+    `shape` is None where frame, background and target do not fit together.
+    """
 
     centroid: np.ndarray
     area: float
     inside: bool
+    shape: np.ndarray | None
 
 
 class _Detector:
@@ -150,6 +158,7 @@ class _Detector:
         self.area = float(np.median([look[1] for look in looks]))
         self.contrast = (colour - self.background).astype(np.float32)
         self.square = np.einsum("ijk,ijk->ij", self.contrast, self.contrast)
+        self.blind = self.square < max(self.floor**2, 0.1 * np.median(self.square))
         self.coarse_contrast = (colour - self.coarse_background).astype(np.float32)
         self.coarse_square = np.einsum(
             "ijk,ijk->ij", self.coarse_contrast, self.coarse_contrast
@@ -201,24 +210,28 @@ class _Detector:
         label, stats = _components(mask.astype(np.uint8))
         if label is None or not 0.2 < stats[cv2.CC_STAT_AREA] / self.area < 5:
             return None
-        core = _erode(label)
+        near = cv2.dilate(label, _DISC) > 0
         match = np.einsum("ijk,ijk->ij", change, self.contrast[window])
         alpha = match / (square + self.floor**2 / 9)
-        alpha[core > 0] = 1
-        alpha[cv2.dilate(label, _DISC) == 0] = 0
+        alpha[_erode(label) > 0] = 1
+        alpha[~near] = 0
         area = float(alpha.sum())
         if area <= 0:
             return None
-        centroid = low + [
-            alpha.sum(axis=0) @ np.arange(alpha.shape[1]) / area,
-            alpha.sum(axis=1) @ np.arange(alpha.shape[0]) / area,
-        ]
+        u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
+        centre = np.array([alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v]) / area
         corner = stats[[cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP]]
         extent = stats[[cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
         first, last = low + corner, low + corner + extent - 1
         if ((first == low) & (low > 0)).any() or ((last == high - 1) & (high < self.size)).any():
             return None  # cut off by the window
-        return _Blob(centroid, area, bool((first > 0).all() and (last < self.size - 1).all()))
+        inside = bool((first > 0).all() and (last < self.size - 1).all())
+        # A background that contains the target hides how far it goes, or makes coverages absurd:
+        # as they lie in [0, 1], their squares (with some noise) cannot sum up to more than they do.
+        blind = self.blind[window][near & (label == 0)].mean() > _BLIND
+        sound = not blind and (alpha**2).sum() < 1.2 * area
+        shape = _shape(alpha, u - centre[0], v - centre[1]) if sound else None
+        return _Blob(low + centre, area, inside, shape)
 
 
 _DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
@@ -240,6 +253,23 @@ def _components(mask, weight=None):
     return (labels == largest).astype(np.uint8), stats[largest]
 
 
+def _shape(alpha, u, v):
+    """Four numbers that tell shapes apart and stay the same under rotation and change of size.
+
+    With z = u + iv from the centroid, rotation changes only the phase of the complex moments
+    c_pq = sum of alpha z^p conj(z)^q. -> magnitudes of c_11, c_20, c_21, c_30, dimensionless
+    """
+    area = alpha.sum()
+    m = np.vander(v, 4, increasing=True).T @ alpha @ np.vander(u, 4, increasing=True)
+    # The pixels' own extent does not count; no shape has a smaller c_11 than a disc, area^2 / 2 pi.
+    c11 = max(m[0, 2] + m[2, 0] - area / 6, 0.01 * area**2)
+    c20 = m[0, 2] - m[2, 0] + 2j * m[1, 1]
+    c21 = m[0, 3] + m[2, 1] + 1j * (m[1, 2] + m[3, 0])
+    c30 = m[0, 3] - 3 * m[2, 1] + 1j * (3 * m[1, 2] - m[3, 0])
+    cube = c11**1.5 / np.sqrt(area)
+    return np.array([np.log(c11 / area**2), abs(c20) / c11, abs(c21) / cube, abs(c30) / cube])
+
+
 # ------------------------------------------------------------------------------------------- track
 
 
@@ -249,14 +279,17 @@ def track(video_path) -> np.ndarray:
     Parameters
     ----------
     video_path : path
-        A video from a camera at rest. The target must stay away from each place for at least a
-        fifth of the frames, or else the place is taken for background with the target in it.
+        A video from a camera at rest. The target may turn and change its size, not its shape, and
+        is whole in at least a quarter of the frames that show any of it. It must stay away from
+        each place for at least a fifth of the frames: what never moves away by about its own width
+        is background.
 
     Returns
     -------
     track : (n, 2) array
         Centroid of the target in each frame, (u right, v down) in pixels, pixel centres at
-        integers; NaN in frames where it is not seen, or only a part of it.
+        integers; NaN in frames where it is not seen, or only a part of it, or where it cannot be
+        told from the background.
 
     Raises
     ------
@@ -266,8 +299,7 @@ def track(video_path) -> np.ndarray:
     detector = _Detector(_sample_frames(video_path))
     blobs = list(_follow(detector, read_video(video_path)))
     centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
-    area = np.array([b.area if b and b.inside else np.nan for b in blobs])
-    centroids[~_whole(area)] = np.nan
+    centroids[~_whole(blobs)] = np.nan
     return centroids
 
 
@@ -284,7 +316,7 @@ def _follow(detector, frames):
             if blob is None:
                 near = detector.search(frame)
                 blob = near and detector.measure(frame, *near)
-        if blob is None:
+        if blob is None or blob.shape is None:
             age += 1
         else:
             if position is not None:
@@ -293,38 +325,25 @@ def _follow(detector, frames):
         yield blob
 
 
-def _whole(area):
-    """Frames in which the visible area (n,), NaN = not seen, is that of the whole target.
+def _whole(blobs):
+    """Frames (n,) in which the whole target is seen, given its blobs (None = not found).
 
-    A frame is partial if it lacks clearly more of the expected area than the scatter, and so is
-    every frame beside it, or beside a frame without target, that lacks a little.
+    Partial views differ from each other, whole views are alike: in the space of shapes they lie
+    close around one of them, at least a quarter of all views. As far as these also agree in size,
+    it is the target's. A view beside a strange one may be cut a little: it must be twice as close.
     """
-    seen = np.isfinite(area)
-    good = seen.copy()
-    # What is hidden pulls the expectation down: leave it out step by step.
-    for tolerance in (0.2, 0.1, 0.05, 0.02, 0.01):
-        lack = 1 - area / _local_fit(area, good)
-        scatter = 1.4826 * np.median(np.abs(lack[good])) if good.any() else 0.0
-        good = seen & (np.abs(lack) < max(tolerance, 5 * scatter))
-    lacking = seen & (lack > max(0.005, 2 * scatter))
-    return ~ndimage.binary_propagation(~good, mask=~good | lacking)
-
-
-def _local_fit(values, good):
-    """Local quadratic fit to the `good` among the values (n,); NaN where too few are near."""
-    offset = np.arange(-_MEMORY, _MEMORY + 1) / _MEMORY
-    kernel = (1 - np.abs(offset) ** 3) ** 3
-
-    def moments(y, order):
-        return [np.convolve(y, kernel * (-offset) ** k, "same") for k in range(order)]
-
-    # A clip shorter than the kernel is padded, since "same" returns the longer of the two lengths.
-    n, pad = len(values), max(0, len(kernel) - len(values))
-    s = moments(np.pad(good.astype(float), (0, pad)), 5)
-    b = moments(np.pad(np.where(good, values, 0.0), (0, pad)), 3)
-    matrix = np.array([[s[i + j] for j in range(3)] for i in range(3)]).transpose(2, 0, 1)
-    enough = s[0] > 3
-    fit = np.full(n + pad, np.nan)
-    right = np.array(b).T[enough][..., None]
-    fit[enough] = np.linalg.solve(matrix[enough] + 1e-6 * np.eye(3), right)[:, 0, 0]
-    return fit[:n]
+    views = [i for i, b in enumerate(blobs) if b is not None and b.inside]
+    sound = [i for i in views if blobs[i].shape is not None]
+    quarter = len(views) // 4
+    strangeness = np.full(len(blobs), np.inf)
+    if len(sound) > quarter:
+        shape = np.array([blobs[i].shape for i in sound])
+        area = np.array([blobs[i].area for i in sound])
+        distance = cdist(shape[:: 1 + len(shape) // _VIEWS], shape)
+        radius = np.partition(distance, quarter, axis=1)[:, quarter]
+        alike = _ALIKE / np.sqrt(area)
+        odd = distance[radius.argmin()] / np.maximum(alike, 6 * radius.min())
+        size = np.abs(np.log(area / np.median(area[odd < 1])))
+        odd_size = size / np.maximum(alike, 10 * np.median(size[odd < 1]))
+        strangeness[sound] = np.maximum(odd, odd_size)
+    return ~ndimage.binary_propagation(strangeness > 1, mask=strangeness > 0.5)
