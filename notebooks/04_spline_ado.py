@@ -492,8 +492,11 @@ def windows(name):
 tried = list(SYSTEMS) if full else ["Lorenz", "RayleighBenard"]
 outcomes = {name: windows(name) for name in tqdm(tried, desc="systems")}
 exact = {name: good for name, (good, _) in outcomes.items()}
-assert not np.all(list(exact.values()), axis=0).any()
-assert all(searched for _, searched in outcomes.values())
+searched = [name for name, (_, right) in outcomes.items() if right]
+one_for_all = np.sum(list(exact.values()), axis=0).max()
+print(f"one threshold for all: exact for at most {one_for_all} of {len(tried)}")
+print(f"the subset search: exact for {len(searched)}, {', '.join(searched)}")
+assert one_for_all < len(searched)
 
 # %%
 fig = plots_solver.plot_windows(thresholds, exact)
@@ -503,7 +506,7 @@ save_figure("solver_windows", fig, caption=caption, numbers={"threshold": thresh
 # %% [markdown]
 # *Thresholds that leave exactly the true terms, at 10 % noise (blue): for some systems there is none, and
 # no single one for the others. Who knows the truth can pick one. The subset search with its charges
-# is exact for all of them.*
+# gets more systems right than any one threshold, even here, before law and curve are refined together.*
 
 # %% [markdown]
 # ## The offset: the origin in which the law is sparsest
