@@ -492,6 +492,8 @@ def windows(name):
 tried = list(SYSTEMS) if full else ["Lorenz", "RayleighBenard"]
 outcomes = {name: windows(name) for name in tqdm(tried, desc="systems")}
 exact = {name: good for name, (good, _) in outcomes.items()}
+
+# %%
 searched = [name for name, (_, right) in outcomes.items() if right]
 one_for_all = np.sum(list(exact.values()), axis=0).max()
 print(f"one threshold for all: exact for at most {one_for_all} of {len(tried)}")
