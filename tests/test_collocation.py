@@ -57,7 +57,7 @@ def dense_jacobian(problem, state, columns):
 
 
 def test_one_equation_per_control_point_but_for_the_initial_condition(problem):
-    assert len(problem.node_first) == problem.r - len(problem.segments)
+    assert problem.nodes.shape[0] == problem.r - len(problem.segments)
 
 
 def test_objective_is_the_sum_of_squares(problem, state):

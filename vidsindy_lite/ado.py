@@ -251,7 +251,7 @@ class _Search:
         x, slope = problem.node_states(control)
         coefficients = np.zeros(self.exponents.shape)
         terms = monomials(x, self.exponents[rows])
-        coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=None)[0]
+        coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=self.noise.min())[0]
         active = np.repeat(rows[:, None], self.d, axis=1)
         origin, still = np.zeros(self.d), np.zeros(self.d, dtype=bool)
         state = State(control, coefficients, active, origin, still)

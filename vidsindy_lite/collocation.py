@@ -9,19 +9,18 @@ not, with the curve already eliminated.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from .information import RIDGE, equilibrated
-from .polynomials import monomial_gradients, monomials
+from .polynomials import monomials, shift_generators
 from .splines import DEGREE, clamped_knots, local_basis
 
 WIDTH = DEGREE + 1
-CHUNK = 512
-"""Nodes whose local matrices are multiplied in one go."""
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
 
@@ -133,6 +132,7 @@ class Collocation:
         physics_weights: np.ndarray,
     ) -> None:
         self.exponents = exponents
+        self.generators = shift_generators(exponents)
         self.d = exponents.shape[1]
         self.segments = list(segments)
         self.data_weights = np.asarray(data_weights, dtype=float)
@@ -141,36 +141,24 @@ class Collocation:
         self.starts = np.cumsum([0] + [len(k) - WIDTH for k in self.knots])
         self.r = int(self.starts[-1])
         self.x = np.concatenate([segment.x for segment in self.segments])
-        self.sample_first, self.sample_values = self._basis([s.t for s in self.segments])
+        self.samples = self._basis([s.t for s in self.segments])
         ends = [segment.breakpoints for segment in self.segments]
-        nodes = [
-            [(b[1:] + b[:-1]) / 2 for b in ends],
-            [b[:1] for b in ends],
-            [b[-1:] for b in ends],
-        ]
-        spans = [
-            [np.diff(b) for b in ends],
-            [np.diff(b[:2]) / 2 for b in ends],
-            [np.diff(b[-2:]) / 2 for b in ends],
-        ]
-        self.node_first, self.node_values = map(
-            np.concatenate, zip(*(self._basis(group) for group in nodes), strict=True)
-        )
-        self.node_slopes = np.concatenate([self._basis(group, order=1)[1] for group in nodes])
-        width = np.concatenate([np.concatenate(group) for group in spans])
+        nodes = [np.concatenate([b[:1], (b[1:] + b[:-1]) / 2, b[-1:]]) for b in ends]
+        spans = [np.diff(b) for b in ends]
+        width = np.concatenate([np.concatenate([w[:1] / 2, w, w[-1:] / 2]) for w in spans])
+        self.nodes, self.slopes = self._basis(nodes), self._basis(nodes, order=1)
         self.node_weights = width / width.sum() * len(self.x)
-        edges = np.cumsum([0] + [sum(map(len, group)) for group in nodes])
-        # Within a group no two nodes share their first control point, so slices add without clash.
-        self.groups = [slice(low, high) for low, high in zip(edges[:-1], edges[1:], strict=True)]
-        self._data_band = self._assemble_data_band()
+        self._data_band = np.zeros((WIDTH * self.d, self.r * self.d))
+        self._data_band[:: self.d] = np.kron(_normal_band(self.samples), self.data_weights)
 
-    def _basis(self, times: list[np.ndarray], order: int = 0) -> tuple[np.ndarray, np.ndarray]:
-        parts = []
-        for knots, start, t in zip(self.knots, self.starts[:-1], times, strict=True):
-            first, values = local_basis(knots, t, order)
-            parts.append((first + start, values))
-        first, values = zip(*parts, strict=True)
-        return np.concatenate(first), np.concatenate(values)
+    def _basis(self, times: list[np.ndarray], order: int = 0) -> sparse.csr_array:
+        """Basis functions of all segments at the given times of each, shape (times, r)."""
+        parts = [local_basis(knots, t, order) for knots, t in zip(self.knots, times, strict=True)]
+        first = np.concatenate(
+            [first + start for (first, _), start in zip(parts, self.starts[:-1], strict=True)]
+        )
+        values = np.concatenate([values for _, values in parts])
+        return _rows_from(first, values, self.r)
 
     def splines(self, control_points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Knots and control points of every segment."""
@@ -178,14 +166,11 @@ class Collocation:
 
     def curve(self, control_points: np.ndarray) -> np.ndarray:
         """The curve at the samples, shape (n, d)."""
-        return _local(self.sample_values, self.sample_first, control_points)
+        return self.samples @ control_points
 
     def node_states(self, control_points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The curve and its slope at the collocation nodes, each of shape (k, d)."""
-        return (
-            _local(self.node_values, self.node_first, control_points),
-            _local(self.node_slopes, self.node_first, control_points),
-        )
+        return self.nodes @ control_points, self.slopes @ control_points
 
     def data_loss(self, control_points: np.ndarray) -> float:
         """Weighted sum of squares of the data residual (chi-square)."""
@@ -223,62 +208,47 @@ class Collocation:
         """
         d, r, l = self.d, self.r, len(self.exponents)
         x, slope = self.node_states(state.control_points)
-        rows = state.active.any(axis=1)
         offset_columns = columns[columns >= d * l] - d * l
         term_columns = columns[columns < d * l]
         terms = monomials(x - state.offset, self.exponents)
-        jacobian = np.einsum(
-            "kli,lj->kji",
-            monomial_gradients(x - state.offset, self.exponents[rows]),
-            state.coefficients[rows],
-        )
         root = np.sqrt(self.node_weights[:, None] * self.physics_weights)
-        residual = root * (slope - terms[:, rows] @ state.coefficients[rows])
-
-        # Jacobian of the physics residual in the local control points: (nodes, equation, a, i).
-        local = -jacobian[:, :, None, :] * self.node_values[:, None, :, None]
-        for i in range(d):
-            local[:, i, :, i] += self.node_slopes
-        local = (local * root[:, :, None, None]).reshape(-1, d, WIDTH * d)
-        band = self._data_band + self._scatter_band(local.transpose(0, 2, 1) @ local)
+        residual = root * (slope - terms @ state.coefficients)
+        # (nodes, equation, coordinate): how the law changes with the state.
+        jacobian = root[:, :, None] * (terms @ (self.generators @ state.coefficients)).transpose(
+            1, 2, 0
+        )
+        physics = self._physics_rows(root, jacobian)
+        band = self._data_band + _normal_band(physics)
         band[0] += damping * band[0] + 1e-12 * band[0].max()
 
-        # The same in the unknowns of the law: own[j] for the terms of equation j, moved for the
-        # offset; and what both leave in the normal equations.
+        # The same in the unknowns of the law: minus the terms in their own equation, and the
+        # rates of the law for the offset; the residual comes first.
         size, count = len(columns), len(term_columns)
-        own = np.zeros((len(residual), d, size))
+        unknowns = np.zeros((len(residual), d, 1 + size))
+        unknowns[:, :, 0] = residual
         for j in range(d):
             here = np.flatnonzero(term_columns // l == j)
-            own[:, j, here] = -root[:, j, None] * terms[:, term_columns[here] % l]
-        own[:, :, count:] = root[:, :, None] * jacobian[:, :, offset_columns]
-        unknowns = np.concatenate([residual[:, :, None], own], axis=2)
+            unknowns[:, j, 1 + here] = -root[:, j, None] * terms[:, term_columns[here] % l]
+        unknowns[:, :, 1 + count :] = jacobian[:, :, offset_columns]
+        unknowns = unknowns.reshape(-1, 1 + size)
         data_residual = self.curve(state.control_points) - self.x
-        right = np.zeros((r, d, 1 + size))
-        right[:, :, 0] = self._pull(data_residual)
-        for part in _chunks(self.groups):
-            blocks = local[part].transpose(0, 2, 1) @ unknowns[part]
-            blocks = blocks.reshape(-1, WIDTH, d, 1 + size)
-            for a in range(WIDTH):
-                right[self.node_first[part] + a] += blocks[:, a]
+        right = physics.T @ unknowns
+        right[:, 0] += (self.samples.T @ (data_residual * self.data_weights)).ravel()
 
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-        solved = cho_solve_banded((factor, True), right.reshape(r * d, -1), check_finite=False)
-        solved = np.ascontiguousarray(solved).reshape(r, d, 1 + size)
+        solved = cho_solve_banded((factor, True), right, check_finite=False)
+        solved = np.ascontiguousarray(solved)
 
         # What the curve cannot follow. Its Gram matrix is the Schur complement, without the
         # cancellation between two large matrices that a large physics weight would bring.
-        gram = np.zeros((1 + size, 1 + size))
-        for part in _chunks(self.groups):
-            near = np.stack([solved[self.node_first[part] + a] for a in range(WIDTH)], axis=1)
-            left = unknowns[part] - local[part] @ near.reshape(-1, WIDTH * d, 1 + size)
-            left = left.reshape(-1, 1 + size)
-            gram += left.T @ left
-        for part in _chunks([slice(0, len(self.x))]):
-            follow = -_local(self.sample_values[part], self.sample_first[part], solved)
-            follow[:, :, 0] += data_residual[part]
-            follow *= np.sqrt(self.data_weights)[:, None]
-            follow = follow.reshape(-1, 1 + size)
-            gram += follow.T @ follow
+        left = unknowns - physics @ solved
+        gram = left.T @ left
+        solved = solved.reshape(r, d, 1 + size)
+        follow = -(self.samples @ solved.reshape(r, -1)).reshape(-1, d, 1 + size)
+        follow[:, :, 0] += data_residual
+        follow *= np.sqrt(self.data_weights)[:, None]
+        follow = follow.reshape(-1, 1 + size)
+        gram += follow.T @ follow
         objective = float((data_residual**2).sum(axis=0) @ self.data_weights + (residual**2).sum())
         return Linearisation(
             objective=objective,
@@ -288,6 +258,16 @@ class Collocation:
             curve_step=-solved[:, :, 0],
             curve_response=-solved[:, :, 1:],
         )
+
+    def _physics_rows(self, root: np.ndarray, jacobian: np.ndarray) -> sparse.csr_array:
+        """Jacobian of the weighted physics residual in the control points, (k d, r d)."""
+        d = self.d
+        values, slopes = (basis.data.reshape(-1, WIDTH) for basis in (self.nodes, self.slopes))
+        local = -jacobian[:, :, None, :] * values[:, None, :, None]
+        for i in range(d):
+            local[:, i, :, i] += root[:, i, None] * slopes
+        first = self.nodes.indices.reshape(-1, WIDTH)[:, 0] * d
+        return _rows_from(np.repeat(first, d), local.reshape(-1, WIDTH * d), self.r * d)
 
     def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> State:
         """Minimise the objective over the curve and the free coefficients and offsets.
@@ -322,45 +302,25 @@ class Collocation:
                 break
         return state
 
-    def _assemble_data_band(self) -> np.ndarray:
-        products = self.sample_values[:, :, None] * self.sample_values[:, None, :]
-        wide = np.zeros((WIDTH * self.d, self.r * self.d))
-        for a in range(WIDTH):
-            for b in range(a + 1):
-                column = np.bincount(self.sample_first + b, products[:, a, b], minlength=self.r)
-                wide[(a - b) * self.d] += (column[:, None] * self.data_weights).ravel()
-        return wide
 
-    def _pull(self, residual: np.ndarray) -> np.ndarray:
-        """Weighted data residual collected at the control points, shape (r, d)."""
-        total = np.zeros((self.r, self.d))
-        for a in range(WIDTH):
-            for i in range(self.d):
-                weight = self.sample_values[:, a] * residual[:, i] * self.data_weights[i]
-                total[:, i] += np.bincount(self.sample_first + a, weight, minlength=self.r)
-        return total
-
-    def _scatter_band(self, blocks: np.ndarray) -> np.ndarray:
-        """Add up local normal matrices (k, 4 d, 4 d) in lower banded storage."""
-        band = np.zeros((WIDTH * self.d, self.r * self.d))
-        for group in self.groups:
-            base = self.node_first[group] * self.d
-            for p in range(WIDTH * self.d):
-                for q in range(p + 1):
-                    band[p - q, base + q] += blocks[group, p, q]
-        return band
+def _rows_from(first: np.ndarray, values: np.ndarray, size: int) -> sparse.csr_array:
+    """Sparse rows that each hold consecutive values from a first column on."""
+    n, width = values.shape
+    columns = first[:, None] + np.arange(width)
+    starts = np.arange(0, n * width + 1, width)
+    return sparse.csr_array((values.ravel(), columns.ravel(), starts), shape=(n, size))
 
 
-def _chunks(slices: Sequence[slice]) -> Iterator[slice]:
-    """Pieces small enough for the processor's cache, which the products then stay in."""
-    for whole in slices:
-        for low in range(whole.start, whole.stop, CHUNK):
-            yield slice(low, min(low + CHUNK, whole.stop))
-
-
-def _local(values: np.ndarray, first: np.ndarray, control_points: np.ndarray) -> np.ndarray:
-    weights = values.reshape(*values.shape, *(1,) * (control_points.ndim - 1))
-    return sum(weights[:, a] * control_points[first + a] for a in range(WIDTH))
+def _normal_band(rows: sparse.csr_array) -> np.ndarray:
+    """Lower banded storage of ``rows' rows``, for rows as `_rows_from` makes them."""
+    n, size = rows.shape
+    values, columns = rows.data.reshape(n, -1), rows.indices.reshape(n, -1)
+    width = values.shape[1]
+    band = np.empty((width, size))
+    for lag in range(width):
+        products = values[:, lag:] * values[:, : width - lag]
+        band[lag] = np.bincount(columns[:, : width - lag].ravel(), products.ravel(), minlength=size)
+    return band
 
 
 def _solved(information: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:

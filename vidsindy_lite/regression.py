@@ -40,6 +40,26 @@ def subset_search(
     """
     matrix, scale = equilibrated(information)
     target = pull * scale
+    kept = np.isneginf(charge)
+    support, value = min(
+        (_descend(matrix, target, charge, first) for first in (start, kept)),
+        key=lambda item: item[1],
+    )
+    while True:
+        deeper = _through_newcomer(matrix, target, charge, support, value)
+        if deeper is None:
+            break
+        support, value = deeper
+    inside = np.flatnonzero(support)
+    solution = np.zeros(len(target))
+    solution[inside] = np.linalg.solve(matrix[np.ix_(inside, inside)], target[inside])
+    return support, solution * scale, value
+
+
+def _descend(
+    matrix: np.ndarray, target: np.ndarray, charge: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Take the best of all drops, adds and swaps until none helps."""
     support = start.copy()
     best, value = support, np.inf
     while True:
@@ -50,8 +70,6 @@ def subset_search(
         if not paid - target[inside] @ fitted < value - 1e-9:
             break
         best, value = support.copy(), float(paid - target[inside] @ fitted)
-        solution = np.zeros(len(target))
-        solution[inside] = fitted
         change, drop, add = min(
             _single_changes(matrix, target, charge, support), key=lambda item: item[0]
         )
@@ -59,7 +77,22 @@ def subset_search(
             break
         support[drop] = False
         support[add] = True
-    return best, solution * scale, value
+    return best, value
+
+
+def _through_newcomer(
+    matrix: np.ndarray, target: np.ndarray, charge: np.ndarray, support: np.ndarray, value: float
+) -> tuple[np.ndarray, float] | None:
+    """A lower value reached by forcing one entry in, which may let several others go."""
+    for entry in np.flatnonzero(~support):
+        locked = charge.copy()
+        locked[entry] = -np.inf
+        start = support.copy()
+        start[entry] = True
+        trial, paid = _descend(matrix, target, locked, start)
+        if paid + charge[entry] < value - 1e-3:
+            return _descend(matrix, target, charge, trial)
+    return None
 
 
 def closest_rival(
