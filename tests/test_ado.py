@@ -67,6 +67,35 @@ def test_other_dimensions_and_uneven_times(name):
     assert score(found, truth).exact
 
 
+TIED = {  # what is conserved ties the candidates together along the record
+    "oscillator": ({"x": {"y": 1}, "y": {"x": -1}}, (10, 10), (11, 10), 20, 3),
+    "rigid body": (
+        {"x": {"yz": 1}, "y": {"xz": -2}, "z": {"xy": 0.6}},
+        (10, 10, 0),
+        (11, 10.5, 0.8),
+        20,
+        3,
+    ),
+    "springs": (
+        {"x": {"y": 1}, "y": {"x": -2, "z": 1}, "z": {"w": 1}, "w": {"x": 1, "z": -3}},
+        (0, 0, 0, 0),
+        (1, 0, 0.5, 0),
+        30,
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TIED)
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_conserved_quantities_do_not_hide_the_law(name, noise):
+    terms, offset, x0, duration, degree = TIED[name]
+    truth = PolynomialSystem.from_terms(terms).shift(offset)
+    t = np.linspace(0, duration, 600)
+    x = add_noise(truth.simulate(t, x0), noise, np.random.default_rng(1))
+    assert score(discover(t, x, degree=degree), truth).exact
+
+
 def test_four_dimensions():
     truth = PolynomialSystem.from_terms(
         {

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vidsindy_lite.polynomials import monomial_exponents, monomials
-from vidsindy_lite.regression import stridge, subset_search
+from vidsindy_lite.regression import closest_rival, stridge, subset_search
 from vidsindy_lite.systems import SYSTEMS
 
 
@@ -115,6 +115,37 @@ def test_a_swap_leaves_a_support_that_drops_and_adds_cannot():
     support, solution, _ = subset_search(information, pull, charge, start)
     assert list(support) == [False, False, True]
     np.testing.assert_allclose(solution, [0, 0, 1], atol=1e-6)
+
+
+def circle(radius=1.0):
+    """Information and pull of 1, x, x^2, y^2, y for y - 10, on a circle around (10, 10)."""
+    angle = np.linspace(0, 6, 200)
+    x, y = 10 + radius * np.cos(angle), 10 + radius * np.sin(angle)
+    columns = np.stack([np.ones_like(x), x, x**2, y**2, y], axis=1)
+    weight = 1e8  # chi-square units: noise of 1e-4
+    return weight * columns.T @ columns, weight * columns.T @ (y - 10)
+
+
+def test_a_conserved_quantity_does_not_trap_the_search():
+    information, pull = circle()
+    start = np.array([True, True, True, True, False])
+    support, solution, _ = subset_search(information, pull, np.full(5, 10.0), start)
+    assert support.tolist() == [True, False, False, False, True]
+    np.testing.assert_allclose(solution[[0, 4]], [-10, 1], rtol=1e-4)
+
+
+def test_the_closest_rival_is_priced_as_it_is():
+    information, pull = circle()
+    support = np.array([True, False, False, False, True])
+    charge = np.full(5, 10.0)
+    cost, dropped, added = closest_rival(information, pull, charge, support)
+    changed = support.copy()
+    changed[dropped], changed[added] = False, True
+    price = objective(information, pull, charge, changed)
+    assert cost == pytest.approx(
+        price - objective(information, pull, charge, support), rel=1e-3, abs=1e-2
+    )
+    assert cost > 9
 
 
 def test_a_charge_of_minus_infinity_keeps_a_worthless_column():

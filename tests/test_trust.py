@@ -7,7 +7,7 @@ from vidsindy_lite.ado import term_charges
 from vidsindy_lite.collocation import Collocation, Segment, State
 from vidsindy_lite.polynomials import PolynomialSystem
 from vidsindy_lite.splines import DEGREE
-from vidsindy_lite.trust import doubts
+from vidsindy_lite.trust import doubts, frame_doubts
 
 NOISE = 0.03
 
@@ -47,3 +47,18 @@ def test_the_true_law_is_not_doubted(duffing):
 
 def test_a_missing_term_is_noticed(duffing):
     assert any("the terms left out explain more than chance" in d for d in fitted(duffing, "x^3"))
+
+
+def test_a_narrow_decision_in_the_frame_of_the_data_is_told(duffing):
+    law = duffing[0]
+    margins = np.full(law.coefficients.size, 100.0)
+    assert frame_doubts(law, margins) == []
+    margins[[law.terms.index("1"), len(law.terms) + law.terms.index("x^3")]] = 3.0, 1.5
+    (doubt,) = frame_doubts(law, margins)
+    assert "with 1 in dx/dt, without x^3 in dy/dt (criterion +1.5)" in doubt
+
+
+def test_a_coordinate_that_lost_its_law_is_told(duffing):
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
+    (doubt,) = frame_doubts(law, np.full(law.coefficients.size, 100.0))
+    assert "no term was found for dy/dt" in doubt

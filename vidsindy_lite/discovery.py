@@ -11,6 +11,7 @@ from scipy.interpolate import BSpline
 from .collocation import Collocation, State
 from .information import inverse
 from .polynomials import PolynomialSystem, shift_generators, shift_matrix, variable_names
+from .trust import frame_doubts
 
 
 @dataclass(frozen=True)
@@ -208,20 +209,23 @@ def report(
 
     native_covariance = covariance[: l * d, : l * d]
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
-    moved, moved_covariance = _pruned(moved, moved_covariance, charges)
+    moved, moved_covariance, margins = _pruned(moved, moved_covariance, charges)
+    law = PolynomialSystem(names, exponents, moved)
+    if not state.moving.any():
+        margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
     splines = (
         BSpline(knots * units.time, control * units.scale + units.centre, 3)
         for knots, control in problem.splines(state.control_points)
     )
     return Discovery(
-        system=PolynomialSystem(names, exponents, moved),
+        system=law,
         native=PolynomialSystem(names, exponents, coefficients),
         offset=offset,
         covariance=moved_covariance,
         native_covariance=native_covariance,
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
         noise=problem.data_weights**-0.5 * units.scale,
-        warnings=tuple(warnings),
+        warnings=(*warnings, *frame_doubts(law, margins)),
         history=tuple(history),
         curves=tuple(splines),
     )
@@ -243,16 +247,19 @@ def _shifted(
 
 def _pruned(
     coefficients: np.ndarray, covariance: np.ndarray, charges: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Set what cannot be told from zero to zero, one by one, and correct the others for it.
 
     Shifting a law by an estimated offset leaves remainders where the exact shift cancels. The
-    least significant is taken out by conditioning the Gaussian estimate on its being zero.
+    least significant is taken out by conditioning the Gaussian estimate on its being zero. Comes
+    back with the margin of each decision, in chi-square units; infinite where none was taken.
     """
     shape = coefficients.shape[::-1]
     flat = coefficients.T.ravel().copy()
     covariance = covariance.copy()
     original = np.diag(covariance).copy()
+    charge = np.tile(charges, shape[0])
+    margins = np.full(len(flat), np.inf)
     while True:
         variance = np.diag(covariance)
         live = np.flatnonzero(flat)
@@ -263,10 +270,13 @@ def _pruned(
         if len(gone):
             flat[gone] = 0.0
             continue
-        weakness = score / np.tile(charges, coefficients.shape[1])[live]
+        weakness = score / charge[live]
         if not len(live) or weakness.min() >= 1:
+            margins[live] = score - charge[live]
             break
-        k = live[weakness.argmin()]
+        weakest = weakness.argmin()
+        k = live[weakest]
+        margins[k] = charge[k] - score[weakest]
         gain = covariance[:, k] / covariance[k, k]
         flat -= gain * flat[k]
         covariance -= np.outer(gain, covariance[k])
@@ -274,7 +284,7 @@ def _pruned(
         covariance[k] = covariance[:, k] = 0.0
     dead = flat == 0
     covariance[dead] = covariance[:, dead] = 0.0
-    return flat.reshape(shape).T, covariance
+    return flat.reshape(shape).T, covariance, margins
 
 
 def _errors(covariance: np.ndarray, law: PolynomialSystem) -> np.ndarray:

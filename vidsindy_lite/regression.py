@@ -8,6 +8,8 @@ from .information import equilibrated
 
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
+PLATEAU = 1e-3
+"""Changes of the objective below this are taken for rounding."""
 
 
 def subset_search(
@@ -15,9 +17,11 @@ def subset_search(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Minimise ``c' S c - 2 b' c + sum of charges of the non-zero entries`` by local search.
 
-    Starts at a support and takes the best of all single drops, adds and swaps until none helps.
-    Unlike a threshold it weighs a term by what the fit loses with it, re-fitting all others, so
-    it survives collinear columns and coefficients of very different size.
+    Takes the best of all single drops, adds and swaps until none helps, once from the given
+    support and once from nothing; then asks of every entry left out whether it lets others go
+    that it does not pay for by itself (where a conserved quantity ties terms together, only that
+    leads on). Unlike a threshold it weighs a term by what the fit loses with it, re-fitting all
+    others, so it survives collinear columns and coefficients of very different size.
 
     Parameters
     ----------
@@ -63,13 +67,11 @@ def _descend(
     support = start.copy()
     best, value = support, np.inf
     while True:
-        inside = np.flatnonzero(support)
-        fitted = np.linalg.solve(matrix[np.ix_(inside, inside)], target[inside])
-        paid = charge[inside[np.isfinite(charge[inside])]].sum()
+        reached = _value(matrix, target, charge, support)
         # Rounding may promise a fall that does not come: what counts is the value itself.
-        if not paid - target[inside] @ fitted < value - 1e-9:
+        if not reached < value - 1e-9:
             break
-        best, value = support.copy(), float(paid - target[inside] @ fitted)
+        best, value = support.copy(), reached
         change, drop, add = min(
             _single_changes(matrix, target, charge, support), key=lambda item: item[0]
         )
@@ -90,7 +92,7 @@ def _through_newcomer(
         start = support.copy()
         start[entry] = True
         trial, paid = _descend(matrix, target, locked, start)
-        if paid + charge[entry] < value - 1e-3:
+        if paid + charge[entry] < value - PLATEAU:
             return _descend(matrix, target, charge, trial)
     return None
 
@@ -115,7 +117,26 @@ def closest_rival(
         The entries that leave and enter, at most one each.
     """
     matrix, scale = equilibrated(information)
-    return min(_single_changes(matrix, pull * scale, charge, support), key=lambda item: item[0])
+    target = pull * scale
+    now = _value(matrix, target, charge, support)
+    rivals = []
+    for cost, dropped, added in _single_changes(matrix, target, charge, support):
+        if np.isfinite(cost):  # a rough one where terms are tied together: work it out again
+            changed = support.copy()
+            changed[dropped], changed[added] = False, True
+            cost = _value(matrix, target, charge, changed) - now
+        rivals.append((cost, dropped, added))
+    return min(rivals, key=lambda item: item[0])
+
+
+def _value(
+    matrix: np.ndarray, target: np.ndarray, charge: np.ndarray, support: np.ndarray
+) -> float:
+    """The objective with charges at its minimum on a support."""
+    inside = np.flatnonzero(support)
+    fitted = np.linalg.solve(matrix[np.ix_(inside, inside)], target[inside])
+    paid = charge[inside[np.isfinite(charge[inside])]].sum()
+    return float(paid - target[inside] @ fitted)
 
 
 def _single_changes(

@@ -62,7 +62,6 @@ def doubts(
     return [
         *_misfit(law, problem, noise),
         *_unmet(state, problem),
-        *_standstill(law),
         *_selection(law, state, problem, charges),
         *_sampling(records),
     ]
@@ -91,14 +90,6 @@ def _unmet(state: State, problem: Collocation) -> list[str]:
     ]
 
 
-def _standstill(law: PolynomialSystem) -> list[str]:
-    return [
-        f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
-        for name, moves in zip(law.names, law.support.any(axis=0), strict=True)
-        if not moves
-    ]
-
-
 def _selection(
     law: PolynomialSystem, state: State, problem: Collocation, charges: np.ndarray
 ) -> list[str]:
@@ -115,7 +106,7 @@ def _left_over(model: Linearisation, state: State) -> list[str]:
     pull = scale * model.gradient
     gain = float(pull @ np.linalg.solve(matrix, pull))
     unused = int((~state.active).sum())
-    if chi2.sf(gain, unused) > CHANCE:
+    if not unused or chi2.sf(gain, unused) > CHANCE:
         return []
     return [
         f"the terms left out explain more than chance (chi-square {gain:.0f} for {unused}): a term "
@@ -135,26 +126,64 @@ def _near_tie(
     )
     if cost > NEAR_TIE:
         return []
-    out, into = (
-        " and ".join(
-            f"{law.terms[k % len(law.terms)]} in d{law.names[k // len(law.terms)]}/dt"
-            for k in entries
-        )
-        for entries in (dropped, added)
-    )
+    out, into = (" and ".join(_place(law, k) for k in entries) for entries in (dropped, added))
     change = (
         f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
     )
+    frame = "in its own frame, " if state.moving.any() else ""
     return [
-        f"another law fits almost as well: {change} (criterion {cost:+.1f}); the data "
+        f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
         "do not settle it: use a longer or cleaner record"
     ]
+
+
+def frame_doubts(law: PolynomialSystem, margins: np.ndarray) -> list[str]:
+    """Reasons not to trust what a law became in the frame of the data.
+
+    Parameters
+    ----------
+    law : PolynomialSystem
+        The law in that frame.
+    margins : ndarray, shape (l d,)
+        By how much the criterion rises if a term is taken out or put back, equation by equation.
+
+    Returns
+    -------
+    list of str
+    """
+    return [*_standstill(law), *_narrow(law, margins)]
+
+
+def _standstill(law: PolynomialSystem) -> list[str]:
+    return [
+        f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
+        for name, moves in zip(law.names, law.support.any(axis=0), strict=True)
+        if not moves
+    ]
+
+
+def _narrow(law: PolynomialSystem, margins: np.ndarray) -> list[str]:
+    close = np.flatnonzero(margins < NEAR_TIE)
+    if not len(close):
+        return []
+    kept = law.support.T.ravel()
+    changes = ", ".join(f"{'without' if kept[k] else 'with'} {_place(law, k)}" for k in close)
+    return [
+        f"in the frame of the data another law fits almost as well: {changes} (criterion "
+        f"{margins[close].min():+.1f}); the standard errors do not count this in"
+    ]
+
+
+def _place(law: PolynomialSystem, entry: int) -> str:
+    """Name of an entry of the coefficients, counted equation by equation."""
+    equation, term = divmod(int(entry), len(law.terms))
+    return f"{law.terms[term]} in d{law.names[equation]}/dt"
 
 
 def _sampling(records: Sequence[Record]) -> list[str]:
     found = []
     turns = sum(t[-1] - t[0] for t, _ in records) / (2 * np.pi)
-    if turns < TURNS:
+    if turns < TURNS and records[0][1].shape[1] > 1:  # on a line nothing turns
         found.append(
             f"the record covers only {turns:.1f} turns of the motion: terms may be "
             "indistinguishable on it; record longer"
