@@ -40,7 +40,7 @@ def test_without_correlation_the_search_finds_the_global_minimum(seed, m, price,
     information = np.diag(10.0 ** rng.uniform(-3, 3, m))
     pull = rng.standard_normal(m) * np.sqrt(np.diag(information))
     charge = price * rng.uniform(0.1, 1, m)
-    support, solution, value = subset_search(information, pull, charge, np.full(m, full))
+    support, solution, value = subset_search(information, pull, 0 * pull, charge, np.full(m, full))
     expected, lowest = brute_force(information, pull, charge)
     # Every term decides for itself: no local minimum. Ties are a matter of rounding.
     worth = pull**2 / np.diag(information)
@@ -54,10 +54,10 @@ def test_without_correlation_the_search_finds_the_global_minimum(seed, m, price,
 def test_with_three_columns_the_search_from_everything_is_rarely_off(seed, m, price):
     information, pull, _ = random_problem(seed, m)
     charge = np.full(m, price)
-    _, _, value = subset_search(information, pull, charge, np.ones(m, dtype=bool))
+    _, _, value = subset_search(information, pull, 0 * pull, charge, np.ones(m, dtype=bool))
     _, lowest = brute_force(information, pull, charge)
     others = [
-        subset_search(information, pull, charge, np.array(s, dtype=bool))[2]
+        subset_search(information, pull, 0 * pull, charge, np.array(s, dtype=bool))[2]
         for s in product([False, True], repeat=m)
     ]
     # One of the starts is the minimum itself, where the search has to stay.
@@ -70,7 +70,7 @@ def test_no_single_move_improves_the_result(seed, m, price):
     information, pull, rng = random_problem(seed, m)
     charge = price * rng.uniform(0.5, 1.5, m)
     start = rng.random(m) < 0.5
-    support, solution, value = subset_search(information, pull, charge, start)
+    support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
     tolerance = 1e-6 * (1 + abs(value))
     assert (np.flatnonzero(solution) == np.flatnonzero(support)).all()
     assert value == pytest.approx(objective(information, pull, charge, support), abs=tolerance)
@@ -95,7 +95,7 @@ def test_with_clear_data_the_true_support_is_found_from_everything_and_from_noth
     information, pull = matrix.T @ matrix, matrix.T @ target
     charge = np.full(10, 0.01)
     for start in (np.ones(10, dtype=bool), np.zeros(10, dtype=bool)):
-        support, solution, value = subset_search(information, pull, charge, start)
+        support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
         assert (support == (truth != 0)).all()
         assert value == pytest.approx(brute_force(information, pull, charge)[1])
         np.testing.assert_allclose(solution[support], truth[support], atol=0.01)
@@ -112,7 +112,7 @@ def test_a_swap_leaves_a_support_that_drops_and_adds_cannot():
     wrong = objective(information, pull, charge, start)
     assert objective(information, pull, charge, [False, False, False]) > wrong
     assert objective(information, pull, charge, [True, False, True]) > wrong
-    support, solution, _ = subset_search(information, pull, charge, start)
+    support, solution, _ = subset_search(information, pull, 0 * pull, charge, start)
     assert list(support) == [False, False, True]
     np.testing.assert_allclose(solution, [0, 0, 1], atol=1e-6)
 
@@ -129,7 +129,7 @@ def circle(radius=1.0):
 def test_a_conserved_quantity_does_not_trap_the_search():
     information, pull = circle()
     start = np.array([True, True, True, True, False])
-    support, solution, _ = subset_search(information, pull, np.full(5, 10.0), start)
+    support, solution, _ = subset_search(information, pull, 0 * pull, np.full(5, 10.0), start)
     assert support.tolist() == [True, False, False, False, True]
     np.testing.assert_allclose(solution[[0, 4]], [-10, 1], rtol=1e-4)
 
@@ -138,7 +138,7 @@ def test_the_closest_rival_is_priced_as_it_is():
     information, pull = circle()
     support = np.array([True, False, False, False, True])
     charge = np.full(5, 10.0)
-    cost, dropped, added = closest_rival(information, pull, charge, support)
+    cost, dropped, added = closest_rival(information, pull, 0 * pull, charge, support)
     changed = support.copy()
     changed[dropped], changed[added] = False, True
     price = objective(information, pull, charge, changed)
@@ -151,7 +151,9 @@ def test_the_closest_rival_is_priced_as_it_is():
 def test_a_charge_of_minus_infinity_keeps_a_worthless_column():
     information, pull = np.eye(3), np.array([5.0, 0.0, 0.1])
     charge = np.array([1.0, -np.inf, 1.0])
-    support, solution, value = subset_search(information, pull, charge, np.ones(3, dtype=bool))
+    support, solution, value = subset_search(
+        information, pull, 0 * pull, charge, np.ones(3, dtype=bool)
+    )
     assert list(support) == [True, True, False]
     np.testing.assert_allclose(solution, [5, 0, 0])
     assert value == pytest.approx(1 - 25)
@@ -159,7 +161,7 @@ def test_a_charge_of_minus_infinity_keeps_a_worthless_column():
 
 def test_the_start_is_left_as_it_is():
     start = np.ones(3, dtype=bool)
-    subset_search(np.eye(3), np.zeros(3), np.ones(3), start)
+    subset_search(np.eye(3), np.zeros(3), np.zeros(3), np.ones(3), start)
     assert start.all()
 
 
@@ -168,8 +170,10 @@ def test_scaling_a_column_scales_its_coefficient_and_changes_nothing_else(seed):
     information, pull, rng = random_problem(seed, 5)
     scale = 10.0 ** rng.uniform(-3, 3, 5)
     charge, start = np.ones(5), np.ones(5, dtype=bool)
-    support, solution, value = subset_search(information, pull, charge, start)
-    scaled = subset_search(information * scale[:, None] * scale, pull * scale, charge, start)
+    support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
+    scaled = subset_search(
+        information * scale[:, None] * scale, pull * scale, 0 * pull, charge, start
+    )
     assert (scaled[0] == support).all()
     np.testing.assert_allclose(scaled[1] * scale, solution, rtol=1e-5, atol=1e-8)
     assert scaled[2] == pytest.approx(value, rel=1e-6)

@@ -280,10 +280,7 @@ class _Search:
             present = state.flat()[columns]
             charge = np.append(np.tile(self.charges, self.d), np.full(self.d, -np.inf))[columns]
             support, solution, _ = subset_search(
-                model.information,
-                model.information @ present + model.gradient,
-                charge,
-                state.free()[columns],
+                model.information, model.gradient, present, charge, state.free()[columns]
             )
             if (support == state.free()[columns]).all():
                 break
@@ -342,16 +339,17 @@ class _Search:
         information = information[np.ix_(hull.columns, hull.columns)]
         support, solution, value = subset_search(
             information,
-            information @ present,
+            np.zeros(len(hull.columns)),
+            present,
             np.tile(self.charges, self.d)[hull.columns],
             np.ones(len(hull.columns), dtype=bool),
         )
-        cost = hull.objective + value + present @ information @ present
         flat = np.zeros((2, self.exponents.size))
         flat[:, hull.columns] = solution, support
         coefficients, active = flat.reshape(2, self.d, -1).transpose(0, 2, 1)
         state = State(hull.state.control_points, coefficients, active != 0, origin.copy(), moving)
-        return _Candidate(cost + self.axis_charge * moving.sum(), state)
+        cost = hull.objective + value + self.axis_charge * moving.sum()
+        return _Candidate(cost, state)
 
     def _best(self, candidates: list[_Candidate], segments: list[Segment]) -> State:
         """Refine the cheapest candidates; the lowest criterion wins."""

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import dataclass
+
 import numpy as np
 
 from .information import equilibrated
 
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
-PLATEAU = 1e-3
-"""Changes of the objective below this are taken for rounding."""
+PLATEAU = 1e-6
+"""Changes of the function below this are taken for rounding."""
 
 
 def subset_search(
-    information: np.ndarray, pull: np.ndarray, charge: np.ndarray, start: np.ndarray
+    information: np.ndarray,
+    gradient: np.ndarray,
+    present: np.ndarray,
+    charge: np.ndarray,
+    start: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Minimise ``c' S c - 2 b' c + sum of charges of the non-zero entries`` by local search.
+    """Minimise a quadratic function of ``c`` plus charges of its non-zero entries, by local search.
 
+    The function is ``(c - p)' S (c - p) - 2 g' (c - p)``: what Gauss-Newton knows around ``p``.
     Takes the best of all single drops, adds and swaps until none helps, once from the given
     support and once from nothing; then asks of every entry left out whether it lets others go
     that it does not pay for by itself (where a conserved quantity ties terms together, only that
@@ -27,8 +35,10 @@ def subset_search(
     ----------
     information : ndarray, shape (m, m)
         ``S``, symmetric positive semi-definite.
-    pull : ndarray, shape (m,)
-        ``b``.
+    gradient : ndarray, shape (m,)
+        ``g``.
+    present : ndarray, shape (m,)
+        ``p``; zeros for a plain regression.
     charge : ndarray, shape (m,)
         Price of each non-zero entry, in the units of the objective; minus infinity keeps it in.
     start : ndarray of bool, shape (m,)
@@ -40,71 +50,30 @@ def subset_search(
     solution : ndarray, shape (m,)
         Minimiser on the support, zero elsewhere.
     value : float
-        The objective with charges.
+        The function with charges.
     """
-    matrix, scale = equilibrated(information)
-    target = pull * scale
-    kept = np.isneginf(charge)
-    support, value = min(
-        (_descend(matrix, target, charge, first) for first in (start, kept)),
-        key=lambda item: item[1],
-    )
-    while True:
-        deeper = _through_newcomer(matrix, target, charge, support, value)
-        if deeper is None:
-            break
-        support, value = deeper
-    inside = np.flatnonzero(support)
-    solution = np.zeros(len(target))
-    solution[inside] = np.linalg.solve(matrix[np.ix_(inside, inside)], target[inside])
-    return support, solution * scale, value
-
-
-def _descend(
-    matrix: np.ndarray, target: np.ndarray, charge: np.ndarray, start: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """Take the best of all drops, adds and swaps until none helps."""
-    support = start.copy()
-    best, value = support, np.inf
-    while True:
-        reached = _value(matrix, target, charge, support)
-        # Rounding may promise a fall that does not come: what counts is the value itself.
-        if not reached < value - 1e-9:
-            break
-        best, value = support.copy(), reached
-        change, drop, add = min(
-            _single_changes(matrix, target, charge, support), key=lambda item: item[0]
-        )
-        if not change < -1e-9:
-            break
-        support[drop] = False
-        support[add] = True
-    return best, value
-
-
-def _through_newcomer(
-    matrix: np.ndarray, target: np.ndarray, charge: np.ndarray, support: np.ndarray, value: float
-) -> tuple[np.ndarray, float] | None:
-    """A lower value reached by forcing one entry in, which may let several others go."""
-    for entry in np.flatnonzero(~support):
-        locked = charge.copy()
-        locked[entry] = -np.inf
-        start = support.copy()
-        start[entry] = True
-        trial, paid = _descend(matrix, target, locked, start)
-        if paid + charge[entry] < value - PLATEAU:
-            return _descend(matrix, target, charge, trial)
-    return None
+    model = _Quadratic(information, gradient, present, charge)
+    starts = (start, np.isneginf(charge))
+    best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
+    while (deeper := _through_newcomer(model, best)) is not None:
+        best = deeper
+    solution = np.zeros(len(charge))
+    solution[best.inside] = best.fitted * model.scale[best.inside]
+    return best.support, solution, best.value
 
 
 def closest_rival(
-    information: np.ndarray, pull: np.ndarray, charge: np.ndarray, support: np.ndarray
+    information: np.ndarray,
+    gradient: np.ndarray,
+    present: np.ndarray,
+    charge: np.ndarray,
+    support: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """The single change of a support that costs least.
 
     Parameters
     ----------
-    information, pull, charge
+    information, gradient, present, charge
         See `subset_search`.
     support : ndarray of bool, shape (m,)
         A support at which `subset_search` has stopped.
@@ -112,46 +81,104 @@ def closest_rival(
     Returns
     -------
     cost : float
-        By how much the objective with charges rises.
+        By how much the function with charges rises.
     dropped, added : ndarray of int
         The entries that leave and enter, at most one each.
     """
-    matrix, scale = equilibrated(information)
-    target = pull * scale
-    now = _value(matrix, target, charge, support)
+    model = _Quadratic(information, gradient, present, charge)
+    fit = model.fit(support)
     rivals = []
-    for cost, dropped, added in _single_changes(matrix, target, charge, support):
+    for cost, dropped, added in _single_changes(model, fit):
         if np.isfinite(cost):  # a rough one where terms are tied together: work it out again
-            changed = support.copy()
-            changed[dropped], changed[added] = False, True
-            cost = _value(matrix, target, charge, changed) - now
+            cost = model.fit(_changed(support, dropped, added)).value - fit.value
         rivals.append((cost, dropped, added))
-    return min(rivals, key=lambda item: item[0])
+    return min(rivals, key=lambda rival: rival[0])
 
 
-def _value(
-    matrix: np.ndarray, target: np.ndarray, charge: np.ndarray, support: np.ndarray
-) -> float:
-    """The objective with charges at its minimum on a support."""
-    inside = np.flatnonzero(support)
-    fitted = np.linalg.solve(matrix[np.ix_(inside, inside)], target[inside])
-    paid = charge[inside[np.isfinite(charge[inside])]].sum()
-    return float(paid - target[inside] @ fitted)
+@dataclass(frozen=True)
+class _Fit:
+    """A quadratic function at its minimum on a support, all in scaled entries."""
+
+    support: np.ndarray
+    inside: np.ndarray
+    inverse: np.ndarray
+    fitted: np.ndarray
+    left: np.ndarray
+    value: float
 
 
-def _single_changes(
-    matrix: np.ndarray, target: np.ndarray, charge: np.ndarray, support: np.ndarray
-) -> list[tuple[float, np.ndarray, np.ndarray]]:
-    """Best drop, add and swap: change of the objective, entries dropped, entries added."""
-    inside, outside = np.flatnonzero(support), np.flatnonzero(~support)
+class _Quadratic:
+    """A quadratic function with charges, its entries scaled to a unit diagonal.
+
+    Everything is reckoned from the present point: with data that are nearly exact the function
+    itself has more digits than a computer, its changes do not.
+    """
+
+    def __init__(self, information, gradient, present, charge) -> None:
+        self.matrix, self.scale = equilibrated(information)
+        self.gradient, self.present = gradient * self.scale, present / self.scale
+        self.charge = charge
+
+    def fit(self, support: np.ndarray) -> _Fit:
+        inside = np.flatnonzero(support)
+        block = self.matrix[np.ix_(inside, inside)]
+        inverse = np.linalg.inv(block)
+        step = -self.present
+        step[inside] = 0.0
+        target = (self.gradient - self.matrix @ step)[inside]
+        moved = inverse @ target
+        moved += inverse @ (target - block @ moved)
+        step[inside] = moved
+        left = self.gradient - self.matrix @ step
+        paid = self.charge[inside[np.isfinite(self.charge[inside])]].sum()
+        value = float(paid - step @ (left + self.gradient))
+        return _Fit(support, inside, inverse, self.present[inside] + moved, left, value)
+
+
+def _descend(model: _Quadratic, start: np.ndarray) -> _Fit:
+    """Take the best of all drops, adds and swaps until none helps."""
+    best = model.fit(start)
+    while True:
+        change, dropped, added = min(_single_changes(model, best), key=lambda item: item[0])
+        if not change < -PLATEAU:
+            return best
+        # Rounding may promise a fall that does not come: what counts is the value itself.
+        fit = model.fit(_changed(best.support, dropped, added))
+        if not fit.value < best.value - PLATEAU:
+            return best
+        best = fit
+
+
+def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
+    """A lower value reached by forcing one entry in, which may let several others go."""
     none = np.array([], dtype=int)
-    inverse = np.linalg.inv(matrix[np.ix_(inside, inside)])
-    fitted = inverse @ target[inside]
-    spread = np.diag(inverse)
-    response = matrix[np.ix_(outside, inside)] @ inverse
-    left = target[outside] - matrix[np.ix_(outside, inside)] @ fitted
-    room = 1 - np.einsum("ak,ka->a", response, matrix[np.ix_(inside, outside)])
-    loss = fitted**2 / spread - charge[inside]
+    for entry in np.flatnonzero(~best.support):
+        forced = copy(model)
+        forced.charge = model.charge.copy()
+        forced.charge[entry] = -np.inf
+        trial = _descend(forced, _changed(best.support, none, entry))
+        if trial.value + model.charge[entry] < best.value - PLATEAU:
+            return _descend(model, trial.support)
+    return None
+
+
+def _changed(support: np.ndarray, dropped: np.ndarray, added: np.ndarray) -> np.ndarray:
+    changed = support.copy()
+    changed[dropped] = False
+    changed[added] = True
+    return changed
+
+
+def _single_changes(model: _Quadratic, fit: _Fit) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Best drop, add and swap: change of the function, entries dropped, entries added."""
+    inside, outside = fit.inside, np.flatnonzero(~fit.support)
+    none = np.array([], dtype=int)
+    charge = model.charge
+    spread = np.diag(fit.inverse)
+    response = model.matrix[np.ix_(outside, inside)] @ fit.inverse
+    left = fit.left[outside]
+    room = 1 - np.einsum("ak,ka->a", response, model.matrix[np.ix_(inside, outside)])
+    loss = fit.fitted**2 / spread - charge[inside]
     cost = charge[outside] - _gain(left, room)
     changes = [(np.inf, none, none)]
     if len(inside):
@@ -160,7 +187,7 @@ def _single_changes(
         changes.append((cost.min(), none, outside[[cost.argmin()]]))
     if len(inside) and len(outside):
         # A drop changes what the others leave over, and the room a newcomer has, by rank one.
-        swapped_left = left[:, None] + response * (fitted / spread)
+        swapped_left = left[:, None] + response * (fit.fitted / spread)
         swapped_room = room[:, None] + response**2 / spread
         swap = loss + charge[outside][:, None] - _gain(swapped_left, swapped_room)
         add, drop = np.unravel_index(swap.argmin(), swap.shape)

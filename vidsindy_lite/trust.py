@@ -117,10 +117,10 @@ def _left_over(model: Linearisation, state: State) -> list[str]:
 def _near_tie(
     model: Linearisation, law: PolynomialSystem, state: State, charges: np.ndarray
 ) -> list[str]:
-    present = state.coefficients.T.ravel()
     cost, dropped, added = closest_rival(
         model.information,
-        model.information @ present + model.gradient,
+        model.gradient,
+        state.coefficients.T.ravel(),
         np.tile(charges, law.d),
         state.active.T.ravel(),
     )
