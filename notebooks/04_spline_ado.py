@@ -405,14 +405,14 @@ def flat_support(law):
 
 def search(algebra, shift):
     coefficients, S = algebra.at(shift)
-    pull = S @ coefficients.T.ravel()
-    support, solution, _ = subset_search(S, pull, charge, np.ones(len(pull), dtype=bool))
-    return coefficients.T.ravel(), S, pull, support, solution
+    c = coefficients.T.ravel()
+    support, solution, _ = subset_search(S, 0 * c, c, charge, np.ones(len(c), dtype=bool))
+    return c, S, support, solution
 
 
 # %%
 algebra, fit = unpruned(t, x)
-c, S, pull, support, solution = search(algebra, -fit.offset)
+c, S, support, solution = search(algebra, -fit.offset)
 is_true = flat_support(truth)
 assert np.abs(c[is_true]).min() < np.abs(c[~is_true]).max()
 assert (support == is_true).all()
@@ -451,7 +451,7 @@ save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 # How sure is the search? `closest_rival` is the single change that costs least.
 
 # %%
-cost, dropped, added = closest_rival(S, pull, charge, support)
+cost, dropped, added = closest_rival(S, 0 * c, c, charge, support)
 names = [f"{term} in d{j}/dt" for j in "xyz" for term in truth.terms[: len(exponents)]]
 out, into = (", ".join(names[k] for k in ks) or "nothing" for ks in (dropped, added))
 print(f"drop {out}, add {into}: {cost:.1f} worse (the charge of a term is about {bar**2:.0f})")
@@ -483,9 +483,9 @@ def windows(name):
     law = SYSTEMS[name].shift(REFERENCE_OFFSET)
     times, states = law.trajectory(1500)
     algebra, fit = unpruned(times, add_noise(states, level, np.random.default_rng(seed)))
-    _, S, pull, support, _ = search(algebra, -fit.offset)
+    c, S, support, _ = search(algebra, -fit.offset)
     true = flat_support(law)
-    good = np.array([(sequential(S, pull, value) == true).all() for value in thresholds])
+    good = np.array([(sequential(S, S @ c, value) == true).all() for value in thresholds])
     return good, (support == true).all()
 
 

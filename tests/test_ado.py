@@ -208,6 +208,13 @@ def test_a_short_record_is_doubted():
     assert any("turns of the motion" in warning for warning in found.warnings)
 
 
+def test_on_a_line_a_record_needs_no_turns():
+    terms, x0, duration = PLANAR["growth"]
+    t = np.linspace(0, duration, 300)
+    law = PolynomialSystem.from_terms(terms)
+    assert discover(t, law.simulate(t, x0)).status == "ok"
+
+
 def test_a_coarse_record_is_doubted():
     t = 1.3 * np.arange(200)
     x = np.stack([np.sin(t), np.cos(t)], axis=1)
