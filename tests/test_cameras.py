@@ -138,24 +138,35 @@ class TestCamera:
         assert camera != replace(camera, scale=2)
         assert camera != "camera"
 
+    def test_hash_agrees_with_equality(self):
+        camera = Camera(position=[1, 2, 0.0], normal=[0, 3, 4], scale=1, angle=0)
+        twin = Camera(position=(1, 2, -0.0), normal=(0, 3.0, 4), scale=1.0, angle=-0.0)
+        assert camera == twin
+        assert len({camera, twin, replace(camera, scale=2), replace(camera, angle=1)}) == 3
+        rig = Rig([camera, replace(camera, normal=(1, 0, 0))])
+        assert len({rig, Rig(rig.cameras), rig.uncalibrated()}) == 2
+
+    @pytest.mark.parametrize("length", [1e-200, 1e200, 5e-324])
+    def test_normals_of_any_length(self, length):
+        camera = Camera(position=[0, 0, 0], normal=[0, 0, length])
+        assert camera.normal.tolist() == [0, 0, 1]
+
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            ({"position": (1, 2)}, "position: must be three finite numbers, got"),
-            ({"position": (1, 2, np.inf)}, "position: must be three finite numbers, got"),
+            ({"position": (1, 2)}, "position: must be 3 finite numbers, got"),
+            ({"position": (1, 2, np.inf)}, "position: must be 3 finite numbers, got"),
             ({"normal": (0, 0, 0)}, "normal: must not be the zero vector, got"),
-            ({"normal": "up"}, "normal: must be three finite numbers, got 'up'"),
+            ({"normal": "up"}, "normal: must be an array of real numbers, got 'up'"),
             ({"angle": None}, "scale and angle: give both .* or neither .* got scale=1.0, angle=N"),
             ({"scale": 0}, "scale: must be positive, got 0"),
             ({"scale": -1}, "scale: must be positive, got -1"),
+            ({"scale": True}, "scale: must be a finite number, got True"),
             ({"scale": np.nan}, "scale: must be a finite number, got nan"),
             ({"angle": "left"}, "angle: must be a finite number, got 'left'"),
-            (
-                {"image_size": (512, 0)},
-                r"image_size: must be two positive integers, got \(512, 0\)",
-            ),
-            ({"image_size": (512.5, 512)}, "image_size: must be two positive integers, got"),
-            ({"image_size": 512}, "image_size: must be two positive integers, got 512"),
+            ({"image_size": (512, 0)}, r"image_size: must be two integers .*, got \(512, 0\)"),
+            ({"image_size": (512.5, 512)}, "image_size: must be two integers of at least 1, got"),
+            ({"image_size": 512}, "image_size: must be two integers of at least 1, got 512"),
         ],
     )
     def test_bad_camera(self, change, message):
@@ -216,7 +227,7 @@ class TestRig:
             ("[[camera]]\nnormal = [0, 0, 1]", "camera 0: position: must be given, got keys norm"),
             (
                 "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1]",
-                "camera 0: normal: must be three",
+                "camera 0: normal: must be 3",
             ),
             (
                 "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\nzoom = 2",
@@ -253,7 +264,10 @@ class TestRig:
     def test_needs_two_cameras(self, small):
         with pytest.raises(ValueError, match="cameras: must be two or more, got 1"):
             Rig(small[1].cameras[:1])
-        with pytest.raises(ValueError, match="cameras: must all be Camera objects, got"):
+        for none in (None, small[1].cameras[0], 3):
+            with pytest.raises(ValueError, match="cameras.*: must be"):
+                Rig(none)
+        with pytest.raises(ValueError, match=r"cameras\[0\]: must be a Camera, got 1"):
             Rig([1, 2])
 
     def test_uncalibrated(self, small):
