@@ -267,7 +267,7 @@ class TestRig:
         for none in (None, small[1].cameras[0], 3):
             with pytest.raises(ValueError, match="cameras.*: must be"):
                 Rig(none)
-        with pytest.raises(ValueError, match=r"cameras\[0\]: must be a Camera, got 1"):
+        with pytest.raises(ValueError, match=r"cameras\[0\]: must be of type Camera, got 1"):
             Rig([1, 2])
 
     def test_uncalibrated(self, small):

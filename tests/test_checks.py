@@ -1,6 +1,7 @@
 """The checks that all modules share."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from vidsindy_lite.checks import (
     check_instance,
     check_integer,
     check_number,
+    check_path,
     check_positive,
     check_times,
     check_vector,
@@ -90,7 +92,14 @@ def test_image_sizes(size):
         check_image_size(size, least=64)
 
 
+def test_paths():
+    assert check_path("path", "a.mkv") == Path("a.mkv")
+    for value in (None, 5, ["a.mkv"]):
+        with pytest.raises(ValueError, match="path: must be the name of a file, got "):
+            check_path("path", value)
+
+
 def test_instances():
     check_instance("name", "rig.toml", str)
-    with pytest.raises(ValueError, match="rig: must be a dict, got 'rig.toml'"):
+    with pytest.raises(ValueError, match="rig: must be of type dict, got 'rig.toml'"):
         check_instance("rig", "rig.toml", dict)

@@ -20,7 +20,6 @@ import tomllib
 from collections.abc import Iterable, Sized
 from dataclasses import dataclass, fields, replace
 from math import hypot
-from pathlib import Path
 
 import numpy as np
 from scipy.linalg import null_space
@@ -32,6 +31,7 @@ from .checks import (
     check_instance,
     check_integer,
     check_number,
+    check_path,
     check_positive,
     check_vector,
 )
@@ -276,8 +276,9 @@ class Rig:
         ValueError
             If the file is not TOML or does not describe a rig; names file, camera and key.
         """
+        path = check_path("path", path)
         try:
-            content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            content = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: must be a TOML file: {error}") from error
         tables = content.pop("camera", None)
@@ -302,7 +303,7 @@ class Rig:
             lines += ["", "[[camera]]"]
             # repr of a float is its shortest exact decimal form, and valid TOML.
             lines += [f"{key} = {value!r}" for key, value in _to_table(camera).items()]
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        check_path("path", path).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     def uncalibrated(self, keep=0):
         """The same rig with scale and angle forgotten in all cameras but one.

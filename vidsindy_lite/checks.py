@@ -5,7 +5,9 @@ Booleans are no numbers here, and text is none even where numpy would read it as
 
 from __future__ import annotations
 
+import os
 from numbers import Integral, Real
+from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +15,14 @@ import numpy as np
 def check_instance(name: str, value: object, kind: type) -> None:
     """An object of a type of ours, not e.g. the name of its file."""
     if not isinstance(value, kind):
-        raise ValueError(f"{name}: must be a {kind.__name__}, got {value!r:.60}")
+        raise ValueError(f"{name}: must be of type {kind.__name__}, got {value!r:.60}")
+
+
+def check_path(name: str, value: str | os.PathLike) -> Path:
+    """The name of one file or folder."""
+    if not isinstance(value, str | os.PathLike):
+        raise ValueError(f"{name}: must be the name of a file, got {value!r:.60}")
+    return Path(value)
 
 
 def check_integer(name: str, value: int, least: int = 0) -> int:
