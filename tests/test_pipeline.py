@@ -1,10 +1,13 @@
 """From video files to equations, and what is refused on the way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite.experiments import film
+from vidsindy_lite.geometry import rodrigues
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +22,20 @@ def test_exact_equations_from_video_files(shot):
     assert all(camera.is_calibrated for camera in found.rig.cameras)
     assert found.x.shape == (200, 3)
     assert [track.shape for track in found.tracks] == [(200, 2)] * 3
+    assert not any("rig" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(("degrees", "known"), [(20, 1), (20, 3), (2, 1)])
+def test_a_wrong_normal_is_named_first(shot, degrees, known):
+    middle = (shot.x.min(axis=0) + shot.x.max(axis=0)) / 2
+    cameras = [replace(camera, position=middle) for camera in shot.rig.cameras]
+    turn = rodrigues([0, 0, 1], np.deg2rad(degrees))
+    cameras[1] = replace(cameras[1], normal=turn @ cameras[1].normal)
+    wrong = vl.Rig(cameras)
+    found = vl.discover_from_videos(shot.paths, wrong if known == 3 else wrong.uncalibrated())
+    assert found.warnings[0].startswith("the rig does not agree with the tracks: ")
+    assert "first of cameras[1] (Lorenz_2.mkv)" in found.warnings[0]
+    assert found.status == "suspect"
 
 
 def test_time_of_a_frame_comes_from_the_frame_rate(shot):
@@ -84,3 +101,60 @@ def test_wrong_number_of_times(shot):
         ValueError, match=r"t: must have shape \(200,\), one per frame, got \(10,\)"
     ):
         vl.discover_from_videos(shot.paths, shot.rig, np.arange(10))
+
+
+@pytest.fixture(scope="module")
+def cut_off(shot):
+    """The first video without its second half; its header still states all frames."""
+    path = shot.paths[0].with_name("cut_off.mkv")
+    content = shot.paths[0].read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    return path
+
+
+def test_a_video_that_is_cut_off_is_named(shot, cut_off):
+    message = r"paths: cut_off.mkv must hold the 200 frames that its header .* got \d+ that can be"
+    with pytest.raises(ValueError, match=message):
+        vl.discover_from_videos([cut_off, *shot.paths[1:]], shot.rig)
+
+
+def test_a_target_that_never_moves_is_named(shot, tmp_path):
+    still = tmp_path / "still.mkv"
+    vl.render_video(still, np.tile([[200.0, 300.0]], (200, 1)), vl.Scene())
+    with pytest.raises(ValueError, match="paths: still.mkv must show one moving target, got none"):
+        vl.discover_from_videos([still, *shot.paths[1:]], shot.rig)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "message"),
+    [
+        ({"rig": "rig.toml"}, {}, "rig: must be of type Rig, got 'rig.toml'"),
+        ({"paths": "a.mkv"}, {}, "paths: must be a list of files, .* got 'a.mkv'"),
+        ({"paths": None}, {}, "paths: must be a list of files, .* got None"),
+        ({"paths": ["a.mkv", None, "c.mkv"]}, {}, r"paths\[1\]: must be the name of a file"),
+        ({}, {"degree": 0}, "degree: must be an integer of at least 1, got 0"),
+        ({}, {"degree": 2.0}, "degree: must be an integer of at least 1, got 2.0"),
+        ({}, {"degree": True}, "degree: must be an integer of at least 1, got True"),
+        ({}, {"seed": -1}, "seed: must be an integer of at least 0, got -1"),
+        ({"t": np.arange(200)[::-1]}, {}, "t: must increase"),
+        ({"t": np.where(np.arange(200) == 7, np.nan, np.arange(200))}, {}, "t: must be finite"),
+        ({"t": "soon"}, {}, "t: must be an array of real numbers"),
+    ],
+)
+def test_what_is_cheap_is_checked_before_a_video_is_tracked(
+    shot, cut_off, arguments, options, message
+):
+    given = {"paths": [cut_off, *shot.paths[1:]], "rig": shot.rig} | arguments
+    with pytest.raises(ValueError, match=message):  # and not that the first video is cut off
+        vl.discover_from_videos(**given, **options)
+
+
+def test_a_rig_without_calibrated_camera_is_refused_before_tracking(shot, cut_off):
+    cameras = [replace(camera, scale=None, angle=None) for camera in shot.rig.cameras]
+    with pytest.raises(ValueError, match="rig: at least one camera must be calibrated"):
+        vl.discover_from_videos([cut_off, *shot.paths[1:]], vl.Rig(cameras))
+
+
+def test_unknown_options_are_refused_before_tracking(shot, cut_off):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'degre'"):
+        vl.discover_from_videos([cut_off, *shot.paths[1:]], shot.rig, degre=2)
