@@ -25,17 +25,28 @@ def test_exact_equations_from_video_files(shot):
     assert not any("rig" in warning for warning in found.warnings)
 
 
-@pytest.mark.parametrize(("degrees", "known"), [(20, 1), (20, 3), (2, 1)])
-def test_a_wrong_normal_is_named_first(shot, degrees, known):
+@pytest.mark.parametrize(("wrong", "calibrated"), [(0, 1), (1, 1), (2, 3)])
+def test_a_wrong_normal_is_named_first(shot, wrong, calibrated):
     middle = (shot.x.min(axis=0) + shot.x.max(axis=0)) / 2
     cameras = [replace(camera, position=middle) for camera in shot.rig.cameras]
-    turn = rodrigues([0, 0, 1], np.deg2rad(degrees))
-    cameras[1] = replace(cameras[1], normal=turn @ cameras[1].normal)
-    wrong = vl.Rig(cameras)
-    found = vl.discover_from_videos(shot.paths, wrong if known == 3 else wrong.uncalibrated())
-    assert found.warnings[0].startswith("the rig does not agree with the tracks: ")
-    assert "first of cameras[1] (Lorenz_2.mkv)" in found.warnings[0]
+    normal = cameras[wrong].normal
+    cameras[wrong] = replace(cameras[wrong], normal=rodrigues([0, 0, 1], np.deg2rad(20)) @ normal)
+    rig = vl.Rig(cameras) if calibrated == 3 else vl.Rig(cameras).uncalibrated()
+    found = vl.discover_from_videos(shot.paths, rig, shot.t)
     assert found.status == "suspect"
+    text = found.warnings[0]
+    assert text.startswith("the rig does not agree with the tracks: ")
+    assert f"of cameras[{wrong}] (Lorenz_{wrong + 1}.mkv) would explain it best" in text
+    proposed = [float(number) for number in text.split("normal (")[1].split(")")[0].split(",")]
+    np.testing.assert_allclose(proposed, normal, atol=5e-3)
+
+
+def test_a_wrong_position_is_no_wrong_normal(shot):
+    first, *others = shot.rig.cameras
+    moved = replace(first, position=first.position + np.array([0, 5.0, 5.0]))
+    found = vl.discover_from_videos(shot.paths, vl.Rig([moved, *others]), shot.t)
+    assert found.warnings[0].startswith("the rig does not agree with the tracks: ")
+    assert "no single wrong normal explains it; check the positions" in found.warnings[0]
 
 
 def test_time_of_a_frame_comes_from_the_frame_rate(shot):

@@ -384,8 +384,8 @@ def learn_cameras(tracks, rig, method="joint"):
     turned = _solve(design, target, rig, unknown)
     if method == "joint":
         clean = np.isin(np.arange(len(tracks[0])), frames[fits])
-        turned = _refine([track[clean] for track in tracks], rig, unknown, turned)
-    elif method == "gradient":
+        return _refine([track[clean] for track in tracks], rig, unknown, turned)
+    if method == "gradient":
         turned = _descend(design, target, rig, unknown)
     return _calibrate(rig, unknown, turned)
 
@@ -459,6 +459,42 @@ def residuals(tracks, rig):
     tracks = _check_tracks(tracks, rig)
     x = reconstruct(tracks, rig)
     return [track - camera.project(x) for track, camera in zip(tracks, rig.cameras, strict=True)]
+
+
+def learn_normal(tracks, rig, index):
+    """Learn the cameras with the normal of one of them unknown as well.
+
+    For a rig that does not agree with its tracks: if the normal of this camera alone was measured
+    badly, the residuals of the new rig are no larger than the errors of the tracks.
+
+    Parameters
+    ----------
+    tracks, rig
+        See `learn_cameras`.
+    index : int
+        Of the camera.
+
+    Returns
+    -------
+    Rig
+
+    Raises
+    ------
+    ValueError
+        See `learn_cameras`.
+    """
+    learned = learn_cameras(tracks, rig)
+    unknown = np.flatnonzero([not camera.is_calibrated for camera in rig.cameras])
+    known = [learned.cameras[i] for i in unknown]
+    turned = np.array([camera.scale * np.exp(1j * camera.angle) for camera in known], complex)
+    tilted = rig.cameras[index]
+
+    def candidate(parameters):
+        cameras = list(rig.cameras)
+        cameras[index] = replace(tilted, normal=tilted.normal + parameters[:2] @ tilted.rows)
+        return _calibrate(Rig(cameras), unknown, np.exp(parameters[2:].copy().view(complex)))
+
+    return _closest(tracks, candidate, np.concatenate(([0.0, 0.0], np.log(turned).view(float))))
 
 
 def check_learnable(rig):
@@ -615,14 +651,18 @@ def _solve(design, target, rig, unknown):
 
 def _refine(tracks, rig, unknown, turned):
     """Smallest reprojection error in pixels, searched in log(s exp(i theta)) = log s + i theta."""
+    start = np.log(turned).view(float)
+    return _closest(tracks, lambda p: _calibrate(rig, unknown, np.exp(p.view(complex))), start)
+
+
+def _closest(tracks, candidate, start):
+    """The rig `candidate(parameters)` of the smallest reprojection error in pixels."""
 
     def error(parameters):
-        candidate = _calibrate(rig, unknown, np.exp(parameters.view(complex)))
-        missed = np.hstack(residuals(tracks, candidate))
+        missed = np.hstack(residuals(tracks, candidate(parameters)))
         return missed[np.isfinite(missed)]
 
-    fit = least_squares(error, np.log(turned).view(float), ftol=1e-15, xtol=1e-15, gtol=1e-15)
-    return np.exp(fit.x.view(complex))
+    return candidate(least_squares(error, start, ftol=1e-15, xtol=1e-15, gtol=1e-15).x)
 
 
 def _descend(design, target, rig, unknown):
@@ -705,7 +745,9 @@ def _check_tracks(tracks, rig):
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
     for i, track in enumerate(tracks):
-        if not np.isfinite(track).all(axis=1).any():
+        unseen = np.isnan(track).any(axis=1, keepdims=True)
+        tracks[i] = np.where(unseen, np.nan, track)  # half a pixel tells nothing
+        if unseen.all():
             raise ValueError(f"tracks[{i}]: must see the target in some frame, got only NaN rows")
     return tracks
 

@@ -10,7 +10,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .ado import discover
-from .cameras import Rig, check_learnable, learn_cameras, reconstruct, residuals
+from .cameras import Rig, check_learnable, learn_cameras, learn_normal, reconstruct, residuals
 from .checks import check_integer, check_path, check_times
 from .discovery import Discovery
 from .tracking import track
@@ -117,7 +117,7 @@ def discover_from_videos(
     x = reconstruct(tracks, learned)
     found = discover(t, x, degree=degree, seed=seed, progress=progress)
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
-    parts["warnings"] = (*_rig_doubts(tracks, learned, paths), *found.warnings)
+    parts["warnings"] = (*_rig_doubts(tracks, learned, rig, paths), *found.warnings)
     return VideoDiscovery(**parts, tracks=tracks, rig=learned, t=t, x=x)
 
 
@@ -137,20 +137,39 @@ def _track(path: Path, frames: int) -> np.ndarray:
     return found
 
 
-def _rig_doubts(tracks: Sequence[np.ndarray], rig: Rig, paths: Sequence[Path]) -> list[str]:
+def _rig_doubts(
+    tracks: Sequence[np.ndarray], learned: Rig, given: Rig, paths: Sequence[Path]
+) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
+    missed = _missed(tracks, learned)
+    if max(missed) <= DISAGREEMENT:
+        return []
+    # The largest residual does not tell which camera is wrong: the others were fitted to it.
+    others = [learn_normal(tracks, given, i) for i in range(len(paths))]
+    left = [max(_missed(tracks, other)) for other in others]
+    i = int(np.argmin(left))
+    normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
+    advice = (
+        f"the normal ({normal}) of cameras[{i}] ({paths[i].name}) would explain it best"
+        if left[i] <= DISAGREEMENT
+        else "no single wrong normal explains it; check the positions, the scales and angles that "
+        "are given, and that all videos start together"
+    )
+    sizes = ", ".join(f"{size:.1f}" for size in missed)
+    return [
+        "the rig does not agree with the tracks: in one frame of ten, tracked and reconstructed "
+        f"target lie more than {sizes} pixels apart, where tracking explains {DISAGREEMENT:g}: "
+        + advice
+    ]
+
+
+def _missed(tracks: Sequence[np.ndarray], rig: Rig) -> list[float]:
+    """Residual in pixels that one frame in ten exceeds, per camera.
+
+    That tenth may hold anything: a few outliers of the tracker do not accuse the rig.
+    """
     missed = []
     for residual in residuals(tracks, rig):
         seen = residual[np.isfinite(residual).all(axis=1)]
-        # One frame in ten may hold anything: outliers of the tracker do not accuse the rig.
         missed.append(np.percentile(np.hypot(*seen.T), 90) if len(seen) else 0.0)
-    if max(missed) <= DISAGREEMENT:
-        return []
-    worst = int(np.argmax(missed))
-    sizes = ", ".join(f"{size:.1f}" for size in missed)
-    return [
-        "the rig does not agree with the tracks: reconstructed and tracked target lie up to "
-        f"{sizes} pixels apart in nine frames of ten, where tracking explains less than "
-        f"{DISAGREEMENT:g}; check position and normal of each camera, first of cameras[{worst}] "
-        f"({paths[worst].name}), the given scales and angles, and that all videos start together"
-    ]
+    return missed
