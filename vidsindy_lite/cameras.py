@@ -644,7 +644,8 @@ def _solve(design, target, rig, unknown):
         raise ValueError(
             f"tracks: the target's motion must determine scale and angle of "
             f"{_names(unknown[share > 0.1])}, got {motion[-1]:.2g} px rms of telling motion "
-            f"against a misfit of {misfit:.2g} px (a static target, or a wrong position or normal)"
+            f"against a misfit of {misfit:.2g} px (a static target, a wrong position or normal, or "
+            "videos in another order than the cameras)"
         )
     return solution.view(complex)  # s exp(i theta)
 

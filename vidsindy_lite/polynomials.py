@@ -207,9 +207,8 @@ class PolynomialSystem:
             If the equations are no such mapping, or a term names an unknown variable or has a
             higher degree than the library.
         """
-        if not isinstance(equations, Mapping) or not all(
-            isinstance(terms, Mapping) for terms in equations.values()
-        ):
+        given = equations.values() if isinstance(equations, Mapping) else ()
+        if not given or not all(isinstance(terms, Mapping) for terms in given):
             raise ValueError(
                 "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
                 f"'y': {{'x': 1}}}}, got {equations!r:.60}"
