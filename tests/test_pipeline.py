@@ -73,9 +73,11 @@ def test_fast_files_hold_the_same_film(shot, tmp_path):
     np.testing.assert_array_equal(vl.track(fast.paths[0]), vl.track(shot.paths[0]))
 
 
-def test_unknown_benchmark_is_named(tmp_path):
+def test_unknown_benchmark_or_seed_is_named(tmp_path):
     with pytest.raises(ValueError, match="name: must be one of Lorenz, .* got 'Lorentz'"):
         film("Lorentz", tmp_path)
+    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got 1.5"):
+        film("Lorenz", tmp_path, seed=1.5)
 
 
 def test_missing_file(shot, tmp_path):
