@@ -141,6 +141,12 @@ def test_seeds_are_local_and_repeatable(name, short_grid):
     assert not np.array_equal(first, other)
 
 
+@pytest.mark.parametrize("name", ["E-SINDy", "WeakSINDy", "Model-A"])
+def test_bad_seeds_are_named(name):
+    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got -1"):
+        BASELINES[name](T, X, seed=-1)
+
+
 def test_the_global_seed_comes_back_after_an_error():
     before = np.random.get_state()[1].copy()  # noqa: NPY002
     with pytest.raises(ValueError, match="x: must hold"):

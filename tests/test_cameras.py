@@ -12,10 +12,11 @@ from vidsindy_lite.cameras import (
     Rig,
     calibration_errors,
     learn_cameras,
+    learn_normal,
     reconstruct,
     residuals,
 )
-from vidsindy_lite.geometry import plane_projection, rotation_to_z
+from vidsindy_lite.geometry import plane_projection, rodrigues, rotation_to_z
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -138,24 +139,35 @@ class TestCamera:
         assert camera != replace(camera, scale=2)
         assert camera != "camera"
 
+    def test_hash_agrees_with_equality(self):
+        camera = Camera(position=[1, 2, 0.0], normal=[0, 3, 4], scale=1, angle=0)
+        twin = Camera(position=(1, 2, -0.0), normal=(0, 3.0, 4), scale=1.0, angle=-0.0)
+        assert camera == twin
+        assert len({camera, twin, replace(camera, scale=2), replace(camera, angle=1)}) == 3
+        rig = Rig([camera, replace(camera, normal=(1, 0, 0))])
+        assert len({rig, Rig(rig.cameras), rig.uncalibrated()}) == 2
+
+    @pytest.mark.parametrize("length", [1e-200, 1e200, 5e-324])
+    def test_normals_of_any_length(self, length):
+        camera = Camera(position=[0, 0, 0], normal=[0, 0, length])
+        assert camera.normal.tolist() == [0, 0, 1]
+
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            ({"position": (1, 2)}, "position: must be three finite numbers, got"),
-            ({"position": (1, 2, np.inf)}, "position: must be three finite numbers, got"),
+            ({"position": (1, 2)}, "position: must be 3 finite numbers, got"),
+            ({"position": (1, 2, np.inf)}, "position: must be 3 finite numbers, got"),
             ({"normal": (0, 0, 0)}, "normal: must not be the zero vector, got"),
-            ({"normal": "up"}, "normal: must be three finite numbers, got 'up'"),
+            ({"normal": "up"}, "normal: must be an array of real numbers, got 'up'"),
             ({"angle": None}, "scale and angle: give both .* or neither .* got scale=1.0, angle=N"),
             ({"scale": 0}, "scale: must be positive, got 0"),
             ({"scale": -1}, "scale: must be positive, got -1"),
+            ({"scale": True}, "scale: must be a finite number, got True"),
             ({"scale": np.nan}, "scale: must be a finite number, got nan"),
             ({"angle": "left"}, "angle: must be a finite number, got 'left'"),
-            (
-                {"image_size": (512, 0)},
-                r"image_size: must be two positive integers, got \(512, 0\)",
-            ),
-            ({"image_size": (512.5, 512)}, "image_size: must be two positive integers, got"),
-            ({"image_size": 512}, "image_size: must be two positive integers, got 512"),
+            ({"image_size": (512, 0)}, r"image_size: must be two integers .*, got \(512, 0\)"),
+            ({"image_size": (512.5, 512)}, "image_size: must be two integers of at least 1, got"),
+            ({"image_size": 512}, "image_size: must be two integers of at least 1, got 512"),
         ],
     )
     def test_bad_camera(self, change, message):
@@ -216,7 +228,7 @@ class TestRig:
             ("[[camera]]\nnormal = [0, 0, 1]", "camera 0: position: must be given, got keys norm"),
             (
                 "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1]",
-                "camera 0: normal: must be three",
+                "camera 0: normal: must be 3",
             ),
             (
                 "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\nzoom = 2",
@@ -253,7 +265,10 @@ class TestRig:
     def test_needs_two_cameras(self, small):
         with pytest.raises(ValueError, match="cameras: must be two or more, got 1"):
             Rig(small[1].cameras[:1])
-        with pytest.raises(ValueError, match="cameras: must all be Camera objects, got"):
+        for none in (None, small[1].cameras[0], 3):
+            with pytest.raises(ValueError, match="cameras.*: must be"):
+                Rig(none)
+        with pytest.raises(ValueError, match=r"cameras\[0\]: must be of type Camera, got 1"):
             Rig([1, 2])
 
     def test_uncalibrated(self, small):
@@ -263,6 +278,14 @@ class TestRig:
         assert start.cameras[2] == rig.cameras[2]
         with pytest.raises(ValueError, match="keep: must be an index of 3 cameras, got 3"):
             rig.uncalibrated(keep=3)
+        for keep in (1.5, -1, "a"):
+            with pytest.raises(ValueError, match="keep: must be an integer of at least 0, got"):
+                rig.uncalibrated(keep)
+
+    def test_files_have_names(self, small):
+        for use in (Rig.load, small[1].save):
+            with pytest.raises(ValueError, match="path: must be the name of a file, got None"):
+                use(None)
 
     @given(SEEDS, st.sampled_from([(512, 512), (640, 480), (100, 300)]))
     @settings(max_examples=30)
@@ -282,6 +305,12 @@ class TestRig:
     def test_around_needs_a_scene(self):
         with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
             Rig.around(np.ones((5, 3)))
+        for none in (np.zeros((0, 3)), np.full((5, 3), np.nan), [[1, 2, 3]]):
+            with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
+                Rig.around(none)
+        for size in (512, "ab", (1, 512)):
+            with pytest.raises(ValueError, match="image_size: must be two integers of at least 2"):
+                Rig.around(np.eye(3), image_size=size)
 
 
 class TestLearning:
@@ -451,7 +480,78 @@ def test_calibration_errors(small):
         calibration_errors(truth, truth.uncalibrated())
 
 
+class TestOutliers:
+    @pytest.mark.parametrize("method", ["joint", "paper"])
+    @pytest.mark.parametrize("seed", range(5))
+    def test_one_outlier_does_not_bend_the_cameras(self, method, seed):
+        _, truth, tracks, rng = scene(seed)
+        turn = rng.uniform(0, 2 * np.pi)
+        tracks[rng.integers(3)][rng.integers(500)] += 200 * np.array([np.cos(turn), np.sin(turn)])
+        learned = learn_cameras(tracks, truth.uncalibrated(), method)
+        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_noisy_tracks_with_outliers_are_as_good_as_without(self, seed):
+        _, truth, tracks, rng = scene(seed)
+        noisy = [track + rng.normal(size=track.shape) for track in tracks]
+        outliers = [track.copy() for track in noisy]
+        gaps = [track.copy() for track in noisy]
+        frames = rng.choice(500, 25, replace=False)
+        for number, frame in enumerate(frames):
+            outliers[number % 3][frame] += 200 * rng.choice([-1, 1], size=2)
+            gaps[number % 3][frame] = np.nan
+        start = truth.uncalibrated()
+        found, expected = (
+            calibration_errors(learn_cameras(seen, start), truth) for seen in (outliers, gaps)
+        )
+        # The two cameras that still see such a frame are left out as well: 1 in 20 frames.
+        np.testing.assert_allclose(found, expected, atol=2e-4)
+        assert np.abs(found).max() < 2e-3
+
+    def test_the_residuals_show_the_frame(self):
+        _, rig, tracks, _ = scene(3)
+        tracks[1][70] += 200
+        missed = [np.linalg.norm(residual, axis=1) for residual in residuals(tracks, rig)]
+        assert np.max(missed, axis=0).argmax() == 70
+        assert np.max(missed) > 50
+        np.testing.assert_allclose(np.delete(np.max(missed, axis=0), 70), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_a_wrong_normal_is_learned_back(index):
+    x, truth, tracks, _ = scene(5)
+    middle = x.mean(axis=0)
+    truth = Rig(replace(camera, position=middle) for camera in truth.cameras)
+    tracks = [camera.project(x) for camera in truth.cameras]
+    turn = rodrigues([1, 2, 3], np.deg2rad(8))
+    cameras = list(truth.cameras)
+    cameras[index] = replace(cameras[index], normal=turn @ cameras[index].normal)
+    learned = learn_normal(tracks, Rig(cameras).uncalibrated(), index)
+    np.testing.assert_allclose(
+        learned.cameras[index].normal, truth.cameras[index].normal, atol=1e-6
+    )
+    np.testing.assert_allclose(np.hstack(residuals(tracks, learned)), 0, atol=1e-4)
+
+
 class TestBadTracks:
+    def test_masked_rows_are_not_seen(self, small):
+        _, rig, tracks, _ = small
+        wild = tracks[1].copy()
+        wild[3] = 1e6
+        masked = np.ma.masked_array(wild, mask=np.zeros((40, 2), dtype=bool))
+        masked[3, 0] = np.ma.masked
+        assert np.isnan(residuals([tracks[0], masked, tracks[2]], rig)[1][3]).all()
+
+    def test_what_is_no_rig_or_no_tracks(self, small):
+        _, rig, tracks, _ = small
+        for use in (learn_cameras, reconstruct, residuals):
+            with pytest.raises(ValueError, match="rig: must be of type Rig, got 'rig.toml'"):
+                use(tracks, "rig.toml")
+            with pytest.raises(ValueError, match="tracks: must be of type Sized, got None"):
+                use(None, rig)
+            with pytest.raises(ValueError, match=r"tracks\[0\]: must be an array of real numbers"):
+                use(["a.mkv", "b.mkv", "c.mkv"], rig)
+
     @pytest.mark.parametrize("use", [learn_cameras, reconstruct, residuals])
     def test_wrong_tracks(self, small, use):
         _, rig, tracks, _ = small

@@ -90,12 +90,16 @@ def test_bad_input():
     with pytest.raises(ValueError, match="x: must not be infinite, got 5 infinite values"):
         drop_blocks(np.full((5, 1), np.inf), 0.1, rng)
     for level in (-0.1, np.nan, np.inf):
-        with pytest.raises(ValueError, match=f"level: must be finite .* got {level}"):
+        with pytest.raises(ValueError, match=f"level: must .* got {level}"):
             add_noise(np.zeros((5, 1)), level, rng)
     for rate in (-0.1, 1.0, np.nan):
-        with pytest.raises(ValueError, match=f"rate: must be at least 0 and below 1, got {rate}"):
+        with pytest.raises(ValueError, match=f"rate: must be .* got {rate}"):
             drop_blocks(np.zeros((500, 1)), rate, rng)
     with pytest.raises(ValueError, match="rate: 5 separate gaps of 9 rows .* into 10 rows"):
         drop_fibers(np.zeros((10, 1)), 0.9, rng)
-    with pytest.raises(ValueError, match="gaps: must be an integer of at least 1, got 0"):
-        drop_fibers(np.zeros((10, 1)), 0.5, rng, gaps=0)
+    for gaps in (0, 1.5):
+        with pytest.raises(ValueError, match="gaps: must be an integer of at least 1, got"):
+            drop_fibers(np.zeros((10, 1)), 0.5, rng, gaps=gaps)
+    for corrupt in (add_noise, drop_blocks, drop_fibers):
+        with pytest.raises(ValueError, match="rng: must be of type Generator, got 0"):
+            corrupt(np.zeros((10, 1)), 0.5, 0)

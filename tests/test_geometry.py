@@ -149,13 +149,13 @@ def test_nan_rows_pass_through():
     ("call", "message"),
     [
         (lambda: rotation_to_z([0, 0, 0]), "normal: must not be the zero vector, got"),
-        (lambda: rotation_to_z([1, 2]), "normal: must be three finite numbers, got"),
-        (lambda: rotation_to_z([1, np.nan, 0]), "normal: must be three finite numbers, got"),
+        (lambda: rotation_to_z([1, 2]), "normal: must be 3 finite numbers, got"),
+        (lambda: rotation_to_z([1, np.nan, 0]), "normal: must be 3 finite numbers, got"),
         (lambda: rodrigues([0, 0, 0], 1.0), "axis: must not be the zero vector, got"),
-        (lambda: rodrigues([0, 0, 1], np.inf), "angle: must be finite, got inf"),
+        (lambda: rodrigues([0, 0, 1], np.inf), "angle: must be a finite number, got inf"),
         (lambda: plane_projection([1, 2], [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
         (lambda: signed_distance(1.0, [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
-        (lambda: in_plane_offset([[1, 2, 3]], [0, 0, 1]), "position: must be three finite"),
+        (lambda: in_plane_offset([[1, 2, 3]], [0, 0, 1]), "position: must be 3 finite"),
         (lambda: plane_through((0, 0, 0), (1, 1, 1), (2, 2, 2)), "must not lie on one line"),
     ],
 )

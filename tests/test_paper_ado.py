@@ -148,6 +148,8 @@ def test_bad_input():
         discover_paper(t[:5], x[:5], degree=2)
     with pytest.raises(ValueError, match="x: every coordinate must move"):
         discover_paper(t, x * [1, 0])
+    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got -1"):
+        discover_paper(t, x, seed=-1)
     for name in ("knots_per_sample", "collocation_per_knot", "pretraining", "epochs"):
         with pytest.raises(ValueError, match=f"{name}: must be at least .*, got 0"):
             discover_paper(t, x, **{name: 0})

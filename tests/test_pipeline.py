@@ -1,10 +1,13 @@
 """From video files to equations, and what is refused on the way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite.experiments import film
+from vidsindy_lite.geometry import rodrigues
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +22,31 @@ def test_exact_equations_from_video_files(shot):
     assert all(camera.is_calibrated for camera in found.rig.cameras)
     assert found.x.shape == (200, 3)
     assert [track.shape for track in found.tracks] == [(200, 2)] * 3
+    assert not any("rig" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(("wrong", "calibrated"), [(0, 1), (1, 1), (2, 3)])
+def test_a_wrong_normal_is_named_first(shot, wrong, calibrated):
+    middle = (shot.x.min(axis=0) + shot.x.max(axis=0)) / 2
+    cameras = [replace(camera, position=middle) for camera in shot.rig.cameras]
+    normal = cameras[wrong].normal
+    cameras[wrong] = replace(cameras[wrong], normal=rodrigues([0, 0, 1], np.deg2rad(20)) @ normal)
+    rig = vl.Rig(cameras) if calibrated == 3 else vl.Rig(cameras).uncalibrated()
+    found = vl.discover_from_videos(shot.paths, rig, shot.t)
+    assert found.status == "suspect"
+    text = found.warnings[0]
+    assert text.startswith("the rig does not agree with the tracks: ")
+    assert f"of cameras[{wrong}] (Lorenz_{wrong + 1}.mkv) would explain it best" in text
+    proposed = [float(number) for number in text.split("normal (")[1].split(")")[0].split(",")]
+    np.testing.assert_allclose(proposed, normal, atol=5e-3)
+
+
+def test_a_wrong_position_is_no_wrong_normal(shot):
+    first, *others = shot.rig.cameras
+    moved = replace(first, position=first.position + np.array([0, 5.0, 5.0]))
+    found = vl.discover_from_videos(shot.paths, vl.Rig([moved, *others]), shot.t)
+    assert found.warnings[0].startswith("the rig does not agree with the tracks: ")
+    assert "no single wrong normal explains it; check the positions" in found.warnings[0]
 
 
 def test_time_of_a_frame_comes_from_the_frame_rate(shot):
@@ -45,9 +73,11 @@ def test_fast_files_hold_the_same_film(shot, tmp_path):
     np.testing.assert_array_equal(vl.track(fast.paths[0]), vl.track(shot.paths[0]))
 
 
-def test_unknown_benchmark_is_named(tmp_path):
+def test_unknown_benchmark_or_seed_is_named(tmp_path):
     with pytest.raises(ValueError, match="name: must be one of Lorenz, .* got 'Lorentz'"):
         film("Lorentz", tmp_path)
+    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got 1.5"):
+        film("Lorenz", tmp_path, seed=1.5)
 
 
 def test_missing_file(shot, tmp_path):
@@ -84,3 +114,60 @@ def test_wrong_number_of_times(shot):
         ValueError, match=r"t: must have shape \(200,\), one per frame, got \(10,\)"
     ):
         vl.discover_from_videos(shot.paths, shot.rig, np.arange(10))
+
+
+@pytest.fixture(scope="module")
+def cut_off(shot):
+    """The first video without its second half; its header still states all frames."""
+    path = shot.paths[0].with_name("cut_off.mkv")
+    content = shot.paths[0].read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    return path
+
+
+def test_a_video_that_is_cut_off_is_named(shot, cut_off):
+    message = r"paths: cut_off.mkv must hold the 200 frames that its header .* got \d+ that can be"
+    with pytest.raises(ValueError, match=message):
+        vl.discover_from_videos([cut_off, *shot.paths[1:]], shot.rig)
+
+
+def test_a_target_that_never_moves_is_named(shot, tmp_path):
+    still = tmp_path / "still.mkv"
+    vl.render_video(still, np.tile([[200.0, 300.0]], (200, 1)), vl.Scene())
+    with pytest.raises(ValueError, match="paths: still.mkv must show one moving target, got none"):
+        vl.discover_from_videos([still, *shot.paths[1:]], shot.rig)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "message"),
+    [
+        ({"rig": "rig.toml"}, {}, "rig: must be of type Rig, got 'rig.toml'"),
+        ({"paths": "a.mkv"}, {}, "paths: must be a list of files, .* got 'a.mkv'"),
+        ({"paths": None}, {}, "paths: must be a list of files, .* got None"),
+        ({"paths": ["a.mkv", None, "c.mkv"]}, {}, r"paths\[1\]: must be the name of a file"),
+        ({}, {"degree": 0}, "degree: must be an integer of at least 1, got 0"),
+        ({}, {"degree": 2.0}, "degree: must be an integer of at least 1, got 2.0"),
+        ({}, {"degree": True}, "degree: must be an integer of at least 1, got True"),
+        ({}, {"seed": -1}, "seed: must be an integer of at least 0, got -1"),
+        ({"t": np.arange(200)[::-1]}, {}, "t: must increase"),
+        ({"t": np.where(np.arange(200) == 7, np.nan, np.arange(200))}, {}, "t: must be finite"),
+        ({"t": "soon"}, {}, "t: must be an array of real numbers"),
+    ],
+)
+def test_what_is_cheap_is_checked_before_a_video_is_tracked(
+    shot, cut_off, arguments, options, message
+):
+    given = {"paths": [cut_off, *shot.paths[1:]], "rig": shot.rig} | arguments
+    with pytest.raises(ValueError, match=message):  # and not that the first video is cut off
+        vl.discover_from_videos(**given, **options)
+
+
+def test_a_rig_without_calibrated_camera_is_refused_before_tracking(shot, cut_off):
+    cameras = [replace(camera, scale=None, angle=None) for camera in shot.rig.cameras]
+    with pytest.raises(ValueError, match="rig: at least one camera must be calibrated"):
+        vl.discover_from_videos([cut_off, *shot.paths[1:]], vl.Rig(cameras))
+
+
+def test_unknown_options_are_refused_before_tracking(shot, cut_off):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'degre'"):
+        vl.discover_from_videos([cut_off, *shot.paths[1:]], shot.rig, degre=2)

@@ -59,6 +59,12 @@ def test_long_names_are_kept_apart():
         ({"x": {"q": 1}}, "term: must be a product"),
         ({"x": {"x^": 1}}, "term: must be a product"),
         ({"x": {"x^4": 1}}, "degree: must be at least"),
+        ({"x": {"": 1}}, "term: must be '1' or a product"),
+        ({"x": {2: 1}}, "term: must be '1' or a product .* got 2"),
+        ({"x": {"x": "a"}}, "coefficient of x: must be a finite number, got 'a'"),
+        ({"x": 3}, "equations: must give each variable its terms, .* got {'x': 3}"),
+        (None, "equations: must give each variable its terms, .* got None"),
+        ({}, "equations: must give each variable its terms, .* got {}"),
     ],
 )
 def test_bad_terms_are_refused(equations, message):
@@ -71,9 +77,15 @@ def test_bad_terms_are_refused(equations, message):
     [
         ((("x",), [[0], [1]], [[np.nan], [1]]), "coefficients: must be finite"),
         ((("x",), [[1], [1]], [[1], [1]]), "exponents: every monomial may appear once"),
-        ((("x", "y"), [[1]], [[1]]), "exponents: must be non-negative with shape"),
-        ((("x",), [[-1]], [[1]]), "exponents: must be non-negative"),
+        ((("x", "y"), [[1]], [[1]]), r"exponents: must have shape \(l, 2\), got shape \(1, 1\)"),
+        ((("x",), [[-1]], [[1]]), "exponents: must be non-negative integers, got -1"),
+        ((("x",), [[1.9]], [[1]]), "exponents: must be non-negative integers, got 1.9"),
+        ((("x",), [[np.nan]], [[1]]), "exponents: must be non-negative integers, got nan"),
+        ((("x",), [[1]], [[1j]]), "coefficients: must be an array of real numbers"),
         ((("x", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct"),
+        ((("", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
+        ((("1", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
+        ((None, [[1]], [[1]]), "names: must be distinct names such as x or x1"),
         ((("x",), [[1]], [[1, 2]]), "coefficients: must have shape"),
     ],
 )
@@ -167,7 +179,15 @@ def test_simulation_says_nan_after_a_blow_up():
 
 @pytest.mark.parametrize(
     ("t", "x0", "message"),
-    [([0, 0], [1], "t: must be"), ([], [1], "t: must be"), ([0, 1], [1, 2], "x0: must have shape")],
+    [
+        ([0, 0], [1], "t: must increase"),
+        ([], [1], "t: must hold at least one time"),
+        (3, [1], "t: must hold at least one time"),
+        ([0, np.inf], [1], "t: must be finite, got inf"),
+        ([0, np.nan, 1], [1], "t: must be finite, got nan"),
+        ([0, 1], [1, 2], "x0: must be 1 finite numbers"),
+        ([0, 1], [np.nan], "x0: must be 1 finite numbers"),
+    ],
 )
 def test_bad_simulations_are_refused(t, x0, message):
     with pytest.raises(ValueError, match=message):
@@ -184,8 +204,21 @@ def test_wrong_shapes_are_named():
     law = PolynomialSystem.from_terms(LORENZ)
     with pytest.raises(ValueError, match=r"x: must have shape \(n, 3\), got \(4, 2\)"):
         law.library(np.zeros((4, 2)))
-    with pytest.raises(ValueError, match="offset: must be 3 finite numbers"):
-        law.shift([1, 2])
+    for offset in ([1, 2], "abc", None):
+        with pytest.raises(ValueError, match="offset: must be"):
+            law.shift(offset)
+    for use in (law, law.gradient, law.library):
+        with pytest.raises(ValueError, match="x: must be an array of real numbers, got 'abc'"):
+            use("abc")
+
+
+@pytest.mark.parametrize("degree", [-1, 2.5, 2.0, True, "3", None])
+def test_degrees_are_whole_numbers(degree):
+    with pytest.raises(ValueError, match="degree: must be an integer of at least 0, got"):
+        monomial_exponents(2, degree)
+    if degree is not None:
+        with pytest.raises(ValueError, match="degree: must be"):
+            PolynomialSystem.from_terms({"x": {"1": 1}}, degree=degree)
 
 
 def test_library_of_monomials():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.records import check_record, cut, typical_step
+from vidsindy_lite.records import check_record, check_records, cut, typical_step
 
 T, X = np.arange(5.0), np.ones((5, 2))
 
@@ -17,8 +17,9 @@ def with_value(row, value):
 @pytest.mark.parametrize(
     ("t", "x", "message"),
     [
-        ("soon", X, "t: must be an array of numbers, got 'soon'"),
-        (T, [[1], [2, 3]], "x: must be an array of numbers"),
+        ("soon", X, "t: must be an array of real numbers, got 'soon'"),
+        (T, [[1], [2, 3]], "x: must be an array of real numbers"),
+        (T, X + 0j, "x: must be an array of real numbers"),
         (T, np.ones(5), r"x: must have shape \(n, d\)"),
         (T, np.ones((5, 0)), r"x: must have shape \(n, d\)"),
         (T[:4], X, r"t: must have shape \(5,\) as x has 5 rows, got \(4,\)"),
@@ -27,7 +28,7 @@ def with_value(row, value):
         (T[::-1], X, "t: must increase"),
         (T, with_value(3, np.inf), "x: must not be infinite .* got infinity in row 3"),
         (T, np.full((5, 2), np.nan), "x: must hold at least one row without NaN, got 5"),
-        (np.empty(0), np.empty((0, 2)), "x: must hold at least one row without NaN, got 0"),
+        (np.empty(0), np.empty((0, 2)), "t: must hold at least one time"),
     ],
 )
 def test_bad_input_is_named(t, x, message):
@@ -39,6 +40,31 @@ def test_missing_rows_are_left_out():
     t, x = check_record(T, with_value(2, np.nan))
     assert t.tolist() == [0, 1, 3, 4]
     assert x.shape == (4, 2)
+
+
+def test_masked_rows_are_missing():
+    mask = np.zeros(X.shape, dtype=bool)
+    mask[2, 1] = True
+    t, x = check_record(T, np.ma.masked_array(with_value(2, 1e9), mask))
+    assert t.tolist() == [0, 1, 3, 4]
+    assert x.max() == 1
+
+
+def test_one_or_several_records():
+    assert [len(t) for t, _ in check_records(T, X)] == [5]
+    assert [len(t) for t, _ in check_records([(T, X), [T[:3], X[:3]]])] == [5, 3]
+
+
+@pytest.mark.parametrize("t", [[1, 2], T, (T, X), [(T, X, X)], {"t": X}, None, [T, X]])
+def test_what_is_no_list_of_records(t):
+    with pytest.raises(ValueError, match=r"x: must be given, unless t is a list of pairs \(t, x\)"):
+        check_records(t)
+
+
+@pytest.mark.parametrize("pairs", [[], [(T, X), (T, X[:, :1])]])
+def test_records_of_one_system(pairs):
+    with pytest.raises(ValueError, match="t: a list of trajectories must hold at least one, all"):
+        check_records(pairs)
 
 
 def test_cut_at_long_steps_and_nowhere_else():

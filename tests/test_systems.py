@@ -62,3 +62,28 @@ def test_bad_benchmarks_are_refused():
         replace(SYSTEMS["Lorenz"], period=0)
     with pytest.raises(ValueError, match="x0: must be 3 finite numbers"):
         replace(SYSTEMS["Lorenz"], x0=(1, 2))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0,), "n: must be an integer of at least 1, got 0"),
+        ((2.5,), "n: must be an integer of at least 1, got 2.5"),
+        ((5, 0), "samples_per_period: must be positive, got 0"),
+        ((5, -1), "samples_per_period: must be positive, got -1"),
+        ((5, np.nan), "samples_per_period: must be a finite number, got nan"),
+    ],
+)
+def test_bad_times_are_refused(arguments, message):
+    for use in (SYSTEMS["Lorenz"].times, SYSTEMS["Lorenz"].trajectory):
+        with pytest.raises(ValueError, match=message):
+            use(*arguments)
+
+
+def test_bad_steps_are_refused():
+    law = SYSTEMS["Lorenz"]
+    for t, x0, substeps, name in [
+        ([0, np.inf], law.x0, 1, "t"), ([0, 1], [1, 2], 1, "x0"), ([0, 1], law.x0, 0, "substeps"),
+    ]:  # fmt: skip
+        with pytest.raises(ValueError, match=f"^{name}: must be"):
+            runge_kutta_4(law, t, x0, substeps)

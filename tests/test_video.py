@@ -153,7 +153,8 @@ def test_a_failed_write_keeps_the_old_file(tmp_path):
         ("background", "moon"), ("shape", "cube"), ("colour", "teal"), ("size", 2),
         ("size", np.nan),
         ("turns", np.inf), ("tumbling", -1), ("size_variation", 0.9), ("noise_variance", -0.1),
-        ("shape_seed", -1), ("image_size", (10, 10)), ("image_size", (512,)),
+        ("shape_seed", -1), ("shape_seed", 1.5), ("size", True), ("turns", "many"),
+        ("image_size", 512), ("image_size", (10, 10)), ("image_size", (512,)),
         ("occluders", ((1, 2, 3),)), ("occluders", ((500, 0, 50, 50),)),
         ("occluders", ((0, 0, 1, 50),)),
     ],
@@ -182,7 +183,7 @@ def test_render_rejects(track, message):
         ("clip.txt", {}, ValueError, "path: must end in .mkv or .avi"),
         ("clip.mkv", {"codec": "XVID"}, ValueError, "codec: must be one of"),
         ("clip.mkv", {"codec": "mp4v"}, ValueError, "path: must end in .mp4"),
-        ("clip.mkv", {"fps": 0}, ValueError, "fps: must be finite and positive, got 0"),
+        ("clip.mkv", {"fps": 0}, ValueError, "fps: must be positive, got 0"),
         ("none/clip.mkv", {}, FileNotFoundError, "path: the folder must exist"),
     ],
 )
@@ -225,3 +226,57 @@ def test_reading_rejects(tmp_path, read):
     writer.release()
     with pytest.raises(ValueError, match=f"path: must .* '{headers}'"):
         read(headers)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "a", None])
+def test_seeds_are_whole_numbers(tmp_path, seed):
+    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got"):
+        render_video(tmp_path / "clip.mkv", [[40, 40]], Scene(), seed=seed)
+    with pytest.raises(ValueError, match="rng: must be an integer of at least 0, got"):
+        Scene.random(seed)
+
+
+def test_what_is_no_scene_path_or_frames_is_named(tmp_path):
+    with pytest.raises(ValueError, match="scene: must be of type Scene, got 'hills'"):
+        render([[40, 40]], "hills")
+    with pytest.raises(ValueError, match="path: must be the name of a file, got None"):
+        write_video(None, [])
+    with pytest.raises(ValueError, match="frames: must be of type Iterable, got None"):
+        write_video(tmp_path / "clip.mkv", None)
+    for read in (read_video, video_info):
+        with pytest.raises(ValueError, match="path: must be the name of a file, got 5"):
+            read(5)
+
+
+def test_masked_rows_of_a_track_are_frames_without_target():
+    scene = Scene("plain", image_size=SMALL)
+    masked = np.ma.masked_array([[40, 40], [50, 40]], mask=[[0, 0], [0, 1]])
+    seen, hidden = render(masked, scene)
+    empty = next(render([[np.nan, np.nan]], scene))
+    assert not np.array_equal(seen, empty)
+    assert np.array_equal(hidden, empty)
+
+
+def test_frames_are_counted_where_the_header_states_no_number(tmp_path):
+    rng = np.random.default_rng(0)
+    path, cut = tmp_path / "clip.mkv", tmp_path / "cut.mkv"
+    fourcc = cv2.VideoWriter_fourcc(*"FFV1")
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, fourcc, 25, SMALL)
+    for _ in range(200):
+        writer.write(rng.integers(0, 256, (*SMALL[::-1], 3), np.uint8))
+    cut.write_bytes(path.read_bytes())  # before the length is written into the header
+    writer.release()
+    assert video_info(path).frames == 200
+    assert 0 < video_info(cut).frames < 200
+    assert video_info(cut).frames == len(list(read_video(cut)))
+
+
+def test_broken_files_print_nothing(tmp_path, capfd):
+    whole = write_video(tmp_path / "clip.mkv", [np.zeros((64, 64, 3), np.uint8)] * 50)
+    cut, text = tmp_path / "cut.mkv", tmp_path / "text.mkv"
+    cut.write_bytes(whole.read_bytes()[:-3000])
+    text.write_text("this is no video\n" * 100)
+    assert 0 < len(list(read_video(cut))) < 50
+    with pytest.raises(ValueError, match="path: must be a video file"):
+        read_video(text)
+    assert capfd.readouterr().err == ""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from .checks import check_integer
 from .metrics import coefficients_in
 from .polynomials import PolynomialSystem
 from .published import PublishedScore
@@ -70,8 +71,7 @@ def could_be(row: PublishedScore, true_terms: int, trials: int = 1) -> bool:
         Laws that were averaged, at least 1.
     """
     _check_true_terms(true_terms)
-    if int(trials) != trials or trials < 1:
-        raise ValueError(f"trials: must be an integer of at least 1, got {trials!r}")
+    trials = check_integer("trials", trials, 1)
     false_sum = trials * (row.false_positives + np.array([-0.5, 0.5]))
     hit_sum = trials * (row.recall + np.array([-1, 1]) * _HALF * PERCENT_STEP) * true_terms
     precision = trials * (row.precision + np.array([-1, 1]) * _HALF * PERCENT_STEP)
@@ -100,7 +100,7 @@ def _precision_sums(true_terms: int, trials: int, most_false: int) -> tuple[np.n
 
 
 def _check_true_terms(true_terms: int) -> None:
-    if int(true_terms) != true_terms or not 1 <= true_terms <= LIBRARY:
+    if check_integer("true_terms", true_terms, 1) > LIBRARY:
         raise ValueError(f"true_terms: must be an integer of 1 to {LIBRARY}, got {true_terms!r}")
 
 

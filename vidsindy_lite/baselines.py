@@ -24,6 +24,7 @@ import numpy as np
 import pysindy
 from pysindy.optimizers import BaseOptimizer
 
+from .checks import check_integer
 from .polynomials import PolynomialSystem, variable_names
 from .records import Record, check_record, cut, typical_step
 from .smoothing import smooth
@@ -157,6 +158,7 @@ def model_a(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> Pol
         Of the probes in the cross-validation.
     """
     library = pysindy.PolynomialLibrary(degree=degree)
+    seed = check_integer("seed", seed)
 
     def rows(segments: Sequence[Record]) -> Rows:
         splines = smooth(segments, np.random.default_rng(seed)).splines
@@ -264,7 +266,7 @@ def _weak_rows(
 def _numpy_seed(seed: int) -> Iterator[None]:
     """Seed numpy's global generator, which pysindy draws from, and put it back after."""
     before = np.random.get_state()  # noqa: NPY002
-    np.random.seed(seed)  # noqa: NPY002
+    np.random.seed(check_integer("seed", seed))  # noqa: NPY002
     try:
         yield
     finally:

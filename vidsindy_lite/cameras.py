@@ -17,20 +17,34 @@ Paper: Section "Coordinates Transformation", Eq. (4)-(6).
 """
 
 import tomllib
+from collections.abc import Iterable, Sized
 from dataclasses import dataclass, fields, replace
-from numbers import Integral, Real
-from pathlib import Path
+from math import hypot
 
 import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import least_squares
 
-from .geometry import in_plane_offset, rotation_to_z
+from .checks import (
+    check_array,
+    check_image_size,
+    check_instance,
+    check_integer,
+    check_number,
+    check_path,
+    check_positive,
+    check_vector,
+)
+from .geometry import in_plane_offset, rotation_to_z, unit_vector
 
 METHODS = ("joint", "paper", "gradient")
 
 # Normals closer to parallel than this (sine of their angle) count as one.
 _PARALLEL = 1e-6
+
+# A frame that is missed by more than so many robust standard deviations holds an outlier.
+_OUTLIER = 8.0
+_ROUNDING = 1e-6  # pixels; missing by less is no disagreement
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,13 +78,10 @@ class Camera:
     image_size: tuple[int, int] = (512, 512)
 
     def __post_init__(self):
-        normal = _vector("normal", self.normal)
-        length = np.linalg.norm(normal)
-        if length == 0:
-            raise ValueError(f"normal: must not be the zero vector, got {self.normal}")
-        if abs(length - 1) > 1e-15:  # a unit vector stays as it is, so that files round-trip
-            normal = normal / length
-        position = _vector("position", self.position)
+        normal = check_vector("normal", self.normal, 3)
+        if abs(hypot(*normal) - 1) > 1e-15:  # a unit vector stays as it is: files round-trip
+            normal = unit_vector("normal", normal)
+        position = check_vector("position", self.position, 3)
         position.flags.writeable = normal.flags.writeable = False
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "normal", normal)
@@ -81,21 +92,22 @@ class Camera:
                 f"scale={self.scale}, angle={self.angle}"
             )
         if self.is_calibrated:
-            scale, angle = _number("scale", self.scale), _number("angle", self.angle)
-            if scale <= 0:
-                raise ValueError(f"scale: must be positive, got {scale}")
-            object.__setattr__(self, "scale", scale)
-            object.__setattr__(self, "angle", angle)
-
-        size = self.image_size
-        if np.shape(size) != (2,) or any(not isinstance(n, Integral) or n < 1 for n in size):
-            raise ValueError(f"image_size: must be two positive integers, got {size}")
-        object.__setattr__(self, "image_size", (int(size[0]), int(size[1])))
+            object.__setattr__(self, "scale", check_positive("scale", self.scale))
+            object.__setattr__(self, "angle", check_number("angle", self.angle))
+        object.__setattr__(self, "image_size", check_image_size(self.image_size))
 
     def __eq__(self, other):
         if not isinstance(other, Camera):
             return NotImplemented
-        return _to_table(self) == _to_table(other)
+        return self._values == other._values
+
+    def __hash__(self):
+        return hash(self._values)
+
+    @property
+    def _values(self):
+        arrays = tuple(self.position.tolist()), tuple(self.normal.tolist())
+        return *arrays, self.scale, self.angle, self.image_size
 
     @property
     def is_calibrated(self):
@@ -186,10 +198,10 @@ class Rig:
     cameras: tuple[Camera, ...]
 
     def __post_init__(self):
-        cameras = tuple(self.cameras)
+        cameras = tuple(self.cameras) if isinstance(self.cameras, Iterable) else (self.cameras,)
         object.__setattr__(self, "cameras", cameras)
-        if not all(isinstance(camera, Camera) for camera in cameras):
-            raise ValueError(f"cameras: must all be Camera objects, got {cameras}")
+        for i, camera in enumerate(cameras):
+            check_instance(f"cameras[{i}]", camera, Camera)
         if len(cameras) < 2:
             raise ValueError(f"cameras: must be two or more, got {len(cameras)}")
         if not _independent(cameras):
@@ -222,11 +234,12 @@ class Rig:
             If x has a wrong shape or all its points coincide.
         """
         x = _rows_of("x", x, 3)
-        low, high = np.nanmin(x, axis=0), np.nanmax(x, axis=0)
+        x = x[~np.isnan(x).any(axis=1)]
+        if len(np.unique(x, axis=0)) < 2:
+            raise ValueError(f"x: must hold at least two different points, got {x.tolist()!r:.60}")
+        low, high = x.min(axis=0), x.max(axis=0)
         middle, reach = (low + high) / 2, np.linalg.norm(high - low)
-        if not reach > 0:
-            raise ValueError(f"x: must hold at least two different points, got extent {reach}")
-        half = (np.array(image_size) - 1) / 2
+        half = (np.array(check_image_size(image_size, least=2)) - 1) / 2
         cameras = []
         for azimuth, elevation, roll in np.deg2rad([[20, 20, 6], [140, 15, -9], [260, 25, 14]]):
             across = np.array([np.cos(azimuth), np.sin(azimuth), 0])
@@ -239,7 +252,7 @@ class Rig:
                 angle=np.arctan2(-np.cos(azimuth), -np.sin(azimuth)) + roll,
                 image_size=image_size,
             )
-            extent = np.nanmax(np.abs(camera.centred(camera.project(x))) / half)
+            extent = np.max(np.abs(camera.centred(camera.project(x))) / half)
             # The outermost point comes to 85 % of the half image: room for the target's size.
             cameras.append(replace(camera, scale=extent / 0.85))
         return cls(cameras)
@@ -263,8 +276,9 @@ class Rig:
         ValueError
             If the file is not TOML or does not describe a rig; names file, camera and key.
         """
+        path = check_path("path", path)
         try:
-            content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            content = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: must be a TOML file: {error}") from error
         tables = content.pop("camera", None)
@@ -289,7 +303,7 @@ class Rig:
             lines += ["", "[[camera]]"]
             # repr of a float is its shortest exact decimal form, and valid TOML.
             lines += [f"{key} = {value!r}" for key, value in _to_table(camera).items()]
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        check_path("path", path).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     def uncalibrated(self, keep=0):
         """The same rig with scale and angle forgotten in all cameras but one.
@@ -302,8 +316,13 @@ class Rig:
         Returns
         -------
         Rig
+
+        Raises
+        ------
+        ValueError
+            If there is no such camera.
         """
-        if not 0 <= keep < len(self.cameras):
+        if not check_integer("keep", keep) < len(self.cameras):
             raise ValueError(f"keep: must be an index of {len(self.cameras)} cameras, got {keep}")
         return Rig(
             camera if i == keep else replace(camera, scale=None, angle=None)
@@ -324,6 +343,9 @@ def learn_cameras(tracks, rig, method="joint"):
       more views; the closed form is then refined to the smallest reprojection error in pixels,
       which removes the bias that pixel noise causes in a scale.
     * "gradient": Eq. (4) in (s, theta) as in the paper, by L-BFGS in PyTorch; for comparison.
+
+    Frames in which the views contradict each other by more than eight robust standard deviations
+    are left out, so that a few outliers of the tracker do not bend the cameras.
 
     Parameters
     ----------
@@ -346,14 +368,9 @@ def learn_cameras(tracks, rig, method="joint"):
     """
     if method not in METHODS:
         raise ValueError(f"method: must be one of {METHODS}, got {method!r}")
+    check_learnable(rig)
     tracks = _check_tracks(tracks, rig)
-    calibrated = np.array([camera.is_calibrated for camera in rig.cameras])
-    unknown = np.flatnonzero(~calibrated)
-    if not calibrated.any():
-        raise ValueError(
-            "rig: at least one camera must be calibrated (scale and angle given) to learn the "
-            f"others, got none of {len(rig.cameras)}"
-        )
+    unknown = np.flatnonzero([not camera.is_calibrated for camera in rig.cameras])
     if unknown.size == 0:
         return rig
     if method != "joint" and not _independent([rig.cameras[i] for i in unknown]):
@@ -361,11 +378,14 @@ def learn_cameras(tracks, rig, method="joint"):
             f"rig: method {method!r} needs two independent normals among the uncalibrated "
             f"cameras, got {[rig.cameras[i].normal.tolist() for i in unknown]}; use 'joint'"
         )
-    design, target = _agreement(tracks, rig, unknown, epipolar=method == "joint")
+    design, target, frames = _agreement(tracks, rig, unknown, epipolar=method == "joint")
+    fits = ~np.isin(frames, _outliers(design, target, frames, rig))
+    design, target = design[fits], target[fits]
     turned = _solve(design, target, rig, unknown)
     if method == "joint":
-        turned = _refine(tracks, rig, unknown, turned)
-    elif method == "gradient":
+        clean = np.isin(np.arange(len(tracks[0])), frames[fits])
+        return _refine([track[clean] for track in tracks], rig, unknown, turned)
+    if method == "gradient":
         turned = _descend(design, target, rig, unknown)
     return _calibrate(rig, unknown, turned)
 
@@ -375,6 +395,9 @@ def reconstruct(tracks, rig):
 
     Paper: Eq. (6), whose "inverse" of a 6 x 3 matrix is the least-squares solution; here with any
     number of cameras, and each view weighted by 1 / scale so that all count in pixels.
+
+    Every frame is taken as it is: an outlier of one track moves the point. Three views show it as
+    a large residual of that frame (see `residuals`), two views cannot.
 
     Parameters
     ----------
@@ -438,6 +461,58 @@ def residuals(tracks, rig):
     return [track - camera.project(x) for track, camera in zip(tracks, rig.cameras, strict=True)]
 
 
+def learn_normal(tracks, rig, index):
+    """Learn the cameras with the normal of one of them unknown as well.
+
+    For a rig that does not agree with its tracks: if the normal of this camera alone was measured
+    badly, the residuals of the new rig are no larger than the errors of the tracks.
+
+    Parameters
+    ----------
+    tracks, rig
+        See `learn_cameras`.
+    index : int
+        Of the camera.
+
+    Returns
+    -------
+    Rig
+
+    Raises
+    ------
+    ValueError
+        See `learn_cameras`.
+    """
+    learned = learn_cameras(tracks, rig)
+    unknown = np.flatnonzero([not camera.is_calibrated for camera in rig.cameras])
+    known = [learned.cameras[i] for i in unknown]
+    turned = np.array([camera.scale * np.exp(1j * camera.angle) for camera in known], complex)
+    tilted = rig.cameras[index]
+
+    def candidate(parameters):
+        cameras = list(rig.cameras)
+        cameras[index] = replace(tilted, normal=tilted.normal + parameters[:2] @ tilted.rows)
+        return _calibrate(Rig(cameras), unknown, np.exp(parameters[2:].copy().view(complex)))
+
+    return _closest(tracks, candidate, np.concatenate(([0.0, 0.0], np.log(turned).view(float))))
+
+
+def check_learnable(rig):
+    """That this is a rig with at least one calibrated camera, from which to learn the others.
+
+    Raises
+    ------
+    ValueError
+        If it is not.
+    """
+    check_instance("rig", rig, Rig)
+    if not any(camera.is_calibrated for camera in rig.cameras):
+        raise ValueError(
+            "rig: at least one camera must be calibrated (scale and angle given) to learn the "
+            f"others, got none of {len(rig.cameras)}"
+        )
+
+
 def calibration_errors(rig, truth):
     """How far learned cameras are from the true ones.
 
@@ -457,6 +532,8 @@ def calibration_errors(rig, truth):
     ValueError
         If the rigs differ in length or a camera is not calibrated.
     """
+    check_instance("rig", rig, Rig)
+    check_instance("truth", truth, Rig)
     if len(rig.cameras) != len(truth.cameras):
         raise ValueError(
             f"rig: must have as many cameras as truth, got {len(rig.cameras)} "
@@ -477,9 +554,10 @@ def _agreement(tracks, rig, unknown, epipolar):
 
     The stacked in-plane coordinates of the views of a frame equal [R^-_1; R^-_2; ...] x. Columns Q
     with Q^T [R^-_1; ...] = 0 take the unknown point out: `epipolar` keeps all of them, Eq. (4)
-    only those by which the unknown cameras predict the known ones.
+    only those by which the unknown cameras predict the known ones. The third result is the frame
+    of each equation.
     """
-    designs, targets = [], []
+    designs, targets, places = [], [], []
     for views, frames in _visibility(tracks):
         rows = [rig.cameras[i].rows for i in views]
         if epipolar:
@@ -503,9 +581,34 @@ def _agreement(tracks, rig, unknown, epipolar):
                 target -= camera.offset @ block
         designs.append(design.reshape(-1, 2 * unknown.size))
         targets.append(target.ravel())
+        places.append(np.repeat(frames, target.shape[1]))
     if not designs:
-        return np.zeros((0, 2 * unknown.size)), np.zeros(0)
-    return np.vstack(designs), np.concatenate(targets)
+        return np.zeros((0, 2 * unknown.size)), np.zeros(0), np.zeros(0, dtype=int)
+    return np.vstack(designs), np.concatenate(targets), np.concatenate(places)
+
+
+def _outliers(design, target, frames, rig):
+    """Frames with an equation that a least-squares fit to all the other frames misses by far.
+
+    Fit and frames are found in turn. The scale of the misses is the median over all frames, so
+    that leaving some out never makes others look worse.
+    """
+    outliers = np.zeros(0, dtype=int)
+    for _ in range(20):
+        fits = ~np.isin(frames, outliers)
+        solution = np.linalg.lstsq(design[fits], target[fits])[0]
+        missed = np.abs(design @ solution - target) / _known_scale(rig)
+        limit = max(_OUTLIER * 1.4826 * np.median(missed), _ROUNDING) if len(missed) else 0.0
+        found = np.unique(frames[missed > limit])
+        if np.array_equal(found, outliers):
+            break
+        outliers = found
+    return outliers
+
+
+def _known_scale(rig):
+    """Mean scale of the calibrated cameras, in scene units per pixel."""
+    return np.mean([camera.scale for camera in rig.cameras if camera.is_calibrated])
 
 
 def _prediction(rows, is_unknown):
@@ -532,8 +635,7 @@ def _solve(design, target, rig, unknown):
             f"for scale and angle of {_names(unknown)}, got {len(design)}"
         )
     solution = np.linalg.lstsq(design, target)[0]
-    scale = np.mean([camera.scale for camera in rig.cameras if camera.is_calibrated])
-    misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / scale
+    misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / _known_scale(rig)
     _, singular, right = np.linalg.svd(design, full_matrices=False)
     motion = singular / np.sqrt(len(design))
     weak = motion <= max(1e-9 * motion[0], 2 * misfit)
@@ -542,28 +644,33 @@ def _solve(design, target, rig, unknown):
         raise ValueError(
             f"tracks: the target's motion must determine scale and angle of "
             f"{_names(unknown[share > 0.1])}, got {motion[-1]:.2g} px rms of telling motion "
-            f"against a misfit of {misfit:.2g} px (a static target, or a wrong position or normal)"
+            f"against a misfit of {misfit:.2g} px (a static target, a wrong position or normal, or "
+            "videos in another order than the cameras)"
         )
     return solution.view(complex)  # s exp(i theta)
 
 
 def _refine(tracks, rig, unknown, turned):
     """Smallest reprojection error in pixels, searched in log(s exp(i theta)) = log s + i theta."""
+    start = np.log(turned).view(float)
+    return _closest(tracks, lambda p: _calibrate(rig, unknown, np.exp(p.view(complex))), start)
+
+
+def _closest(tracks, candidate, start):
+    """The rig `candidate(parameters)` of the smallest reprojection error in pixels."""
 
     def error(parameters):
-        candidate = _calibrate(rig, unknown, np.exp(parameters.view(complex)))
-        missed = np.hstack(residuals(tracks, candidate))
+        missed = np.hstack(residuals(tracks, candidate(parameters)))
         return missed[np.isfinite(missed)]
 
-    fit = least_squares(error, np.log(turned).view(float), ftol=1e-15, xtol=1e-15, gtol=1e-15)
-    return np.exp(fit.x.view(complex))
+    return candidate(least_squares(error, start, ftol=1e-15, xtol=1e-15, gtol=1e-15).x)
 
 
 def _descend(design, target, rig, unknown):
     """Eq. (4) by gradients: L-BFGS in (s, theta) from the calibrated camera's scale and no turn."""
     import torch  # slow to import, and only this comparison needs it
 
-    start = np.mean([camera.scale for camera in rig.cameras if camera.is_calibrated])
+    start = _known_scale(rig)
     unit = np.abs(design).mean()  # makes the unknowns of order one
     design, target = torch.tensor(design / unit), torch.tensor(target / (unit * start))
     scale = torch.ones(unknown.size, dtype=torch.float64, requires_grad=True)
@@ -628,6 +735,8 @@ def _require_all_calibrated(name, cameras):
 
 
 def _check_tracks(tracks, rig):
+    check_instance("rig", rig, Rig)
+    check_instance("tracks", tracks, Sized)
     if len(tracks) != len(rig.cameras):
         raise ValueError(
             f"tracks: must be one per camera, got {len(tracks)} for {len(rig.cameras)} cameras"
@@ -637,13 +746,15 @@ def _check_tracks(tracks, rig):
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
     for i, track in enumerate(tracks):
-        if not np.isfinite(track).all(axis=1).any():
+        unseen = np.isnan(track).any(axis=1, keepdims=True)
+        tracks[i] = np.where(unseen, np.nan, track)  # half a pixel tells nothing
+        if unseen.all():
             raise ValueError(f"tracks[{i}]: must see the target in some frame, got only NaN rows")
     return tracks
 
 
 def _rows_of(name, value, width):
-    value = np.asarray(value, dtype=float)
+    value = check_array(name, value)
     if value.ndim != 2 or value.shape[1] != width:
         raise ValueError(f"{name}: must have shape (n, {width}), got {value.shape}")
     if np.isinf(value).any():
@@ -651,22 +762,6 @@ def _rows_of(name, value, width):
             f"{name}: must be finite or NaN, got {np.isinf(value).sum()} infinite values"
         )
     return value
-
-
-def _vector(name, value):
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise ValueError(f"{name}: must be three finite numbers, got {value!r}")
-    return array
-
-
-def _number(name, value):
-    if not isinstance(value, Real) or not np.isfinite(value):
-        raise ValueError(f"{name}: must be a finite number, got {value!r}")
-    return float(value)
 
 
 def _to_table(camera):

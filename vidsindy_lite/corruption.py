@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .checks import check_array, check_instance, check_integer, check_number
+
 BLOCK = 0.01
 """Length of a random block, as a fraction of the record."""
 
@@ -34,8 +36,9 @@ def add_noise(x: np.ndarray, level: float, rng: np.random.Generator) -> np.ndarr
         If ``x`` is not two-dimensional or ``level`` is negative or not finite.
     """
     x = _states(x)
-    if not 0 <= level < np.inf:
-        raise ValueError(f"level: must be finite and not negative, got {level}")
+    check_instance("rng", rng, np.random.Generator)
+    if check_number("level", level) < 0:
+        raise ValueError(f"level: must not be negative, got {level}")
     return x + level * np.nanstd(x, axis=0) * rng.standard_normal(x.shape)
 
 
@@ -78,13 +81,12 @@ def drop_fibers(x: np.ndarray, rate: float, rng: np.random.Generator, gaps: int 
     gaps : int
         Number of separate gaps.
     """
-    if int(gaps) != gaps or gaps < 1:
-        raise ValueError(f"gaps: must be an integer of at least 1, got {gaps!r}")
-    return _drop(x, _rate(rate), int(gaps), rng)
+    return _drop(x, _rate(rate), check_integer("gaps", gaps, 1), rng)
 
 
 def _drop(x: np.ndarray, rate: float, count: int, rng: np.random.Generator) -> np.ndarray:
     x = _states(x).copy()
+    check_instance("rng", rng, np.random.Generator)
     total = round(rate * len(x))
     if total == 0:
         return x
@@ -105,13 +107,13 @@ def _drop(x: np.ndarray, rate: float, count: int, rng: np.random.Generator) -> n
 
 
 def _rate(rate: float) -> float:
-    if not 0 <= rate < 1:
+    if not 0 <= check_number("rate", rate) < 1:
         raise ValueError(f"rate: must be at least 0 and below 1, got {rate}")
     return rate
 
 
 def _states(x: np.ndarray) -> np.ndarray:
-    x = np.asarray(x, dtype=float)
+    x = check_array("x", x)
     if x.ndim != 2 or not len(x):
         raise ValueError(f"x: must have shape (n, d) with n of at least 1, got {x.shape}")
     if np.isinf(x).any():

@@ -25,6 +25,7 @@ import numpy as np
 from .ado import discover
 from .baselines import BASELINES
 from .cameras import Rig, learn_cameras, reconstruct
+from .checks import check_integer
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .discovery import Discovery
 from .metrics import Score, pulls, score, trajectory_error
@@ -114,6 +115,7 @@ def film(
     Film
     """
     _check_choice("name", name, SYSTEMS)
+    seed = check_integer("seed", seed)
     truth = SYSTEMS[name].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(frames, SAMPLES_PER_PERIOD)
     rig = Rig.around(x)

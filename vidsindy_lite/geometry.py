@@ -11,6 +11,8 @@ distance of a camera plane".
 
 import numpy as np
 
+from .checks import check_array, check_number, check_vector
+
 
 def rodrigues(axis, angle):
     """Rotation by an angle about an axis, by Rodrigues' formula.
@@ -33,10 +35,8 @@ def rodrigues(axis, angle):
     ValueError
         If the axis is not a finite non-zero vector of shape (3,), or the angle is not finite.
     """
-    x, y, z = _unit("axis", axis)
-    angle = float(angle)
-    if not np.isfinite(angle):
-        raise ValueError(f"angle: must be finite, got {angle}")
+    x, y, z = unit_vector("axis", axis)
+    angle = check_number("angle", angle)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     # 1 - cos(a) = 2 sin(a/2)^2 keeps its digits at small angles.
     return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
@@ -64,7 +64,7 @@ def rotation_to_z(normal):
     ValueError
         If the normal is not a finite non-zero vector of shape (3,).
     """
-    a, b, c = _unit("normal", normal)
+    a, b, c = unit_vector("normal", normal)
     horizontal = np.hypot(a, b)
     axis = (b, -a, 0.0) if horizontal > 0 else (1.0, 0.0, 0.0)
     # arctan2 is accurate at every angle; arccos(c) loses half its digits near 0 and pi.
@@ -95,7 +95,7 @@ def plane_projection(x, normal, d):
         If `x` does not end in an axis of length 3, or the normal is not a finite non-zero vector.
     """
     x = _points("x", x)
-    unit = _unit("normal", normal)
+    unit = unit_vector("normal", normal)
     return x - signed_distance(x, normal, d)[..., None] * unit
 
 
@@ -121,7 +121,7 @@ def signed_distance(x, normal, d):
         If `x` does not end in an axis of length 3, or the normal is not a finite non-zero vector.
     """
     x = _points("x", x)
-    unit = _unit("normal", normal)
+    unit = unit_vector("normal", normal)
     return x @ unit + float(d) / np.linalg.norm(normal)
 
 
@@ -146,12 +146,12 @@ def plane_through(p1, p2, p3):
     ValueError
         If the points lie on one line, or are not finite vectors of shape (3,).
     """
-    p1, p2, p3 = (_vector(f"p{i}", p) for i, p in enumerate((p1, p2, p3), start=1))
+    p1, p2, p3 = (check_vector(f"p{i}", p, 3) for i, p in enumerate((p1, p2, p3), start=1))
     normal = np.cross(p2 - p1, p3 - p1)
     reach = np.linalg.norm(p2 - p1) * np.linalg.norm(p3 - p1)
     if np.linalg.norm(normal) <= 1e-12 * reach:
         raise ValueError(f"p1, p2, p3: must not lie on one line, got {p1}, {p2}, {p3}")
-    normal = _unit("normal", normal)
+    normal = unit_vector("normal", normal)
     return normal, -float(normal @ p1)
 
 
@@ -181,26 +181,26 @@ def in_plane_offset(position, normal):
     ValueError
         If position or normal is not a vector of shape (3,), or the normal is zero.
     """
-    position = _vector("position", position)
+    position = check_vector("position", position, 3)
     return rotation_to_z(normal)[:2] @ position
 
 
 def _points(name, x):
-    x = np.asarray(x, dtype=float)
+    x = check_array(name, x)
     if x.ndim == 0 or x.shape[-1] != 3:
         raise ValueError(f"{name}: must have shape (..., 3), got {x.shape}")
     return x
 
 
-def _vector(name, value):
-    value = np.asarray(value, dtype=float)
-    if value.shape != (3,) or not np.isfinite(value).all():
-        raise ValueError(f"{name}: must be three finite numbers, got {value.tolist()}")
-    return value
+def unit_vector(name, value):
+    """A finite vector of shape (3,), of any length but zero, at unit length.
 
-
-def _unit(name, value):
-    value = _vector(name, value)
+    Raises
+    ------
+    ValueError
+        If the vector is zero, not finite or of another shape.
+    """
+    value = check_vector(name, value, 3)
     largest = np.abs(value).max()
     if largest == 0:
         raise ValueError(f"{name}: must not be the zero vector, got {value.tolist()}")

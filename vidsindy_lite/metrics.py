@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .checks import check_array
 from .discovery import Discovery
 from .polynomials import PolynomialSystem
 
@@ -75,7 +76,7 @@ def score(found, truth: PolynomialSystem) -> Score:
     Raises
     ------
     ValueError
-        If the dimensions differ or the truth has no term.
+        If one of them is no law, the dimensions differ or the truth has no term.
 
     Examples
     --------
@@ -86,7 +87,10 @@ def score(found, truth: PolynomialSystem) -> Score:
     found = getattr(found, "system", found)
     for name, law in (("found", found), ("truth", truth)):
         if not isinstance(law, PolynomialSystem):
-            raise ValueError(f"{name}: must be a law, a PolynomialSystem, got {law!r:.60}")
+            raise ValueError(
+                f"{name}: must be a PolynomialSystem (what was found comes first, the truth "
+                f"second), got {law!r:.60}"
+            )
     if found.d != truth.d:
         raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {found.d}")
     if not truth.support.any():
@@ -230,7 +234,7 @@ def trajectory_error(x: np.ndarray, truth: np.ndarray) -> TrajectoryError:
     ValueError
         If the shapes differ, the truth is not finite or ``x`` has no row without NaN.
     """
-    x, truth = np.asarray(x, dtype=float), np.asarray(truth, dtype=float)
+    x, truth = check_array("x", x), check_array("truth", truth)
     if truth.ndim != 2 or not np.isfinite(truth).all():
         raise ValueError(f"truth: must be finite with shape (n, d), got shape {truth.shape}")
     if x.shape != truth.shape:

@@ -30,6 +30,7 @@ import numpy as np
 import torch
 from scipy.linalg import solveh_banded
 
+from .checks import check_integer
 from .discovery import Units
 from .polynomials import PolynomialSystem, monomial_exponents, monomials, variable_names
 from .records import check_record
@@ -143,7 +144,7 @@ def discover_paper(
     ):
         if not value >= least:
             raise ValueError(f"{name}: must be at least {least}, got {value}")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(check_integer("seed", seed))
     spans = max(1, round(knots_per_sample * (len(t) - 1)))
     fit = _Fit(t, x, exponents, spans, collocation_per_knot, physics_weight, rng)
     fit.descend(pretraining, learning_rate)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -10,10 +10,15 @@ import numpy as np
 from tqdm import tqdm
 
 from .ado import discover
-from .cameras import Rig, learn_cameras, reconstruct
+from .cameras import Rig, check_learnable, learn_cameras, learn_normal, reconstruct, residuals
+from .checks import check_integer, check_path, check_times
 from .discovery import Discovery
 from .tracking import track
 from .video import video_info
+
+DISAGREEMENT = 1.0
+"""Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
+less than half of that."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +48,9 @@ def discover_from_videos(
     rig: Rig,
     t: np.ndarray | None = None,
     *,
+    degree: int = 3,
+    seed: int = 0,
     progress: bool = False,
-    **options,
 ) -> VideoDiscovery:
     """Discover the governing equations of a target filmed by several fixed cameras.
 
@@ -55,23 +61,31 @@ def discover_from_videos(
     rig : Rig
         Positions and normals of all cameras, scale and angle of at least one.
     t : array_like, shape (n,), optional
-        Time of each frame; by default the frame number over the frame rate, in seconds.
+        Time of each frame, increasing; by default the frame number over the frame rate, in
+        seconds. The unit of time is that of the equations.
+    degree, seed : int
+        See `discover`.
     progress : bool
         Show progress bars.
-    **options
-        Passed to `discover`.
 
     Returns
     -------
     VideoDiscovery
+        Its first warning is that the rig does not agree with the tracks, if it does not.
 
     Raises
     ------
     FileNotFoundError, ValueError
-        If a file is missing or no video, if the numbers of files, cameras or frames disagree, or
-        if cameras or law cannot be learned (see `learn_cameras` and `discover`).
+        If a file is missing, cut off or no video, if the numbers of files, cameras or frames
+        disagree, if a target is not found, or if cameras or law cannot be learned (see
+        `learn_cameras` and `discover`). What can be told before a video is tracked is.
     """
-    paths = [Path(path) for path in paths]
+    check_learnable(rig)
+    check_integer("degree", degree, 1)
+    check_integer("seed", seed)
+    if isinstance(paths, str) or not isinstance(paths, Iterable):
+        raise ValueError(f"paths: must be a list of files, one per camera, got {paths!r:.60}")
+    paths = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
     if len(paths) != len(rig.cameras):
         raise ValueError(
             f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
@@ -94,13 +108,68 @@ def discover_from_videos(
             rates = ", ".join(f"{shot.fps:g}" for shot in shots)
             raise ValueError(f"t: must be given if the videos differ in frame rate, got {rates}")
         t = np.arange(shots[0].frames) / shots[0].fps
-    t = np.asarray(t, dtype=float)
+    t = check_times(t)
     if t.shape != (shots[0].frames,):
         raise ValueError(f"t: must have shape ({shots[0].frames},), one per frame, got {t.shape}")
     bar = tqdm(paths, desc="track", disable=not progress, leave=False)
-    tracks = tuple(track(path) for path in bar)
+    tracks = tuple(_track(path, len(t)) for path in bar)
     learned = learn_cameras(tracks, rig)
     x = reconstruct(tracks, learned)
-    found = discover(t, x, progress=progress, **options)
+    found = discover(t, x, degree=degree, seed=seed, progress=progress)
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
+    parts["warnings"] = (*_rig_doubts(tracks, learned, rig, paths), *found.warnings)
     return VideoDiscovery(**parts, tracks=tracks, rig=learned, t=t, x=x)
+
+
+def _track(path: Path, frames: int) -> np.ndarray:
+    """Track a video that should have so many frames and one moving target."""
+    found = track(path)
+    if len(found) != frames:
+        raise ValueError(
+            f"paths: {path.name} must hold the {frames} frames that its header states, got "
+            f"{len(found)} that can be read: the file is cut off or damaged, or its header wrong"
+        )
+    if not np.isfinite(found).any():
+        raise ValueError(
+            f"paths: {path.name} must show one moving target, got none in any frame: what never "
+            "moves away from a place by about its own width is taken for background"
+        )
+    return found
+
+
+def _rig_doubts(
+    tracks: Sequence[np.ndarray], learned: Rig, given: Rig, paths: Sequence[Path]
+) -> list[str]:
+    """Do the cameras agree on the target to within what tracking can be blamed for?"""
+    missed = _missed(tracks, learned)
+    if max(missed) <= DISAGREEMENT:
+        return []
+    # The largest residual does not tell which camera is wrong: the others were fitted to it.
+    others = [learn_normal(tracks, given, i) for i in range(len(paths))]
+    left = [max(_missed(tracks, other)) for other in others]
+    i = int(np.argmin(left))
+    normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
+    advice = (
+        f"the normal ({normal}) of cameras[{i}] ({paths[i].name}) would explain it best"
+        if left[i] <= DISAGREEMENT
+        else "no single wrong normal explains it; check the positions, the scales and angles that "
+        "are given, and that all videos start together"
+    )
+    sizes = ", ".join(f"{size:.1f}" for size in missed)
+    return [
+        "the rig does not agree with the tracks: in one frame of ten, tracked and reconstructed "
+        f"target lie more than {sizes} pixels apart, where tracking explains {DISAGREEMENT:g}: "
+        + advice
+    ]
+
+
+def _missed(tracks: Sequence[np.ndarray], rig: Rig) -> list[float]:
+    """Residual in pixels that one frame in ten exceeds, per camera.
+
+    That tenth may hold anything: a few outliers of the tracker do not accuse the rig.
+    """
+    missed = []
+    for residual in residuals(tracks, rig):
+        seen = residual[np.isfinite(residual).all(axis=1)]
+        missed.append(np.percentile(np.hypot(*seen.T), 90) if len(seen) else 0.0)
+    return missed

@@ -8,7 +8,7 @@ the law in any other frame follows exactly (paper: Eq. 10) and is never typed by
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement
@@ -16,6 +16,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.special import comb as binomial
+
+from .checks import check_array, check_integer, check_number, check_times, check_vector
 
 
 def variable_names(d: int) -> tuple[str, ...]:
@@ -38,9 +40,7 @@ def monomial_exponents(d: int, degree: int) -> np.ndarray:
     ndarray of int, shape (l, d)
         For d = 2, degree = 2: 1, x, y, x^2, xy, y^2.
     """
-    for name, value, least in (("d", d, 1), ("degree", degree, 0)):
-        if int(value) != value or value < least:
-            raise ValueError(f"{name}: must be an integer of at least {least}, got {value!r}")
+    d, degree = check_integer("d", d, 1), check_integer("degree", degree)
     rows = [
         [picked.count(i) for i in range(d)]
         for total in range(degree + 1)
@@ -137,7 +137,7 @@ class PolynomialSystem:
     Parameters
     ----------
     names : sequence of str, length d
-        Names of the state variables.
+        Names of the state variables: a letter, then letters, digits and underscores.
     exponents : array_like of int, shape (l, d)
         The monomials of the library, one row each.
     coefficients : array_like, shape (l, d)
@@ -146,7 +146,8 @@ class PolynomialSystem:
     Raises
     ------
     ValueError
-        If shapes disagree, an exponent is negative or repeated, or a value is not finite.
+        If shapes disagree, a name is none, an exponent is negative, not whole or repeated, or a
+        value is not finite.
     """
 
     names: tuple[str, ...]
@@ -154,16 +155,24 @@ class PolynomialSystem:
     coefficients: np.ndarray
 
     def __post_init__(self) -> None:
-        names = tuple(self.names)
-        exponents = np.array(self.exponents, dtype=int)
-        coefficients = np.array(self.coefficients, dtype=float)
-        if not names or len(set(names)) != len(names):
-            raise ValueError(f"names: must be distinct and at least one, got {names}")
-        if exponents.ndim != 2 or exponents.shape[1] != len(names) or (exponents < 0).any():
+        names = tuple(self.names) if isinstance(self.names, Iterable) else ()
+        named = all(isinstance(name, str) and name.isidentifier() for name in names)
+        if not names or not named or len(set(names)) != len(names):
             raise ValueError(
-                f"exponents: must be non-negative with shape (l, {len(names)}), "
-                f"got shape {exponents.shape} with minimum {exponents.min(initial=0)}"
+                f"names: must be distinct names such as x or x1, at least one, got {self.names!r}"
             )
+        powers = check_array("exponents", self.exponents)
+        coefficients = check_array("coefficients", self.coefficients).copy()
+        if powers.ndim != 2 or powers.shape[1] != len(names):
+            raise ValueError(
+                f"exponents: must have shape (l, {len(names)}), got shape {powers.shape}"
+            )
+        whole = np.isfinite(powers) & (powers >= 0) & (powers == np.rint(powers))
+        if not whole.all():
+            raise ValueError(
+                f"exponents: must be non-negative integers, got {powers[~whole][0]:g}"
+            )
+        exponents = powers.astype(int)
         if len(np.unique(exponents, axis=0)) != len(exponents):
             raise ValueError("exponents: every monomial may appear once, got a repeated row")
         if coefficients.shape != exponents.shape:
@@ -195,14 +204,21 @@ class PolynomialSystem:
         Raises
         ------
         ValueError
-            If a term names an unknown variable or has a higher degree than the library.
+            If the equations are no such mapping, or a term names an unknown variable or has a
+            higher degree than the library.
         """
+        given = equations.values() if isinstance(equations, Mapping) else ()
+        if not given or not all(isinstance(terms, Mapping) for terms in given):
+            raise ValueError(
+                "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
+                f"'y': {{'x': 1}}}}, got {equations!r:.60}"
+            )
         names = tuple(equations)
         parsed = [
             {term: _parse_term(term, names) for term in terms} for terms in equations.values()
         ]
         highest = max((sum(e) for terms in parsed for e in terms.values()), default=0)
-        degree = highest if degree is None else degree
+        degree = highest if degree is None else check_integer("degree", degree)
         if highest > degree:
             raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
         exponents = monomial_exponents(len(names), degree)
@@ -210,7 +226,8 @@ class PolynomialSystem:
         coefficients = np.zeros(exponents.shape)
         for column, (terms, values) in enumerate(zip(parsed, equations.values(), strict=True)):
             for term, value in values.items():
-                coefficients[index[terms[term]], column] += value
+                number = check_number(f"coefficient of {term}", value)
+                coefficients[index[terms[term]], column] += number
         return cls(names, exponents, coefficients)
 
     @property
@@ -239,7 +256,7 @@ class PolynomialSystem:
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
-        x = np.asarray(x, dtype=float)
+        x = check_array("x", x)
         return (self.library(np.atleast_2d(x)) @ self.coefficients).reshape(x.shape)
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
@@ -255,7 +272,7 @@ class PolynomialSystem:
         ndarray, shape (n, d, d) or (d, d)
             ``[..., j, i]`` is the derivative of equation j with respect to variable i.
         """
-        x = np.asarray(x, dtype=float)
+        x = check_array("x", x)
         points = self._points(np.atleast_2d(x))
         jacobian = np.einsum(
             "nli,lj->nji", monomial_gradients(points, self.exponents), self.coefficients
@@ -272,9 +289,7 @@ class PolynomialSystem:
         offset : array_like, shape (d,)
             Shift of the trajectory, in state units.
         """
-        offset = np.asarray(offset, dtype=float)
-        if offset.shape != (self.d,) or not np.isfinite(offset).all():
-            raise ValueError(f"offset: must be {self.d} finite numbers, got {offset}")
+        offset = check_vector("offset", offset, self.d)
         exponents = closure(self.exponents)
         rows = {tuple(e): row for row, e in enumerate(exponents)}
         closed = np.zeros(exponents.shape)
@@ -290,8 +305,8 @@ class PolynomialSystem:
 
         Parameters
         ----------
-        t : ndarray, shape (n,)
-            Increasing times.
+        t : array_like, shape (n,)
+            Increasing, finite times.
         x0 : array_like, shape (d,)
             State at ``t[0]``.
 
@@ -299,12 +314,13 @@ class PolynomialSystem:
         -------
         ndarray, shape (n, d)
             The trajectory; rows after a blow-up are NaN.
+
+        Raises
+        ------
+        ValueError
+            If the times do not increase, or a time or a number of the state is not finite.
         """
-        t, x0 = np.asarray(t, dtype=float), np.asarray(x0, dtype=float)
-        if t.ndim != 1 or len(t) < 1 or (np.diff(t) <= 0).any():
-            raise ValueError(f"t: must be a non-empty, increasing 1-D array, got shape {t.shape}")
-        if x0.shape != (self.d,):
-            raise ValueError(f"x0: must have shape ({self.d},), got {x0.shape}")
+        t, x0 = check_times(t), check_vector("x0", x0, self.d)
 
         def escaped(_, x):
             return 1e8 * (1 + np.abs(x0).max()) - np.abs(x).max()
@@ -344,13 +360,15 @@ class PolynomialSystem:
         return f"${self.latex()}$"
 
     def _points(self, x: np.ndarray) -> np.ndarray:
-        x = np.asarray(x, dtype=float)
+        x = check_array("x", x)
         if x.ndim != 2 or x.shape[1] != self.d:
             raise ValueError(f"x: must have shape (n, {self.d}), got {x.shape}")
         return x
 
 
 def _parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
+    if not isinstance(term, str) or not term.strip():
+        raise ValueError(f"term: must be '1' or a product of the variables {names}, got {term!r}")
     exponents = dict.fromkeys(names, 0)
     rest = "" if term.strip() == "1" else term.replace("**", "^").replace("*", " ").strip()
     longest_first = "|".join(sorted(map(re.escape, names), key=len, reverse=True))

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .checks import check_array, check_times
+
 Record = tuple[np.ndarray, np.ndarray]
 """Times (n,) and states (n, d) without missing rows."""
 
@@ -18,7 +20,7 @@ def check_record(t: np.ndarray, x: np.ndarray) -> Record:
     t : array_like, shape (n,)
         Increasing, finite times.
     x : array_like, shape (n, d)
-        States; a row with a NaN is missing.
+        States; a row with a NaN, or with a masked entry of a masked array, is missing.
 
     Returns
     -------
@@ -30,18 +32,12 @@ def check_record(t: np.ndarray, x: np.ndarray) -> Record:
     ValueError
         If shapes disagree, ``t`` does not increase, a value is infinite or nothing is left.
     """
-    t, x = _numbers("t", t), _numbers("x", x)
+    t, x = check_array("t", t), check_array("x", x)
     if x.ndim != 2 or x.shape[1] < 1:
         raise ValueError(f"x: must have shape (n, d) with d of at least 1, got {x.shape}")
     if t.shape != (len(x),):
         raise ValueError(f"t: must have shape ({len(x)},) as x has {len(x)} rows, got {t.shape}")
-    if not np.isfinite(t).all():
-        raise ValueError(f"t: must be finite, got {t[~np.isfinite(t)][0]}")
-    if (np.diff(t) <= 0).any():
-        row = int(np.flatnonzero(np.diff(t) <= 0)[0])
-        raise ValueError(
-            f"t: must increase, got t[{row}] = {t[row]:g} before t[{row + 1}] = {t[row + 1]:g}"
-        )
+    t = check_times(t)
     if np.isinf(x).any():
         raise ValueError(
             f"x: must not be infinite (NaN marks a missing row), "
@@ -53,11 +49,30 @@ def check_record(t: np.ndarray, x: np.ndarray) -> Record:
     return t[seen], x[seen]
 
 
-def _numbers(name: str, values: np.ndarray) -> np.ndarray:
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: must be an array of numbers, got {values!r:.60}") from None
+def check_records(
+    t: np.ndarray | Sequence[tuple[np.ndarray, np.ndarray]], x: np.ndarray | None = None
+) -> list[Record]:
+    """Check one trajectory ``t, x``, or a list of several pairs ``(t, x)`` of one dimension.
+
+    Raises
+    ------
+    ValueError
+        If ``t`` is neither, or a trajectory is malformed; see `check_record`.
+    """
+    pairs = t if x is None else [(t, x)]
+    if not isinstance(pairs, list | tuple) or not all(
+        isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs
+    ):
+        raise ValueError(
+            f"x: must be given, unless t is a list of pairs (t, x), got t = {t!r:.60}"
+        )
+    records = [check_record(*pair) for pair in pairs]
+    if len({values.shape[1] for _, values in records}) != 1:
+        raise ValueError(
+            "t: a list of trajectories must hold at least one, all of the same dimension, "
+            f"got shapes {[values.shape for _, values in records]}"
+        )
+    return records
 
 
 def cut(record: Record, longest_step: float) -> list[Record]:

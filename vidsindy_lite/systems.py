@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .checks import check_integer, check_positive, check_times, check_vector
 from .polynomials import PolynomialSystem
 
 REFERENCE_OFFSET = (10.0, 10.0, 0.0)
@@ -37,10 +38,8 @@ class Benchmark(PolynomialSystem):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(self.x0) != self.d or not np.isfinite(self.x0).all():
-            raise ValueError(f"x0: must be {self.d} finite numbers, got {self.x0}")
-        if not self.period > 0:
-            raise ValueError(f"period: must be positive, got {self.period}")
+        check_vector("x0", self.x0, self.d)
+        check_positive("period", self.period)
 
     def shift(self, offset) -> Benchmark:
         """The same experiment seen from a shifted origin; see `PolynomialSystem.shift`."""
@@ -49,7 +48,8 @@ class Benchmark(PolynomialSystem):
 
     def times(self, n: int = 1500, samples_per_period: float = 100) -> np.ndarray:
         """Times of ``n`` video frames, shape (n,), starting at 0."""
-        return np.arange(n) * (self.period / samples_per_period)
+        step = self.period / check_positive("samples_per_period", samples_per_period)
+        return np.arange(check_integer("n", n, 1)) * step
 
     def trajectory(
         self, n: int = 1500, samples_per_period: float = 100
@@ -77,8 +77,8 @@ def runge_kutta_4(system: PolynomialSystem, t: np.ndarray, x0, substeps: int = 1
     -------
     ndarray, shape (n, d)
     """
-    states = [np.asarray(x0, dtype=float)]
-    for step in np.diff(t) / substeps:
+    states = [check_vector("x0", x0, system.d)]
+    for step in np.diff(check_times(t)) / check_integer("substeps", substeps, 1):
         x = states[-1]
         for _ in range(substeps):
             k1 = system(x)

@@ -20,6 +20,20 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from .checks import (
+    check_array,
+    check_image_size,
+    check_instance,
+    check_integer,
+    check_number,
+    check_path,
+    check_positive,
+)
+
+# What is wrong with a file is said by our errors, which name it. OpenCV reads this when it opens
+# its first file; -8 is ffmpeg's "quiet".
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
 SHAPES = ("disc", "polygon", "irregular")
 
 # Vivid colours (blue, green, red), each far from every (muted) colour of every background.
@@ -210,15 +224,13 @@ class Scene:
                 raise ValueError(f"{name}: must be one of {', '.join(allowed)}, got {value!r}")
         for name, low, high in [
             ("size", 4, 100), ("turns", -np.inf, np.inf), ("tumbling", 0, np.inf),
-            ("size_variation", 0, 0.5), ("noise_variance", 0, 0.1), ("shape_seed", 0, np.inf),
+            ("size_variation", 0, 0.5), ("noise_variance", 0, 0.1),
         ]:
-            value = getattr(self, name)
-            if not (np.isfinite(value) and low <= value <= high):
-                raise ValueError(f"{name}: must be finite and in [{low}, {high}], got {value}")
-        size = tuple(self.image_size)
-        if len(size) != 2 or any(s != int(s) or s < 64 for s in size):
-            raise ValueError(f"image_size: must be two whole numbers of at least 64, got {size}")
-        object.__setattr__(self, "image_size", (int(size[0]), int(size[1])))
+            if not low <= check_number(name, getattr(self, name)) <= high:
+                raise ValueError(f"{name}: must be in [{low}, {high}], got {getattr(self, name)}")
+        check_integer("shape_seed", self.shape_seed)
+        size = check_image_size(self.image_size, least=64)
+        object.__setattr__(self, "image_size", size)
         occluders = tuple(tuple(o) for o in self.occluders)
         for occluder in occluders:
             whole = len(occluder) == 4 and all(x == int(x) for x in occluder)
@@ -237,11 +249,13 @@ class Scene:
 
         Parameters
         ----------
-        rng : np.random.Generator or seed
+        rng : np.random.Generator or int
+            The source of random numbers, or its seed.
         **fixed
             Fields that are given instead of drawn (disturbances are never drawn).
         """
-        rng = np.random.default_rng(rng)
+        if not isinstance(rng, np.random.Generator):
+            rng = np.random.default_rng(check_integer("rng", rng))
         drawn = {
             "background": str(rng.choice(list(BACKGROUNDS))),
             "shape": str(rng.choice(SHAPES)),
@@ -365,9 +379,11 @@ def render(track, scene, seed=0) -> Iterator[np.ndarray]:
     Raises
     ------
     ValueError
-        If `track` has the wrong shape or infinite values.
+        If `track` has the wrong shape or infinite values, `scene` is none or `seed` is negative.
     """
-    track = np.asarray(track, float)
+    check_instance("scene", scene, Scene)
+    seed = check_integer("seed", seed)
+    track = check_array("track", track)
     if track.ndim != 2 or track.shape[1] != 2 or len(track) == 0:
         raise ValueError(f"track: must have shape (n, 2) with n >= 1, got {track.shape}")
     if np.isinf(track).any():
@@ -443,7 +459,8 @@ def write_video(path, frames: Iterable[np.ndarray], fps=25, codec=None) -> Path:
     OSError
         If the file cannot be written.
     """
-    path = Path(path)
+    path = check_path("path", path)
+    check_instance("frames", frames, Iterable)
     suffix = path.suffix.lower()
     if codec is None and suffix not in LOSSLESS:
         raise ValueError(f"path: must end in .mkv or .avi unless codec is given, got '{path}'")
@@ -453,8 +470,7 @@ def write_video(path, frames: Iterable[np.ndarray], fps=25, codec=None) -> Path:
     if suffix not in CODECS[codec]:
         allowed = " or ".join(CODECS[codec])
         raise ValueError(f"path: must end in {allowed} for {codec}, got '{path}'")
-    if not (np.isfinite(fps) and fps > 0):
-        raise ValueError(f"fps: must be finite and positive, got {fps}")
+    fps = check_positive("fps", fps)
     if not path.parent.is_dir():
         raise FileNotFoundError(f"path: the folder must exist, got '{path.parent}'")
     partial = path.with_name(f".{path.stem}.{os.getpid()}{suffix}")
@@ -506,12 +522,15 @@ def open_video(path) -> cv2.VideoCapture:
     ValueError
         If the file is empty, is not a video, or holds no frame.
     """
-    path = Path(path)
+    path = check_path("path", path)
     if not path.is_file():
         raise FileNotFoundError(f"path: no such video file, got '{path}'")
     if path.stat().st_size == 0:
         raise ValueError(f"path: must be a video file, got the empty file '{path}'")
+    loud = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    cv2.utils.logging.setLogLevel(loud)
     if not capture.isOpened():
         raise ValueError(f"path: must be a video file that OpenCV can read, got '{path}'")
     if not capture.grab():
@@ -544,7 +563,10 @@ def _decode(capture):
 
 
 def video_info(path) -> VideoInfo:
-    """Number of frames (as the file's header states it), frame rate and size of a video file.
+    """Number of frames, frame rate and size of a video file.
+
+    The number is what the file's header states, which is more than the frames that can be read if
+    the file was cut off later; where the header states none, the frames are counted.
 
     Raises
     ------
@@ -553,8 +575,8 @@ def video_info(path) -> VideoInfo:
     """
     capture = open_video(path)
     size = int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
-    info = VideoInfo(
-        round(capture.get(cv2.CAP_PROP_FRAME_COUNT)), capture.get(cv2.CAP_PROP_FPS), size
-    )
+    frames, fps = round(capture.get(cv2.CAP_PROP_FRAME_COUNT)), capture.get(cv2.CAP_PROP_FPS)
+    if frames < 1:  # the file was cut off while it was written
+        frames = sum(1 for _ in iter(capture.grab, False))
     capture.release()
-    return info
+    return VideoInfo(frames, fps, size)

@@ -1,0 +1,105 @@
+"""The checks that all modules share."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.checks import (
+    check_array,
+    check_image_size,
+    check_instance,
+    check_integer,
+    check_number,
+    check_path,
+    check_positive,
+    check_times,
+    check_vector,
+)
+
+
+@pytest.mark.parametrize("value", [-1, 1.5, 2.0, True, "2", None, np.nan, [1]])
+def test_integers(value):
+    assert check_integer("seed", np.int64(3)) == 3
+    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got "):
+        check_integer("seed", value)
+
+
+@pytest.mark.parametrize("value", [np.nan, -np.inf, True, "1", 1j, None, np.ones(1)])
+def test_numbers(value):
+    assert check_number("angle", np.float32(-0.5)) == -0.5
+    with pytest.raises(ValueError, match="angle: must be a finite number, got "):
+        check_number("angle", value)
+
+
+@pytest.mark.parametrize("value", [0, -1e-9])
+def test_positive_numbers(value):
+    assert check_positive("scale", 2) == 2.0
+    with pytest.raises(ValueError, match=f"scale: must be positive, got {value}"):
+        check_positive("scale", value)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        "abc", ["1", "2"], [1j], [[1], [1, 2]], np.arange(3).astype("datetime64[s]"), object(),
+        np.array([1, 2j], dtype=object),
+    ],
+)  # fmt: skip
+def test_what_is_no_array_of_real_numbers(values):
+    with pytest.raises(ValueError, match="x: must be an array of real numbers, got "):
+        check_array("x", values)
+
+
+@pytest.mark.parametrize("dtype", [int, float])
+def test_masked_entries_are_missing(dtype):
+    masked = np.ma.masked_array(np.arange(4, dtype=dtype), mask=[0, 0, 1, 0])
+    values = check_array("x", masked)
+    assert type(values) is np.ndarray
+    np.testing.assert_array_equal(values, [0, 1, np.nan, 3])
+    assert masked.data.tolist() == [0, 1, 2, 3]
+
+
+def test_vectors_are_copied():
+    given = np.array([1.0, 2.0])
+    check_vector("offset", given, 2)[0] = 9
+    assert given[0] == 1
+    for bad in ([1, 2, 3], [1, np.nan], [[1, 2]]):
+        with pytest.raises(ValueError, match="offset: must be 2 finite numbers, got "):
+            check_vector("offset", bad, 2)
+
+
+@pytest.mark.parametrize(
+    ("t", "message"),
+    [
+        ([], "t: must hold at least one time"),
+        (3.0, "t: must hold at least one time"),
+        ([0, np.inf], "t: must be finite, got inf"),
+        (np.ma.masked_array([0, 1, 2], [0, 1, 0]), "t: must be finite, got nan"),
+        ([0, 2, 2], "t: must increase, got t[1] = 2 before t[2] = 2"),
+    ],
+)
+def test_times(t, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        check_times(t)
+
+
+@pytest.mark.parametrize("size", [512, None, "ab", (512,), (512.0, 512), (True, True), (512, 63)])
+def test_image_sizes(size):
+    assert check_image_size([64, 80], least=64) == (64, 80)
+    with pytest.raises(ValueError, match="image_size: must be two integers of at least 64, got "):
+        check_image_size(size, least=64)
+
+
+def test_paths():
+    assert check_path("path", "a.mkv") == Path("a.mkv")
+    for value in (None, 5, ["a.mkv"]):
+        with pytest.raises(ValueError, match="path: must be the name of a file, got "):
+            check_path("path", value)
+
+
+def test_instances():
+    check_instance("name", "rig.toml", str)
+    with pytest.raises(ValueError, match="rig: must be of type dict, got 'rig.toml'"):
+        check_instance("rig", "rig.toml", dict)

@@ -1,0 +1,91 @@
+"""What arguments have to be: each check gives back the clean value, or names argument, rule, value.
+
+Booleans are no numbers here, and text is none even where numpy would read it as one.
+"""
+
+from __future__ import annotations
+
+import os
+from numbers import Integral, Real
+from pathlib import Path
+
+import numpy as np
+
+
+def check_instance(name: str, value: object, kind: type) -> None:
+    """An object of a type of ours, not e.g. the name of its file."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name}: must be of type {kind.__name__}, got {value!r:.60}")
+
+
+def check_path(name: str, value: str | os.PathLike) -> Path:
+    """The name of one file or folder."""
+    if not isinstance(value, str | os.PathLike):
+        raise ValueError(f"{name}: must be the name of a file, got {value!r:.60}")
+    return Path(value)
+
+
+def check_integer(name: str, value: int, least: int = 0) -> int:
+    """An integer of at least ``least``; with the default, a seed or an index."""
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
+        raise ValueError(f"{name}: must be an integer of at least {least}, got {value!r:.60}")
+    return int(value)
+
+
+def check_number(name: str, value: float) -> float:
+    """A finite real number."""
+    if not isinstance(value, Real) or isinstance(value, bool) or not np.isfinite(value):
+        raise ValueError(f"{name}: must be a finite number, got {value!r:.60}")
+    return float(value)
+
+
+def check_positive(name: str, value: float) -> float:
+    """A finite number above zero."""
+    if check_number(name, value) <= 0:
+        raise ValueError(f"{name}: must be positive, got {value}")
+    return float(value)
+
+
+def check_array(name: str, values: np.ndarray) -> np.ndarray:
+    """Real numbers as an array of floats, in which the masked entries of a masked array are NaN."""
+    try:
+        array = values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+        if array.dtype.kind not in "biufO":
+            raise TypeError
+        return np.ma.filled(array.astype(float, copy=False), np.nan)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: must be an array of real numbers, got {values!r:.60}") from None
+
+
+def check_vector(name: str, values: np.ndarray, size: int) -> np.ndarray:
+    """So many finite numbers, shape (size,); a copy."""
+    vector = check_array(name, values).copy()
+    if vector.shape != (size,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name}: must be {size} finite numbers, got {values!r:.60}")
+    return vector
+
+
+def check_times(t: np.ndarray) -> np.ndarray:
+    """Finite, increasing times, at least one, shape (n,)."""
+    t = check_array("t", t)
+    if t.ndim != 1 or not len(t):
+        raise ValueError(f"t: must hold at least one time, with shape (n,), got shape {t.shape}")
+    if not np.isfinite(t).all():
+        raise ValueError(f"t: must be finite, got {t[~np.isfinite(t)][0]}")
+    if (np.diff(t) <= 0).any():
+        row = int(np.flatnonzero(np.diff(t) <= 0)[0])
+        raise ValueError(
+            f"t: must increase, got t[{row}] = {t[row]:g} before t[{row + 1}] = {t[row + 1]:g}"
+        )
+    return t
+
+
+def check_image_size(size: tuple[int, int], least: int = 1) -> tuple[int, int]:
+    """Width and height in whole pixels."""
+    try:
+        width, height = size
+        return check_integer("", width, least), check_integer("", height, least)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"image_size: must be two integers of at least {least}, got {size!r:.60}"
+        ) from None
