@@ -389,7 +389,7 @@ for method in baselines.BASELINES:
 # * "Nine datasets" are seven, and the paper's frame of reference has to be guessed from its own
 #   ground truths.
 #
-# How far noise can be carried is the end of [notebook 04](04_spline_ado.ipynb).
+# How noise and gaps change this is [notebook 06](06_robustness_and_ablation.ipynb).
 
 # %% [markdown]
 # ## Exercises

@@ -20,6 +20,7 @@ from scipy.stats import chi2
 from tqdm import tqdm
 
 from .bridges import Gap, gaps, join
+from .checks import check_integer
 from .collocation import CLEANEST, Collocation, Segment, State
 from .discovery import Discovery, Step, Units, report
 from .frames import FrameAlgebra, sparse_origins
@@ -32,7 +33,7 @@ from .polynomials import (
     shift_matrix,
     variable_names,
 )
-from .records import Record, check_record, cut, typical_step
+from .records import Record, check_records, cut, typical_step
 from .regression import subset_search
 from .smoothing import smooth
 from .splines import DEGREE, clamped_knots
@@ -92,17 +93,8 @@ def discover(
     >>> t, x = vl.SYSTEMS["Lorenz"].trajectory(1500)
     >>> print(vl.discover(t, x).equations())
     """
-    if not isinstance(degree, int | np.integer) or degree < 1:
-        raise ValueError(f"degree: must be an integer of at least 1, got {degree!r}")
-    pairs = t if x is None else [(t, x)]
-    if not isinstance(pairs, list | tuple) or any(len(pair) != 2 for pair in pairs):
-        raise ValueError("x: must be given, unless t is a list of pairs (t, x)")
-    records = [check_record(*pair) for pair in pairs]
-    if not records or len({values.shape[1] for _, values in records}) != 1:
-        raise ValueError(
-            "t: a list of trajectories must hold at least one, all of the same dimension, "
-            f"got shapes {[values.shape for _, values in records]}"
-        )
+    degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
+    records = check_records(t, x)
     return _Search(records, degree, seed, progress).run()
 
 
