@@ -269,6 +269,7 @@ class Collocation:
         first = self.nodes.indices.reshape(-1, WIDTH)[:, 0] * d
         return _rows_from(np.repeat(first, d), local.reshape(-1, WIDTH * d), self.r * d)
 
+    @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> State:
         """Minimise the objective over the curve and the free coefficients and offsets.
 
@@ -287,8 +288,7 @@ class Collocation:
             step = _solved(model.information, model.gradient, damping)
             for fraction in (1.0, 0.3, 0.1):
                 trial = _moved(state, model, step, fraction)
-                with np.errstate(over="ignore", invalid="ignore"):
-                    trial_value = self.objective(trial)
+                trial_value = self.objective(trial)
                 if trial_value < value:
                     break
             else:

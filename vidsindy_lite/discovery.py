@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
+from .checks import check_array
 from .collocation import Collocation, State
 from .information import inverse
 from .polynomials import PolynomialSystem, shift_generators, shift_matrix, variable_names
@@ -83,12 +84,13 @@ class Discovery:
     system : PolynomialSystem
         The law in the frame of the data.
     native : PolynomialSystem
-        The law in the frame in which it is sparsest: ``system`` is ``native.shift(offset)``, less
-        the terms that the data cannot tell from zero.
+        The law in the frame in which it is sparsest, or in one such frame if there are several:
+        ``system`` is ``native.shift(offset)``, less the terms that the data cannot tell from zero.
     offset : ndarray, shape (d,)
         Origin of the native frame, in units of the data.
     covariance, native_covariance : ndarray, shape (l d, l d)
-        Of the coefficients, equation by equation; zero for inactive terms.
+        Of the coefficients, equation by equation, if the terms are the right ones; zero for
+        inactive terms.
     offset_errors : ndarray, shape (d,)
         Standard errors of the offset; zero along an axis that was not moved.
     noise : ndarray, shape (d,)
@@ -162,7 +164,7 @@ class Discovery:
 
     def curve(self, t: np.ndarray) -> np.ndarray:
         """The fitted curve, shape (n, d), in the frame of the data; NaN outside the stretches."""
-        t = np.asarray(t, dtype=float)
+        t = check_array("t", t)
         values = np.full((*t.shape, self.system.d), np.nan)
         for spline in self.curves:
             low, high = spline.t[0], spline.t[-1]
