@@ -6,7 +6,7 @@ READY  := $(VENV)/.installed
 PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test test-fast bench lint lab clean
+.PHONY: help figures test test-fast bench lint demo lab clean
 
 help:
 	@echo "make figures          run all notebooks, regenerate figures/ and the notebooks' outputs"
@@ -16,6 +16,7 @@ help:
 	@echo "make test-fast        all tests but the notebook runs"
 	@echo "make bench            speed and memory, as ratios"
 	@echo "make lint             ruff"
+	@echo "make demo             three videos of one target, and its equations, in a minute"
 	@echo "make lab              JupyterLab on the notebooks"
 	@echo "make clean            remove $(VENV), build and caches"
 
@@ -42,6 +43,9 @@ bench: $(READY)
 
 lint: $(READY)
 	$(BIN)/ruff check .
+
+demo: $(READY)
+	$(BIN)/python -m vidsindy_lite demo
 
 lab: $(READY)
 	$(BIN)/jupyter lab --ServerApp.root_dir=. --LabApp.default_url=/lab/tree/notebooks

@@ -409,6 +409,16 @@ def test_command_line_outside_a_repository(tmp_path, monkeypatch, capsys):
     assert "repository: expected to be inside a clone" in capsys.readouterr().err
 
 
+def test_demo_goes_from_videos_to_the_law(capsys):
+    assert main(["demo", "--system", "SprottE", "--frames", "200"]) == 0
+    assert "against the truth: all true terms found, 0 false" in capsys.readouterr().out
+
+
+def test_demo_that_cannot_work_says_why(capsys):
+    assert main(["demo", "--frames", "10"]) == 2
+    assert "x: must hold at least as many samples as unknowns" in capsys.readouterr().err
+
+
 def test_help_has_examples():
     command = [sys.executable, "-m", "vidsindy_lite", "run", "--help"]
     root = repository.PACKAGE.parent
