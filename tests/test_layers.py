@@ -9,7 +9,7 @@ import vidsindy_lite
 
 FLOORS = [
     {"repository", "polynomials", "splines", "geometry", "records", "information"},
-    {"systems", "cameras", "published"},
+    {"systems", "sights", "cameras", "perspective", "published"},
     {"video", "tracking", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",

@@ -8,6 +8,7 @@ from .ado import discover
 from .cameras import Camera, Rig, learn_cameras, reconstruct, residuals
 from .discovery import Discovery
 from .metrics import Score, score
+from .perspective import PerspectiveCamera
 from .pipeline import VideoDiscovery, discover_from_videos
 from .polynomials import PolynomialSystem
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
@@ -20,6 +21,7 @@ __all__ = [
     "Benchmark",
     "Camera",
     "Discovery",
+    "PerspectiveCamera",
     "PolynomialSystem",
     "Rig",
     "Scene",
