@@ -16,8 +16,8 @@ FLOORS = [
         "ado", "paper_ado", "baselines", "metrics", "limits",
     },
     {"pipeline", "sweeps"},
-    {"experiments", "audit"},
-    {"plots", "plots_solver", "plots_study", "plots_audit", "artifacts", "runner", "__main__"},
+    {"experiments", "audit", "lab"},
+    {"plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "artifacts", "runner", "__main__"},
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent
 
