@@ -38,15 +38,17 @@ profile: str = "full"  # full or quick
 seed: int = 0  # of the tables in the videos, and of the rigs put up at random
 
 # %%
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import lab, learn_cameras, plots, plots_lab, read_video, reconstruct, residuals
+from vidsindy_lite import lab, plots, plots_lab
 from vidsindy_lite.artifacts import save_figure, save_table
-from vidsindy_lite.cameras import calibration_errors
+from vidsindy_lite.cameras import Rig, calibration_errors, learn_cameras, reconstruct, residuals
+from vidsindy_lite.video import read_video
 
 plt.style.use("vidsindy_lite.vidsindy")
 full = profile == "full"
@@ -217,7 +219,7 @@ def error_of_rig(stream):
     return length(reconstruct(pixels, found)[marked] - lab.MARKED)
 
 
-streams = np.random.SeedSequence(seed).spawn(200 if full else 20)
+streams = np.random.SeedSequence(seed).spawn(200 if full else 12)
 anywhere = np.array([error_of_rig(stream) for stream in streams])
 low, middle, high = np.quantile(anywhere, (0.05, 0.5, 0.95))
 print(f"median {middle:.1f} mm, nine of ten between {low:.1f} and {high:.1f} mm")
@@ -230,7 +232,7 @@ save_figure("lab_anywhere", fig, caption=caption, numbers={"error": anywhere})
 
 # %% [markdown]
 # *Wherever the three cameras stand, the orthographic model costs millimetres at the marked point; the
-# paper's error lies in the middle of the distribution.*
+# paper's error is an ordinary one.*
 
 # %% [markdown]
 # ## Perspective cameras
@@ -265,12 +267,12 @@ models = {"orthographic": by_flat, "perspective": by_pinhole}
 points = {"marked point": lab.MARKED, "the paper's result for it": lab.IDENTIFIED}
 found = {name: values.reshape(paths.shape) for name, values in models.items()}
 fig = plots_lab.plot_table(truth, paths, found, points)
-caption = "The scene, and the paths from above: true, by orthographic and by perspective cameras."
+caption = "The paths from above: true, by orthographic and by perspective cameras; and the scene."
 save_figure("lab_table", fig, caption=caption, numbers={"truth": paths, **found})
 
 # %% [markdown]
-# *Left: cameras around the corner of the table. Right: the paths from above; orthographic cameras (red)
-# bend them, perspective cameras (blue) put them on the truth (grey).*
+# *Left: the paths from above; orthographic cameras (red) bend them, perspective cameras (blue) put them
+# on the truth (grey). Right: the scene, with the part of the table that the cameras look at.*
 
 # %% [markdown]
 # ## The image of a ball
@@ -292,8 +294,9 @@ tracking = [
     length(track - camera.ball_image(x, lab.RADIUS)[0])
     for camera, track in zip(truth.cameras, tracks, strict=True)
 ]
-print(f"centroid beside centre: up to {np.max(shifts):.3f} px; tracker: {rms(np.array(tracking)):.4f} px rms")
-assert 10 * np.max(tracking) < np.max(shifts) < 0.1
+print(f"centroid beside centre: up to {np.max(shifts):.4f} px; tracker: up to {np.max(tracking):.4f} px")
+assert np.max(tracking) < 0.005
+assert 5 * np.max(tracking) < np.max(shifts) < 0.1
 
 # %% [markdown]
 # As the ball's radius is known, the difference can be computed once the ball's place is, and taken off:
@@ -318,6 +321,8 @@ for name, (rig, path) in results.items():
     rows.append(row | {"error of scale (%)": 100 * scale, "error of angle (mrad)": 1000 * angle})
 assert all(row["rms (mm)"] < 1 for row in rows[1:])
 assert all(row["error of scale (%)"] < 0.1 and row["error of angle (mrad)"] < 1 for row in rows[2:])
+assert rows[0]["largest (mm)"] > 10
+assert rows[3]["rms (mm)"] < 0.01
 assert rows[3]["rms (mm)"] < 0.1 * rows[2]["rms (mm)"] < 0.1 * rows[1]["rms (mm)"]
 save_table("lab_models", rows, caption="Three paths of the ball, by the model of the cameras.")
 
@@ -332,14 +337,51 @@ save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 # size of the ball.*
 
 # %% [markdown]
+# ## What else it could be
+#
+# All this takes position and normal of every camera as exact. In a lab they are measured, and small
+# errors of them cost as much as the wrong model. Perspective cameras, exact pixels, camera 2 misplaced
+# or turned:
+
+
+# %%
+def misplaced(name, **change):
+    cameras = list(start.cameras)
+    cameras[1] = replace(cameras[1], **change)
+    rig = learn_cameras(pixels, Rig(cameras))
+    missed = np.hstack(residuals(pixels, rig))
+    error = rms(reconstruct(pixels, rig) - x)
+    return {"camera 2": name, "rms (mm)": error, "residuals (px rms)": np.sqrt(np.mean(missed**2))}
+
+
+# %%
+second = start.cameras[1]
+tilt = np.deg2rad(0.5) * second.rows[0]
+rows = [
+    misplaced("as it is"),
+    misplaced("5 mm lower", position=second.position - [0, 0, 5]),
+    misplaced("turned by half a degree", normal=second.normal + tilt),
+]
+assert rows[1]["rms (mm)"] > 1
+assert rows[2]["rms (mm)"] > 5
+assert rows[2]["residuals (px rms)"] > 1
+save_table("lab_misplaced", rows, caption="Perspective cameras, one of them measured wrong.")
+
+# %% [markdown]
+# So the orthographic model is *sufficient* for the paper's error, but a normal that is wrong by half a
+# degree would be as well. Without the footage nobody can tell which it was; the residuals would have told
+# that something was.
+
+# %% [markdown]
 # ## What we learned
 #
-# * The paper's error is **not** for want of resolution. Orthographic cameras two metres from a table give
-#   errors of several millimetres from noiseless videos, and a formula without free parameters says which.
+# * Orthographic cameras two metres from a table give errors of several millimetres from noiseless
+#   videos, and a first-order formula says where and how large.
 # * The error falls as depth range over distance. In the videos of the other notebooks the cameras *are*
 #   orthographic; with real ones, stand far away with a long lens, or use perspective cameras.
 # * Perspective cameras need no more to be known: position and normal of all, calibration of one. The
-#   start is linear, and whole pixels already suffice for less than a millimetre.
+#   start is linear, and whole pixels already suffice for less than a millimetre. But positions and
+#   normals must then be measured with care.
 # * Below a tenth of a millimetre, a ball is not a point. (Below a hundredth, our rendered ball in one
 #   colour without noise, highlight and shadow flatters the tracker: no real video is that good.)
 #
@@ -348,12 +390,12 @@ save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 # * "(182.92, 291.81, 24.50) mm ... closely aligning with the ground truth values of (180, 300,
 #   26.25) mm": 8.87 mm, an ordinary error for the orthographic model at such distances, wherever the
 #   cameras stand.
-# * "can be further improved when high-resolution videos are recorded": hardly. Ours are exact to a
-#   thousandth of a pixel, and the orthographic error stays what it is.
+# * "can be further improved when high-resolution videos are recorded": not with these cameras. Ours are
+#   tracked to a few thousandths of a pixel, and the orthographic error stays what it is.
 # * "A standard billiard ball": by its height, a snooker ball.
 #
-# Not modelled: lens distortion, a principal point off the middle of the image, cameras that are not
-# synchronised, and errors of the measured positions and normals (exercise 2).
+# Not modelled: lens distortion, a principal point off the middle of the image, and cameras that are not
+# synchronised.
 
 # %% [markdown]
 # ## Exercises
@@ -363,29 +405,24 @@ save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 # <details><summary>Solution</summary>
 #
 # ```python
-# from dataclasses import replace
-#
 # larger = [camera.ball_image(x, 57.15 / 2)[0] for camera in truth.cameras]
 # print(rms(reconstruct(larger, learn_cameras(larger, start)) - x))
 # ```
 #
-# SOLUTION1
+# Hardly: 0.045 mm rms instead of 0.038 mm. The shift of the centroid, and the error with it, grows with
+# the square of the radius.
 # </details>
 #
-# **2.** The position of camera 2 was measured 5 mm wrong. What does that cost, and do the residuals tell?
+# **2.** Are two perspective cameras enough, one of them calibrated?
 #
 # <details><summary>Solution</summary>
 #
 # ```python
-# from dataclasses import replace
-#
-# from vidsindy_lite import Rig
-#
-# cameras = list(start.cameras)
-# cameras[1] = replace(cameras[1], position=cameras[1].position + [0, 0, 5])
-# rig = learn_cameras(pixels, Rig(cameras))
-# print(rms(reconstruct(pixels, rig) - x), np.sqrt(np.mean(np.hstack(residuals(pixels, rig)) ** 2)))
+# pair = Rig(start.cameras[:2])
+# rig = learn_cameras(rounded[:2], pair)
+# print(rms(reconstruct(rounded[:2], rig) - x))
 # ```
 #
-# SOLUTION2
+# Yes: 0.83 mm rms from whole pixels instead of 0.64 mm, and from the tracks as good as with three. But
+# with one condition per frame left, little would tell that a camera was measured wrong.
 # </details>

@@ -17,7 +17,10 @@ FLOORS = [
     },
     {"pipeline", "sweeps"},
     {"experiments", "audit", "lab"},
-    {"plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "artifacts", "runner", "__main__"},
+    {
+        "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "artifacts", "runner",
+        "__main__",
+    },
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent
 

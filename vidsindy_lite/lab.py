@@ -218,7 +218,7 @@ def film(rig, x, folder, seed=0):
     return tracks
 
 
-def learn_from_ball(tracks, rig, radius=RADIUS, rounds=4):
+def learn_from_ball(tracks, rig, radius=RADIUS, rounds=3):
     """Learn the cameras from centroids of a ball's images, which are not images of its centre.
 
     How far the two differ follows from the ball's radius and place (`ball_image`). So: learn and

@@ -6,10 +6,11 @@ Every function takes what is plotted and returns a matplotlib Figure. The look i
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import LogLocator
 
 
 def plot_table(rig, x, found, marked):
-    """The scene in space, and its paths from above with what was reconstructed.
+    """Paths from above with what was reconstructed, and the scene in space.
 
     Parameters
     ----------
@@ -22,9 +23,11 @@ def plot_table(rig, x, found, marked):
     marked : dict of str to ndarray, shape (3,)
         Points that are drawn as pentagrams.
     """
-    figure = plt.figure(figsize=(10.5, 5.2))
-    space = figure.add_subplot(1, 2, 1, projection="3d", proj_type="ortho")
-    above = figure.add_subplot(1, 2, 2, aspect="equal")
+    figure = plt.figure(figsize=(10.5, 4.8))
+    panels = figure.subplot_mosaic(
+        [["above", "space"]], per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}
+    )
+    above, space = panels["above"], panels["space"]
     for path in x:
         space.plot(*path.T, color="k", lw=1.2)
     for i, camera in enumerate(rig.cameras):
@@ -36,10 +39,10 @@ def plot_table(rig, x, found, marked):
     space.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     space.set_zlim3d(0, space.get_zlim3d()[1])
     space.locator_params(nbins=4)
-    for axis in (space.xaxis, space.yaxis, space.zaxis):
+    for axis in (space.xaxis, space.yaxis):
         axis.labelpad = 8
     extent = np.ptp([space.get_xlim3d(), space.get_ylim3d(), space.get_zlim3d()], axis=1)
-    space.set_box_aspect(extent, zoom=0.9)
+    space.set_box_aspect(extent, zoom=0.85)
     space.view_init(elev=25, azim=-65)
     for k, path in enumerate(x):
         above.plot(*path[:, :2].T, color="0.75", lw=5, label="truth" if k == 0 else None)
@@ -48,7 +51,7 @@ def plot_table(rig, x, found, marked):
             above.plot(*path[:, :2].T, f"C{1 - i}", lw=1.3, label=name if k == 0 else None)
     for (name, point), style in zip(marked.items(), ("*k", "*C4"), strict=True):
         above.plot(*point[:2], style, ms=12, mec="white", mew=0.6, ls="", label=name)
-    above.set(xlabel="x (mm)", ylabel="y (mm)")
+    above.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
     figure.legend(*above.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
@@ -77,6 +80,10 @@ def plot_orthographic_error(t, measured, predicted, ratio, by_distance):
     for (name, error), style in zip(by_distance.items(), ("oC1", "--k"), strict=True):
         right.loglog(ratio, error, style, label=name)
     right.set(title="as the cameras move away", ylabel="rms error (mm)")
+    right.set_xticks(ratio, [f"{value:.2g}" for value in ratio])
+    right.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    right.yaxis.set_major_formatter("{x:g}")
+    right.minorticks_off()
     right.set_xlabel("depth range / distance")
     right.legend()
     return figure

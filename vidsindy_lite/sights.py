@@ -16,7 +16,7 @@ import numpy as np
 # Lines of sight closer to parallel than this (sine of their angle) count as one.
 PARALLEL = 1e-6
 
-_STEPS = 30  # of Gauss and Newton; from the linear solution four or five are enough
+_STEPS = 30  # of Gauss and Newton; from the linear solution four or five are usual
 _SETTLED = 1e-11  # pixels
 
 
@@ -46,21 +46,37 @@ def intersect(cameras, tracks):
         left, right = (np.stack(part, axis=1) for part in zip(*pairs, strict=True))
         shown = visible.T[:, :, None]
         left, right = left * shown[..., None], right * shown
-        return left.reshape(len(left), -1, 3), right.reshape(len(left), -1)
+        rows = 2 * len(cameras)
+        return left.reshape(-1, rows, 3), right.reshape(-1, rows)
 
-    left, right = stacked(_line(*pair) for pair in zip(cameras, seen, strict=True))
+    matrices, scales = [camera.matrix for camera in cameras], [camera.scale for camera in cameras]
+    left, right = stacked(map(_line, matrices, scales, seen))
     crossing = np.linalg.svd(left, compute_uv=False)[:, 2] > PARALLEL
     visible, seen = visible[:, crossing], seen[:, crossing]
     point = _least_squares(left[crossing], right[crossing])
-    for _ in range(_STEPS):
-        views = zip(cameras, seen, strict=True)
+
+    def look(point):
+        views = zip(matrices, scales, seen, strict=True)
         slope, missed = stacked(_reprojection(*view, point) for view in views)
-        step = _least_squares(slope, missed)
-        point = point + step
-        if not np.max(np.abs(slope @ step[..., None]), initial=0) > _SETTLED:
+        return slope, missed, np.sum(missed**2, axis=1)
+
+    slope, missed, error = look(point)
+    part = np.ones((len(point), 1))  # of the step, halved where the whole one leads uphill
+    for _ in range(_STEPS):
+        step = part * _least_squares(slope, missed)
+        with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
+            new_slope, new_missed, new_error = look(point + step)
+        moved = np.max(np.abs(slope @ step[..., None]), initial=0)
+        lower = new_error <= (1 + 1e-12) * error + _SETTLED**2  # or equal, but for rounding
+        part = np.where(lower[:, None], 1, part / 2)
+        point[lower] += step[lower]
+        slope[lower], missed[lower], error[lower] = (
+            new_slope[lower], new_missed[lower], new_error[lower],
+        )  # fmt: skip
+        if moved <= _SETTLED:
             break
-    for camera, shown in zip(cameras, visible, strict=True):
-        depth = point @ camera.matrix[2, :3] + camera.matrix[2, 3]
+    for matrix, shown in zip(matrices, visible, strict=True):
+        depth = point @ matrix[2, :3] + matrix[2, 3]
         point[shown & (depth <= 0)] = np.nan
     x = np.full((len(crossing), 3), np.nan)
     x[crossing] = point
@@ -95,12 +111,12 @@ def epipolar_equations(known, known_pixels, unknown, pixels):
     target : ndarray, shape (k,)
         In the unit of the unknown camera's scale, times pixels.
     """
-    left, right = _line(known, known.turned(known_pixels))
+    left, right = _line(known.matrix, known.scale, known.turned(known_pixels))
     direction = np.cross(left[:, 0], left[:, 1])
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     on_line = (np.linalg.pinv(left) @ right[..., None])[..., 0]
-    linear, constant = unknown.matrix[:, :3], unknown.matrix[:, 3]
-    g, h = on_line @ linear.T + constant, direction @ linear.T
+    linear, constant = np.split(unknown.matrix, [3], axis=1)
+    g, h = on_line @ linear.T + constant[:, 0], direction @ linear.T
     across = g[:, 2:] * h[:, :2] - h[:, 2:] * g[:, :2]
     size = np.linalg.norm(across, axis=1)
     reach = np.abs(g[:, 2]) + np.abs(h[:, 2]) * np.linalg.norm(g[:, :2], axis=1)
@@ -110,22 +126,27 @@ def epipolar_equations(known, known_pixels, unknown, pixels):
     return design, (h[good, 0] * g[good, 1] - h[good, 1] * g[good, 0]) / size[good]
 
 
-def _line(camera, turned):
+def _line(matrix, scale, turned):
     """Equations left @ x = right of the lines of sight at T x_c, (n, 2, 3), (n, 2), scene units."""
-    matrix, seen = camera.matrix, camera.scale * turned
+    seen = scale * turned
     left = matrix[:2, :3] - seen[:, :, None] * matrix[2, :3]
     return left, seen * matrix[2, 3] - matrix[:2, 3]
 
 
-def _reprojection(camera, turned, x):
+def _reprojection(matrix, scale, turned, x):
     """Slope of the T x_c at which points are seen, (n, 2, 3), and how far it is off, (n, 2)."""
-    matrix = camera.matrix
     image = x @ matrix[:, :3].T + matrix[:, 3]
     plane, depth = image[:, :2] / image[:, 2:], image[:, 2, None, None]
-    slope = (matrix[:2, :3] - plane[:, :, None] * matrix[2, :3]) / (camera.scale * depth)
-    return slope, turned - plane / camera.scale
+    slope = (matrix[:2, :3] - plane[:, :, None] * matrix[2, :3]) / (scale * depth)
+    return slope, turned - plane / scale
 
 
 def _least_squares(left, right):
+    """Solutions of many small systems; zero where one is singular: a point that ran far away."""
     q, r = np.linalg.qr(left)
-    return np.linalg.solve(r, q.swapaxes(1, 2) @ right[..., None])[..., 0]
+    pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
+    singular = ~(pivots.min(axis=1) > PARALLEL**2 * pivots.max(axis=1))
+    r[singular] = np.eye(3)
+    x = np.linalg.solve(r, q.swapaxes(1, 2) @ right[..., None])[..., 0]
+    x[singular] = 0
+    return x
