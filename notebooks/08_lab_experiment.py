@@ -35,7 +35,7 @@
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
-seed: int = 0  # of the tables in the videos, and of the rigs put up at random
+seed: int = 0  # of the cloth in the videos, and of the rigs put up at random
 
 # %%
 from dataclasses import replace
@@ -320,7 +320,9 @@ for name, (rig, path) in results.items():
     row |= {"marked point (mm)": length(path - x)[marked]}
     rows.append(row | {"error of scale (%)": 100 * scale, "error of angle (mrad)": 1000 * angle})
 assert all(row["rms (mm)"] < 1 for row in rows[1:])
-assert all(row["error of scale (%)"] < 0.1 and row["error of angle (mrad)"] < 1 for row in rows[2:])
+assert all(row["error of scale (%)"] < 0.1 for row in rows[1:])
+assert rows[1]["error of angle (mrad)"] < 1.5
+assert all(row["error of angle (mrad)"] < 0.1 for row in rows[2:])
 assert rows[0]["largest (mm)"] > 10
 assert rows[3]["rms (mm)"] < 0.01
 assert rows[3]["rms (mm)"] < 0.1 * rows[2]["rms (mm)"] < 0.1 * rows[1]["rms (mm)"]
@@ -350,8 +352,10 @@ def misplaced(name, **change):
     cameras[1] = replace(cameras[1], **change)
     rig = learn_cameras(pixels, Rig(cameras))
     missed = np.hstack(residuals(pixels, rig))
-    error = rms(reconstruct(pixels, rig) - x)
-    return {"camera 2": name, "rms (mm)": error, "residuals (px rms)": np.sqrt(np.mean(missed**2))}
+    values = rms(reconstruct(pixels, rig) - x), np.sqrt(np.mean(missed**2))
+    return {"camera 2": name} | dict(
+        zip(("rms (mm)", "residuals (px rms)"), np.round(values, 6).tolist(), strict=True)
+    )
 
 
 # %%
@@ -380,8 +384,9 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 # * The error falls as depth range over distance. In the videos of the other notebooks the cameras *are*
 #   orthographic; with real ones, stand far away with a long lens, or use perspective cameras.
 # * Perspective cameras need no more to be known: position and normal of all, calibration of one. The
-#   start is linear, and whole pixels already suffice for less than a millimetre. But positions and
-#   normals must then be measured with care.
+#   start is linear, and whole pixels already suffice for less than a millimetre (with focal lengths
+#   within 0.1 %, angles within about a milliradian). But positions and normals must then be measured
+#   with care.
 # * Below a tenth of a millimetre, a ball is not a point. (Below a hundredth, our rendered ball in one
 #   colour without noise, highlight and shadow flatters the tracker: no real video is that good.)
 #

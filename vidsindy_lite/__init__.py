@@ -1,7 +1,7 @@
 """Governing equations of a moving target from the videos of three cameras.
 
 The modules stand in the order of the pipeline:
-systems, cameras | video, tracking | ado (discovery) | pipeline | experiments.
+systems, cameras, perspective | video, tracking | ado (discovery) | pipeline | experiments, lab.
 """
 
 from .ado import discover

@@ -185,7 +185,7 @@ def film(rig, x, folder, seed=0):
     """Film each path with every camera and track the ball.
 
     The ball is drawn as the ellipse that a perspective image of a ball is, in one colour: no
-    highlight, no shadow, no motion blur, no image noise.
+    highlight, no shadow, no motion blur, no image noise. The table behind it is a plain cloth.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def film(rig, x, folder, seed=0):
     folder : path
         Where the videos go: path_1_camera_1.mkv and so on.
     seed : int
-        Draws the tables.
+        Draws the shade of the cloth.
 
     Returns
     -------
@@ -205,12 +205,12 @@ def film(rig, x, folder, seed=0):
     """
     tracks = []
     for i, camera in enumerate(rig.cameras):
-        scene = Scene(background="wood", image_size=camera.image_size)
+        scene = Scene(background="plain", image_size=camera.image_size)
         parts = []
         for k, path in enumerate(x):
             centroids, shapes = camera.ball_image(path, RADIUS)
             file = Path(folder) / f"path_{k + 1}_camera_{i + 1}.mkv"
-            # All clips of one camera show the same table.
+            # All clips of one camera show the same cloth.
             number = len(rig.cameras) * seed + i
             render_video(file, centroids, scene, FPS, number, 2 / scene.size * shapes)
             parts.append(track(file))

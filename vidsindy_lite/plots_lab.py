@@ -23,7 +23,7 @@ def plot_table(rig, x, found, marked):
     marked : dict of str to ndarray, shape (3,)
         Points that are drawn as pentagrams.
     """
-    figure = plt.figure(figsize=(10.5, 4.8))
+    figure = plt.figure(figsize=(10.5, 5.4))
     panels = figure.subplot_mosaic(
         [["above", "space"]], per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}
     )
@@ -34,7 +34,7 @@ def plot_table(rig, x, found, marked):
         middle = camera.position - camera.normal * np.linalg.norm(camera.position - x.mean((0, 1)))
         space.plot(*np.transpose([camera.position, middle]), f"C{i + 2}:", lw=1)
         space.plot(*camera.position, f"C{i + 2}s", ms=8)
-        space.text(*camera.position, f"   $C_{i + 1}$")
+        space.text(*camera.position + [0, 0, 130], f"$C_{i + 1}$", ha="center")
     space.plot([0, 750, 750, 0, 0], [0, 0, 750, 750, 0], 0, color="0.6", lw=0.8)
     space.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     space.set_zlim3d(0, space.get_zlim3d()[1])
