@@ -23,7 +23,7 @@ def plot_table(rig, x, found, marked):
     marked : dict of str to ndarray, shape (3,)
         Points that are drawn as pentagrams.
     """
-    figure = plt.figure(figsize=(10.5, 5.4))
+    figure = plt.figure(figsize=(10.5, 5.2))
     panels = figure.subplot_mosaic(
         [["above", "space"]], per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}
     )
@@ -38,11 +38,11 @@ def plot_table(rig, x, found, marked):
     space.plot([0, 750, 750, 0, 0], [0, 0, 750, 750, 0], 0, color="0.6", lw=0.8)
     space.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     space.set_zlim3d(0, space.get_zlim3d()[1])
-    space.locator_params(nbins=4)
-    for axis in (space.xaxis, space.yaxis):
-        axis.labelpad = 8
+    space.locator_params(nbins=3)
+    for axis in (space.xaxis, space.yaxis, space.zaxis):
+        axis.labelpad = 10
     extent = np.ptp([space.get_xlim3d(), space.get_ylim3d(), space.get_zlim3d()], axis=1)
-    space.set_box_aspect(extent, zoom=0.85)
+    space.set_box_aspect(extent, zoom=0.74)
     space.view_init(elev=25, azim=-65)
     for k, path in enumerate(x):
         above.plot(*path[:, :2].T, color="0.75", lw=5, label="truth" if k == 0 else None)
