@@ -9,15 +9,18 @@ import vidsindy_lite
 
 FLOORS = [
     {"repository", "checks", "polynomials", "splines", "geometry", "records", "information"},
-    {"systems", "cameras", "published"},
+    {"systems", "sights", "cameras", "perspective", "published"},
     {"video", "tracking", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
         "ado", "paper_ado", "baselines", "metrics", "limits",
     },
     {"pipeline", "sweeps"},
-    {"experiments", "audit"},
-    {"plots", "plots_solver", "plots_study", "plots_audit", "artifacts", "runner", "__main__"},
+    {"experiments", "audit", "lab"},
+    {
+        "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "artifacts", "runner",
+        "__main__",
+    },
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent
 

@@ -53,6 +53,27 @@ def test_size_variation_keeps_the_centroid():
     assert areas.max() / areas.min() > 3
 
 
+def test_shapes_map_the_outline_and_keep_the_centroid():
+    track = np.tile([48.3, 40.6], (3, 1))
+    shapes = np.array([np.eye(2), [[1.5, 0], [0, 1]], [[1.2, 0.3], [0.3, 0.8]]])
+    scene = Scene("plain", size=24, image_size=SMALL)
+    empty = next(render([[np.nan, np.nan]], scene))
+    frames = list(render(track, scene, shapes=shapes))
+    looks = [drawn_centroid_and_area(frame, empty, "red") for frame in frames]
+    assert np.abs([centroid - track[0] for centroid, _ in looks]).max() < 0.02
+    expected = np.pi * 12**2 * np.linalg.det(shapes)
+    np.testing.assert_allclose([area for _, area in looks], expected, rtol=0.01)
+    wide = np.any(frames[1] != empty, axis=-1)
+    assert np.ptp(np.flatnonzero(wide.any(axis=0))) == pytest.approx(36, abs=1.5)
+    assert np.ptp(np.flatnonzero(wide.any(axis=1))) == pytest.approx(24, abs=1.5)
+
+
+@pytest.mark.parametrize("shapes", [np.eye(2), np.ones((3, 2, 2)), np.full((2, 2, 2), np.nan)])
+def test_render_rejects_shapes(shapes):
+    with pytest.raises(ValueError, match=r"shapes: must be finite, of shape \(2, 2, 2\), got"):
+        render(np.zeros((2, 2)), Scene(), shapes=shapes)
+
+
 @pytest.mark.parametrize("background", BACKGROUNDS)
 @pytest.mark.parametrize("seed", range(3))
 def test_target_stands_out_of_every_background(background, seed):

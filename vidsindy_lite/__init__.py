@@ -1,13 +1,14 @@
 """Governing equations of a moving target from the videos of three cameras.
 
 The modules stand in the order of the pipeline:
-systems, cameras | video, tracking | ado (discovery) | pipeline | experiments.
+systems, cameras, perspective | video, tracking | ado (discovery) | pipeline | experiments, lab.
 """
 
 from .ado import discover
 from .cameras import Camera, Rig, learn_cameras, reconstruct, residuals
 from .discovery import Discovery
 from .metrics import Score, score
+from .perspective import PerspectiveCamera
 from .pipeline import VideoDiscovery, discover_from_videos
 from .polynomials import PolynomialSystem
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
@@ -20,6 +21,7 @@ __all__ = [
     "REFERENCE_OFFSET",
     "Benchmark",
     "Camera",
+    "PerspectiveCamera",
     "Rig",
     "learn_cameras",
     "reconstruct",

@@ -20,6 +20,7 @@ import tomllib
 from collections.abc import Iterable, Sized
 from dataclasses import dataclass, fields, replace
 from math import hypot
+from typing import ClassVar
 
 import numpy as np
 from scipy.linalg import null_space
@@ -36,11 +37,9 @@ from .checks import (
     check_vector,
 )
 from .geometry import in_plane_offset, rotation_to_z, unit_vector
+from .sights import PARALLEL, epipolar_equations, intersect
 
 METHODS = ("joint", "paper", "gradient")
-
-# Normals closer to parallel than this (sine of their angle) count as one.
-_PARALLEL = 1e-6
 
 # A frame that is missed by more than so many robust standard deviations holds an outlier.
 _OUTLIER = 8.0
@@ -70,6 +69,8 @@ class Camera:
     ValueError
         If an argument has a wrong shape, is not finite, or only one of scale and angle is given.
     """
+
+    model: ClassVar[str] = "orthographic"  # its name in the file of a rig
 
     position: np.ndarray
     normal: np.ndarray
@@ -107,7 +108,7 @@ class Camera:
     @property
     def _values(self):
         arrays = tuple(self.position.tolist()), tuple(self.normal.tolist())
-        return *arrays, self.scale, self.angle, self.image_size
+        return self.model, *arrays, self.scale, self.angle, self.image_size
 
     @property
     def is_calibrated(self):
@@ -124,6 +125,11 @@ class Camera:
         """Delta_c = R^- position, shape (2,), scene units."""
         return in_plane_offset(self.position, self.normal)
 
+    @property
+    def matrix(self):
+        """Camera matrix, shape (3, 4): s T(theta) x_c = (X, Y) / W, (X, Y, W) = matrix @ (x, 1)."""
+        return np.vstack((np.column_stack((self.rows, -self.offset)), [0, 0, 0, 1]))
+
     def project(self, x):
         """Pixels at which points are seen.
 
@@ -135,7 +141,8 @@ class Camera:
         Returns
         -------
         ndarray, shape (n, 2)
-            Pixels (u to the right, v down), the centre of the first pixel being (0, 0).
+            Pixels (u to the right, v down), the centre of the first pixel being (0, 0). NaN for
+            points behind a perspective camera.
 
         Raises
         ------
@@ -144,13 +151,18 @@ class Camera:
         """
         self._require_calibrated()
         x = _rows_of("x", x, 3)
-        plane = (x @ self.rows.T - self.offset) / self.scale
+        matrix = self.matrix
+        image = x @ matrix[:, :3].T + matrix[:, 3]
+        image[~(image[:, 2] > 0)] = np.nan
+        plane = image[:, :2] / (self.scale * image[:, 2:])
         centred = plane @ _turn(self.angle)  # row vectors: (T^-1 w)^T = w^T T
         width, height = self.image_size
         return np.column_stack(((width - 1) / 2 + centred[:, 0], (height - 1) / 2 - centred[:, 1]))
 
     def plane_coordinates(self, pixels):
         """In-plane coordinates R^- x = s T(theta) x_c + Delta_c of what is seen at the pixels.
+
+        For a perspective camera, of what is seen there at distance 1.
 
         Parameters
         ----------
@@ -166,8 +178,12 @@ class Camera:
         ValueError
             If the camera is not calibrated, or pixels has a wrong shape or an infinite value.
         """
+        return self.scale * self.turned(pixels) + self.offset
+
+    def turned(self, pixels):
+        """Pixels along the axes of the view plane: T(theta) x_c, shape (n, 2)."""
         self._require_calibrated()
-        return self.scale * self.centred(pixels) @ _turn(self.angle).T + self.offset
+        return self.centred(pixels) @ _turn(self.angle).T
 
     def centred(self, pixels):
         """Pixels measured from the middle of the image, right and *up*: x_c, shape (n, 2)."""
@@ -187,12 +203,14 @@ class Rig:
     Parameters
     ----------
     cameras : sequence of Camera
-        Two or more, with at least two normals that are not parallel.
+        Two or more, orthographic or perspective, that do not all look along the same lines: two
+        orthographic normals must not be parallel, or two pinholes not coincide, or there is one
+        camera of each kind.
 
     Raises
     ------
     ValueError
-        If there are fewer than two cameras or fewer than two independent normals.
+        If there are fewer than two cameras, or all look along the same lines.
     """
 
     cameras: tuple[Camera, ...]
@@ -205,10 +223,16 @@ class Rig:
         if len(cameras) < 2:
             raise ValueError(f"cameras: must be two or more, got {len(cameras)}")
         if not _independent(cameras):
+            kind = "normal" if cameras[0].model == Camera.model else "position"
             raise ValueError(
-                "cameras: must have at least two independent normals, got parallel ones "
-                f"{[camera.normal.tolist() for camera in cameras]}"
+                f"cameras: must have at least two independent {kind}s, got only "
+                f"{[getattr(camera, kind).tolist() for camera in cameras]}"
             )
+
+    @property
+    def is_orthographic(self):
+        """Whether all cameras are: then agreement of the views is linear in what is unknown."""
+        return all(camera.model == Camera.model for camera in self.cameras)
 
     @classmethod
     def around(cls, x, image_size=(512, 512)):
@@ -298,7 +322,10 @@ class Rig:
         path : path-like
             Overwritten if it exists.
         """
-        lines = ["# Cameras of a rig; scale in scene units per pixel, angle in radians."]
+        lines = [
+            "# Cameras of a rig; scale in scene units per pixel (of a perspective camera: at "
+            "distance 1), angle in radians."
+        ]
         for camera in self.cameras:
             lines += ["", "[[camera]]"]
             # repr of a float is its shortest exact decimal form, and valid TOML.
@@ -341,7 +368,9 @@ def learn_cameras(tracks, rig, method="joint"):
     * "joint": every equation that does not hold the unknown point, among them the epipolar
       constraint between uncalibrated cameras that Eq. (4) leaves out, and every frame with two or
       more views; the closed form is then refined to the smallest reprojection error in pixels,
-      which removes the bias that pixel noise causes in a scale.
+      which removes the bias that pixel noise causes in a scale. With a perspective camera in the
+      rig, the closed form goes from the known cameras to the others, one epipolar constraint at a
+      time, and the refinement is the same.
     * "gradient": Eq. (4) in (s, theta) as in the paper, by L-BFGS in PyTorch; for comparison.
 
     Frames in which the views contradict each other by more than eight robust standard deviations
@@ -373,6 +402,12 @@ def learn_cameras(tracks, rig, method="joint"):
     unknown = np.flatnonzero([not camera.is_calibrated for camera in rig.cameras])
     if unknown.size == 0:
         return rig
+    if not rig.is_orthographic:
+        if method != "joint":
+            raise ValueError(
+                f"method: must be 'joint' for a rig with a perspective camera, got {method!r}"
+            )
+        return _refine(tracks, rig, unknown, _spread(tracks, rig))
     if method != "joint" and not _independent([rig.cameras[i] for i in unknown]):
         raise ValueError(
             f"rig: method {method!r} needs two independent normals among the uncalibrated "
@@ -394,7 +429,7 @@ def reconstruct(tracks, rig):
     """3D trajectory from the tracks of a calibrated rig, by least squares in pixels.
 
     Paper: Eq. (6), whose "inverse" of a 6 x 3 matrix is the least-squares solution; here with any
-    number of cameras, and each view weighted by 1 / scale so that all count in pixels.
+    number of cameras, of either kind, and each view weighted so that all count in pixels.
 
     Every frame is taken as it is: an outlier of one track moves the point. Three views show it as
     a large residual of that frame (see `residuals`), two views cannot.
@@ -409,7 +444,8 @@ def reconstruct(tracks, rig):
     Returns
     -------
     ndarray, shape (n, 3)
-        Scene units; NaN where fewer than two views with independent normals see the target.
+        Scene units; NaN where fewer than two cameras see the target, where all that do look along
+        the same line, or where the lines of sight meet behind a perspective camera.
 
     Raises
     ------
@@ -418,6 +454,8 @@ def reconstruct(tracks, rig):
     """
     tracks = _check_tracks(tracks, rig)
     _require_all_calibrated("rig", rig.cameras)
+    if not rig.is_orthographic:
+        return intersect(rig.cameras, tracks)
     x = np.full((len(tracks[0]), 3), np.nan)
     for views, frames in _visibility(tracks):
         cameras = [rig.cameras[i] for i in views]
@@ -561,7 +599,7 @@ def _agreement(tracks, rig, unknown, epipolar):
     for views, frames in _visibility(tracks):
         rows = [rig.cameras[i].rows for i in views]
         if epipolar:
-            annihilator = null_space(np.vstack(rows).T, rcond=_PARALLEL)
+            annihilator = null_space(np.vstack(rows).T, rcond=PARALLEL)
         elif len(views) == len(tracks):
             annihilator = _prediction(rows, np.isin(views, unknown))
         else:
@@ -635,7 +673,8 @@ def _solve(design, target, rig, unknown):
             f"for scale and angle of {_names(unknown)}, got {len(design)}"
         )
     solution = np.linalg.lstsq(design, target)[0]
-    misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / _known_scale(rig)
+    scale = np.mean(np.abs(solution.view(complex)))
+    misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / scale if scale > 0 else np.inf
     _, singular, right = np.linalg.svd(design, full_matrices=False)
     motion = singular / np.sqrt(len(design))
     weak = motion <= max(1e-9 * motion[0], 2 * misfit)
@@ -650,6 +689,43 @@ def _solve(design, target, rig, unknown):
     return solution.view(complex)  # s exp(i theta)
 
 
+def _spread(tracks, rig):
+    """s exp(i theta) of the unknown cameras of any kind: from the known ones, round by round.
+
+    Between two perspective cameras that are both unknown, the epipolar constraint is not linear; so
+    a camera waits until one that shares frames with it is known.
+    """
+    start, learned = rig, [i for i, camera in enumerate(rig.cameras) if not camera.is_calibrated]
+    while unknown := [i for i in learned if not start.cameras[i].is_calibrated]:
+        found, failed = {}, []
+        for i in unknown:
+            try:
+                found[i] = _solve(*_from_known(tracks, start, i), start, np.array([i]))[0]
+            except ValueError as error:
+                failed.append(error)
+        if not found:
+            raise failed[0]
+        start = _calibrate(start, list(found), list(found.values()))
+    if not np.isfinite(reconstruct(tracks, start)).any():
+        raise ValueError(
+            "rig: the lines of sight must meet in front of the perspective cameras, got none that "
+            "do (does each normal point from the scene to its camera?)"
+        )
+    return np.array([start.cameras[i].scale * np.exp(1j * start.cameras[i].angle) for i in learned])
+
+
+def _from_known(tracks, rig, index):
+    """Linear equations for one unknown camera from all known ones."""
+    equations = [(np.zeros((0, 2)), np.zeros(0))]
+    camera, track = rig.cameras[index], tracks[index]
+    for known, other in zip(rig.cameras, tracks, strict=True):
+        if known.is_calibrated:
+            common = np.isfinite(track).all(axis=1) & np.isfinite(other).all(axis=1)
+            equations.append(epipolar_equations(known, other[common], camera, track[common]))
+    design, target = zip(*equations, strict=True)
+    return np.vstack(design), np.concatenate(target)
+
+
 def _refine(tracks, rig, unknown, turned):
     """Smallest reprojection error in pixels, searched in log(s exp(i theta)) = log s + i theta."""
     start = np.log(turned).view(float)
@@ -659,11 +735,14 @@ def _refine(tracks, rig, unknown, turned):
 def _closest(tracks, candidate, start):
     """The rig `candidate(parameters)` of the smallest reprojection error in pixels."""
 
-    def error(parameters):
-        missed = np.hstack(residuals(tracks, candidate(parameters)))
-        return missed[np.isfinite(missed)]
+    def missed(parameters):
+        return np.hstack(residuals(tracks, candidate(parameters)))
 
-    return candidate(least_squares(error, start, ftol=1e-15, xtol=1e-15, gtol=1e-15).x)
+    used = np.isfinite(missed(start))  # the same ones throughout
+    fit = least_squares(
+        lambda parameters: missed(parameters)[used], start, ftol=1e-15, xtol=1e-15, gtol=1e-15
+    )
+    return candidate(fit.x)
 
 
 def _descend(design, target, rig, unknown):
@@ -720,9 +799,17 @@ def _visibility(tracks):
 
 
 def _independent(cameras):
-    """Whether at least two of the normals are not parallel."""
-    normals = np.array([camera.normal for camera in cameras])
-    return len(normals) >= 2 and np.linalg.svd(normals, compute_uv=False)[1] > _PARALLEL
+    """Whether two of the cameras look along different lines: do all have the same centre?
+
+    The centre is the pinhole, or a point at infinity in the direction of an orthographic normal.
+    """
+    normals = np.array([c.normal for c in cameras if c.model == Camera.model])
+    pinholes = np.array([c.position for c in cameras if c.model != Camera.model])
+    if len(normals) < 2 and len(pinholes) < 2:
+        return len(normals) == len(pinholes) == 1
+    apart = len(pinholes) > 1 and np.ptp(pinholes, axis=0).max() > 1e-9 * np.abs(pinholes).max()
+    turned = len(normals) > 1 and np.linalg.svd(normals, compute_uv=False)[1] > PARALLEL
+    return bool(apart or turned or (len(normals) and len(pinholes)))
 
 
 def _require_all_calibrated(name, cameras):
@@ -766,14 +853,16 @@ def _rows_of(name, value, width):
 
 def _to_table(camera):
     """A camera as plain numbers under the keys of the file; None is left out."""
-    table = {"position": camera.position.tolist(), "normal": camera.normal.tolist()}
+    table = {} if camera.model == Camera.model else {"model": camera.model}
+    table |= {"position": camera.position.tolist(), "normal": camera.normal.tolist()}
     if camera.is_calibrated:
         table |= {"scale": camera.scale, "angle": camera.angle}
     return table | {"image_size": list(camera.image_size)}
 
 
 def _from_table(index, table):
-    keys = [field.name for field in fields(Camera)]
+    keys = ["model", *(field.name for field in fields(Camera))]
+    models = {kind.model: kind for kind in (Camera, *Camera.__subclasses__())}
     try:
         if not isinstance(table, dict):
             raise ValueError(f"must be a table, got {table!r}")
@@ -783,7 +872,10 @@ def _from_table(index, table):
         for key in ("position", "normal"):
             if key not in table:
                 raise ValueError(f"{key}: must be given, got keys {', '.join(table)}")
-        return Camera(**table)
+        model = table.get("model", Camera.model)
+        if model not in models:
+            raise ValueError(f"model: must be one of {', '.join(models)}, got {model!r}")
+        return models[model](**{key: value for key, value in table.items() if key != "model"})
     except ValueError as error:
         raise ValueError(f"camera {index}: {error}") from error
 

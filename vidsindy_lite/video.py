@@ -359,7 +359,7 @@ def _poses(scene, n, rng):
     return angle, scale
 
 
-def render(track, scene, seed=0) -> Iterator[np.ndarray]:
+def render(track, scene, seed=0, shapes=None) -> Iterator[np.ndarray]:
     """Frames of a target that moves along a pixel track through a scene.
 
     The area centroid of the drawn target lies at the track position to better than 0.02 px.
@@ -371,6 +371,8 @@ def render(track, scene, seed=0) -> Iterator[np.ndarray]:
     scene : Scene
     seed : int
         Draws the background, the random pose and the noise.
+    shapes : (n, 2, 2) array, optional
+        Linear map of the outline in each frame, (u, v): how a perspective camera sees it.
 
     Yields
     ------
@@ -379,7 +381,8 @@ def render(track, scene, seed=0) -> Iterator[np.ndarray]:
     Raises
     ------
     ValueError
-        If `track` has the wrong shape or infinite values, `scene` is none or `seed` is negative.
+        If `track` or `shapes` has the wrong shape or infinite values, `scene` is none or `seed`
+        is negative.
     """
     check_instance("scene", scene, Scene)
     seed = check_integer("seed", seed)
@@ -389,10 +392,16 @@ def render(track, scene, seed=0) -> Iterator[np.ndarray]:
     if np.isinf(track).any():
         count = np.isinf(track).sum()
         raise ValueError(f"track: must be finite or NaN, got {count} infinite values")
-    return _frames(track, scene, seed)
+    shapes = np.broadcast_to(np.eye(2), (len(track), 2, 2)) if shapes is None else np.array(shapes)
+    if shapes.shape != (len(track), 2, 2) or not np.isfinite(shapes).all():
+        raise ValueError(
+            f"shapes: must be finite, of shape ({len(track)}, 2, 2), got shape {shapes.shape} and "
+            f"{np.sum(~np.isfinite(shapes))} other values"
+        )
+    return _frames(track, scene, seed, shapes)
 
 
-def _frames(track, scene, seed):
+def _frames(track, scene, seed, shapes):
     spawned = np.random.SeedSequence(seed).spawn(3)
     scenery, motion, noise = (np.random.default_rng(s) for s in spawned)
     width, height = scene.image_size
@@ -404,11 +413,12 @@ def _frames(track, scene, seed):
     outline = scene.outline()
     colour = np.array(COLOURS[scene.colour], np.float32)
     sigma = np.float32(255 * np.sqrt(scene.noise_variance))
-    for centre, angle, scale in zip(track, *_poses(scene, len(track), motion), strict=True):
+    poses = zip(track, shapes, *_poses(scene, len(track), motion), strict=True)
+    for centre, shape, angle, scale in poses:
         frame = background.copy()
         if np.isfinite(centre).all():
             turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-            alpha, corner = _coverage(centre + scale * outline @ turn)
+            alpha, corner = _coverage(centre + scale * outline @ turn @ shape.T)
             _blend(frame, background, visible, alpha, corner, colour)
         if sigma > 0:
             grain = sigma * noise.standard_normal(frame.shape, np.float32)
@@ -416,9 +426,9 @@ def _frames(track, scene, seed):
         yield frame
 
 
-def render_video(path, track, scene, fps=25, seed=0) -> Path:
+def render_video(path, track, scene, fps=25, seed=0, shapes=None) -> Path:
     """Render a track in a scene (see `render`) and write it to a video file (see `write_video`)."""
-    return write_video(path, render(track, scene, seed), fps)
+    return write_video(path, render(track, scene, seed, shapes), fps)
 
 
 # ------------------------------------------------------------------------------------------- files
