@@ -24,7 +24,7 @@ def test_the_code_runs(tmp_path, monkeypatch, capsys):
 
 
 def test_the_rig_file_is_one(tmp_path):
-    (text,) = blocks("toml")
+    text = "\n".join(blocks("toml"))  # the second one adds a camera
     (tmp_path / "rig.toml").write_text(text)
     rig = Rig.load(tmp_path / "rig.toml")
     assert [camera.is_calibrated for camera in rig.cameras] == [True, False, False]
