@@ -9,7 +9,8 @@ where R^- are the first two rows of the rotation that takes the unit normal to e
 Delta_c = R^- position. Position and normal are measured; scale s (scene units per pixel) and
 in-plane angle theta are given for at least one camera of a `Rig` and learned for the others
 (`learn_cameras`). `reconstruct` then turns the tracks into a trajectory, and `residuals` says by
-how many pixels it misses them.
+how many pixels it misses them. `perspective.PerspectiveCamera` is a second kind of camera for the
+same rigs, which differs from the first in its `matrix` alone.
 
 A track is an (n, 2) array of pixels, one row per frame; a row holding NaN means "not seen".
 

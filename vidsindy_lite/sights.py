@@ -45,7 +45,7 @@ def intersect(cameras, tracks):
         """Equations of all cameras, (n, 2 m, 3) and (n, 2 m), zero where the target is hidden."""
         left, right = (np.stack(part, axis=1) for part in zip(*pairs, strict=True))
         shown = visible.T[:, :, None]
-        left, right = left * shown[..., None], right * shown
+        left, right = np.where(shown[..., None], left, 0), np.where(shown, right, 0)
         rows = 2 * len(cameras)
         return left.reshape(-1, rows, 3), right.reshape(-1, rows)
 
