@@ -27,7 +27,7 @@ def test_the_rig_file_is_one(tmp_path):
     text = "\n".join(blocks("toml"))  # the second one adds a camera
     (tmp_path / "rig.toml").write_text(text)
     rig = Rig.load(tmp_path / "rig.toml")
-    assert [camera.is_calibrated for camera in rig.cameras] == [True, False, False]
+    assert [camera.is_calibrated for camera in rig.cameras] == [True, False, False, True]
 
 
 def test_a_line_that_does_not_run_is_seen():

@@ -522,6 +522,8 @@ def learn_normal(tracks, rig, index):
     ValueError
         See `learn_cameras`.
     """
+    if not check_integer("index", index) < len(rig.cameras):
+        raise ValueError(f"index: must be below {len(rig.cameras)}, the cameras, got {index}")
     learned = learn_cameras(tracks, rig)
     unknown = np.flatnonzero([not camera.is_calibrated for camera in rig.cameras])
     known = [learned.cameras[i] for i in unknown]
