@@ -1,4 +1,4 @@
-"""What all tests share: settings, and a repository of tiny notebooks."""
+"""What all tests share: settings, random curves, and a repository of tiny notebooks."""
 
 import os
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 # Before numpy is imported: results then do not depend on the number of cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -36,6 +37,15 @@ HEADER = """\
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
 """
+
+
+def trajectory(rng, n):
+    """A smooth 3D curve of random shape, size and place."""
+    t = np.linspace(0, 8, n)[:, None]
+    waves = sum(
+        rng.normal(size=3) / k * np.sin(k * t + rng.uniform(0, 2 * np.pi, 3)) for k in range(1, 6)
+    )
+    return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
 
 
 class TinyRepository:

@@ -4,6 +4,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from conftest import trajectory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,15 +20,6 @@ from vidsindy_lite.cameras import (
 from vidsindy_lite.geometry import plane_projection, rodrigues, rotation_to_z
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def trajectory(rng, n):
-    """A smooth 3D curve of random shape, size and place."""
-    t = np.linspace(0, 8, n)[:, None]
-    waves = sum(
-        rng.normal(size=3) / k * np.sin(k * t + rng.uniform(0, 2 * np.pi, 3)) for k in range(1, 6)
-    )
-    return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
 
 
 def random_rig(rng, x, cameras=3):

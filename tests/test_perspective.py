@@ -5,6 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from conftest import trajectory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -20,15 +21,6 @@ from vidsindy_lite.cameras import (
 from vidsindy_lite.perspective import PerspectiveCamera
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def trajectory(rng, n):
-    """A smooth 3D curve of random shape, size and place."""
-    t = np.linspace(0, 8, n)[:, None]
-    waves = sum(
-        rng.normal(size=3) / k * np.sin(k * t + rng.uniform(0, 2 * np.pi, 3)) for k in range(1, 6)
-    )
-    return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
 
 
 def scene(seed, n=200, cameras=3, kinds=(PerspectiveCamera,)):
