@@ -381,7 +381,7 @@ def start(t, x):
 def unpruned(t, x):
     state, problem, unmet = start(t, x)
     for alpha in (0.1, 1.0, 10.0, 100.0):
-        problem = Collocation(problem.segments, exponents, problem.data_weights, alpha / unmet)
+        problem = problem.weighted(problem.data_weights, alpha / unmet)
         state = problem.solve(state, tolerance=1.0)
     information = problem.linearise(state, everything).information
     return FrameAlgebra(exponents, state.coefficients, information), state

@@ -41,3 +41,11 @@ def test_gaps_that_are_not_named_stay_open():
     joined, curves = join(segments, splines, [], records, CIRCLE, 0.2)
     assert joined == segments
     assert curves == splines
+
+
+def test_a_law_that_blows_up_in_a_gap_leaves_the_curve_finite():
+    records, segments, splines = pieces()
+    wild = PolynomialSystem.from_terms({"x": {"x^3": 1e3}, "y": {"x": -1}})
+    _, curves = join(segments, splines, [(0, 2.0)], records, wild, 0.2)
+    t = np.linspace(2.1, 2.9, 40)
+    assert np.isfinite(curves[0](t)).all()

@@ -75,6 +75,8 @@ def test_schur_complement_and_gradient_agree_with_dense_algebra(problem, state):
     np.testing.assert_allclose(model.gradient, -law.T @ projector @ residual, rtol=1e-4, atol=1e-4)
     step = -np.linalg.pinv(curve) @ residual
     np.testing.assert_allclose(model.curve_step.ravel(), step, rtol=1e-4, atol=1e-5)
+    left = ((residual + curve @ step) ** 2).sum()
+    assert model.fall == pytest.approx((residual**2).sum() - left, rel=1e-6)
 
 
 def test_solve_reaches_a_stationary_point(problem, state):
@@ -98,3 +100,24 @@ def test_refined_segment_halves_every_span():
     assert len(segment.breakpoints) == 5
     assert len(segment.refined().breakpoints) == 9
     assert set(segment.breakpoints) <= set(segment.refined().breakpoints)
+
+
+def test_other_weights_leave_a_problem_as_it_is(problem, state):
+    before = problem.objective(state)
+    other = problem.weighted(np.array([1.0, 9.0]), np.array([5.0, 2.0]))
+    fresh = Collocation(problem.segments, problem.exponents, [1.0, 9.0], [5.0, 2.0])
+    assert other.objective(state) == fresh.objective(state) != before
+    assert problem.objective(state) == before
+
+
+def test_a_fit_stops_when_nothing_more_is_promised(problem, state):
+    solved = problem.solve(state, tolerance=1e-9, max_steps=200)
+    model = problem.linearise(solved, np.flatnonzero(solved.free()))
+    promise = model.fall + model.gradient @ np.linalg.solve(model.information, model.gradient)
+    assert 0 <= promise < 1e-6 * problem.objective(solved)
+    linearised = []
+    problem.linearise = lambda *args: (
+        linearised.append(1) or type(problem).linearise(problem, *args)
+    )
+    problem.solve(solved, tolerance=1e-3)
+    assert len(linearised) == 1

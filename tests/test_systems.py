@@ -83,7 +83,16 @@ def test_bad_times_are_refused(arguments, message):
 def test_bad_steps_are_refused():
     law = SYSTEMS["Lorenz"]
     for t, x0, substeps, name in [
-        ([0, np.inf], law.x0, 1, "t"), ([0, 1], [1, 2], 1, "x0"), ([0, 1], law.x0, 0, "substeps"),
+        ([0, np.inf], law.x0, 1, "t"), ([0, 1], [1, 2, np.nan], 1, "x0"),
+        ([0, 1], law.x0, 0, "substeps"),
     ]:  # fmt: skip
         with pytest.raises(ValueError, match=f"^{name}: must be"):
             runge_kutta_4(law, t, x0, substeps)
+
+
+def test_several_motions_are_integrated_at_once():
+    law, t = SYSTEMS["SprottE"], np.linspace(0, 1, 5)
+    starts = np.array([[-1.0, 1.0, 1.0], [0.5, 0.2, -1.0]])
+    together = runge_kutta_4(law, t, starts)
+    alone = [runge_kutta_4(law, t, x0) for x0 in starts]
+    np.testing.assert_allclose(together, np.stack(alone, axis=1), rtol=1e-12)

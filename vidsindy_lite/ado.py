@@ -190,33 +190,36 @@ class _Search:
             segments = [
                 Segment.even(t, x, self.spacing, record) for record, (t, x) in self.stretches
             ]
-            control = _fit_curves(segments, self.curves)
-            self._measure_slack(segments, control)
+            problem = self._problem(segments)
+            control = _fit_curves(problem, self.curves)
+            self._measure_slack(problem, control)
             bar.update()
             candidates = []
             for start in sorted({min(2, self.degree), self.degree}):
-                candidates += self._candidates(self._unpruned(segments, control, start), segments)
+                candidates += self._candidates(self._unpruned(problem, control, start), problem)
             bar.update()
-            state = self._best(candidates, segments)
+            state = self._best(candidates, problem)
             bar.update()
-            state, segments = self._bridge(state, segments)
+            state, problem = self._bridge(state, problem)
             bar.update()
-            state, problem = self._polish(state, segments)
+            state, problem = self._polish(state, problem)
             bar.update()
         law = PolynomialSystem(variable_names(self.d), self.exponents, state.coefficients)
         warnings = doubts(law, state, problem, self.charges, self.records, self.smoothed_noise)
         return report(state, problem, self.units, self.charges, warnings, self.history)
 
-    def _measure_slack(self, segments: list[Segment], control: np.ndarray) -> None:
+    def _measure_slack(self, problem: Collocation, control: np.ndarray) -> None:
         """Misfit of a plain regression on the smoothed curve: the scale of physics weights."""
-        problem = Collocation(segments, self.exponents, self.noise**-2, np.ones(self.d))
         x, slope = problem.node_states(control)
         terms = monomials(x, self.exponents)
         misfit = slope - terms @ np.linalg.lstsq(terms, slope, rcond=None)[0]
         self.slack = np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
 
-    def _problem(self, segments: list[Segment], weight: float) -> Collocation:
-        return Collocation(segments, self.exponents, self.noise**-2, weight / self.slack**2)
+    def _problem(self, segments: Sequence[Segment]) -> Collocation:
+        return Collocation(segments, self.exponents, self.noise**-2, np.ones(self.d))
+
+    def _weighted(self, problem: Collocation, weight: float) -> Collocation:
+        return problem.weighted(self.noise**-2, weight / self.slack**2)
 
     def _criterion(self, problem: Collocation, state: State) -> float:
         terms = self.charges @ state.active.sum(axis=1)
@@ -236,10 +239,10 @@ class _Search:
             )
         )
 
-    def _unpruned(self, segments: list[Segment], control: np.ndarray, degree: int) -> State:
+    def _unpruned(self, problem: Collocation, control: np.ndarray, degree: int) -> State:
         """Fit all terms up to a degree while the physics weight rises."""
         rows = self.exponents.sum(axis=1) <= degree
-        problem = self._problem(segments, 1.0)
+        problem = self._weighted(problem, 1.0)
         x, slope = problem.node_states(control)
         coefficients = np.zeros(self.exponents.shape)
         terms = monomials(x, self.exponents[rows])
@@ -248,20 +251,20 @@ class _Search:
         origin, still = np.zeros(self.d), np.zeros(self.d, dtype=bool)
         state = State(control, coefficients, active, origin, still)
         for weight in FIRST_WEIGHTS:
-            problem = self._problem(segments, weight)
+            problem = self._weighted(problem, weight)
             state = problem.solve(state, tolerance=1.0, max_steps=15)
             self._log(f"unpruned, degree {degree}", problem, state, weight)
         return state
 
     def _select(
-        self, state: State, segments: list[Segment], weight: float, stage: str
+        self, state: State, problem: Collocation, weight: float, stage: str
     ) -> tuple[State, float]:
         """Alternate between the subset search and Gauss-Newton until the criterion stops falling.
 
         The search runs over all terms, active or not, on the quadratic model with the curve
         eliminated; its proposal is kept only if the true criterion falls after a refit.
         """
-        problem = self._problem(segments, weight)
+        problem = self._weighted(problem, weight)
         size = self.exponents.size
         state = problem.solve(state, tolerance=0.1)
         best = self._criterion(problem, state)
@@ -285,12 +288,12 @@ class _Search:
             self._log(stage, problem, state, weight)
         return state, best
 
-    def _candidates(self, state: State, segments: list[Segment]) -> list[_Candidate]:
+    def _candidates(self, state: State, problem: Collocation) -> list[_Candidate]:
         """Supports in the frames where the law is sparsest, by the quadratic model."""
         weight = FIRST_WEIGHTS[-1]
-        state, _ = self._select(state, segments, weight, "subset search, centred frame")
-        hull = self._hull(state, segments, weight)
-        x = np.concatenate([segment.x for segment in segments])
+        state, _ = self._select(state, problem, weight, "subset search, centred frame")
+        hull = self._hull(state, problem, weight)
+        x = problem.x
         origins = sparse_origins(
             hull.algebra, hull.state.active, self.home, (x.min(axis=0), x.max(axis=0)),
             self.charges.max(), keep=4, rng=self.rng,
@@ -308,8 +311,8 @@ class _Search:
         )
         return [(np.where(mask, origin, self.home), np.array(mask)) for mask in masks]
 
-    def _hull(self, state: State, segments: list[Segment], weight: float) -> _Hull:
-        problem = self._problem(segments, weight)
+    def _hull(self, state: State, problem: Collocation, weight: float) -> _Hull:
+        problem = self._weighted(problem, weight)
         state = State(
             state.control_points,
             shift_matrix(self.exponents, state.offset) @ state.coefficients,
@@ -343,37 +346,37 @@ class _Search:
         cost = hull.objective + value + self.axis_charge * moving.sum()
         return _Candidate(cost, state)
 
-    def _best(self, candidates: list[_Candidate], segments: list[Segment]) -> State:
+    def _best(self, candidates: list[_Candidate], problem: Collocation) -> State:
         """Refine the cheapest candidates; the lowest criterion wins."""
         candidates = sorted(candidates, key=lambda candidate: candidate.cost)
         states = list({_key(c.state): c.state for c in reversed(candidates)}.values())[::-1][:3]
         stage = "subset search, own frame"
         for weight in SEARCH_WEIGHTS:
-            refined = [self._select(state, segments, weight, stage) for state in states]
+            refined = [self._select(state, problem, weight, stage) for state in states]
             limit = min(value for _, value in refined) + self.charges.max()
             kept = {_key(state): state for state, value in refined if value <= limit}
             states = list(kept.values())
-        settled = [self._come_home(state, segments) for state in states]
+        settled = [self._come_home(state, problem) for state in states]
         return min(settled, key=lambda item: item[1])[0]
 
-    def _come_home(self, state: State, segments: list[Segment]) -> tuple[State, float]:
+    def _come_home(self, state: State, problem: Collocation) -> tuple[State, float]:
         """Put axes of the offset back to where they cost nothing, if the criterion falls.
 
         The frames were compared at a small physics weight, at which weak terms do not count.
         """
-        value = self._criterion(self._problem(segments, FINAL_WEIGHT), state)
+        value = self._criterion(self._weighted(problem, FINAL_WEIGHT), state)
         if not state.moving.any():
             return state, value
-        hull = self._hull(state, segments, FINAL_WEIGHT)
+        hull = self._hull(state, problem, FINAL_WEIGHT)
         variants = [self._candidate(hull, *variant) for variant in self._variants(state.offset)]
         closest = min(variants, key=lambda candidate: candidate.cost)
         if closest.cost < value and closest.state.moving.sum() < state.moving.sum():
-            trial, cost = self._select(closest.state, segments, FINAL_WEIGHT, "offset home")
+            trial, cost = self._select(closest.state, problem, FINAL_WEIGHT, "offset home")
             if cost < value:
                 return trial, cost
         return state, value
 
-    def _bridge(self, state: State, segments: list[Segment]) -> tuple[State, list[Segment]]:
+    def _bridge(self, state: State, problem: Collocation) -> tuple[State, Collocation]:
         """Integrate the law across gaps and search again with the physics enforced there.
 
         A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut
@@ -381,55 +384,57 @@ class _Search:
         halved, down to single gaps.
         """
         for _ in range(3):
-            open_gaps = gaps(segments)
+            open_gaps = gaps(problem.segments)
             if not open_gaps:
                 break
             before = state.active
-            state, segments = self._bridge_group(state, segments, open_gaps)
-            state, _ = self._select(state, segments, FINAL_WEIGHT, "subset search, bridged")
-            state, _ = self._come_home(state, segments)
+            state, problem = self._bridge_group(state, problem, open_gaps)
+            state, _ = self._select(state, problem, FINAL_WEIGHT, "subset search, bridged")
+            state, _ = self._come_home(state, problem)
             if (state.active == before).all():
                 break
-        return state, segments
+        return state, problem
 
     def _bridge_group(
-        self, state: State, segments: list[Segment], group: list[Gap]
-    ) -> tuple[State, list[Segment]]:
-        problem = self._problem(segments, FINAL_WEIGHT)
+        self, state: State, problem: Collocation, group: list[Gap]
+    ) -> tuple[State, Collocation]:
+        problem = self._weighted(problem, FINAL_WEIGHT)
         joined, curves = join(
-            segments, _splines(problem, state), group, self.records, self._law(state), self.spacing
-        )
-        trial = replace(state, control_points=_fit_curves(joined, curves))
-        bridged = self._problem(joined, FINAL_WEIGHT)
+            problem.segments, _splines(problem, state), group, self.records, self._law(state),
+            self.spacing,
+        )  # fmt: skip
+        bridged = self._problem(joined)
+        trial = replace(state, control_points=_fit_curves(bridged, curves))
         for weight in SEARCH_WEIGHTS:
-            trial = self._problem(joined, weight).solve(trial, tolerance=1.0, max_steps=10)
+            bridged = self._weighted(bridged, weight)
+            trial = bridged.solve(trial, tolerance=1.0, max_steps=10)
         # A bridge takes away the freedom of one initial condition: so much may the fit lose.
         freedom = self.d * len(group) + bridged.x.size - problem.x.size
         loss = bridged.objective(trial) - problem.objective(state)
         if loss < freedom + 4 * np.sqrt(2 * freedom):
-            return trial, joined
+            return trial, bridged
         if len(group) == 1:
-            return state, segments
+            return state, problem
         for half in (group[: len(group) // 2], group[len(group) // 2 :]):
-            state, segments = self._bridge_group(state, segments, half)
-        return state, segments
+            state, problem = self._bridge_group(state, problem, half)
+        return state, problem
 
     def _law(self, state: State) -> PolynomialSystem:
         names = variable_names(self.d)
         law = PolynomialSystem(names, self.exponents, state.coefficients)
         return law.shift(state.offset)
 
-    def _polish(self, state: State, segments: list[Segment]) -> tuple[State, Collocation]:
+    def _polish(self, state: State, problem: Collocation) -> tuple[State, Collocation]:
         """Refit with the law exact, on finer knots until that no longer matters."""
-        problem = self._problem(segments, FINAL_WEIGHT)
+        problem = self._weighted(problem, FINAL_WEIGHT)
         state = problem.solve(state, tolerance=1e-4)
         columns = np.flatnonzero(state.free())
         for _ in range(3):
             before = state.flat()[columns]
-            segments = [segment.refined() for segment in segments]
-            control = _fit_curves(segments, _splines(problem, state))
+            finer = self._problem([segment.refined() for segment in problem.segments])
+            control = _fit_curves(finer, _splines(problem, state))
             self.noise = self._residual_noise(problem, state)
-            problem = self._problem(segments, FINAL_WEIGHT)
+            problem = self._weighted(finer, FINAL_WEIGHT)
             state = problem.solve(replace(state, control_points=control), tolerance=1e-4)
             spread = np.sqrt(np.diag(inverse(problem.linearise(state, columns).information)))
             change = np.abs(state.flat()[columns] - before)
@@ -437,7 +442,7 @@ class _Search:
                 break
         # A term that only made up for the error of coarser splines goes, and the noise, known
         # better now, may change what is worth its charge.
-        state, _ = self._select(state, segments, FINAL_WEIGHT, "polish")
+        state, _ = self._select(state, problem, FINAL_WEIGHT, "polish")
         return problem.solve(state, tolerance=1e-4), problem
 
     def _residual_noise(self, problem: Collocation, state: State) -> np.ndarray:
@@ -466,10 +471,10 @@ def _stretches(records: Sequence[Record], longest_step: float) -> list[tuple[int
 
 
 def _fit_curves(
-    segments: Sequence[Segment], curves: Sequence[Callable[[np.ndarray], np.ndarray]]
+    problem: Collocation, curves: Sequence[Callable[[np.ndarray], np.ndarray]]
 ) -> np.ndarray:
     control = []
-    for segment, curve in zip(segments, curves, strict=True):
+    for segment, curve in zip(problem.segments, curves, strict=True):
         b = segment.breakpoints
         dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
         control.append(

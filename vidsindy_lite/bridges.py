@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, CubicHermiteSpline
 
 from .collocation import Segment
 from .polynomials import PolynomialSystem
@@ -45,7 +45,6 @@ class Joined:
     def __init__(self, splines: Sequence[BSpline], law: PolynomialSystem) -> None:
         self.splines = splines
         self.law = law
-        self.reversed = PolynomialSystem(law.names, law.exponents, -law.coefficients)
 
     def __call__(self, t: np.ndarray) -> np.ndarray:
         """Evaluate at increasing times, shape (n, d)."""
@@ -54,21 +53,38 @@ class Joined:
         for (low, high), spline in zip(ends, self.splines, strict=True):
             inside = (t >= low) & (t <= high)
             values[inside] = spline(t[inside])
-        for i, ((_, low), (high, _)) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
-            inside = (t > low) & (t < high)
-            forward = _integrate(self.law, t[inside] - low, self.splines[i](low))
-            backward = _integrate(self.reversed, high - t[inside][::-1], self.splines[i + 1](high))
-            share = ((t[inside] - low) / (high - low))[:, None]
-            crossing = (1 - share) * forward + share * backward[::-1]
-            if not np.isfinite(crossing).all():  # the law blows up: the fit will refuse the bridge
-                crossing = (1 - share) * self.splines[i](low) + share * self.splines[i + 1](high)
-            values[inside] = crossing
+        crossed = [(low, high) for (_, low), (high, _) in zip(ends[:-1], ends[1:], strict=True)]
+        inside = [(t > low) & (t < high) for low, high in crossed]
+        steps = 1 + max(rows.sum() for rows in inside)
+        forward, backward = self._crossings(np.array(crossed), steps)
+        for (low, high), rows, left, right in zip(crossed, inside, forward, backward, strict=True):
+            share = (t[rows] - low) / (high - low)
+            values[rows] = (1 - share[:, None]) * left(share) + share[:, None] * right(1 - share)
         return values
 
+    def _crossings(
+        self, crossed: np.ndarray, steps: int
+    ) -> tuple[list[CubicHermiteSpline], list[CubicHermiteSpline]]:
+        """Each gap from its left and from its right end, as functions of the share covered."""
+        x0 = np.array(
+            [spline(low) for spline, (low, _) in zip(self.splines[:-1], crossed, strict=True)]
+            + [spline(high) for spline, (_, high) in zip(self.splines[1:], crossed, strict=True)]
+        )
+        length = np.diff(crossed)
+        pace = np.concatenate([length, -length])
+        share = np.linspace(0, 1, steps + 1)
 
-def _integrate(law: PolynomialSystem, elapsed: np.ndarray, x0: np.ndarray) -> np.ndarray:
-    with np.errstate(over="ignore", invalid="ignore"):
-        return runge_kutta_4(law, np.concatenate([[0.0], elapsed]), x0, substeps=1)[1:]
+        def rate(x):
+            return pace * self.law(x)
+
+        with np.errstate(over="ignore", invalid="ignore"):
+            paths = runge_kutta_4(rate, share, x0, substeps=1)
+            slopes = np.array([rate(x) for x in paths])
+        # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
+        lost = ~(np.isfinite(paths) & np.isfinite(slopes)).all(axis=(0, 2))
+        paths[:, lost], slopes[:, lost] = x0[lost], 0.0
+        curves = [CubicHermiteSpline(share, paths[:, i], slopes[:, i]) for i in range(len(x0))]
+        return curves[: len(crossed)], curves[len(crossed) :]
 
 
 def join(

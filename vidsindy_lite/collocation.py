@@ -10,6 +10,7 @@ not, with the curve already eliminated.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,11 +94,13 @@ class State:
 class Linearisation:
     """The least-squares problem around a state, with the control points eliminated.
 
-    The objective near the state is ``objective + step' information step - 2 gradient' step`` for
-    a step in the columns named by ``columns`` (indices into `State.flat`).
+    The objective near the state is ``objective - fall + step' information step - 2 gradient' step``
+    for a step in the columns named by ``columns`` (indices into `State.flat`), with the curve that
+    goes best with it; ``fall`` is what the curve gains by itself.
     """
 
     objective: float
+    fall: float
     columns: np.ndarray
     information: np.ndarray
     gradient: np.ndarray
@@ -135,8 +138,6 @@ class Collocation:
         self.generators = shift_generators(exponents)
         self.d = exponents.shape[1]
         self.segments = list(segments)
-        self.data_weights = np.asarray(data_weights, dtype=float)
-        self.physics_weights = np.asarray(physics_weights, dtype=float)
         self.knots = [clamped_knots(segment.breakpoints) for segment in self.segments]
         self.starts = np.cumsum([0] + [len(k) - WIDTH for k in self.knots])
         self.r = int(self.starts[-1])
@@ -148,8 +149,20 @@ class Collocation:
         width = np.concatenate([np.concatenate([w[:1] / 2, w, w[-1:] / 2]) for w in spans])
         self.nodes, self.slopes = self._basis(nodes), self._basis(nodes, order=1)
         self.node_weights = width / width.sum() * len(self.x)
+        self._sample_band = _normal_band(self.samples)
+        self._weigh(data_weights, physics_weights)
+
+    def weighted(self, data_weights: np.ndarray, physics_weights: np.ndarray) -> Collocation:
+        """The same with other weights; what hangs on the knots alone is shared."""
+        other = copy(self)
+        other._weigh(data_weights, physics_weights)
+        return other
+
+    def _weigh(self, data_weights: np.ndarray, physics_weights: np.ndarray) -> None:
+        self.data_weights = np.asarray(data_weights, dtype=float)
+        self.physics_weights = np.asarray(physics_weights, dtype=float)
         self._data_band = np.zeros((WIDTH * self.d, self.r * self.d))
-        self._data_band[:: self.d] = np.kron(_normal_band(self.samples), self.data_weights)
+        self._data_band[:: self.d] = np.kron(self._sample_band, self.data_weights)
 
     def _basis(self, times: list[np.ndarray], order: int = 0) -> sparse.csr_array:
         """Basis functions of all segments at the given times of each, shape (times, r)."""
@@ -252,6 +265,7 @@ class Collocation:
         objective = float((data_residual**2).sum(axis=0) @ self.data_weights + (residual**2).sum())
         return Linearisation(
             objective=objective,
+            fall=objective - float(gram[0, 0]),
             columns=columns,
             information=gram[1:, 1:],
             gradient=-gram[1:, 0],
@@ -274,7 +288,7 @@ class Collocation:
         """Minimise the objective over the curve and the free coefficients and offsets.
 
         Gauss-Newton with step halving, and Levenberg-Marquardt damping where that fails; stops
-        when the objective falls by less than ``tolerance`` (chi-square units).
+        when a step promises to lower the objective by less than ``tolerance`` (chi-square units).
         """
         columns = np.flatnonzero(state.free())
         value = self.objective(state)
@@ -286,6 +300,9 @@ class Collocation:
                 damping = max(10 * damping, 1e-8)
                 continue
             step = _solved(model.information, model.gradient, damping)
+            if damping == 0.0 and model.fall + model.gradient @ step < tolerance:
+                last = _moved(state, model, step, 1.0)
+                return last if self.objective(last) < value else state
             for fraction in (1.0, 0.3, 0.1):
                 trial = _moved(state, model, step, fraction)
                 trial_value = self.objective(trial)
@@ -296,10 +313,8 @@ class Collocation:
                 if damping > 1e2:
                     break
                 continue
-            fall, state, value = value - trial_value, trial, trial_value
+            state, value = trial, trial_value
             damping = damping / 10 if damping > 1e-8 else 0.0
-            if fall < tolerance and damping == 0.0:
-                break
         return state
 
 

@@ -64,6 +64,8 @@ class FrameAlgebra:
             origin = origin + step
             if not np.abs(origin).max() < 1e6:
                 return np.full(self.d, np.nan)
+            if np.abs(step).max() < 1e-9:
+                break
         return origin
 
     def _scores(self, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -121,7 +121,7 @@ class _Quadratic:
 
     def fit(self, support: np.ndarray) -> _Fit:
         inside = np.flatnonzero(support)
-        block = self.matrix[np.ix_(inside, inside)]
+        block = self.matrix[inside[:, None], inside]
         inverse = np.linalg.inv(block)
         step = -self.present
         step[inside] = 0.0
@@ -175,9 +175,10 @@ def _single_changes(model: _Quadratic, fit: _Fit) -> list[tuple[float, np.ndarra
     none = np.array([], dtype=int)
     charge = model.charge
     spread = np.diag(fit.inverse)
-    response = model.matrix[np.ix_(outside, inside)] @ fit.inverse
+    shared = model.matrix[outside[:, None], inside]
+    response = shared @ fit.inverse
     left = fit.left[outside]
-    room = 1 - np.einsum("ak,ka->a", response, model.matrix[np.ix_(inside, outside)])
+    room = 1 - (response * shared).sum(axis=1)
     loss = fit.fitted**2 / spread - charge[inside]
     cost = charge[outside] - _gain(left, room)
     changes = [(np.inf, none, none)]

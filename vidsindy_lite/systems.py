@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .checks import check_integer, check_positive, check_times, check_vector
+from .checks import check_array, check_integer, check_positive, check_times, check_vector
 from .polynomials import PolynomialSystem
 
 REFERENCE_OFFSET = (10.0, 10.0, 0.0)
@@ -59,32 +60,36 @@ class Benchmark(PolynomialSystem):
         return t, self.simulate(t, self.x0)
 
 
-def runge_kutta_4(system: PolynomialSystem, t: np.ndarray, x0, substeps: int = 10) -> np.ndarray:
+def runge_kutta_4(
+    rate: Callable[[np.ndarray], np.ndarray], t: np.ndarray, x0: np.ndarray, substeps: int = 10
+) -> np.ndarray:
     """Integrate with the classical 4th-order Runge-Kutta method, as the paper does.
 
     Parameters
     ----------
-    system : PolynomialSystem
-        The law.
+    rate : callable
+        The law: time derivative of a state, or of several at once; a `PolynomialSystem` is one.
     t : ndarray, shape (n,)
         Increasing times of the returned rows.
-    x0 : array_like, shape (d,)
-        State at ``t[0]``.
+    x0 : array_like, shape (d,) or (m, d)
+        State, or states of several motions, at ``t[0]``.
     substeps : int
         Equal steps between two times.
 
     Returns
     -------
-    ndarray, shape (n, d)
+    ndarray, shape (n, d) or (n, m, d)
     """
-    states = [check_vector("x0", x0, system.d)]
+    states = [check_array("x0", x0)]
+    if not np.isfinite(states[0]).all():
+        raise ValueError(f"x0: must be finite, got {x0!r:.60}")
     for step in np.diff(check_times(t)) / check_integer("substeps", substeps, 1):
         x = states[-1]
         for _ in range(substeps):
-            k1 = system(x)
-            k2 = system(x + step / 2 * k1)
-            k3 = system(x + step / 2 * k2)
-            k4 = system(x + step * k3)
+            k1 = rate(x)
+            k2 = rate(x + step / 2 * k1)
+            k3 = rate(x + step / 2 * k2)
+            k4 = rate(x + step * k3)
             x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         states.append(x)
     return np.array(states)
