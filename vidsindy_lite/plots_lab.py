@@ -23,7 +23,7 @@ def plot_table(rig, x, found, marked):
     marked : dict of str to ndarray, shape (3,)
         Points that are drawn as pentagrams.
     """
-    figure = plt.figure(figsize=(10.5, 5.2))
+    figure = plt.figure(figsize=(10.5, 4.4))
     panels = figure.subplot_mosaic(
         [["above", "space"]], per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}
     )
@@ -52,7 +52,7 @@ def plot_table(rig, x, found, marked):
     for (name, point), style in zip(marked.items(), ("*k", "*C4"), strict=True):
         above.plot(*point[:2], style, ms=12, mec="white", mew=0.6, ls="", label=name)
     above.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
-    figure.legend(*above.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    figure.legend(*above.get_legend_handles_labels(), loc="outside upper center", ncols=5)
     return figure
 
 

@@ -35,7 +35,7 @@ def plot_robustness(curves, published=None):
         for k, (method, by_level) in enumerate(methods.items()):
             colour, marker = _STYLES[method]
             levels = 100 * np.array(list(by_level))
-            beside = 0.012 * np.ptp(levels) * (k - (len(methods) - 1) / 2)
+            beside = 0.006 * np.ptp(levels) * (k - (len(methods) - 1) / 2)
             errors = [[100 * r.score.l2 for r in results] for results in by_level.values()]
             wrong = [[r.wrong_terms for r in results] for results in by_level.values()]
             for axes, values in zip(column, (errors, wrong), strict=True):
