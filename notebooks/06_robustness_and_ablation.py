@@ -448,7 +448,7 @@ for level in noise["noise"][1:]:
 exact = {
     f"{100 * level:.0f} % noise": [r for r in group if r.score.exact]
     for level, group in by_level(ours, "noise").items()
-    if level in (0.05, 0.1, 0.2, 0.3, 0.5)
+    if level
 }
 
 # %%

@@ -92,15 +92,16 @@ def plot_pull_distribution(pulls):
     Parameters
     ----------
     pulls : dict of str to ndarray
-        ``(found - true) / standard error`` of all coefficients, by condition.
+        ``(found - true) / standard error`` of all coefficients, by condition, in rising order.
     """
     figure, axes = plt.subplots(figsize=(7, 4))
     reach = np.linspace(0, 4, 200)
     axes.plot(reach, 100 * halfnorm.cdf(reach), color="0.8", lw=7, label="if they are right")
-    for k, (name, values) in enumerate(pulls.items()):
+    colours = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(pulls)))
+    for (name, values), colour in zip(pulls.items(), colours, strict=True):
         ordered = np.sort(np.abs(values))
         share = 100 * np.arange(1, len(ordered) + 1) / len(ordered)
-        axes.step(ordered, share, where="post", color=f"C{k}", lw=1.4, label=name)
+        axes.step(ordered, share, where="post", color=colour, lw=1.4, label=name)
     axes.set(xlim=(0, 4), ylim=(0, 102), xlabel="|error| / standard error")
     axes.set_ylabel("coefficients below (%)")
     axes.legend(loc="lower right")
