@@ -23,6 +23,7 @@ from contextlib import contextmanager
 import numpy as np
 import pysindy
 from pysindy.optimizers import BaseOptimizer
+from sklearn import config_context
 
 from .checks import check_integer
 from .polynomials import PolynomialSystem, variable_names
@@ -224,7 +225,9 @@ def _least_squares(threshold: float, ridge: float = RIDGE) -> BaseOptimizer:
 
 
 def _fit(optimizer: BaseOptimizer, rows: Rows) -> np.ndarray:
-    with warnings.catch_warnings():
+    # Without the checks of arguments, which take longer than such small regressions.
+    unchecked = config_context(skip_parameter_validation=True)
+    with unchecked, warnings.catch_warnings():
         # A threshold above all coefficients is a normal member of the grid.
         warnings.filterwarnings("ignore", "Sparsity parameter is too big")
         warnings.filterwarnings("ignore", "STLSQ did not converge")
