@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from vidsindy_lite.information import equilibrated, inverse
 
@@ -20,3 +21,10 @@ def test_equilibrated_has_a_unit_diagonal_and_scales_back():
 def test_what_cannot_be_told_is_uncertain_not_certain():
     dependent = np.array([[1.0, 1.0], [1.0, 1.0]])
     assert np.diag(inverse(dependent)).min() > 1e6
+
+
+def test_no_information_is_a_huge_variance_not_an_overflow():
+    with np.errstate(all="raise"):
+        variance = np.diag(inverse(np.diag([4.0, 0.0])))
+    assert variance[0] == pytest.approx(0.25)
+    assert 1e200 < variance[1] < np.inf

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+NOTHING = 1e-250
+"""Least information; its inverse, even over the ridge, is still a number."""
 RIDGE = 1e-12
 """Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance."""
 
@@ -28,7 +30,7 @@ def equilibrated(information: np.ndarray, ridge: float = RIDGE) -> tuple[np.ndar
         ``scale[:, None] * information * scale``, plus the ridge.
     scale : ndarray, shape (m,)
     """
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), NOTHING))
     matrix = information * scale[:, None] * scale
     matrix[np.diag_indices_from(matrix)] += ridge
     return matrix, scale
