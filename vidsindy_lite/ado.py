@@ -49,6 +49,8 @@ FALSE_ALARM = 0.004
 """Chance of a false term in a law, if all candidates were independent."""
 OFFSET_CHARGE = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
+SPLINE_ERROR = 3e-7
+"""Error of a coefficient, in standard units, that the knots may leave if the data are nearly exact."""
 GAP = 0.4
 """A pause longer than this fraction of the time scale of the motion is a gap."""
 SHORTEST_STRETCH = 4
@@ -437,8 +439,9 @@ class _Search:
             problem = self._weighted(finer, FINAL_WEIGHT)
             state = problem.solve(replace(state, control_points=control), tolerance=1e-4)
             spread = np.sqrt(np.diag(inverse(problem.linearise(state, columns).information)))
-            change = np.abs(state.flat()[columns] - before)
-            if (change < np.maximum(0.1 * spread, 1e-6)).all():
+            # Half the spacing, a sixteenth of the error: so much is left of what it just was.
+            error = np.abs(state.flat()[columns] - before) / 15
+            if (error < np.maximum(0.1 * spread, SPLINE_ERROR)).all():
                 break
         # A term that only made up for the error of coarser splines goes, and the noise, known
         # better now, may change what is worth its charge.
