@@ -47,6 +47,8 @@ FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
 FALSE_ALARM = 0.004
 """Chance of a false term in a law, if all candidates were independent."""
+NEEDLESS_START = 0.1
+"""Chance that a second start, from terms of all degrees, is made though the first left nothing."""
 OFFSET_CHARGE = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 SPLINE_ERROR = 3e-7
@@ -198,7 +200,10 @@ class _Search:
             bar.update()
             candidates = []
             for start in sorted({min(2, self.degree), self.degree}):
-                candidates += self._candidates(self._unpruned(problem, control, start), problem)
+                state = self._unpruned(problem, control, start)
+                candidates += self._candidates(state, problem)
+                if not self._leaves_something_over(state, problem):
+                    break
             bar.update()
             state = self._best(candidates, problem)
             bar.update()
@@ -257,6 +262,13 @@ class _Search:
             state = problem.solve(state, tolerance=1.0, max_steps=15)
             self._log(f"unpruned, degree {degree}", problem, state, weight)
         return state
+
+    def _leaves_something_over(self, state: State, problem: Collocation) -> bool:
+        """Would the terms of higher degree together explain more of the data than chance does?"""
+        left_out = self.exponents.size - state.active.sum()
+        problem = self._weighted(problem, FIRST_WEIGHTS[-1])
+        _, gain = problem.linearise(state, np.arange(self.exponents.size)).newton()
+        return left_out > 0 and gain > chi2.isf(NEEDLESS_START, left_out)
 
     def _select(
         self, state: State, problem: Collocation, weight: float, stage: str

@@ -107,6 +107,14 @@ class Linearisation:
     curve_step: np.ndarray
     curve_response: np.ndarray
 
+    def newton(self, damping: float = 0.0) -> tuple[np.ndarray, float]:
+        """The best step in the columns, and by how much it promises to lower the objective."""
+        if not len(self.columns):
+            return self.gradient, self.fall
+        matrix, scale = equilibrated(self.information, RIDGE + damping)
+        step = scale * np.linalg.solve(matrix, scale * self.gradient)
+        return step, float(self.fall + self.gradient @ step)
+
 
 class Collocation:
     """Data and physics loss on cubic splines, one per segment, sharing one law.
@@ -299,8 +307,8 @@ class Collocation:
             except LinAlgError:
                 damping = max(10 * damping, 1e-8)
                 continue
-            step = _solved(model.information, model.gradient, damping)
-            if damping == 0.0 and model.fall + model.gradient @ step < tolerance:
+            step, promise = model.newton(damping)
+            if damping == 0.0 and promise < tolerance:
                 last = _moved(state, model, step, 1.0)
                 return last if self.objective(last) < value else state
             for fraction in (1.0, 0.3, 0.1):
@@ -336,13 +344,6 @@ def _normal_band(rows: sparse.csr_array) -> np.ndarray:
         products = values[:, lag:] * values[:, : width - lag]
         band[lag] = np.bincount(columns[:, : width - lag].ravel(), products.ravel(), minlength=size)
     return band
-
-
-def _solved(information: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:
-    if not len(gradient):
-        return gradient
-    matrix, scale = equilibrated(information, RIDGE + damping)
-    return scale * np.linalg.solve(matrix, scale * gradient)
 
 
 def _moved(state: State, model: Linearisation, step: np.ndarray, fraction: float) -> State:
