@@ -4,6 +4,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 
 from .systems import SYSTEMS
 
@@ -183,7 +184,7 @@ def _discover(options: argparse.Namespace) -> int:
 
     from vidsindy_lite import Rig, discover_from_videos
     from vidsindy_lite.checks import check_positive
-    from vidsindy_lite.report import check_folder_is_free, write_report
+    from vidsindy_lite.report import PAGE, check_folder_is_free, write_report
     from vidsindy_lite.synchrony import list_lags
     from vidsindy_lite.video import video_info
 
@@ -203,10 +204,10 @@ def _discover(options: argparse.Namespace) -> int:
     told = {"rig file": options.rig, "degree": options.degree, "seed": options.seed}
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"frames in a unit of time": options.fps} if options.fps is not None else {}
-    page = write_report(found, options.videos, options.out, told)
+    write_report(found, options.videos, options.out, told)
     print(found)
     print(f"status: {found.status}; lags of the videos: {list_lags(found.lags.lags)} frames")
-    print(f"report: {page}")
+    print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
 
 

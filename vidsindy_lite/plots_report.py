@@ -2,8 +2,9 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.patheffects import withStroke
 
-from .plots import _finish
+from .plots import _finish, _show
 
 
 def plot_path(t, x, curve):
@@ -42,6 +43,38 @@ def plot_path(t, x, curve):
     return figure
 
 
+def plot_views(images, titles, tracks, index):
+    """One frame of each video, the whole track over it, and a ring where the target is.
+
+    Parameters
+    ----------
+    images : sequence of ndarray, shape (height, width, 3), uint8
+        Blue-green-red, as a video reader gives them; sizes may differ.
+    titles : sequence of str
+    tracks : sequence of ndarray, shape (n, 2)
+        Pixels of the target in all frames of each video.
+    index : int
+        Where on the tracks the images were taken.
+    """
+    columns = min(len(images), 3)
+    rows = -(-len(images) // columns)
+    size = (3.5 * columns, 3.2 * rows)
+    figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False)
+    halo = [withStroke(linewidth=2.4, foreground="white")]
+    for axes, image, title, track in zip(grid.flat, images, titles, tracks, strict=False):
+        height, width = image.shape[:2]
+        _show(axes, image)
+        axes.plot(*track.T, color="C0", lw=1, path_effects=halo)
+        axes.plot(*track[index], "o", ms=22, mfc="none", mec="C1", mew=2)
+        axes.set_title(title, fontsize=11)
+        axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
+        axes.set(xticks=(0, width // 2, width), yticks=(0, height // 2, height))
+        axes.set(xlabel="u (px)", ylabel="v (px)")
+    for axes in grid.flat[len(images) :]:
+        axes.remove()
+    return figure
+
+
 def plot_residuals(t, residuals, limit):
     """By how many pixels the reconstructed target misses each track, over time.
 
@@ -63,4 +96,23 @@ def plot_residuals(t, residuals, limit):
         axes.set_title(f"camera {i + 1}")
     figure.supylabel("residual (px)", fontsize=11)
     panels[-1, 0].set_xlabel("time (units of the equations)")
+    return figure
+
+
+def plot_lags(lags, missed, limit):
+    """How well the views agree at each lag of one video.
+
+    Parameters
+    ----------
+    lags : ndarray, shape (k,)
+        Frames.
+    missed : ndarray, shape (k,)
+        Disagreement, pixels.
+    limit : float
+        Pixels that tracking can be blamed for.
+    """
+    figure, axes = plt.subplots(figsize=(7.5, 3.8))
+    axes.semilogy(lags, missed, "o-", ms=4, lw=1)
+    axes.axhline(limit, color="0.4", lw=1, ls="--")
+    axes.set(xlabel="lag of the second video (frames)", ylabel="disagreement (px)")
     return figure

@@ -22,8 +22,8 @@ import numpy as np
 from .cameras import residuals
 from .checks import check_path
 from .pipeline import VideoDiscovery
-from .plots import plot_frames, plot_rig
-from .plots_report import plot_path, plot_residuals
+from .plots import plot_rig
+from .plots_report import plot_path, plot_residuals, plot_views
 from .synchrony import DISAGREEMENT
 from .video import read_video, video_info
 
@@ -264,12 +264,12 @@ def _camera_rows(cameras):
         {
             "video": c["video"], "frames": str(c["frames"]), "fps": f"{c['fps']:g}",
             "camera": c["model"], "scale": f"{c['scale']:.6g}", "angle (rad)": f"{c['angle']:.5f}",
-            "lag (frames)": f"{c['lag']:.3f} ± {shown(c['lag_error'], '.1g')}",
+            "lag (frames)": f"{c['lag']:.3f} ± {shown(c['lag_error'], '.1g')}" if i else "0",
             "seen (%)": f"{100 * c['share_of_frames_seen']:.1f}",
             "residual, rms (px)": shown(c["residual_rms"], ".3f"),
             "nine in ten below (px)": shown(c["residual_of_nine_in_ten"], ".3f"),
         }
-        for c in cameras
+        for i, c in enumerate(cameras)
     ]  # fmt: skip
 
 
@@ -293,8 +293,8 @@ def _figures(found, paths):
         if seen.any():
             yield _figure(
                 _first_look(found, paths, int(seen.argmax())),
-                "One instant in every video, with the whole track over it and the target "
-                "magnified. A track that leaves the target, or is that of another thing, shows.",
+                "One instant in every video, with the whole track over it and a ring around the "
+                "target. The tracks should be whole and the rings on the same thing.",
             )
         if found.rig.is_orthographic:
             yield _figure(
@@ -313,7 +313,7 @@ def _first_look(found, paths, instant):
     places = [(Path(path), found.lags.frame(i, instant)) for i, path in enumerate(paths)]
     images = [next(islice(read_video(path), frame, None)) for path, frame in places]
     titles = [f"{path.name}, frame {frame}" for path, frame in places]
-    return plot_frames(images, titles, found.tracks, instant)
+    return plot_views(images, titles, found.tracks, instant)
 
 
 def _figure(figure, caption):
