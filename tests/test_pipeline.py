@@ -125,11 +125,10 @@ def test_given_lags_are_used(shot, late):
 
 def test_a_wrong_lag_of_zero_is_not_accepted(shot, late):
     paths = [shot.paths[0], late, shot.paths[2]]
-    found = vl.discover_from_videos(paths, shot.rig, lags=(0, 0, 0), degree=1)
-    assert found.status == "suspect"
-    assert found.warnings[0].startswith("the rig does not agree with the tracks")
-    assert "the lags that are given (0, 0, 0 frames)" in found.warnings[1]
-    assert "that make the views agree (0, 7, 0)" in found.warnings[1]
+    message = r"lags: must make the views agree, got \(0, 0, 0\) frames where \(0, 7, 0\) do"
+    for rig in (shot.rig, shot.rig.uncalibrated()):
+        with pytest.raises(ValueError, match=message):
+            vl.discover_from_videos(paths, rig, lags=(0, 0, 0))
 
 
 def test_different_frame_rates(shot, tmp_path):

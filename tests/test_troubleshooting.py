@@ -140,7 +140,7 @@ TROUBLES = {
     "the target's motion must determine": nothing_in_common,
     "the rig does not agree with the tracks": wrong_position,
     "the lags of the videos cannot be told": repeating,
-    "the lags that are given": lambda studio: studio.says(lags=(0, 5, 0)),
+    "lags: must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
     "the terms left out explain more than chance": dependent_errors,
     "may lie outside the library": lambda studio: pendulum(degree=1),
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -87,8 +87,8 @@ def discover_from_videos(
     ------
     FileNotFoundError, ValueError
         If a file is missing, cut off or no video, if the numbers of files and cameras disagree, if
-        a target is not found, or if cameras or law cannot be learned (see `learn_cameras` and
-        `discover`). What can be told before a video is tracked is.
+        a target is not found, if the given lags are clearly wrong, or if cameras or law cannot be
+        learned (see `learn_cameras` and `discover`). What can be told before a video is tracked is.
     """
     check_learnable(rig)
     check_integer("degree", degree, 1)
@@ -117,19 +117,18 @@ def discover_from_videos(
     bar = tqdm(list(zip(paths, shots, strict=True)), desc="track", disable=not progress)
     raw = [_track(path, shot.frames) for path, shot in bar]
     synchrony = learn_lags(raw, rig, rates, start=lags)
-    tracks = align(raw, synchrony.lags if lags is None else lags, rates)
+    if lags is not None:
+        synchrony = _given(lags, synchrony)
+    tracks = align(raw, synchrony.lags, rates)
     learned = learn_cameras(tracks, rig)
     x = reconstruct(tracks, learned)
     found = discover(t, x, degree=degree, seed=seed, progress=progress)
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
     parts["warnings"] = (
         *_rig_doubts(tracks, learned, rig, paths),
-        *_lag_doubts(synchrony, lags),
+        *synchrony.doubts,
         *found.warnings,
     )
-    if lags is not None:
-        missed = max(disagreement(tracks, learned))
-        synchrony = Synchrony(lags, synchrony.rates, 0 * lags, missed)
     return VideoDiscovery(**parts, tracks=tracks, rig=learned, lags=synchrony, t=t, x=x)
 
 
@@ -167,6 +166,17 @@ def _track(path: Path, frames: int) -> np.ndarray:
     return found
 
 
+def _given(lags: np.ndarray, learned: Synchrony) -> Synchrony:
+    """The lags that are given, unless others are clearly those of the tracks."""
+    apart = np.abs(learned.lags - lags) > _WRONG_LAG + 5 * learned.errors
+    if learned.agree and apart.any():
+        raise ValueError(
+            f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
+            f"({list_lags(learned.lags)}) do: leave them out, or check them"
+        )
+    return replace(learned, lags=lags, errors=0 * lags, doubts=())
+
+
 def _rig_doubts(
     tracks: Sequence[np.ndarray], learned: Rig, given: Rig, paths: Sequence[Path]
 ) -> list[str]:
@@ -190,16 +200,4 @@ def _rig_doubts(
         "the rig does not agree with the tracks: in one frame of ten, tracked and reconstructed "
         f"target lie more than {sizes} pixels apart, where tracking explains {DISAGREEMENT:g}: "
         + advice
-    ]
-
-
-def _lag_doubts(synchrony: Synchrony, given: np.ndarray | None) -> list[str]:
-    """Are the lags known, and those that are given right?"""
-    if given is None:
-        return list(synchrony.doubts)
-    if not synchrony.agree or np.abs(synchrony.lags - given).max() < _WRONG_LAG:
-        return []
-    return [
-        f"the lags that are given ({list_lags(given)} frames) are not those that make the views "
-        f"agree ({list_lags(synchrony.lags)}): leave them out, or check them"
     ]
