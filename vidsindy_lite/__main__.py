@@ -182,8 +182,9 @@ def _size(text: str) -> tuple[int, int]:
 def _discover(options: argparse.Namespace) -> int:
     import numpy as np
 
-    from vidsindy_lite import Rig, discover_from_videos
+    from vidsindy_lite.cameras import Rig
     from vidsindy_lite.checks import check_positive
+    from vidsindy_lite.pipeline import discover_from_videos
     from vidsindy_lite.report import PAGE, check_folder_is_free, write_report
     from vidsindy_lite.synchrony import list_lags
     from vidsindy_lite.video import video_info
@@ -233,8 +234,9 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _demo(options: argparse.Namespace) -> int:
-    from vidsindy_lite import discover_from_videos, score
     from vidsindy_lite.experiments import film
+    from vidsindy_lite.metrics import score
+    from vidsindy_lite.pipeline import discover_from_videos
 
     with tempfile.TemporaryDirectory() as folder:
         print(f"filming {options.system}: three videos of {options.frames} frames ...", flush=True)

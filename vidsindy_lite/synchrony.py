@@ -58,8 +58,8 @@ class Synchrony:
     rates : ndarray, shape (m,)
         Frames of each video in one frame of the first.
     errors : ndarray, shape (m,)
-        Standard errors of the lags, if the errors of the tracks are independent; infinite if no
-        lags make the views agree, zero if they were given. Lags that whole numbers fit as well are
+        Standard errors of the lags, if the errors of the tracks are independent; infinite if the
+        tracks do not tell them, zero if they were given. Lags that whole numbers fit as well are
         whole.
     missed : float
         The `disagreement` of the worst camera that is left.
@@ -197,8 +197,8 @@ def _ambiguous(alike: Sequence[Synchrony]) -> list[str]:
 
 def _blurred(best: Synchrony) -> list[str]:
     return [
-        f"the lag of video {i + 1} cannot be told: {lag:.1f} ± {error:.1g} frames, because the "
-        "target moves too little or too slowly; give the lags if you know them"
+        f"the lag of video {i + 1} cannot be told, because the target moves too little or too slowly: "
+        f"{lag:g} frames were taken; give the lags if you know them"
         for i, (lag, error) in enumerate(zip(best.lags, best.errors, strict=True))
         if error > BLURRED
     ]
@@ -251,8 +251,12 @@ class _Views:
             lags[1:] += step / max(size, 1)  # further than a frame the slope does not hold
             if size < _SETTLED:
                 break
-        noise = np.mean((here[used] + slope @ step) ** 2)
-        information = slope.T @ slope / max(noise, _ROUNDING**2)
+        noise = max(np.mean((here[used] + slope @ step) ** 2), _ROUNDING**2)
+        told = self._told(lags, used, noise, np.sum(slope**2, axis=0))
+        information = slope.T @ slope / noise * np.sqrt(np.outer(told, told))
+        if not told.all():
+            errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
+            return Synchrony(np.array(whole, float), self.rates, errors, self.missed(whole))
         errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information)))))
         # Schwarz's criterion: a fraction is one more unknown per video.
         rounded = np.rint(lags) + 0.0  # and not -0
@@ -260,6 +264,25 @@ class _Views:
         if beside @ information @ beside < len(beside) * np.log(used.sum()):
             lags = rounded
         return Synchrony(lags, self.rates, errors, self.missed(lags))
+
+    def _told(self, lags, used, noise, slopes):
+        """Share of each lag's squared slope that is motion and not noise, between 0 and 1.
+
+        Interpolated noise has a slope, too. But whole frames beside the lags its size is the same
+        as at them: there only motion makes the residuals larger.
+        """
+        shares = []
+        for one, slope in zip(np.eye(len(lags))[1:], slopes, strict=True):
+            tried = [self.residuals(lags + shift) for shift in (0 * one, one, -one)]
+            if any(part is None for part in tried):  # a frame beside, nothing fits at all
+                shares.append(1.0)
+                continue
+            both = used & np.isfinite(tried).all(axis=0)
+            here, ahead, behind = (np.sum(part[both] ** 2) for part in tried)
+            chance = 2 * noise * np.sqrt(2 * both.sum())  # two standard deviations of such a sum
+            rise = ((ahead + behind) / 2 - here - chance) / slope
+            shares.append(float(np.clip(rise, 0, 1)))
+        return np.array(shares)
 
 
 def _whole_lags(views: _Views) -> list[np.ndarray]:
