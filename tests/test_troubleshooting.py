@@ -117,11 +117,11 @@ def oscillation(step, count, noise):
 
 
 def dependent_errors(studio):
-    t = np.linspace(0, 40, 800)
+    t = np.linspace(0, 20, 300)
     x = np.stack([np.sin(t), np.cos(t)], axis=1)
-    noise = np.random.default_rng(0).normal(size=(820, 2))
-    smooth = np.stack([np.convolve(part, np.ones(20) / 20, "valid") for part in noise.T], axis=1)
-    return told(vl.discover, t, x + 0.05 * smooth[:800], degree=3)
+    noise = np.random.default_rng(0).normal(size=(302, 2))  # each error lasts for three frames
+    smooth = np.stack([np.convolve(part, np.ones(3), "valid") for part in noise.T], axis=1)
+    return told(vl.discover, t, x + 0.0115 * smooth, degree=2)
 
 
 def occupied(studio):
@@ -141,8 +141,8 @@ TROUBLES = {
     "the rig does not agree with the tracks": wrong_position,
     "the lags of the videos cannot be told": repeating,
     "lags: must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
-    "the terms left out explain more than chance": dependent_errors,
-    "may lie outside the library": lambda studio: pendulum(degree=1),
+    "the curve misses the data": lambda studio: pendulum(degree=1),
+    "another law fits almost as well": dependent_errors,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
     "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
     "must be a new folder or hold an earlier report": occupied,

@@ -33,7 +33,9 @@ less than half of that."""
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
 ALIKE = 2.0
-"""Ratio of disagreements up to which two lags fit equally well."""
+"""Ratio of disagreements up to which two lags fit equally well, ..."""
+FINE = 0.05
+"""... and disagreement in pixels below which all do: real tracks are no better than that."""
 
 _OVERLAP = 0.5  # share of the shorter of two videos that both must show
 _INSTANTS = 200  # at which the first step compares two views
@@ -175,7 +177,7 @@ def learn_lags(
     found = sorted((s for s in found if s.agree), key=lambda s: s.missed)
     if not found:
         return Synchrony(first, views.rates, np.full(len(first), np.inf), missed)
-    alike = [s for s in found if s.missed <= ALIKE * found[0].missed]
+    alike = [s for s in found if s.missed <= max(ALIKE * found[0].missed, FINE)]
     best = min(alike, key=lambda s: np.abs(s.lags).sum())
     return replace(best, doubts=tuple(_ambiguous(alike) + _blurred(best)))
 
