@@ -59,7 +59,7 @@ from vidsindy_lite.video import Scene, read_video, render, video_info, write_vid
 # %%
 plt.style.use("vidsindy_lite.vidsindy")
 full = profile == "full"
-names = ("Lorenz", "SprottE") if full else ("Lorenz",)
+names = ("Lorenz",)  # others: any of SYSTEMS
 frames = 1000 if full else 300
 late, fps = 7, 30
 
@@ -110,7 +110,7 @@ print(rig_template(cameras=2))
 # %% [markdown]
 # ## One command
 #
-# In a terminal, the next line would read
+# In a terminal, the command of the next cell would read
 #
 # ```
 # python -m vidsindy_lite discover a.avi b.avi c.avi --rig rig.toml --fps 66.67

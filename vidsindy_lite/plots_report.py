@@ -60,12 +60,12 @@ def plot_views(images, titles, tracks, index):
     rows = -(-len(images) // columns)
     size = (3.5 * columns, 3.2 * rows)
     figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False)
-    halo = [withStroke(linewidth=2.4, foreground="white")]
+    halo = [withStroke(linewidth=3.5, foreground="white")]
     for axes, image, title, track in zip(grid.flat, images, titles, tracks, strict=False):
         height, width = image.shape[:2]
         _show(axes, image)
-        axes.plot(*track.T, color="C0", lw=1, path_effects=halo)
-        axes.plot(*track[index], "o", ms=22, mfc="none", mec="C1", mew=2)
+        axes.plot(*track.T, color="white", lw=0.7)
+        axes.plot(*track[index], "o", ms=22, mfc="none", mec="C0", mew=2, path_effects=halo)
         axes.set_title(title, fontsize=11)
         axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
         axes.set(xticks=(0, width // 2, width), yticks=(0, height // 2, height))
