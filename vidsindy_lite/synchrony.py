@@ -199,8 +199,8 @@ def _ambiguous(alike: Sequence[Synchrony]) -> list[str]:
 
 def _blurred(best: Synchrony) -> list[str]:
     return [
-        f"the lag of video {i + 1} cannot be told, because the target moves too little or too slowly: "
-        f"{lag:g} frames were taken; give the lags if you know them"
+        f"the lag of video {i + 1} cannot be told, because the target moves too little or too "
+        f"slowly: {lag:g} frames were taken; give the lags if you know them"
         for i, (lag, error) in enumerate(zip(best.lags, best.errors, strict=True))
         if error > BLURRED
     ]
