@@ -10,7 +10,7 @@ import vidsindy_lite
 FLOORS = [
     {"repository", "checks", "polynomials", "splines", "geometry", "records", "information"},
     {"systems", "sights", "cameras", "perspective", "templates", "published"},
-    {"video", "tracking", "synchrony", "corruption"},
+    {"video", "tracking", "synchrony", "uncertainty", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
         "ado", "paper_ado", "baselines", "metrics", "limits",

@@ -550,15 +550,42 @@ def learn_normal(tracks, rig, index):
     def candidate(parameters):
         cameras = list(rig.cameras)
         cameras[index] = replace(tilted, normal=tilted.normal + parameters[:2] @ tilted.rows)
-        return _with_parameters(Rig(cameras), parameters[2:])
+        return with_parameters(Rig(cameras), parameters[2:])
 
+    start = camera_parameters(rig, learned)
+    return _closest(tracks, candidate, np.concatenate(([0.0, 0.0], start)))
+
+
+def camera_parameters(rig, learned):
+    """What was learned of the unknown cameras of a rig, as `with_parameters` takes it.
+
+    Parameters
+    ----------
+    rig, learned : Rig
+        Before and after `learn_cameras`.
+
+    Returns
+    -------
+    ndarray, shape (2 u + 2 v,)
+        Log of the scale and angle of each uncalibrated camera, then the offset of each camera
+        without a position, over the width of what the calibrated cameras see.
+    """
     turned = np.array(
         [learned.cameras[i].scale * np.exp(1j * learned.cameras[i].angle) for i in _unknown(rig)],
         complex,
     )
     offsets = np.array([learned.cameras[i].offset for i in _loose(rig)])
-    start = _parameters(rig, turned, offsets.reshape(-1, 2))
-    return _closest(tracks, candidate, np.concatenate(([0.0, 0.0], start)))
+    return _parameters(rig, turned, offsets.reshape(-1, 2))
+
+
+def with_parameters(rig, parameters):
+    """The rig with all that is unknown of its cameras filled in from `camera_parameters`."""
+    unknown = _unknown(rig)
+    logs, offsets = np.split(parameters, [2 * unknown.size])
+    cameras = list(rig.cameras)
+    for i, offset in zip(_loose(rig), offsets.reshape(-1, 2) * _known_width(rig), strict=True):
+        cameras[i] = replace(cameras[i], position=offset @ cameras[i].rows)
+    return _calibrate(Rig(cameras), unknown, np.exp(logs.copy().view(complex)))
 
 
 def check_learnable(rig):
@@ -795,7 +822,7 @@ def _from_known(tracks, rig, index):
 def _refine(tracks, rig, turned, offsets):
     """Smallest reprojection error in pixels, searched from s exp(i theta) and offsets."""
     return _closest(
-        tracks, lambda p: _with_parameters(rig, p), _parameters(rig, turned, offsets)
+        tracks, lambda p: with_parameters(rig, p), _parameters(rig, turned, offsets)
     )
 
 
@@ -805,16 +832,6 @@ def _parameters(rig, turned, offsets):
     As a width counts what the calibrated cameras see.
     """
     return np.concatenate((np.log(turned).view(float), (offsets / _known_width(rig)).ravel()))
-
-
-def _with_parameters(rig, parameters):
-    """The rig with all that is unknown of its cameras filled in from `_parameters`."""
-    unknown = _unknown(rig)
-    logs, offsets = np.split(parameters, [2 * unknown.size])
-    cameras = list(rig.cameras)
-    for i, offset in zip(_loose(rig), offsets.reshape(-1, 2) * _known_width(rig), strict=True):
-        cameras[i] = replace(cameras[i], position=offset @ cameras[i].rows)
-    return _calibrate(Rig(cameras), unknown, np.exp(logs.copy().view(complex)))
 
 
 def _closest(tracks, candidate, start):

@@ -15,6 +15,7 @@ from .checks import check_integer, check_path, check_times, check_vector
 from .discovery import Discovery
 from .synchrony import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
 from .tracking import track
+from .uncertainty import systematic_errors
 from .video import VideoInfo, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
@@ -122,7 +123,8 @@ def discover_from_videos(
     tracks = align(raw, synchrony.lags, rates)
     learned = learn_cameras(tracks, rig)
     x = reconstruct(tracks, learned)
-    found = discover(t, x, degree=degree, seed=seed, progress=progress)
+    shared = systematic_errors(raw, rig, learned, synchrony)
+    found = discover(t, x, degree=degree, seed=seed, progress=progress, systematic=shared)
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
     parts["warnings"] = (
         *_rig_doubts(tracks, learned, rig, paths),
