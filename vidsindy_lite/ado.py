@@ -79,7 +79,8 @@ def discover(
         Show a progress bar.
     systematic : array_like, shape (k, n, d), optional
         Errors that all samples share, such as those of a scale: what k independent causes, each
-        off by one standard error, add to ``x``. One such array per trajectory if ``t`` is a list.
+        off by one standard error, add to ``x``; smooth like the path, and below its noise. One
+        such array per trajectory if ``t`` is a list.
 
     Returns
     -------
@@ -99,7 +100,8 @@ def discover(
     """
     degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
     records = check_records(t, x)
-    shared = check_systematic(systematic, [t] if x is not None else [pair[0] for pair in t], records)
+    times = [t] if x is not None else [pair[0] for pair in t]
+    shared = check_systematic(systematic, times, records)
     return _Search(records, shared, degree, seed, progress).run()
 
 
@@ -224,9 +226,7 @@ class _Search:
 
     def _problem(self, segments: list[Segment], weight: float) -> Collocation:
         shared = np.concatenate([self._shared(segment) for segment in segments])
-        return Collocation(
-            segments, self.exponents, self.noise**-2, weight / self.slack**2, shared
-        )
+        return Collocation(segments, self.exponents, self.noise**-2, weight / self.slack**2, shared)
 
     def _shared(self, segment: Segment) -> np.ndarray:
         """Systematic errors at the samples of a segment, shape (n, d, k)."""

@@ -273,7 +273,8 @@ class Rig:
         x = _rows_of("x", x, 3)
         x = x[~np.isnan(x).any(axis=1)]
         if len(np.unique(x, axis=0)) < 2:
-            raise ValueError(f"x: must hold at least two different points, got {x.tolist()!r:.60}")
+            points = f"{x.tolist()!r:.60}" if len(x) else "only rows with NaN"
+            raise ValueError(f"x: must hold at least two different points, got {points}")
         low, high = x.min(axis=0), x.max(axis=0)
         middle, reach = (low + high) / 2, np.linalg.norm(high - low)
         half = (np.array(check_image_size(image_size, least=2)) - 1) / 2
@@ -314,6 +315,8 @@ class Rig:
             If the file is not TOML or does not describe a rig; names file, camera and key.
         """
         path = check_path("path", path)
+        if not path.is_file():
+            raise FileNotFoundError(f"{path}: no such rig file")
         try:
             content = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
