@@ -217,7 +217,11 @@ class TestRig:
             ("[camera]\nnormal = [0, 0, 1]", r"must hold \[\[camera\]\] tables"),
             ("unit = 'mm'\n[[camera]]", r"nothing else, got \['camera', 'unit'\]"),
             ("camera = [1, 2]", "camera 0: must be a table"),
-            ("[[camera]]\nnormal = [0, 0, 1]", "camera 0: position: must be given, got keys norm"),
+            ("[[camera]]\nposition = [0, 0, 1]", "camera 0: normal: must be given, got keys posi"),
+            (
+                "[[camera]]\nmodel = 'perspective'\nnormal = [0, 0, 1]",
+                "camera 0: position: must be given for a perspective camera",
+            ),
             (
                 "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1]",
                 "camera 0: normal: must be 3",
@@ -618,3 +622,78 @@ class TestBadTracks:
         tracks = [camera.project(x) for camera in rig.cameras]
         learned = learn_cameras(tracks, rig.uncalibrated())
         assert np.abs(calibration_errors(learned, rig)).max() < 1e-9
+
+
+class TestPosition:
+    """Cameras whose position is not trusted: two more unknowns each."""
+
+    @staticmethod
+    def without(rig, *loose):
+        return Rig(
+            replace(camera, position=None) if i in loose else camera
+            for i, camera in enumerate(rig.cameras)
+        )
+
+    @given(SEEDS, st.sampled_from([(0, (2,)), (0, (1,)), (2, (2,)), (1, (0,))]))
+    @settings(max_examples=10)
+    def test_exact_tracks_give_the_exact_path(self, seed, which):
+        keep, loose = which
+        x, rig, tracks, _ = scene(seed, n=100)
+        learned = learn_cameras(tracks, self.without(rig.uncalibrated(keep), *loose))
+        for camera, true in zip(learned.cameras, rig.cameras, strict=True):
+            np.testing.assert_allclose(camera.offset, true.offset, atol=1e-6 * np.abs(x).max())
+        assert np.abs(calibration_errors(learned, rig)).max() < 1e-7
+        assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 1e-5
+
+    def test_a_calibrated_rig_may_miss_one(self):
+        x, rig, tracks, _ = scene(3)
+        learned = learn_cameras(tracks, self.without(rig, 1))
+        np.testing.assert_allclose(learned.cameras[1].offset, rig.cameras[1].offset, rtol=1e-7)
+        assert learned.cameras[0] == rig.cameras[0]
+
+    def test_two_of_four(self):
+        x, rig, tracks, rng = scene(5, cameras=4)
+        tracks = [track + 0.1 * rng.normal(size=track.shape) for track in tracks]
+        learned = learn_cameras(tracks, self.without(rig.uncalibrated(), 1, 3))
+        assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 0.3
+
+    def test_it_is_the_position_that_was_wrong(self):
+        _, rig, tracks, _ = scene(6)
+        first, second, third = rig.uncalibrated().cameras
+        moved = replace(third, position=third.position + 20 * rig.cameras[2].scale * third.rows[0])
+        off = np.hstack(residuals(tracks, learn_cameras(tracks, Rig([first, second, moved]))))
+        free = self.without(Rig([first, second, moved]), 2)
+        assert np.abs(off).max() > 1
+        assert np.abs(np.hstack(residuals(tracks, learn_cameras(tracks, free)))).max() < 1e-6
+
+    def test_a_wrong_normal_is_found_beside_it(self):
+        _, rig, tracks, _ = scene(8, cameras=4)
+        start = self.without(rig.uncalibrated(), 3)
+        true = start.cameras[1].normal
+        wrong = replace(start.cameras[1], normal=rodrigues([0, 0, 1], 0.1) @ true)
+        first, _, third, fourth = start.cameras
+        found = learn_normal(tracks, Rig([first, wrong, third, fourth]), 1)
+        np.testing.assert_allclose(found.cameras[1].normal, true, atol=1e-4)
+
+    def test_file(self, small, tmp_path):
+        rig = self.without(small[1], 1)
+        rig.save(tmp_path / "rig.toml")
+        assert (tmp_path / "rig.toml").read_text().count("position") == 2
+        assert Rig.load(tmp_path / "rig.toml") == rig
+        assert len({*rig.cameras, *Rig.load(tmp_path / "rig.toml").cameras}) == 3
+
+    def test_what_cannot_be_learned_is_said(self, small):
+        x, rig, tracks, _ = small
+        with pytest.raises(ValueError, match=r"rig: the positions of two cameras .* got 1"):
+            learn_cameras(tracks, self.without(rig, 1, 2))
+        with pytest.raises(ValueError, match=r"'joint' .* position of cameras\[2\], got 'paper'"):
+            learn_cameras(tracks, self.without(rig.uncalibrated(), 2), method="paper")
+        still = [np.repeat(track[:1], 40, axis=0) for track in tracks]
+        message = r"must determine scale, angle and position of .*cameras\[2\]"
+        with pytest.raises(ValueError, match=message):
+            learn_cameras(still, self.without(rig.uncalibrated(), 2))
+        loose = self.without(rig, 1)
+        with pytest.raises(ValueError, match=r"got cameras\[1\] without; use learn_cameras"):
+            reconstruct(tracks, loose)
+        with pytest.raises(ValueError, match="camera: position must be known, got None"):
+            loose.cameras[1].project(x)

@@ -9,8 +9,8 @@ import vidsindy_lite
 
 FLOORS = [
     {"repository", "checks", "polynomials", "splines", "geometry", "records", "information"},
-    {"systems", "sights", "cameras", "perspective", "published"},
-    {"video", "tracking", "corruption"},
+    {"systems", "sights", "cameras", "perspective", "templates", "published"},
+    {"video", "tracking", "synchrony", "uncertainty", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
         "ado", "paper_ado", "baselines", "metrics", "limits",
@@ -18,8 +18,8 @@ FLOORS = [
     {"pipeline", "sweeps"},
     {"experiments", "audit", "lab"},
     {
-        "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "artifacts", "runner",
-        "__main__",
+        "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "plots_report",
+        "report", "artifacts", "runner", "__main__",
     },
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent

@@ -335,3 +335,13 @@ class TestReconstruction:
         assert np.isnan(found[1]).all()
         parallel = [np.array([[255.5, 255.5]])] * 2
         assert np.isnan(reconstruct(parallel, rig)).all()
+
+
+def test_a_position_beside_a_perspective_camera_cannot_be_learned():
+    _, rig, tracks, _ = scene(1, kinds=(PerspectiveCamera,))
+    flat = Camera(normal=rig.cameras[0].normal, scale=1.0, angle=0.0)
+    mixed = Rig([flat, *rig.cameras[1:]])
+    with pytest.raises(ValueError, match=r"all positions must be given .* none of cameras\[0\]"):
+        learn_cameras(tracks, mixed)
+    with pytest.raises(ValueError, match="position: must be given for a perspective camera"):
+        PerspectiveCamera(normal=(0, 0, 1))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -92,14 +93,62 @@ def test_wrong_number_of_files(shot):
         vl.discover_from_videos(shot.paths[:2], shot.rig)
 
 
-def test_videos_of_different_length(shot, tmp_path):
-    short = tmp_path / "short.mkv"
-    frames = [frame for frame, _ in zip(vl.read_video(shot.paths[2]), range(20), strict=False)]
-    vl.write_video(short, frames)
-    with pytest.raises(
-        ValueError, match="same number of frames, got .*: 200, .*: 200, short.mkv: 20"
-    ):
-        vl.discover_from_videos([*shot.paths[:2], short], shot.rig)
+@pytest.fixture(scope="module")
+def late(shot):
+    """The second video without its first 7 frames and its last 20."""
+    path = shot.paths[1].with_name("late.mkv")
+    vl.write_video(path, list(vl.read_video(shot.paths[1]))[7:180])
+    return path
+
+
+def test_videos_of_different_length_that_start_at_different_times(shot, late):
+    paths = [shot.paths[0], late, shot.paths[2]]
+    found = vl.discover_from_videos(paths, shot.rig.uncalibrated(), shot.t)
+    np.testing.assert_allclose(found.lags.lags, (0, 7, 0), atol=0.01)
+    assert vl.score(found, shot.truth).exact
+    assert np.isnan(found.tracks[1][:7]).all()
+    np.testing.assert_allclose(found.tracks[1][7:180], shot.tracks[1][7:180], atol=0.1)
+    assert len(found.x) == len(found.t) == 200
+    assert not any("lags" in warning for warning in found.warnings)
+
+
+def test_given_lags_are_used(shot, late):
+    paths = [late, shot.paths[0], shot.paths[2]]  # the first one is the clock
+    first, second, third = shot.rig.cameras
+    rig = vl.Rig([second, first, third])
+    found = vl.discover_from_videos(paths, rig, shot.t[7:180], lags=(7, 0, 0), degree=2)
+    assert found.lags.lags.tolist() == [0, -7, -7]
+    assert found.lags.errors.tolist() == [0, 0, 0]
+    assert max(np.nanmax(np.abs(r)) for r in vl.residuals(found.tracks, found.rig)) < 0.2
+    assert not any("lags" in warning for warning in found.warnings)
+
+
+def test_a_wrong_lag_of_zero_is_not_accepted(shot, late):
+    paths = [shot.paths[0], late, shot.paths[2]]
+    message = r"lags: must make the views agree, got \(0, 0, 0\) frames where \(0, 7, 0\) do"
+    for rig in (shot.rig, shot.rig.uncalibrated()):
+        with pytest.raises(ValueError, match=message):
+            vl.discover_from_videos(paths, rig, lags=(0, 0, 0))
+
+
+def test_different_frame_rates(shot, tmp_path):
+    half = tmp_path / "half.mkv"
+    vl.write_video(half, list(vl.read_video(shot.paths[2]))[::2], fps=12.5)
+    found = vl.discover_from_videos([*shot.paths[:2], half], shot.rig, degree=2)
+    np.testing.assert_allclose(found.lags.rates, (1, 1, 0.5))
+    np.testing.assert_allclose(found.lags.lags, 0, atol=0.01)
+    assert np.nanmax(np.abs(found.x - shot.x)) < 5 * shot.rig.cameras[0].scale
+
+
+def test_grey_videos(shot, tmp_path):
+    paths = []
+    for path in shot.paths:
+        grey = (cv2.cvtColor(f, cv2.COLOR_BGR2GRAY) for f in vl.read_video(path))
+        paths.append(vl.write_video(tmp_path / path.name, (np.dstack([g] * 3) for g in grey)))
+    for path, track in zip(paths, shot.tracks, strict=True):
+        error = vl.track(path) - track
+        assert np.isfinite(error).all(axis=1).mean() > 0.8
+        assert np.sqrt(np.nanmean(error**2)) < 0.5
 
 
 def test_image_size_must_be_that_of_the_camera(shot, tmp_path):
@@ -111,7 +160,7 @@ def test_image_size_must_be_that_of_the_camera(shot, tmp_path):
 
 def test_wrong_number_of_times(shot):
     with pytest.raises(
-        ValueError, match=r"t: must have shape \(200,\), one per frame, got \(10,\)"
+        ValueError, match=r"t: must have shape \(200,\), one per frame of the .*, got \(10,\)"
     ):
         vl.discover_from_videos(shot.paths, shot.rig, np.arange(10))
 
@@ -148,6 +197,7 @@ def test_a_target_that_never_moves_is_named(shot, tmp_path):
         ({}, {"degree": 0}, "degree: must be an integer of at least 1, got 0"),
         ({}, {"degree": 2.0}, "degree: must be an integer of at least 1, got 2.0"),
         ({}, {"degree": True}, "degree: must be an integer of at least 1, got True"),
+        ({}, {"lags": (0, 7)}, "lags: must be 3 finite numbers"),
         ({}, {"seed": -1}, "seed: must be an integer of at least 0, got -1"),
         ({"t": np.arange(200)[::-1]}, {}, "t: must increase"),
         ({"t": np.where(np.arange(200) == 7, np.nan, np.arange(200))}, {}, "t: must be finite"),

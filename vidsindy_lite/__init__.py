@@ -1,7 +1,8 @@
 """Governing equations of a moving target from the videos of three cameras.
 
 The modules stand in the order of the pipeline:
-systems, cameras, perspective | video, tracking | ado (discovery) | pipeline | experiments, lab.
+systems, cameras, perspective | video, tracking, synchrony | ado (discovery) | pipeline |
+experiments, lab | report.
 """
 
 from .ado import discover
@@ -11,6 +12,7 @@ from .metrics import Score, score
 from .perspective import PerspectiveCamera
 from .pipeline import VideoDiscovery, discover_from_videos
 from .polynomials import PolynomialSystem
+from .synchrony import Synchrony, align, learn_lags
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
 from .tracking import track
 from .video import Scene, read_video, render_video, write_video
@@ -31,6 +33,9 @@ __all__ = [
     "write_video",
     "read_video",
     "track",
+    "Synchrony",
+    "align",
+    "learn_lags",
     "discover",
     "Discovery",
     "score",

@@ -1,11 +1,36 @@
-"""The command line: ``python -m vidsindy_lite run`` and ``python -m vidsindy_lite demo``."""
+"""The command line, ``python -m vidsindy_lite COMMAND``: discover, rig-template, demo and run."""
 
 import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 
 from .systems import SYSTEMS
+
+DISCOVER_DESCRIPTION = """\
+Find the equations of motion of one target in your own videos, and write a report.
+
+There is one video per camera of the rig file, in its order: cameras at rest, one thing that moves.
+They may start at different times, differ in length and in frame rate; the first one is the clock.
+"""
+
+DISCOVER_EPILOG = """\
+examples:
+  python -m vidsindy_lite rig-template --cameras 3 > rig.toml      and fill it in
+  python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml
+  python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml --lag 0,7,0 --degree 2
+
+The folder then holds report.html (one page, images included), result.json (the same as data) and
+rig.toml (the learned cameras). If anything fails, it holds what it held before.
+
+exit status: 0 if there is no reason to doubt the law, 1 if there is (the report says which),
+2 if there is no report; the error says why.
+"""
+
+TEMPLATE_DESCRIPTION = """\
+Print a rig file with a comment on every value, to be filled in with what you measured.
+"""
 
 RUN_DESCRIPTION = """\
 Execute the notebooks through papermill, in order, and regenerate their figures and tables.
@@ -38,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         return options.command(options)
-    except (ValueError, FileNotFoundError) as error:
+    except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
 
@@ -47,9 +72,60 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m vidsindy_lite",
         description="From three videos of a moving target to its governing equations.",
-        epilog="`python -m vidsindy_lite run --help` says more.",
+        epilog="`python -m vidsindy_lite discover --help` says more, and so do the others.",
     )
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    discover = commands.add_parser(
+        "discover",
+        help="from your own videos and a rig file to a report on the law",
+        description=DISCOVER_DESCRIPTION,
+        epilog=DISCOVER_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    discover.add_argument("videos", nargs="+", metavar="VIDEO", help="one per camera of the rig")
+    discover.add_argument("--rig", required=True, metavar="FILE", help="where the cameras stand")
+    discover.add_argument(
+        "--out", default="report", metavar="DIR", help="folder of the report (default: report)"
+    )
+    discover.add_argument(
+        "--lag",
+        type=_numbers,
+        metavar="0,L2,L3",
+        help="by how many frames of the first video each one starts later; the default is to learn "
+        "it (a first number below zero needs the form --lag=-7,0,0)",
+    )
+    discover.add_argument(
+        "--fps",
+        type=float,
+        metavar="RATE",
+        help="frames of each video in one unit of time of the equations (default: as the files "
+        "say, which makes it a second of video)",
+    )
+    discover.add_argument(
+        "--degree", type=int, default=3, help="highest degree of the polynomials (default: 3)"
+    )
+    discover.add_argument("--seed", type=int, default=0, help="of the search (default: 0)")
+    discover.set_defaults(command=_discover)
+
+    template = commands.add_parser(
+        "rig-template", help="print a rig file to fill in", description=TEMPLATE_DESCRIPTION
+    )
+    template.add_argument("--cameras", type=int, default=3, help="how many (default: 3)")
+    template.add_argument(
+        "--model",
+        choices=("orthographic", "perspective"),
+        default="orthographic",
+        help="orthographic for far cameras with long lenses (default), perspective for near ones",
+    )
+    template.add_argument(
+        "--size",
+        type=_size,
+        default=(1920, 1080),
+        metavar="WxH",
+        help="of the videos in pixels (default: 1920x1080)",
+    )
+    template.set_defaults(command=_rig_template)
 
     run = commands.add_parser(
         "run",
@@ -94,6 +170,55 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _numbers(text: str) -> list[float]:
+    return [float(part) for part in text.split(",")]
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
+def _discover(options: argparse.Namespace) -> int:
+    import numpy as np
+
+    from vidsindy_lite.cameras import Rig
+    from vidsindy_lite.checks import check_positive
+    from vidsindy_lite.pipeline import discover_from_videos
+    from vidsindy_lite.report import PAGE, check_folder_is_free, write_report
+    from vidsindy_lite.synchrony import list_lags
+    from vidsindy_lite.video import video_info
+
+    check_folder_is_free(options.out)
+    rig, t = Rig.load(options.rig), None
+    if options.fps is not None:
+        t = np.arange(video_info(options.videos[0]).frames) / check_positive("fps", options.fps)
+    found = discover_from_videos(
+        options.videos,
+        rig,
+        t,
+        lags=options.lag,
+        degree=options.degree,
+        seed=options.seed,
+        progress=True,
+    )
+    told = {"rig file": options.rig, "degree": options.degree, "seed": options.seed}
+    told |= {"lags": "learned" if options.lag is None else options.lag}
+    told |= {"frames in a unit of time": options.fps} if options.fps is not None else {}
+    write_report(found, options.videos, options.out, told)
+    print(found)
+    print(f"status: {found.status}; lags of the videos: {list_lags(found.lags.lags)} frames")
+    print(f"report: {Path(options.out) / PAGE}")
+    return 0 if found.status == "ok" else 1
+
+
+def _rig_template(options: argparse.Namespace) -> int:
+    from vidsindy_lite.templates import rig_template
+
+    print(rig_template(options.cameras, options.model, options.size), end="")
+    return 0
+
+
 def _run(options: argparse.Namespace) -> int:
     from vidsindy_lite import runner  # papermill takes a second to import; --help need not wait
 
@@ -109,8 +234,9 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _demo(options: argparse.Namespace) -> int:
-    from vidsindy_lite import discover_from_videos, score
     from vidsindy_lite.experiments import film
+    from vidsindy_lite.metrics import score
+    from vidsindy_lite.pipeline import discover_from_videos
 
     with tempfile.TemporaryDirectory() as folder:
         print(f"filming {options.system}: three videos of {options.frames} frames ...", flush=True)

@@ -33,7 +33,7 @@ from .polynomials import (
     shift_matrix,
     variable_names,
 )
-from .records import Record, check_records, cut, typical_step
+from .records import Record, check_records, check_systematic, cut, typical_step
 from .regression import subset_search
 from .smoothing import smooth
 from .splines import DEGREE, clamped_knots
@@ -65,6 +65,7 @@ def discover(
     degree: int = 3,
     seed: int = 0,
     progress: bool = False,
+    systematic: np.ndarray | Sequence[np.ndarray] | None = None,
 ) -> Discovery:
     """Discover the polynomial law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -80,6 +81,10 @@ def discover(
         For the random probes of the noise estimate and the starts of the offset search.
     progress : bool
         Show a progress bar.
+    systematic : array_like, shape (k, n, d), optional
+        Errors that all samples share, such as those of a scale: what k independent causes, each
+        off by one standard error, add to ``x``; smooth like the path, and below its noise. One
+        such array per trajectory if ``t`` is a list.
 
     Returns
     -------
@@ -99,7 +104,9 @@ def discover(
     """
     degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
     records = check_records(t, x)
-    return _Search(records, degree, seed, progress).run()
+    times = [t] if x is not None else [pair[0] for pair in t]
+    shared = check_systematic(systematic, times, records)
+    return _Search(records, shared, degree, seed, progress).run()
 
 
 def term_charges(exponents: np.ndarray) -> np.ndarray:
@@ -138,6 +145,7 @@ class _Search:
     """One discovery: the data in standard units, and the stages that lead to the law."""
 
     records: list[Record]
+    systematic: list[np.ndarray]
     degree: int
     seed: int
     progress: bool
@@ -179,6 +187,7 @@ class _Search:
         self.units = Units(centre, scale, step / speed)
         self.step = speed
         self.records = [(t * speed, values) for t, values in records]
+        self.systematic = [modes / scale[:, None] for modes in self.systematic]
         self.stretches = [(i, (t * speed, values)) for i, (t, values) in stretches]
         self.noise = self.smoothed_noise = np.maximum(smoothed.noise, CLEANEST)
         self.curves = [
@@ -223,7 +232,14 @@ class _Search:
         self.slack = np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
 
     def _problem(self, segments: Sequence[Segment]) -> Collocation:
-        return Collocation(segments, self.exponents, self.noise**-2, np.ones(self.d))
+        shared = np.concatenate([self._shared(segment) for segment in segments])
+        weights = self.noise**-2, np.ones(self.d)
+        return Collocation(segments, self.exponents, *weights, shared)
+
+    def _shared(self, segment: Segment) -> np.ndarray:
+        """Systematic errors at the samples of a segment, shape (n, d, k)."""
+        t, _ = self.records[segment.record]
+        return self.systematic[segment.record][np.searchsorted(t, segment.t)]
 
     def _weighted(self, problem: Collocation, weight: float) -> Collocation:
         return problem.weighted(self.noise**-2, weight / self.slack**2)
@@ -463,7 +479,7 @@ class _Search:
     def _residual_noise(self, problem: Collocation, state: State) -> np.ndarray:
         """Standard deviation of the data residual, less the freedom that the fit used up."""
         used = state.free().sum() / self.d + len(problem.segments)
-        residual = problem.curve(state.control_points) - problem.x
+        residual, _ = problem.data_residual(state.control_points)
         return np.maximum(
             np.sqrt((residual**2).sum(axis=0) / max(len(residual) - used, 1.0)), CLEANEST
         )

@@ -8,9 +8,10 @@ of the image, x_c = (u - (W-1)/2, (H-1)/2 - v), it sees
 where R^- are the first two rows of the rotation that takes the unit normal to e_z and
 Delta_c = R^- position. Position and normal are measured; scale s (scene units per pixel) and
 in-plane angle theta are given for at least one camera of a `Rig` and learned for the others
-(`learn_cameras`). `reconstruct` then turns the tracks into a trajectory, and `residuals` says by
-how many pixels it misses them. `perspective.PerspectiveCamera` is a second kind of camera for the
-same rigs, which differs from the first in its `matrix` alone.
+(`learn_cameras`). So is Delta_c of cameras without a position, if two others have one.
+`reconstruct` then turns the tracks into a trajectory, and `residuals` says by how many pixels it
+misses them. `perspective.PerspectiveCamera` is a second kind of camera for the same rigs, which
+differs from the first in its `matrix` alone.
 
 A track is an (n, 2) array of pixels, one row per frame; a row holding NaN means "not seen".
 
@@ -53,9 +54,10 @@ class Camera:
 
     Parameters
     ----------
-    position : array_like, shape (3,)
+    position : array_like, shape (3,), optional
         The point of the reference frame that is seen in the middle of the image, or any other
-        point on the same line of sight. Scene units.
+        point on the same line of sight. Scene units. None: to be learned, as the one of these
+        points that is closest to the origin.
     normal : array_like, shape (3,)
         Normal of the view plane, pointing from the scene to the camera. Stored with unit length.
     scale : float, optional
@@ -73,7 +75,7 @@ class Camera:
 
     model: ClassVar[str] = "orthographic"  # its name in the file of a rig
 
-    position: np.ndarray
+    position: np.ndarray | None = None
     normal: np.ndarray
     scale: float | None = None
     angle: float | None = None
@@ -83,10 +85,12 @@ class Camera:
         normal = check_vector("normal", self.normal, 3)
         if abs(hypot(*normal) - 1) > 1e-15:  # a unit vector stays as it is: files round-trip
             normal = unit_vector("normal", normal)
-        position = check_vector("position", self.position, 3)
-        position.flags.writeable = normal.flags.writeable = False
-        object.__setattr__(self, "position", position)
+        normal.flags.writeable = False
         object.__setattr__(self, "normal", normal)
+        if self.is_placed:
+            position = check_vector("position", self.position, 3)
+            position.flags.writeable = False
+            object.__setattr__(self, "position", position)
 
         if (self.scale is None) != (self.angle is None):
             raise ValueError(
@@ -108,13 +112,19 @@ class Camera:
 
     @property
     def _values(self):
-        arrays = tuple(self.position.tolist()), tuple(self.normal.tolist())
-        return self.model, *arrays, self.scale, self.angle, self.image_size
+        position = tuple(self.position.tolist()) if self.is_placed else None
+        normal = tuple(self.normal.tolist())
+        return self.model, position, normal, self.scale, self.angle, self.image_size
 
     @property
     def is_calibrated(self):
         """Whether scale and angle are known."""
         return self.scale is not None
+
+    @property
+    def is_placed(self):
+        """Whether the position is known."""
+        return self.position is not None
 
     @property
     def rows(self):
@@ -124,6 +134,8 @@ class Camera:
     @property
     def offset(self):
         """Delta_c = R^- position, shape (2,), scene units."""
+        if not self.is_placed:
+            raise ValueError("camera: position must be known, got None; see learn_cameras")
         return in_plane_offset(self.position, self.normal)
 
     @property
@@ -261,7 +273,8 @@ class Rig:
         x = _rows_of("x", x, 3)
         x = x[~np.isnan(x).any(axis=1)]
         if len(np.unique(x, axis=0)) < 2:
-            raise ValueError(f"x: must hold at least two different points, got {x.tolist()!r:.60}")
+            points = f"{x.tolist()!r:.60}" if len(x) else "only rows with NaN"
+            raise ValueError(f"x: must hold at least two different points, got {points}")
         low, high = x.min(axis=0), x.max(axis=0)
         middle, reach = (low + high) / 2, np.linalg.norm(high - low)
         half = (np.array(check_image_size(image_size, least=2)) - 1) / 2
@@ -302,6 +315,8 @@ class Rig:
             If the file is not TOML or does not describe a rig; names file, camera and key.
         """
         path = check_path("path", path)
+        if not path.is_file():
+            raise FileNotFoundError(f"{path}: no such rig file")
         try:
             content = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -359,9 +374,10 @@ class Rig:
 
 
 def learn_cameras(tracks, rig, method="joint"):
-    """Learn scale and angle of the uncalibrated cameras from tracks of one moving target.
+    """Learn what is not known of the cameras from tracks of one moving target.
 
-    In (s cos theta, s sin theta) of the unknown cameras, the condition that all views agree on one
+    In (s cos theta, s sin theta) of the unknown cameras and Delta_c of those without a position,
+    the condition that all views agree on one
     point is linear, so no starting guess is needed.
 
     * "paper": Eq. (4), closed form. The uncalibrated views predict the calibrated ones; uses the
@@ -382,45 +398,52 @@ def learn_cameras(tracks, rig, method="joint"):
     tracks : sequence of array_like, shape (n, 2)
         One track per camera of the rig, frame by frame the same instants; NaN = not seen.
     rig : Rig
-        At least one calibrated camera. Calibrated cameras stay as they are.
+        At least one calibrated camera. What is given stays as it is. If a position is missing, two
+        others must be given, with independent normals, and all cameras be orthographic: in depth
+        from a single camera nothing would fix the origin.
     method : {"joint", "paper", "gradient"}
 
     Returns
     -------
     Rig
-        The same cameras, all calibrated.
+        The same cameras, all calibrated and placed.
 
     Raises
     ------
     ValueError
-        If the tracks do not match the rig, no camera is calibrated, or the target's motion does
-        not determine a camera's scale and angle.
+        If the tracks do not match the rig, no camera is calibrated, too few are placed, or the
+        target's motion does not determine a camera.
     """
     if method not in METHODS:
         raise ValueError(f"method: must be one of {METHODS}, got {method!r}")
     check_learnable(rig)
     tracks = _check_tracks(tracks, rig)
-    unknown = np.flatnonzero([not camera.is_calibrated for camera in rig.cameras])
-    if unknown.size == 0:
+    unknown, loose = _unknown(rig), _loose(rig)
+    if not unknown.size and not loose.size:
         return rig
+    if loose.size and method != "joint":
+        raise ValueError(
+            f"method: must be 'joint' for a rig without the position of {_names(loose)}, "
+            f"got {method!r}"
+        )
     if not rig.is_orthographic:
         if method != "joint":
             raise ValueError(
                 f"method: must be 'joint' for a rig with a perspective camera, got {method!r}"
             )
-        return _refine(tracks, rig, unknown, _spread(tracks, rig))
+        return _refine(tracks, rig, _spread(tracks, rig), np.zeros((0, 2)))
     if method != "joint" and not _independent([rig.cameras[i] for i in unknown]):
         raise ValueError(
             f"rig: method {method!r} needs two independent normals among the uncalibrated "
             f"cameras, got {[rig.cameras[i].normal.tolist() for i in unknown]}; use 'joint'"
         )
-    design, target, frames = _agreement(tracks, rig, unknown, epipolar=method == "joint")
+    design, target, frames = _agreement(tracks, rig, unknown, loose, epipolar=method == "joint")
     fits = ~np.isin(frames, _outliers(design, target, frames, rig))
     design, target = design[fits], target[fits]
-    turned = _solve(design, target, rig, unknown)
+    turned, offsets = _solve(design, target, rig, unknown, loose)
     if method == "joint":
         clean = np.isin(np.arange(len(tracks[0])), frames[fits])
-        return _refine([track[clean] for track in tracks], rig, unknown, turned)
+        return _refine([track[clean] for track in tracks], rig, turned, offsets)
     if method == "gradient":
         turned = _descend(design, target, rig, unknown)
     return _calibrate(rig, unknown, turned)
@@ -525,21 +548,51 @@ def learn_normal(tracks, rig, index):
     if not check_integer("index", index) < len(rig.cameras):
         raise ValueError(f"index: must be below {len(rig.cameras)}, the cameras, got {index}")
     learned = learn_cameras(tracks, rig)
-    unknown = np.flatnonzero([not camera.is_calibrated for camera in rig.cameras])
-    known = [learned.cameras[i] for i in unknown]
-    turned = np.array([camera.scale * np.exp(1j * camera.angle) for camera in known], complex)
     tilted = rig.cameras[index]
 
     def candidate(parameters):
         cameras = list(rig.cameras)
         cameras[index] = replace(tilted, normal=tilted.normal + parameters[:2] @ tilted.rows)
-        return _calibrate(Rig(cameras), unknown, np.exp(parameters[2:].copy().view(complex)))
+        return with_parameters(Rig(cameras), parameters[2:])
 
-    return _closest(tracks, candidate, np.concatenate(([0.0, 0.0], np.log(turned).view(float))))
+    start = camera_parameters(rig, learned)
+    return _closest(tracks, candidate, np.concatenate(([0.0, 0.0], start)))
+
+
+def camera_parameters(rig, learned):
+    """What was learned of the unknown cameras of a rig, as `with_parameters` takes it.
+
+    Parameters
+    ----------
+    rig, learned : Rig
+        Before and after `learn_cameras`.
+
+    Returns
+    -------
+    ndarray, shape (2 u + 2 v,)
+        Log of the scale and angle of each uncalibrated camera, then the offset of each camera
+        without a position, over the width of what the calibrated cameras see.
+    """
+    turned = np.array(
+        [learned.cameras[i].scale * np.exp(1j * learned.cameras[i].angle) for i in _unknown(rig)],
+        complex,
+    )
+    offsets = np.array([learned.cameras[i].offset for i in _loose(rig)])
+    return _parameters(rig, turned, offsets.reshape(-1, 2))
+
+
+def with_parameters(rig, parameters):
+    """The rig with all that is unknown of its cameras filled in from `camera_parameters`."""
+    unknown = _unknown(rig)
+    logs, offsets = np.split(parameters, [2 * unknown.size])
+    cameras = list(rig.cameras)
+    for i, offset in zip(_loose(rig), offsets.reshape(-1, 2) * _known_width(rig), strict=True):
+        cameras[i] = replace(cameras[i], position=offset @ cameras[i].rows)
+    return _calibrate(Rig(cameras), unknown, np.exp(logs.copy().view(complex)))
 
 
 def check_learnable(rig):
-    """That this is a rig with at least one calibrated camera, from which to learn the others.
+    """That this is a rig with enough known of its cameras to learn the rest.
 
     Raises
     ------
@@ -551,6 +604,20 @@ def check_learnable(rig):
         raise ValueError(
             "rig: at least one camera must be calibrated (scale and angle given) to learn the "
             f"others, got none of {len(rig.cameras)}"
+        )
+    loose = _loose(rig)
+    if not loose.size:
+        return
+    if not rig.is_orthographic:
+        raise ValueError(
+            "rig: all positions must be given if a camera is perspective, got none of "
+            f"{_names(loose)}"
+        )
+    placed = [camera for camera in rig.cameras if camera.is_placed]
+    if not _independent(placed):
+        raise ValueError(
+            "rig: the positions of two cameras with independent normals must be given to learn "
+            f"those of {_names(loose)}, got {len(placed)}"
         )
 
 
@@ -590,8 +657,11 @@ def calibration_errors(rig, truth):
     )
 
 
-def _agreement(tracks, rig, unknown, epipolar):
-    """Linear equations design @ p = target for p = (s cos theta, s sin theta) of unknown cameras.
+def _agreement(tracks, rig, unknown, loose, epipolar):
+    """Linear equations design @ p = target for all that is unknown of the cameras.
+
+    p holds (s cos theta, s sin theta) of the unknown cameras, then Delta_c of the loose ones,
+    divided by the half width of their image: so all of the design is in pixels.
 
     The stacked in-plane coordinates of the views of a frame equal [R^-_1; R^-_2; ...] x. Columns Q
     with Q^T [R^-_1; ...] = 0 take the unknown point out: `epipolar` keeps all of them, Eq. (4)
@@ -608,23 +678,27 @@ def _agreement(tracks, rig, unknown, epipolar):
         else:
             continue
         blocks = np.split(annihilator, len(views))
-        design = np.zeros((len(frames), annihilator.shape[1], unknown.size, 2))
+        design = np.zeros((len(frames), annihilator.shape[1], unknown.size + loose.size, 2))
         target = np.zeros(design.shape[:2])
+        turns, offsets = np.split(design, [unknown.size], axis=2)
         for i, block in zip(views, blocks, strict=True):
             camera, pixels = rig.cameras[i], tracks[i][frames]
             if camera.is_calibrated:
-                target -= camera.plane_coordinates(pixels) @ block
+                target -= camera.scale * camera.turned(pixels) @ block
             else:
                 # s T(theta) (X, Y) = [[X, Y], [Y, -X]] p
                 x, y = camera.centred(pixels).T
                 matrix = np.array([[x, y], [y, -x]])
-                design[:, :, unknown == i] = np.einsum("abf,aq->fqb", matrix, block)[:, :, None]
+                turns[:, :, unknown == i] = np.einsum("abf,aq->fqb", matrix, block)[:, :, None]
+            if camera.is_placed:
                 target -= camera.offset @ block
-        designs.append(design.reshape(-1, 2 * unknown.size))
+            else:
+                offsets[:, :, loose == i] = camera.image_size[0] / 2 * block.T[:, None]
+        designs.append(design.reshape(len(frames) * annihilator.shape[1], -1))
         targets.append(target.ravel())
         places.append(np.repeat(frames, target.shape[1]))
     if not designs:
-        return np.zeros((0, 2 * unknown.size)), np.zeros(0), np.zeros(0, dtype=int)
+        return np.zeros((0, 2 * (unknown.size + loose.size))), np.zeros(0), np.zeros(0, dtype=int)
     return np.vstack(designs), np.concatenate(targets), np.concatenate(places)
 
 
@@ -652,6 +726,21 @@ def _known_scale(rig):
     return np.mean([camera.scale for camera in rig.cameras if camera.is_calibrated])
 
 
+def _known_width(rig):
+    """Mean width of what the calibrated cameras see, in scene units."""
+    return np.mean([c.scale * c.image_size[0] for c in rig.cameras if c.is_calibrated])
+
+
+def _unknown(rig):
+    """Indices of the cameras without scale and angle."""
+    return np.flatnonzero([not camera.is_calibrated for camera in rig.cameras])
+
+
+def _loose(rig):
+    """Indices of the cameras without a position."""
+    return np.flatnonzero([not camera.is_placed for camera in rig.cameras])
+
+
 def _prediction(rows, is_unknown):
     """Columns Q of Eq. (4): R^-_known pinv(R^-_unknown) y_unknown - y_known = 0."""
     known = np.vstack([r for r, flag in zip(rows, is_unknown, strict=True) if not flag])
@@ -663,20 +752,22 @@ def _prediction(rows, is_unknown):
     return annihilator
 
 
-def _solve(design, target, rig, unknown):
-    """Least-squares s exp(i theta), or an error that names the cameras the tracks do not determine.
+def _solve(design, target, rig, unknown, loose):
+    """Least-squares s exp(i theta) and offsets, or an error that names what the tracks leave open.
 
     The design is in pixels: a singular value over sqrt(n) is the motion, in pixels rms, that tells
     one combination of the parameters. Noise on a target that does not move makes 0.6-1.4 times the
     misfit of it, so twice the misfit is asked for.
     """
+    wanted = "scale, angle and position" if len(loose) else "scale and angle"
     if len(design) < design.shape[1]:
         raise ValueError(
             f"tracks: frames with common views must give at least {design.shape[1]} equations "
-            f"for scale and angle of {_names(unknown)}, got {len(design)}"
+            f"for {wanted} of {_names([*unknown, *loose])}, got {len(design)}"
         )
     solution = np.linalg.lstsq(design, target)[0]
-    scale = np.mean(np.abs(solution.view(complex)))
+    turned, offsets = solution[: 2 * len(unknown)].view(complex), solution[2 * len(unknown) :]
+    scale = np.mean(np.abs(turned)) if len(unknown) else _known_scale(rig)
     misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / scale if scale > 0 else np.inf
     _, singular, right = np.linalg.svd(design, full_matrices=False)
     motion = singular / np.sqrt(len(design))
@@ -684,12 +775,13 @@ def _solve(design, target, rig, unknown):
     if weak.any():
         share = np.linalg.norm(right[weak].reshape(weak.sum(), -1, 2), axis=(0, 2))
         raise ValueError(
-            f"tracks: the target's motion must determine scale and angle of "
-            f"{_names(unknown[share > 0.1])}, got {motion[-1]:.2g} px rms of telling motion "
-            f"against a misfit of {misfit:.2g} px (a static target, a wrong position or normal, or "
-            "videos in another order than the cameras)"
+            f"tracks: the target's motion must determine {wanted} of "
+            f"{_names(np.array([*unknown, *loose])[share > 0.1])}, got {motion[-1]:.2g} px rms of "
+            f"telling motion against a misfit of {misfit:.2g} px (a static target, a wrong "
+            "position or normal, videos in another order than the cameras, or of other motions)"
         )
-    return solution.view(complex)  # s exp(i theta)
+    widths = [rig.cameras[i].image_size[0] for i in loose]
+    return turned, offsets.reshape(-1, 2) * np.reshape(widths, (-1, 1)) / 2
 
 
 def _spread(tracks, rig):
@@ -703,7 +795,8 @@ def _spread(tracks, rig):
         found, failed = {}, []
         for i in unknown:
             try:
-                found[i] = _solve(*_from_known(tracks, start, i), start, np.array([i]))[0]
+                turned, _ = _solve(*_from_known(tracks, start, i), start, [i], [])
+                found[i] = turned[0]
             except ValueError as error:
                 failed.append(error)
         if not found:
@@ -729,10 +822,19 @@ def _from_known(tracks, rig, index):
     return np.vstack(design), np.concatenate(target)
 
 
-def _refine(tracks, rig, unknown, turned):
-    """Smallest reprojection error in pixels, searched in log(s exp(i theta)) = log s + i theta."""
-    start = np.log(turned).view(float)
-    return _closest(tracks, lambda p: _calibrate(rig, unknown, np.exp(p.view(complex))), start)
+def _refine(tracks, rig, turned, offsets):
+    """Smallest reprojection error in pixels, searched from s exp(i theta) and offsets."""
+    return _closest(
+        tracks, lambda p: with_parameters(rig, p), _parameters(rig, turned, offsets)
+    )
+
+
+def _parameters(rig, turned, offsets):
+    """What a search varies, all of order one: log s + i theta, and offsets over the image's width.
+
+    As a width counts what the calibrated cameras see.
+    """
+    return np.concatenate((np.log(turned).view(float), (offsets / _known_width(rig)).ravel()))
 
 
 def _closest(tracks, candidate, start):
@@ -822,6 +924,11 @@ def _require_all_calibrated(name, cameras):
                 f"{name}: all cameras must be calibrated, got cameras[{i}] without scale and "
                 "angle; use learn_cameras first"
             )
+        if not camera.is_placed:
+            raise ValueError(
+                f"{name}: all cameras must have a position, got cameras[{i}] without; use "
+                "learn_cameras first"
+            )
 
 
 def _check_tracks(tracks, rig):
@@ -857,7 +964,9 @@ def _rows_of(name, value, width):
 def _to_table(camera):
     """A camera as plain numbers under the keys of the file; None is left out."""
     table = {} if camera.model == Camera.model else {"model": camera.model}
-    table |= {"position": camera.position.tolist(), "normal": camera.normal.tolist()}
+    if camera.is_placed:
+        table["position"] = camera.position.tolist()
+    table["normal"] = camera.normal.tolist()
     if camera.is_calibrated:
         table |= {"scale": camera.scale, "angle": camera.angle}
     return table | {"image_size": list(camera.image_size)}
@@ -872,9 +981,8 @@ def _from_table(index, table):
         for key in table:
             if key not in keys:
                 raise ValueError(f"{key}: must be one of {', '.join(keys)}")
-        for key in ("position", "normal"):
-            if key not in table:
-                raise ValueError(f"{key}: must be given, got keys {', '.join(table)}")
+        if "normal" not in table:
+            raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
         model = table.get("model", Camera.model)
         if model not in models:
             raise ValueError(f"model: must be one of {', '.join(models)}, got {model!r}")

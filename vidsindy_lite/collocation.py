@@ -133,6 +133,9 @@ class Collocation:
         1 / variance of the measurement noise.
     physics_weights : ndarray, shape (d,)
         Weight of the mean-square residual of each equation per sample.
+    systematic : ndarray, shape (n, d, k), optional
+        Errors that all samples share: they are the curve plus noise plus a sum of these, each
+        times an unknown number of mean 0 and variance 1.
     """
 
     def __init__(
@@ -141,6 +144,7 @@ class Collocation:
         exponents: np.ndarray,
         data_weights: np.ndarray,
         physics_weights: np.ndarray,
+        systematic: np.ndarray | None = None,
     ) -> None:
         self.exponents = exponents
         self.generators = shift_generators(exponents)
@@ -150,6 +154,7 @@ class Collocation:
         self.starts = np.cumsum([0] + [len(k) - WIDTH for k in self.knots])
         self.r = int(self.starts[-1])
         self.x = np.concatenate([segment.x for segment in self.segments])
+        self.systematic = np.empty((*self.x.shape, 0)) if systematic is None else systematic
         self.samples = self._basis([s.t for s in self.segments])
         ends = [segment.breakpoints for segment in self.segments]
         nodes = [np.concatenate([b[:1], (b[1:] + b[:-1]) / 2, b[-1:]]) for b in ends]
@@ -193,10 +198,18 @@ class Collocation:
         """The curve and its slope at the collocation nodes, each of shape (k, d)."""
         return self.nodes @ control_points, self.slopes @ control_points
 
-    def data_loss(self, control_points: np.ndarray) -> float:
-        """Weighted sum of squares of the data residual (chi-square)."""
+    def data_residual(self, control_points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,)."""
         residual = self.curve(control_points) - self.x
-        return float((residual**2).sum(axis=0) @ self.data_weights)
+        weighted = self.data_weights[:, None] * self.systematic
+        matrix = np.einsum("nik,nil->kl", weighted, self.systematic) + np.eye(weighted.shape[-1])
+        sizes = -np.linalg.solve(matrix, np.einsum("nik,ni->k", weighted, residual))
+        return residual + self.systematic @ sizes, sizes
+
+    def data_loss(self, control_points: np.ndarray) -> float:
+        """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
+        residual, sizes = self.data_residual(control_points)
+        return float((residual**2).sum(axis=0) @ self.data_weights + sizes @ sizes)
 
     def physics_residual(self, state: State) -> np.ndarray:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
@@ -245,16 +258,19 @@ class Collocation:
         # The same in the unknowns of the law: minus the terms in their own equation, and the
         # rates of the law for the offset; the residual comes first.
         size, count = len(columns), len(term_columns)
-        unknowns = np.zeros((len(residual), d, 1 + size))
+        shared = slice(1 + size, 1 + size + self.systematic.shape[-1])
+        unknowns = np.zeros((len(residual), d, shared.stop))
         unknowns[:, :, 0] = residual
         for j in range(d):
             here = np.flatnonzero(term_columns // l == j)
             unknowns[:, j, 1 + here] = -root[:, j, None] * terms[:, term_columns[here] % l]
-        unknowns[:, :, 1 + count :] = jacobian[:, :, offset_columns]
-        unknowns = unknowns.reshape(-1, 1 + size)
-        data_residual = self.curve(state.control_points) - self.x
+        unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
+        unknowns = unknowns.reshape(-1, shared.stop)
+        data_residual, sizes = self.data_residual(state.control_points)
         right = physics.T @ unknowns
         right[:, 0] += (self.samples.T @ (data_residual * self.data_weights)).ravel()
+        weighted = (self.data_weights[:, None] * self.systematic).reshape(len(self.x), -1)
+        right[:, shared] = (self.samples.T @ weighted).reshape(r * d, -1)
 
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
         solved = cho_solve_banded((factor, True), right, check_finite=False)
@@ -264,13 +280,23 @@ class Collocation:
         # cancellation between two large matrices that a large physics weight would bring.
         left = unknowns - physics @ solved
         gram = left.T @ left
-        solved = solved.reshape(r, d, 1 + size)
-        follow = -(self.samples @ solved.reshape(r, -1)).reshape(-1, d, 1 + size)
+        solved = solved.reshape(r, d, shared.stop)
+        follow = -(self.samples @ solved.reshape(r, -1)).reshape(-1, d, shared.stop)
         follow[:, :, 0] += data_residual
+        follow[:, :, shared] += self.systematic
         follow *= np.sqrt(self.data_weights)[:, None]
-        follow = follow.reshape(-1, 1 + size)
+        follow = follow.reshape(-1, shared.stop)
         gram += follow.T @ follow
+        gram[shared, shared] += np.eye(len(sizes))
+        gram[0, 0] += sizes @ sizes
+        gram[0, shared] += sizes
+        gram[shared, 0] += sizes
+        # The systematic errors go with the law as is best for the fit, as the curve does.
+        response = np.linalg.solve(gram[shared, shared], gram[shared])
+        gram = (gram - gram[:, shared] @ response)[: 1 + size, : 1 + size]
+        solved = (solved - solved[:, :, shared] @ response)[:, :, : 1 + size]
         objective = float((data_residual**2).sum(axis=0) @ self.data_weights + (residual**2).sum())
+        objective += float(sizes @ sizes)
         return Linearisation(
             objective=objective,
             fall=objective - float(gram[0, 0]),

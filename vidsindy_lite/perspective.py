@@ -46,6 +46,11 @@ class PerspectiveCamera(Camera):
 
     model: ClassVar[str] = "perspective"
 
+    def __post_init__(self):
+        super().__post_init__()
+        if not self.is_placed:
+            raise ValueError("position: must be given for a perspective camera, got None")
+
     @property
     def matrix(self):
         """Camera matrix, shape (3, 4); its last row gives the distance in front of the camera."""

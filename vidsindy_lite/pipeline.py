@@ -1,24 +1,24 @@
-"""From video files to equations: track, learn the cameras, reconstruct, discover."""
+"""From video files to equations: track, learn lags and cameras, reconstruct, discover."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
 from .ado import discover
-from .cameras import Rig, check_learnable, learn_cameras, learn_normal, reconstruct, residuals
-from .checks import check_integer, check_path, check_times
+from .cameras import Rig, check_learnable, learn_cameras, learn_normal, reconstruct
+from .checks import check_integer, check_path, check_times, check_vector
 from .discovery import Discovery
+from .synchrony import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
 from .tracking import track
-from .video import video_info
+from .uncertainty import systematic_errors
+from .video import VideoInfo, video_info
 
-DISAGREEMENT = 1.0
-"""Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
-less than half of that."""
+_WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
 @dataclass(frozen=True)
@@ -28,17 +28,20 @@ class VideoDiscovery(Discovery):
     Parameters
     ----------
     tracks : tuple of ndarray, shape (n, 2)
-        Pixels of the target in each video; NaN where it was not seen.
+        Pixels of the target in each video at these times; NaN where it was not seen.
     rig : Rig
         The cameras, all calibrated.
+    lags : Synchrony
+        When each video started.
     t : ndarray, shape (n,)
-        Time of each frame.
+        Time of each frame of the first video.
     x : ndarray, shape (n, 3)
         Reconstructed trajectory in scene units; NaN where fewer than two cameras saw the target.
     """
 
     tracks: tuple[np.ndarray, ...]
     rig: Rig
+    lags: Synchrony
     t: np.ndarray
     x: np.ndarray
 
@@ -48,21 +51,29 @@ def discover_from_videos(
     rig: Rig,
     t: np.ndarray | None = None,
     *,
+    lags: Sequence[float] | None = None,
     degree: int = 3,
     seed: int = 0,
     progress: bool = False,
 ) -> VideoDiscovery:
     """Discover the governing equations of a target filmed by several fixed cameras.
 
+    The frames of the first video are the clock; the others may start earlier or later, differ in
+    length, and in frame rate if their files state it.
+
     Parameters
     ----------
     paths : sequence of path
-        One video file per camera of the rig, all of the same frames.
+        One video file per camera of the rig.
     rig : Rig
         Positions and normals of all cameras, scale and angle of at least one.
     t : array_like, shape (n,), optional
-        Time of each frame, increasing; by default the frame number over the frame rate, in
-        seconds. The unit of time is that of the equations.
+        Time of each frame of the first video, increasing; all videos then have the same frame rate.
+        By default the frame number over the frame rate, in seconds. The unit of time is that of the
+        equations.
+    lags : array_like, shape (m,), optional
+        By how many frames of the first video each one starts later; only differences count. By
+        default they are learned, see `learn_lags`.
     degree, seed : int
         See `discover`.
     progress : bool
@@ -76,9 +87,9 @@ def discover_from_videos(
     Raises
     ------
     FileNotFoundError, ValueError
-        If a file is missing, cut off or no video, if the numbers of files, cameras or frames
-        disagree, if a target is not found, or if cameras or law cannot be learned (see
-        `learn_cameras` and `discover`). What can be told before a video is tracked is.
+        If a file is missing, cut off or no video, if the numbers of files and cameras disagree, if
+        a target is not found, if the given lags are clearly wrong, or if cameras or law cannot be
+        learned (see `learn_cameras` and `discover`). What can be told before a video is tracked is.
     """
     check_learnable(rig)
     check_integer("degree", degree, 1)
@@ -91,34 +102,54 @@ def discover_from_videos(
             f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
             f"got {len(paths)}"
         )
+    if lags is not None:
+        lags = check_vector("lags", lags, len(paths))
+        lags -= lags[0]
     shots = [video_info(path) for path in paths]
-    if len({shot.frames for shot in shots}) != 1:
-        lengths = ", ".join(
-            f"{path.name}: {shot.frames}" for path, shot in zip(paths, shots, strict=True)
-        )
-        raise ValueError(f"paths: the videos must have the same number of frames, got {lengths}")
     for path, shot, camera in zip(paths, shots, rig.cameras, strict=True):
+        if shot.frames < 2:
+            raise ValueError(f"paths: {path.name} must be a video, got a single frame")
         if shot.size != camera.image_size:
             raise ValueError(
                 f"paths: {path.name} must have the image size of its camera in the rig, "
                 f"{camera.image_size}, got {shot.size}"
             )
-    if t is None:
-        if len({shot.fps for shot in shots}) != 1:
-            rates = ", ".join(f"{shot.fps:g}" for shot in shots)
-            raise ValueError(f"t: must be given if the videos differ in frame rate, got {rates}")
-        t = np.arange(shots[0].frames) / shots[0].fps
-    t = check_times(t)
-    if t.shape != (shots[0].frames,):
-        raise ValueError(f"t: must have shape ({shots[0].frames},), one per frame, got {t.shape}")
-    bar = tqdm(paths, desc="track", disable=not progress, leave=False)
-    tracks = tuple(_track(path, len(t)) for path in bar)
+    t, rates = _clock(shots, t)
+    bar = tqdm(list(zip(paths, shots, strict=True)), desc="track", disable=not progress)
+    raw = [_track(path, shot.frames) for path, shot in bar]
+    synchrony = learn_lags(raw, rig, rates, start=lags)
+    if lags is not None:
+        synchrony = _given(lags, synchrony)
+    tracks = align(raw, synchrony.lags, rates)
     learned = learn_cameras(tracks, rig)
     x = reconstruct(tracks, learned)
-    found = discover(t, x, degree=degree, seed=seed, progress=progress)
+    shared = systematic_errors(raw, rig, learned, synchrony)
+    found = discover(t, x, degree=degree, seed=seed, progress=progress, systematic=shared)
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
-    parts["warnings"] = (*_rig_doubts(tracks, learned, rig, paths), *found.warnings)
-    return VideoDiscovery(**parts, tracks=tracks, rig=learned, t=t, x=x)
+    parts["warnings"] = (
+        *_rig_doubts(tracks, learned, rig, paths),
+        *synchrony.doubts,
+        *found.warnings,
+    )
+    return VideoDiscovery(**parts, tracks=tracks, rig=learned, lags=synchrony, t=t, x=x)
+
+
+def _clock(
+    shots: Sequence[VideoInfo], t: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Time of each frame of the first video, and frames of each video in one frame of the first."""
+    if t is not None:
+        t = check_times(t)
+        if t.shape != (shots[0].frames,):
+            raise ValueError(
+                f"t: must have shape ({shots[0].frames},), one per frame of the first video, "
+                f"got {t.shape}"
+            )
+        return t, None
+    fps = np.array([shot.fps for shot in shots])
+    if not (np.isfinite(fps) & (fps > 0)).all():
+        raise ValueError(f"t: must be given if a file states no frame rate, got {fps.tolist()}")
+    return np.arange(shots[0].frames) / fps[0], fps / fps[0]
 
 
 def _track(path: Path, frames: int) -> np.ndarray:
@@ -137,23 +168,34 @@ def _track(path: Path, frames: int) -> np.ndarray:
     return found
 
 
+def _given(lags: np.ndarray, learned: Synchrony) -> Synchrony:
+    """The lags that are given, unless others are clearly those of the tracks."""
+    apart = np.abs(learned.lags - lags) > _WRONG_LAG + 5 * learned.errors
+    if learned.agree and apart.any():
+        raise ValueError(
+            f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
+            f"({list_lags(learned.lags)}) do: leave them out, or check them"
+        )
+    return replace(learned, lags=lags, errors=0 * lags, doubts=())
+
+
 def _rig_doubts(
     tracks: Sequence[np.ndarray], learned: Rig, given: Rig, paths: Sequence[Path]
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
-    missed = _missed(tracks, learned)
+    missed = disagreement(tracks, learned)
     if max(missed) <= DISAGREEMENT:
         return []
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
     others = [learn_normal(tracks, given, i) for i in range(len(paths))]
-    left = [max(_missed(tracks, other)) for other in others]
+    left = [max(disagreement(tracks, other)) for other in others]
     i = int(np.argmin(left))
     normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
     advice = (
         f"the normal ({normal}) of cameras[{i}] ({paths[i].name}) would explain it best"
         if left[i] <= DISAGREEMENT
         else "no single wrong normal explains it; check the positions, the scales and angles that "
-        "are given, and that all videos start together"
+        "are given, and that at least half of the shortest video is in common with the others"
     )
     sizes = ", ".join(f"{size:.1f}" for size in missed)
     return [
@@ -161,15 +203,3 @@ def _rig_doubts(
         f"target lie more than {sizes} pixels apart, where tracking explains {DISAGREEMENT:g}: "
         + advice
     ]
-
-
-def _missed(tracks: Sequence[np.ndarray], rig: Rig) -> list[float]:
-    """Residual in pixels that one frame in ten exceeds, per camera.
-
-    That tenth may hold anything: a few outliers of the tracker do not accuse the rig.
-    """
-    missed = []
-    for residual in residuals(tracks, rig):
-        seen = residual[np.isfinite(residual).all(axis=1)]
-        missed.append(np.percentile(np.hypot(*seen.T), 90) if len(seen) else 0.0)
-    return missed

@@ -75,6 +75,56 @@ def check_records(
     return records
 
 
+def check_systematic(
+    systematic: np.ndarray | Sequence[np.ndarray] | None,
+    times: Sequence[np.ndarray],
+    records: Sequence[Record],
+) -> list[np.ndarray]:
+    """Systematic errors of records, as `discover` takes them, at the samples that are not missing.
+
+    Parameters
+    ----------
+    systematic : array_like, shape (k, n, d), or list of such, or None
+        For one record, or for each.
+    times : sequence of array_like, shape (n,)
+        Of all samples of each record, missing or not.
+    records : sequence of Record
+
+    Returns
+    -------
+    list of ndarray, shape (m, d, k)
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, or a value at a sample is not finite.
+    """
+    if systematic is None:
+        return [np.empty((*x.shape, 0)) for _, x in records]
+    parts = [systematic] if len(records) == 1 and np.ndim(systematic) == 3 else systematic
+    if len(parts) != len(records):
+        raise ValueError(
+            f"systematic: must be one array per trajectory ({len(records)}), got {len(parts)}"
+        )
+    checked = []
+    for part, t, (seen, x) in zip(parts, times, records, strict=True):
+        part = check_array("systematic", part)
+        if part.ndim != 3 or part.shape[1:] != (len(t), x.shape[1]):
+            raise ValueError(
+                f"systematic: must have shape (k, {len(t)}, {x.shape[1]}), got {part.shape}"
+            )
+        part = np.moveaxis(part, 0, -1)[np.searchsorted(t, seen)]
+        if not np.isfinite(part).all():
+            raise ValueError("systematic: must be finite where x is, got NaN or infinity")
+        checked.append(part)
+    if len({part.shape[-1] for part in checked}) != 1:
+        raise ValueError(
+            "systematic: must hold the same causes for all trajectories, got "
+            f"{[part.shape[-1] for part in checked]} of them"
+        )
+    return checked
+
+
 def cut(record: Record, longest_step: float) -> list[Record]:
     """Cut a record wherever two samples are further apart than ``longest_step``."""
     t, x = record

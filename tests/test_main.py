@@ -1,0 +1,135 @@
+"""The command line on one's own videos: from three lossy files to a report, or one clear error."""
+
+import json
+
+import numpy as np
+import pytest
+
+import vidsindy_lite as vl
+from vidsindy_lite.__main__ import main
+from vidsindy_lite.video import render
+
+SIZE = (128, 128)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Three lossy videos of 30 fps and different length; the second starts 7 frames late."""
+    folder = tmp_path_factory.mktemp("own")
+    truth = vl.SYSTEMS["SprottE"].shift(vl.REFERENCE_OFFSET)
+    _, x = truth.trajectory(220)
+    rig = vl.Rig.around(x, SIZE)
+    rows = slice(0, 220), slice(7, 215), slice(0, 210)
+    scene = vl.Scene(background="plain", size=12, image_size=SIZE)
+    for name, camera, shown in zip("abc", rig.cameras, rows, strict=True):
+        frames = render(camera.project(x)[shown], scene)
+        vl.write_video(folder / f"{name}.avi", frames, fps=30, codec="MJPG")
+    rig.uncalibrated().save(folder / "rig.toml")
+    return folder
+
+
+@pytest.fixture
+def here(folder, tmp_path, monkeypatch):
+    """The same files in a fresh working directory."""
+    for path in folder.iterdir():
+        (tmp_path / path.name).symlink_to(path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+VIDEOS = ["a.avi", "b.avi", "c.avi"]
+
+
+def test_from_videos_to_a_report(here, capsys):
+    status = main(["discover", *VIDEOS, "--rig", "rig.toml", "--degree", "2", "--out", "law"])
+    shown = capsys.readouterr()
+    data = json.loads((here / "law" / "result.json").read_text("utf-8"))
+    assert status == (0 if data["status"] == "ok" else 1)
+    assert "dx/dt = " in shown.out
+    assert f"status: {data['status']}" in shown.out
+    assert "track" in shown.err  # progress
+    np.testing.assert_allclose([c["lag"] for c in data["cameras"]], (0, 7, 0), atol=0.05)
+    assert [c["frames"] for c in data["cameras"]] == [220, 208, 210]
+    assert data["options"]["lags"] == "learned"
+    assert data["t"][30] == pytest.approx(1.0)
+    assert data["law"]["data"]["equations"] in (here / "law" / "report.html").read_text("utf-8")
+
+
+def corrupt(folder):
+    (folder / "bad.avi").write_bytes(b"no video at all" * 100)
+
+
+def cut_off(folder):
+    content = (folder / "c.avi").read_bytes()
+    (folder / "bad.avi").write_bytes(content[: len(content) // 2])
+
+
+def one_frame(folder):
+    frame = next(vl.read_video(folder / "a.avi"))
+    vl.write_video(folder / "bad.avi", [frame])
+
+
+def empty(folder):
+    (folder / "bad.avi").touch()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda folder: None, "no such video file, got 'bad.avi'"),
+        (corrupt, "must be a video file that OpenCV can read, got 'bad.avi'"),
+        (cut_off, "bad.avi must hold the 210 frames that its header states, got"),
+        (one_frame, "bad.avi must be a video, got a single frame"),
+        (empty, "must be a video file, got the empty file 'bad.avi'"),
+    ],
+)
+def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
+    spoil(here)
+    assert main(["discover", "a.avi", "b.avi", "bad.avi", "--rig", "rig.toml"]) == 2
+    (error,) = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
+    assert message in error
+    assert not (here / "report").exists()
+    assert not list(here.glob(".report*"))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--rig", "none.toml"], "none.toml"),
+        (["--rig", "a.avi"], "a.avi: must be a TOML file"),
+        (["--rig", "rig.toml", "--lag", "0,7"], "lags: must be 3 finite numbers"),
+        (["--rig", "rig.toml", "--fps", "0"], "fps: must be positive, got 0"),
+        (["--rig", "rig.toml", "--degree", "0"], "degree: must be an integer of at least 1"),
+        (["--rig", "rig.toml", "--seed", "-1"], "seed: must be an integer of at least 0"),
+        (["--rig", "rig.toml", "--out", "."], "out: must be a new folder"),
+    ],
+)
+def test_bad_options_are_told_before_anything_is_tracked(here, capsys, options, message):
+    assert main(["discover", *VIDEOS, *options]) == 2
+    shown = capsys.readouterr().err
+    assert f"error: {message}" in shown or message in shown
+    assert "track:" not in shown
+
+
+def test_lags_that_are_no_numbers(here, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["discover", *VIDEOS, "--rig", "rig.toml", "--lag", "0,soon,0"])
+    assert "argument --lag: invalid" in capsys.readouterr().err
+
+
+def test_the_help_helps(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["discover", "--help"])
+    shown = capsys.readouterr().out
+    for word in ("--rig", "--out", "--lag", "--fps", "--degree", "--seed", "exit status", "report"):
+        assert word in shown
+
+
+def test_a_template_to_fill_in(tmp_path, capsys):
+    assert main(["rig-template", "--cameras", "4", "--size", "640x480"]) == 0
+    (tmp_path / "rig.toml").write_text(capsys.readouterr().out, encoding="utf-8")
+    rig = vl.Rig.load(tmp_path / "rig.toml")
+    assert len(rig.cameras) == 4
+    assert rig.cameras[0].image_size == (640, 480)
+    assert main(["rig-template", "--cameras", "1"]) == 2
+    assert "cameras: must be an integer of at least 2" in capsys.readouterr().err

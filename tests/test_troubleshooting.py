@@ -1,0 +1,169 @@
+"""Every row of the README's table of troubles: its trouble is made, and its message appears."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import trajectory
+from scipy.integrate import solve_ivp
+
+import vidsindy_lite as vl
+from vidsindy_lite.corruption import add_noise
+from vidsindy_lite.report import check_folder_is_free
+from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.video import render
+
+README = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
+TABLE = README.split("## When something is wrong")[1].split("\n## ")[0]
+MESSAGES = re.findall(r"^\| `(.+?)` \|", TABLE, re.MULTILINE)
+SIZE, FRAMES = (96, 96), 120
+
+
+class Studio:
+    """Small videos of a random motion, and what is said when something about them is changed."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        x = trajectory(np.random.default_rng(4), FRAMES)
+        self.rig = vl.Rig.around(x, SIZE)
+        self.tracks = [camera.project(x) for camera in self.rig.cameras]
+        self.paths = [self.video(f"{i}.mkv", track) for i, track in enumerate(self.tracks)]
+
+    def video(self, name, track):
+        scene = vl.Scene(background="plain", size=8, image_size=SIZE)
+        return vl.write_video(self.folder / name, render(track, scene))
+
+    def says(self, paths=None, cameras=None, **options):
+        """The error or the warnings of a discovery."""
+        rig = vl.Rig(cameras) if cameras else self.rig
+        return told(vl.discover_from_videos, paths or self.paths, rig, degree=1, **options)
+
+    def without_last(self, path):
+        return self.says([*self.paths[:2], path])
+
+
+def told(function, *arguments, **options):
+    try:
+        return "\n".join(function(*arguments, **options).warnings)
+    except (ValueError, FileNotFoundError) as error:
+        return str(error)
+
+
+def unreadable(studio):
+    path = studio.folder / "text.mkv"
+    path.write_text("no video " * 100)
+    return studio.without_last(path)
+
+
+def damaged(studio):
+    path = studio.folder / "damaged.mkv"
+    content = studio.paths[2].read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    return studio.without_last(path)
+
+
+def still(studio):
+    return studio.without_last(studio.video("still.mkv", np.full((FRAMES, 2), 48.0)))
+
+
+def other_size(studio):
+    *others, last = studio.rig.cameras
+    return studio.says(cameras=[*others, replace(last, image_size=(96, 64))])
+
+
+def uncalibrated(studio):
+    return studio.says(cameras=[replace(c, scale=None, angle=None) for c in studio.rig.cameras])
+
+
+def without_positions(studio):
+    first, *others = studio.rig.cameras
+    return studio.says(cameras=[first, *(replace(c, position=None) for c in others)])
+
+
+def nothing_in_common(studio):
+    tracks = [np.random.default_rng(i).uniform(0, 95, (FRAMES, 2)) for i in range(3)]
+    return told(vl.learn_cameras, tracks, studio.rig.uncalibrated())
+
+
+def wrong_position(studio):
+    first, *others = studio.rig.cameras
+    moved = first.position + 20 * first.scale * first.rows[0]
+    return studio.says(cameras=[replace(first, position=moved), *others])
+
+
+def repeating(studio):
+    phase = 2 * np.pi * np.arange(200) / 50.3
+    x = np.column_stack((np.cos(phase), np.sin(phase), 0.5 * np.cos(phase + 1)))
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) for camera in rig.cameras]
+    tracks[1] = tracks[1][15:]
+    return "\n".join(vl.learn_lags(tracks, rig).doubts)
+
+
+def pendulum(degree):
+    t = np.linspace(0, 40, 800)
+    swing = solve_ivp(
+        lambda _, x: [x[1], -np.sin(3 * x[0])], (0, 40), [0.9, 0], t_eval=t, rtol=1e-9
+    )
+    x = add_noise(swing.y.T, 0.005, np.random.default_rng(0))
+    return told(vl.discover, t, x, degree=degree)
+
+
+def oscillation(step, count, noise):
+    t = step * np.arange(count)
+    x = np.stack([np.sin(t), np.cos(t)], axis=1)
+    return told(vl.discover, t, add_noise(x, noise, np.random.default_rng(0)), degree=1)
+
+
+def dependent_errors(studio):
+    t = np.linspace(0, 20, 300)
+    x = np.stack([np.sin(t), np.cos(t)], axis=1)
+    noise = np.random.default_rng(0).normal(size=(302, 2))  # each error lasts for three frames
+    smooth = np.stack([np.convolve(part, np.ones(3), "valid") for part in noise.T], axis=1)
+    return told(vl.discover, t, x + 0.0115 * smooth, degree=2)
+
+
+def occupied(studio):
+    return told(check_folder_is_free, studio.folder)
+
+
+TROUBLES = {
+    "no such video file": lambda studio: studio.without_last(studio.folder / "none.mkv"),
+    "must be a video file that OpenCV can read": unreadable,
+    "frames that its header states": damaged,
+    "must show one moving target": still,
+    "must have the image size of its camera": other_size,
+    "there must be one video per camera": lambda studio: studio.says(studio.paths[:2]),
+    "at least one camera must be calibrated": uncalibrated,
+    "the positions of two cameras with independent normals must be given": without_positions,
+    "the target's motion must determine": nothing_in_common,
+    "the rig does not agree with the tracks": wrong_position,
+    "the lags of the videos cannot be told": repeating,
+    "lags: must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
+    "the curve misses the data": lambda studio: pendulum(degree=1),
+    "another law fits almost as well": dependent_errors,
+    "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
+    "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
+    "must be a new folder or hold an earlier report": occupied,
+}
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    return Studio(tmp_path_factory.mktemp("studio"))
+
+
+@pytest.mark.parametrize("message", MESSAGES)
+def test_the_message_appears(studio, message):
+    assert message in TROUBLES[message](studio)
+
+
+def test_every_trouble_is_in_the_table():
+    assert set(MESSAGES) == set(TROUBLES)
+    assert len(set(MESSAGES)) == len(MESSAGES)
+
+
+def test_without_trouble_no_message_appears(studio):
+    text = studio.says()
+    assert not any(message in text for message in MESSAGES if "rig" in message or "lag" in message)
