@@ -52,7 +52,7 @@ NEEDLESS_START = 0.1
 OFFSET_CHARGE = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 SPLINE_ERROR = 3e-7
-"""Error of a coefficient, in standard units, that the knots may leave if the data are nearly exact."""
+"""Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
 GAP = 0.4
 """A pause longer than this fraction of the time scale of the motion is a gap."""
 SHORTEST_STRETCH = 4
