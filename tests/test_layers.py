@@ -10,7 +10,7 @@ import vidsindy_lite
 FLOORS = [
     {"repository", "checks", "polynomials", "splines", "geometry", "records", "information"},
     {"systems", "sights", "cameras", "perspective", "published"},
-    {"video", "tracking", "corruption"},
+    {"video", "background", "detector", "training", "tracking", "corruption"},
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
         "ado", "paper_ado", "baselines", "metrics", "limits",

@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vidsindy_lite.background import _shape
 from vidsindy_lite.cameras import Rig
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
-from vidsindy_lite.tracking import _shape, track
+from vidsindy_lite.tracking import track
 from vidsindy_lite.video import (
     COLOURS,
     SHAPES,

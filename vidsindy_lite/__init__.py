@@ -12,7 +12,7 @@ from .perspective import PerspectiveCamera
 from .pipeline import VideoDiscovery, discover_from_videos
 from .polynomials import PolynomialSystem
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
-from .tracking import track
+from .tracking import Track, follow, track
 from .video import Scene, read_video, render_video, write_video
 
 __all__ = [
@@ -31,6 +31,8 @@ __all__ = [
     "write_video",
     "read_video",
     "track",
+    "follow",
+    "Track",
     "discover",
     "Discovery",
     "score",

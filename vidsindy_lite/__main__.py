@@ -1,4 +1,4 @@
-"""The command line: ``python -m vidsindy_lite run`` and ``python -m vidsindy_lite demo``."""
+"""The command line: ``python -m vidsindy_lite`` with ``run``, ``demo`` or ``train-detector``."""
 
 import argparse
 import sys
@@ -30,6 +30,12 @@ exit status: 0 if every notebook ran to its end and the figures are complete, 1 
 DEMO_DESCRIPTION = """\
 Film a target that obeys a known law with three cameras, forget two of them and the law, and find
 both again from the video files: the whole pipeline in less than a minute.
+"""
+
+TRAIN_DESCRIPTION = """\
+Train the learned detector from scratch on frames that the package renders, and write its weights
+(detector.pt) and the record of the training (detector.json) into the package. Half an hour on two
+cores. Stopped, it goes on from its last checkpoint when it is started again.
 """
 
 
@@ -91,6 +97,17 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument("--frames", type=int, default=500, help="per camera (default: 500)")
     demo.add_argument("--seed", type=int, default=0, help="of scenes and noise (default: 0)")
     demo.set_defaults(command=_demo)
+
+    train = commands.add_parser(
+        "train-detector",
+        help="train the learned detector from scratch",
+        description=TRAIN_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    train.add_argument("--seed", type=int, default=0, help="of weights and frames (default: 0)")
+    train.add_argument("--steps", type=int, help="batches of 16 frames (default: as shipped)")
+    train.add_argument("--output", metavar="FILE", help="weights (default: those of the package)")
+    train.set_defaults(command=_train)
     return parser
 
 
@@ -123,6 +140,16 @@ def _demo(options: argparse.Namespace) -> int:
     print(f"the same around the origin ({', '.join(f'{value:.4f}' for value in found.offset)}):")
     print(found.equations("native"))
     print(f"against the truth: {score(found, shot.truth)}")
+    return 0
+
+
+def _train(options: argparse.Namespace) -> int:
+    from vidsindy_lite import training  # torch takes a second to import
+
+    output = training.WEIGHTS if options.output is None else options.output
+    steps = training.STEPS if options.steps is None else options.steps
+    record = training.train(output, options.seed, steps, progress=True)
+    print(f"{record['frames']} frames, loss {record['loss'][0]} to {record['loss'][-1]}: {output}")
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -13,7 +14,7 @@ from .ado import discover
 from .cameras import Rig, check_learnable, learn_cameras, learn_normal, reconstruct, residuals
 from .checks import check_integer, check_path, check_times
 from .discovery import Discovery
-from .tracking import track
+from .tracking import Track, check_detector, follow
 from .video import video_info
 
 DISAGREEMENT = 1.0
@@ -48,6 +49,7 @@ def discover_from_videos(
     rig: Rig,
     t: np.ndarray | None = None,
     *,
+    detector: str | os.PathLike = "auto",
     degree: int = 3,
     seed: int = 0,
     progress: bool = False,
@@ -63,6 +65,8 @@ def discover_from_videos(
     t : array_like, shape (n,), optional
         Time of each frame, increasing; by default the frame number over the frame rate, in
         seconds. The unit of time is that of the equations.
+    detector : str or path
+        See `track`.
     degree, seed : int
         See `discover`.
     progress : bool
@@ -71,7 +75,8 @@ def discover_from_videos(
     Returns
     -------
     VideoDiscovery
-        Its first warning is that the rig does not agree with the tracks, if it does not.
+        Its first warnings are that the rig does not agree with the tracks, if it does not, and
+        which backgrounds are not at rest.
 
     Raises
     ------
@@ -83,6 +88,7 @@ def discover_from_videos(
     check_learnable(rig)
     check_integer("degree", degree, 1)
     check_integer("seed", seed)
+    check_detector(detector)
     if isinstance(paths, str) or not isinstance(paths, Iterable):
         raise ValueError(f"paths: must be a list of files, one per camera, got {paths!r:.60}")
     paths = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
@@ -112,24 +118,30 @@ def discover_from_videos(
     if t.shape != (shots[0].frames,):
         raise ValueError(f"t: must have shape ({shots[0].frames},), one per frame, got {t.shape}")
     bar = tqdm(paths, desc="track", disable=not progress, leave=False)
-    tracks = tuple(_track(path, len(t)) for path in bar)
+    followed = [_follow(path, len(t), detector) for path in bar]
+    tracks = tuple(seen.pixels for seen in followed)
     learned = learn_cameras(tracks, rig)
     x = reconstruct(tracks, learned)
     found = discover(t, x, degree=degree, seed=seed, progress=progress)
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
-    parts["warnings"] = (*_rig_doubts(tracks, learned, rig, paths), *found.warnings)
+    parts["warnings"] = (
+        *_rig_doubts(tracks, learned, rig, paths),
+        *(warning for seen in followed for warning in seen.warnings),
+        *found.warnings,
+    )
     return VideoDiscovery(**parts, tracks=tracks, rig=learned, t=t, x=x)
 
 
-def _track(path: Path, frames: int) -> np.ndarray:
+def _follow(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     """Track a video that should have so many frames and one moving target."""
-    found = track(path)
-    if len(found) != frames:
+    found = follow(path, detector)
+    if len(found.pixels) != frames:
         raise ValueError(
             f"paths: {path.name} must hold the {frames} frames that its header states, got "
-            f"{len(found)} that can be read: the file is cut off or damaged, or its header wrong"
+            f"{len(found.pixels)} that can be read: the file is cut off or damaged, or its header "
+            "wrong"
         )
-    if not np.isfinite(found).any():
+    if not np.isfinite(found.pixels).any():
         raise ValueError(
             f"paths: {path.name} must show one moving target, got none in any frame: what never "
             "moves away from a place by about its own width is taken for background"

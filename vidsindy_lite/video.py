@@ -336,16 +336,23 @@ def _coverage(polygon):
 
 
 def _blend(frame, background, visible, alpha, corner, colour):
-    """Blend the target into `frame` in place, over the part of its patch inside the image."""
+    """Blend the target into `frame` in place, over the part of its patch inside the image.
+
+    Returns
+    -------
+    float
+        The area of the target that can be seen, pixels.
+    """
     height, width = visible.shape
     left, top = np.maximum(corner, 0)
     right, bottom = np.minimum(corner + alpha.shape[::-1], (width, height))
     if left >= right or top >= bottom:
-        return
+        return 0.0
     window = np.s_[top:bottom, left:right]
     a = alpha[top - corner[1]:bottom - corner[1], left - corner[0]:right - corner[0]]
     a = (a * visible[window])[..., None]
     frame[window] = np.rint(background[window] * (1 - a) + a * colour)
+    return float(a.sum())
 
 
 def _poses(scene, n, rng):
@@ -384,6 +391,46 @@ def render(track, scene, seed=0, shapes=None) -> Iterator[np.ndarray]:
         If `track` or `shapes` has the wrong shape or infinite values, `scene` is none or `seed`
         is negative.
     """
+    return (drawn.frame for drawn in render_labelled(track, scene, seed, shapes))
+
+
+class LabelledFrame(NamedTuple):
+    """A frame and what a detector has to find in it.
+
+    Parameters
+    ----------
+    frame : ndarray, shape (height, width, 3), uint8
+        Blue-green-red.
+    extent : ndarray, shape (2,)
+        Width and height of the whole target in pixels; NaN in a frame without target.
+    visible : float
+        Share of the target's area that can be seen.
+    """
+
+    frame: np.ndarray
+    extent: np.ndarray
+    visible: float
+
+
+def render_labelled(track, scene, seed=0, shapes=None, scenery=None) -> Iterator[LabelledFrame]:
+    """Frames as of `render`, with what a detector has to find in them.
+
+    Parameters
+    ----------
+    track, scene, seed, shapes
+        See `render`.
+    scenery : ndarray, shape (height, width, 3), uint8, optional
+        An image in the place of the scene's background; occluders are drawn over it.
+
+    Yields
+    ------
+    LabelledFrame
+
+    Raises
+    ------
+    ValueError
+        As of `render`, or if `scenery` is no image of the scene's size.
+    """
     check_instance("scene", scene, Scene)
     seed = check_integer("seed", seed)
     track = check_array("track", track)
@@ -398,32 +445,44 @@ def render(track, scene, seed=0, shapes=None) -> Iterator[np.ndarray]:
             f"shapes: must be finite, of shape ({len(track)}, 2, 2), got shape {shapes.shape} and "
             f"{np.sum(~np.isfinite(shapes))} other values"
         )
-    return _frames(track, scene, seed, shapes)
+    if scenery is not None:
+        scenery = np.asarray(scenery)
+        if scenery.shape != (*scene.image_size[::-1], 3) or scenery.dtype != np.uint8:
+            raise ValueError(
+                f"scenery: must be uint8 of the scene's image size {scene.image_size}, "
+                f"got {scenery.dtype} of shape {scenery.shape}"
+            )
+    return _frames(track, scene, seed, shapes, scenery)
 
 
-def _frames(track, scene, seed, shapes):
+def _frames(track, scene, seed, shapes, scenery):
     spawned = np.random.SeedSequence(seed).spawn(3)
-    scenery, motion, noise = (np.random.default_rng(s) for s in spawned)
+    layout, motion, noise = (np.random.default_rng(s) for s in spawned)
     width, height = scene.image_size
-    background = BACKGROUNDS[scene.background](scenery, scene.image_size)
+    if scenery is None:
+        background = BACKGROUNDS[scene.background](layout, scene.image_size)
+    else:
+        background = scenery.copy()
     visible = np.ones((height, width), np.float32)
     for left, top, w, h in scene.occluders:
-        background[top:top + h, left:left + w] = _occluder(scenery, (w, h))
+        background[top:top + h, left:left + w] = _occluder(layout, (w, h))
         visible[top:top + h, left:left + w] = 0
     outline = scene.outline()
     colour = np.array(COLOURS[scene.colour], np.float32)
     sigma = np.float32(255 * np.sqrt(scene.noise_variance))
     poses = zip(track, shapes, *_poses(scene, len(track), motion), strict=True)
     for centre, shape, angle, scale in poses:
-        frame = background.copy()
+        frame, extent, seen = background.copy(), np.full(2, np.nan), 0.0
         if np.isfinite(centre).all():
             turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-            alpha, corner = _coverage(centre + scale * outline @ turn @ shape.T)
-            _blend(frame, background, visible, alpha, corner, colour)
+            polygon = centre + scale * outline @ turn @ shape.T
+            alpha, corner = _coverage(polygon)
+            extent = np.ptp(polygon, axis=0)
+            seen = _blend(frame, background, visible, alpha, corner, colour) / alpha.sum()
         if sigma > 0:
             grain = sigma * noise.standard_normal(frame.shape, np.float32)
             frame = cv2.add(frame, grain, dtype=cv2.CV_8U)
-        yield frame
+        yield LabelledFrame(frame, extent, seen)
 
 
 def render_video(path, track, scene, fps=25, seed=0, shapes=None) -> Path:
