@@ -13,6 +13,7 @@ from vidsindy_lite.video import (
     Scene,
     read_video,
     render,
+    render_labelled,
     render_video,
     video_info,
     write_video,
@@ -41,6 +42,33 @@ def test_drawn_centroid_and_area(shape, size, u, v, seed):
     centroid, area = drawn_centroid_and_area(frame, empty, scene.colour)
     assert centroid == pytest.approx([u, v], abs=0.02)
     assert area == pytest.approx(np.pi * size**2 / 4, rel=0.01)
+
+
+def test_labels_of_a_frame():
+    scene = Scene("plain", size=20, occluders=((50, 0, 21, 80),), image_size=SMALL)
+    track = [[30.0, 40.0], [49.5, 40.0], [60.0, 40.0], [-0.5, 40.0], [np.nan, np.nan]]
+    drawn = list(render_labelled(track, scene))
+    whole, half, hidden, cut, absent = drawn
+    for labelled, visible in ((whole, 1), (half, 0.5), (hidden, 0), (cut, 0.5)):
+        np.testing.assert_allclose(labelled.extent, 20, atol=0.02)
+        assert labelled.visible == pytest.approx(visible, abs=1e-6)
+    assert np.isnan(absent.extent).all()
+    assert absent.visible == 0
+    for labelled, frame in zip(drawn, render(track, scene), strict=True):
+        np.testing.assert_array_equal(labelled.frame, frame)
+
+
+def test_scenery_stands_in_for_the_background():
+    scenery = np.random.default_rng(0).integers(0, 255, (80, 96, 3), np.uint8)
+    before = scenery.copy()
+    scene = Scene(occluders=((0, 0, 10, 10),), image_size=SMALL)
+    (drawn,) = render_labelled([[60.0, 40.0]], scene, scenery=scenery)
+    np.testing.assert_array_equal(drawn.frame[:, 10:40], scenery[:, 10:40])
+    assert (drawn.frame[:10, :10] != scenery[:10, :10]).any()
+    np.testing.assert_array_equal(scenery, before)
+    for bad in (scenery[:70], scenery.astype(float)):
+        with pytest.raises(ValueError, match=r"scenery: must be uint8 .* \(96, 80\), got"):
+            render_labelled([[60.0, 40.0]], scene, scenery=bad)
 
 
 def test_size_variation_keeps_the_centroid():

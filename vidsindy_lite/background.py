@@ -31,6 +31,7 @@ _RING = 2  # pixels on both sides of the target's outline whose coverage is esti
 _BORDER = 3  # coarse pixels around a place that show how its surroundings continue
 _OFTEN = 0.1  # share of the samples that must differ from the background to cast doubt on it
 _TOO_LARGE = 0.25  # share of the image that no target fills
+_ROUNDING = 0.05  # grey levels squared; variance of coarse differences without any noise
 _QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
 _BLIND = 0.1  # share of the target's outline that may lie on background of the same colour
 _ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
@@ -111,22 +112,41 @@ def _uncover(background, samples, floor):
         view[inside] = min(looks, key=lambda look: np.abs(look - expected).sum())
 
 
-def _unrest(background, samples, floor):
+def _unrest(changes, floor):
     """How much else differs from the background, in areas of the largest thing that does.
 
     Of a target before a background at rest nothing else does: 0. Something that fills much of the
-    image is no target. The median over the samples.
+    image is no target. The median over the samples, given their differences from the background.
     """
-    coarse = _reduce(background)
     unrest = []
-    for sample in samples:
-        differs = np.linalg.norm(_reduce(sample) - coarse, axis=-1) > floor
+    for change in changes:
+        differs = np.linalg.norm(change, axis=-1) > floor
         _, largest = _components(differs.astype(np.uint8))
         if largest is not None:
             area = largest[cv2.CC_STAT_AREA]
             other = differs.sum() - (area if area < _TOO_LARGE * differs.size else 0)
             unrest.append(other / area)
     return float(np.median(unrest)) if unrest else 0.0
+
+
+def _shake(background, changes, floor):
+    """Pixels by which the whole background is displaced, where that is certain, else 0.
+
+    To first order a displacement changes the image by minus that times its slope: least squares,
+    with a prior of one coarse pixel where there is little to see. The median over the samples.
+    """
+    slope = np.stack(np.gradient(background, axis=(1, 0)))
+    shake = []
+    for change in changes:
+        calm = np.linalg.norm(change, axis=-1) <= floor
+        g, d = slope[:, calm].reshape(2, -1), change[calm].ravel()
+        variance = d.var() + _ROUNDING
+        information = g @ g.T / variance + np.eye(2)
+        displacement = np.linalg.solve(information, g @ d / variance)
+        error = np.sqrt(np.trace(np.linalg.inv(information)))
+        distance = np.linalg.norm(displacement)
+        shake.append(_COARSE * distance if distance > 5 * error else 0.0)
+    return float(np.median(shake))
 
 
 # --------------------------------------------------------------------------------------- the model
@@ -160,9 +180,11 @@ class BackgroundModel:
         self.noise = 1.4826 * float(np.median(deviation))
         self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
         _uncover(self.background, samples, self.coarse_floor)
-        self.unrest = _unrest(self.background, samples, self.coarse_floor)
         self.size = np.array(self.background.shape[1::-1])
         self.coarse_background = _reduce(self.background)
+        changes = [_reduce(sample) - self.coarse_background for sample in samples]
+        self.unrest = _unrest(changes, self.coarse_floor)
+        self.shake = _shake(self.coarse_background, changes, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         self.blur = 1.2 if self.noise > _QUIET else 0.0
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise

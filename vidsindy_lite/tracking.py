@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 DETECTORS = ("auto", "background", "learned")
 
-_RESTLESS = 0.5  # unrest from which a background is not at rest
+_RESTLESS = 0.3  # unrest above which a background is not at rest; before one at rest it is 0.03
+_SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
 _GAIN = 0.3  # of confidence, that a sighting has to exceed to be worth anything
 _GAP = 0.75  # price of a gap, in units of confidence: what is seen for a frame or two is an error
 _JUMP = 2.0  # price of a jump
@@ -86,7 +87,7 @@ def track(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") -
     Warns
     -----
     UserWarning
-        If the background is not at rest.
+        If the camera or the background is not at rest.
 
     Raises
     ------
@@ -117,23 +118,28 @@ def follow(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") 
     if detector not in ("auto", "background"):
         return _link_detections(video_path, _detector(detector), str(detector))
     model = BackgroundModel(sample_frames(video_path))
+    name, doubts = Path(video_path).name, []
+    if model.shake > _SHAKY:
+        doubts.append(
+            f"{name}: the camera moves, typically by {model.shake:.1f} px or more; its motion is "
+            "part of the track"
+        )
     if model.unrest <= _RESTLESS:
-        return _follow_model(video_path, model)
+        return _follow_model(video_path, model, doubts)
     doubt = (
-        f"{Path(video_path).name}: the background is not at rest (in a typical frame "
-        f"{model.unrest:.1f} times the area of the largest moving thing changes besides it). If it "
-        "is the camera that moves, its motion is part of the track"
+        f"{name}: the background is not at rest: besides the largest thing that moves, "
+        f"{model.unrest:.1f} times its area changes in a typical frame"
     )
     if detector == "background":
-        return _follow_model(video_path, model, (doubt,))
-    doubt += ". The learned detector is used"
-    return _link_detections(video_path, _detector("learned"), "learned", (doubt,))
+        return _follow_model(video_path, model, [*doubts, doubt])
+    doubts.append(f"{doubt}; the learned detector is used, which is less exact")
+    return _link_detections(video_path, _detector("learned"), "learned", doubts)
 
 
 def check_detector(name: str | os.PathLike) -> None:
     """The name of a way to find the target, or of an .onnx file."""
-    model = isinstance(name, str | os.PathLike) and Path(name).suffix.lower() == ".onnx"
-    if not model and name not in DETECTORS:
+    is_name = isinstance(name, str | os.PathLike)
+    if not is_name or (name not in DETECTORS and Path(name).suffix.lower() != ".onnx"):
         raise ValueError(
             f"detector: must be one of {', '.join(DETECTORS)}, or the name of an .onnx file, "
             f"got {name!r:.60}"
@@ -147,12 +153,12 @@ def _detector(name):
     return LearnedDetector() if name == "learned" else OnnxDetector(name)
 
 
-def _follow_model(path, model, doubts=()):
+def _follow_model(path, model, doubts):
     blobs = list(follow_blobs(model, read_video(path)))
     strange = strangeness(blobs)
     centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
     centroids[~whole(strange)] = np.nan
-    return Track(centroids, np.exp(-strange), "background", doubts)
+    return Track(centroids, np.exp(-strange), "background", tuple(doubts))
 
 
 def _link_detections(path, detector, name, doubts=()):
@@ -162,7 +168,7 @@ def _link_detections(path, detector, name, doubts=()):
     chain = link(sightings)
     pixels = np.array([d.centre if d else (np.nan, np.nan) for d in chain], float)
     confidence = np.array([d.confidence if d else 0.0 for d in chain])
-    return Track(pixels, confidence, name, doubts)
+    return Track(pixels, confidence, name, tuple(doubts))
 
 
 def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:

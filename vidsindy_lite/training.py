@@ -25,7 +25,7 @@ from .video import BACKGROUNDS, COLOURS, LabelledFrame, Scene, render_labelled
 SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
 SEEN_SHAPES = ("disc", "polygon")
 """What the detector is trained on. The other backgrounds and shapes are kept to test it."""
-STEPS = 6000
+STEPS = 5000
 BATCH = 16
 SIDE = 160
 """Width and height of a training frame, pixels."""
@@ -88,10 +88,10 @@ def _rectangle(rng):
     return (*(int(rng.integers(0, SIDE - s + 1)) for s in size), *map(int, size))
 
 
-def background_pool(rng: np.random.Generator, each: int = _EACH) -> np.ndarray:
-    """Backgrounds to cut training frames from, (kinds each, 512, 512, 3) uint8."""
+def background_pool(rng: np.random.Generator) -> np.ndarray:
+    """Backgrounds to cut training frames from, (m, 512, 512, 3) uint8."""
     size = (_POOLED, _POOLED)
-    return np.stack([BACKGROUNDS[kind](rng, size) for kind in SEEN_BACKGROUNDS * each])
+    return np.stack([BACKGROUNDS[kind](rng, size) for kind in SEEN_BACKGROUNDS * _EACH])
 
 
 def _scenery(rng, pool):
