@@ -19,7 +19,7 @@ from vidsindy_lite.video import (
     Scene,
     _coverage,
     render,
-    render_labelled,
+    render_restless,
     render_video,
     write_video,
 )
@@ -273,22 +273,6 @@ def test_bad_files(tmp_path):
 # ------------------------------------------------------------------- restless scenes and detectors
 
 
-def restless_video(path, truth, scene, motion, light=0.0, seed=0):
-    """A target on `truth` before a background that moves by whole pixels, in changing light."""
-    rng = np.random.default_rng(seed)
-    width, height = scene.image_size
-    margin = int(np.abs(motion).max())
-    large = BACKGROUNDS[scene.background](rng, (width + 2 * margin, height + 2 * margin))
-
-    def frames():
-        for k, (place, (u, v)) in enumerate(zip(truth, motion + margin, strict=True)):
-            view = large[v:v + height, u:u + width]
-            view = np.clip(view * (1 + light * np.sin(k / 3)), 0, 255).astype(np.uint8)
-            yield next(render_labelled(place[None], scene, seed, scenery=view)).frame
-
-    return write_video(path, frames())
-
-
 def shaking(n, seed=0):
     return np.random.default_rng(seed).normal(0, 3, (n, 2)).round().astype(int)
 
@@ -306,7 +290,8 @@ def test_auto_takes_the_learned_detector_where_the_background_moves(
 ):
     truth = winding_path(60)
     scene = Scene(background, shape="irregular", size=20, image_size=SIZE)
-    path = restless_video(tmp_path / "clip.mkv", truth, scene, motion(60), light)
+    light = 1 + light * np.sin(np.arange(60) / 3)
+    path = write_video(tmp_path / "clip.mkv", render_restless(truth, scene, motion(60), light))
     found = follow(path)
     assert found.detector == "learned"
     assert any("the background is not at rest" in w for w in found.warnings)
@@ -331,7 +316,8 @@ def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
 def test_a_camera_that_trembles_is_told(tmp_path):
     scene = Scene("sky", size=20, image_size=SIZE)
     tremble = np.random.default_rng(1).integers(-1, 2, (60, 2))
-    path = restless_video(tmp_path / "clip.mkv", winding_path(60), scene, tremble)
+    frames = render_restless(winding_path(60), scene, tremble)
+    path = write_video(tmp_path / "clip.mkv", frames)
     with pytest.warns(UserWarning, match=r"clip\.mkv: the camera moves, typically by [\d.]+ px"):
         track(path)
 

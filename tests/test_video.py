@@ -14,6 +14,7 @@ from vidsindy_lite.video import (
     read_video,
     render,
     render_labelled,
+    render_restless,
     render_video,
     video_info,
     write_video,
@@ -69,6 +70,18 @@ def test_scenery_stands_in_for_the_background():
     for bad in (scenery[:70], scenery.astype(float)):
         with pytest.raises(ValueError, match=r"scenery: must be uint8 .* \(96, 80\), got"):
             render_labelled([[60.0, 40.0]], scene, scenery=bad)
+
+
+def test_a_restless_background_moves_behind_the_target():
+    scene, track = Scene("bricks", size=16, image_size=SMALL), np.full((3, 2), [48.0, 40.0])
+    shifts = np.array([[0, 0], [5, -3], [0, 0]])
+    first, second, third = render_restless(track, scene, shifts, light=[1, 1, 0.5])
+    np.testing.assert_array_equal(first[:20, 5:], second[3:23, :-5])
+    np.testing.assert_array_equal(first[38:43, 46:51], second[38:43, 46:51])
+    np.testing.assert_allclose(third[:20].astype(float), first[:20] / 2, atol=0.51)
+    for bad in (shifts[:2], shifts / 2):
+        with pytest.raises(ValueError, match=r"shifts: must be integers .* \(3, 2\), got"):
+            next(render_restless(track, scene, bad))
 
 
 def test_size_variation_keeps_the_centroid():

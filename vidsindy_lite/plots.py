@@ -337,6 +337,22 @@ def plot_track_errors(errors):
     return figure
 
 
+def plot_loss(loss, steps):
+    """The loss of a training over its steps.
+
+    Parameters
+    ----------
+    loss : sequence of float
+        Means over blocks of steps.
+    steps : int
+        Length of a block.
+    """
+    figure, axes = plt.subplots()
+    axes.semilogy(steps * (np.arange(len(loss)) + 1), loss)
+    axes.set(xlabel="step", ylabel="loss")
+    return figure
+
+
 def plot_gaps(t, x, truth):
     """A trajectory with missing stretches, shaded over time and left out in space (Fig. S3).
 

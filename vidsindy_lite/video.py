@@ -455,6 +455,38 @@ def render_labelled(track, scene, seed=0, shapes=None, scenery=None) -> Iterator
     return _frames(track, scene, seed, shapes, scenery)
 
 
+def render_restless(track, scene, shifts, light=None, seed=0) -> Iterator[np.ndarray]:
+    """Frames as of `render`, of a scene whose background moves and whose light changes.
+
+    Parameters
+    ----------
+    track, scene, seed
+        See `render`; the target keeps its pose.
+    shifts : (n, 2) array of int
+        Where the view has moved to over the background in each frame, pixels (u, v).
+    light : (n,) array, optional
+        Factor of the background's brightness in each frame.
+
+    Yields
+    ------
+    frame : (height, width, 3) uint8, blue-green-red
+    """
+    track, shifts = check_array("track", track), np.asarray(shifts)
+    if shifts.shape != track.shape or shifts.dtype.kind != "i":
+        raise ValueError(
+            f"shifts: must be integers of the track's shape {track.shape}, "
+            f"got {shifts.dtype} of shape {shifts.shape}"
+        )
+    light = np.ones(len(track)) if light is None else check_array("light", light)
+    corners = shifts - shifts.min(axis=0)
+    width, height = scene.image_size
+    size = (width, height) + corners.max(axis=0)
+    large = BACKGROUNDS[scene.background](np.random.default_rng(seed), tuple(map(int, size)))
+    for place, (u, v), factor in zip(track, corners, light, strict=True):
+        scenery = cv2.convertScaleAbs(large[v:v + height, u:u + width], alpha=factor)
+        yield next(render_labelled(place[None], scene, seed, scenery=scenery)).frame
+
+
 def _frames(track, scene, seed, shapes, scenery):
     spawned = np.random.SeedSequence(seed).spawn(3)
     layout, motion, noise = (np.random.default_rng(s) for s in spawned)
