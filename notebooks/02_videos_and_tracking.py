@@ -399,10 +399,10 @@ cases = {
 # %%
 found, last = {}, []
 for name, (background, shifts, brightness) in cases.items():
-    scene = Scene(background, "irregular", size=20, shape_seed=seed)
-    clip = render_restless(truth, scene, shifts, brightness, seed)
+    view = Scene(background, "irregular", size=20, shape_seed=seed)
+    clip = render_restless(truth, view, shifts, brightness, seed)
     path = write_video(Path(folder.name) / "restless.mkv", clip)
-    last.append(list(islice(read_video(path), middle, middle + 1))[0])
+    last.append(next(islice(read_video(path), middle, None)))
     found[name] = {way: follow(path, way) for way in ("background", "learned", "auto")}
     print(f"{name}: auto takes {found[name]['auto'].detector}", *found[name]["auto"].warnings, sep="\n  ")
 
