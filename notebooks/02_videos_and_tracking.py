@@ -364,7 +364,7 @@ assert np.median([np.sqrt(np.nanmean(error**2)) for error in drawn]) < 0.15
 # the anchors under the bell are to know the centroid $\mathbf c^*$:
 #
 # $$\mathcal L=\frac{\sum(y-p)^2\,H(y,p)}{\sum y}+\frac{\sum y\,\|\mathbf a+4\mathbf d-\mathbf c^*\|_1/4}{\sum y}
-# +\text{the same for the logarithm of the size},$$
+# +\text{half of the same for the logarithm of the size},$$
 #
 # with $H$ the cross entropy, which $(y-p)^2$ mutes where the network is right already. In use, the
 # answers that agree are averaged: that is where the fractions of a pixel come from.

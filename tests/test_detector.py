@@ -9,7 +9,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tiny_onnx import write_red_detector
+from tiny_onnx import BOX, write_red_detector
 
 from vidsindy_lite import training
 from vidsindy_lite.__main__ import main
@@ -154,7 +154,7 @@ def test_an_onnx_model_sees_frames_of_any_size(tmp_path, size):
     (found,) = detections(detector.predict(frame))
     np.testing.assert_allclose(found.centre, [115.5, 75.5], atol=0.25 * STRIDE)
     scale = min(size[0] / 256, size[1] / 192)
-    np.testing.assert_allclose(found.size, 24 / scale)
+    np.testing.assert_allclose(found.size, BOX / scale)
 
 
 def test_bad_onnx_files(tmp_path):

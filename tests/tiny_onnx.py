@@ -9,6 +9,7 @@ import struct
 import numpy as np
 
 STRIDE = 8
+BOX = 96  # pixels: every box is so large that all which see red agree
 
 
 def _varint(n):
@@ -59,7 +60,7 @@ def write_red_detector(path, size, batch=1, rows=5):
     weight = np.ones((1, 3, STRIDE, STRIDE), np.float32) * 20 / STRIDE**2
     weight[0, 1:] *= -0.5  # red, green, blue: the more red than other
     v, u = np.mgrid[STRIDE / 2:height:STRIDE, STRIDE / 2:width:STRIDE].reshape(2, n)
-    boxes = np.stack([u, v, *np.full((rows - 3, n), 24.0)])[None, :rows - 1].astype(np.float32)
+    boxes = np.stack([u, v, *np.full((rows - 3, n), BOX)])[None, :rows - 1].astype(np.float32)
     constants = {
         "weight": weight, "bias": np.array([-5], np.float32), "boxes": boxes,
         "shape": np.array([1, 1, n]),

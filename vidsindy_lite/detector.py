@@ -198,13 +198,14 @@ class OnnxDetector:
             raise ValueError(
                 f"detector: must be an ONNX file that OpenCV can run, got '{self.path}': {error}"
             ) from None
-        shape = re.findall(r"<Input> \w+ \[1 x 3 x (\d+) x (\d+)\]", self.network.dump())
+        # OpenCV tells the shape of an input only in its description of the whole network.
+        shape = set(re.findall(r"<Input> \w+ \[1 x 3 x (\d+) x (\d+)\]", self.network.dump()))
         if len(shape) != 1:
             raise ValueError(
                 "detector: must take one image of fixed shape (1, 3, height, width), got another "
                 f"input in '{self.path}'"
             )
-        self.height, self.width = map(int, shape[0])
+        self.height, self.width = map(int, shape.pop())
 
     def predict(self, image: np.ndarray) -> np.ndarray:
         """Predictions, (5, n), for an image (height, width, 3) uint8, blue-green-red."""
