@@ -146,15 +146,17 @@ def test_missing_weights(tmp_path):
 # -------------------------------------------------------------------------------------------- ONNX
 
 
-@pytest.mark.parametrize("size", [(128, 96), (256, 256), (320, 160)])
+@pytest.mark.parametrize("size", [(128, 96), (256, 256), (288, 192), (512, 512)])
 def test_an_onnx_model_sees_frames_of_any_size(tmp_path, size):
     detector = OnnxDetector(write_red_detector(tmp_path / "red.onnx", size))
     frame = np.full((192, 256, 3), 90, np.uint8)
-    frame[60:92, 100:132] = (0, 0, 255)  # its centre is at (115.5, 75.5)
-    (found,) = detections(detector.predict(frame))
-    np.testing.assert_allclose(found.centre, [115.5, 75.5], atol=0.25 * STRIDE)
+    frame[64:96, 96:128] = (0, 0, 255)  # whole squares of anchors in all of these sizes
+    found = detector.predict(frame)
+    sure = found[:, found[4] > 0.5]
+    np.testing.assert_allclose(sure[:2].mean(axis=1), [111.5, 79.5], atol=0.01)
     scale = min(size[0] / 256, size[1] / 192)
-    np.testing.assert_allclose(found.size, BOX / scale)
+    np.testing.assert_allclose(sure[2:4], BOX / scale)
+    assert sure.shape[1] == (32 * scale / 8) ** 2  # its anchors are 8 pixels apart
 
 
 def test_bad_onnx_files(tmp_path):

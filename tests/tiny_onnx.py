@@ -9,7 +9,7 @@ import struct
 import numpy as np
 
 STRIDE = 8
-BOX = 96  # pixels: every box is so large that all which see red agree
+BOX = 160  # pixels: so large that all which see the same red thing agree
 
 
 def _varint(n):

@@ -30,6 +30,7 @@ _COARSE = 4  # factor by which the image is reduced for the search over the whol
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
 _BORDER = 3  # coarse pixels around a place that show how its surroundings continue
 _OFTEN = 0.1  # share of the samples that must differ from the background to cast doubt on it
+_NEAR = 16  # coarse pixels, within which several things that differ may be one target
 _TOO_LARGE = 0.25  # share of the image that no target fills
 _ROUNDING = 0.05  # grey levels squared; variance of coarse differences without any noise
 _QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
@@ -113,19 +114,24 @@ def _uncover(background, samples, floor):
 
 
 def _unrest(changes, floor):
-    """How much else differs from the background, in areas of the largest thing that does.
+    """How much differs from the background far from the largest thing that does, in its areas.
 
-    Of a target before a background at rest nothing else does: 0. Something that fills much of the
-    image is no target. The median over the samples, given their differences from the background.
+    Of a target before a background at rest nothing does: 0. Something that fills much of the image
+    is no target. The median over the samples, given their differences from the background.
     """
     unrest = []
     for change in changes:
         differs = np.linalg.norm(change, axis=-1) > floor
         _, largest = _components(differs.astype(np.uint8))
-        if largest is not None:
-            area = largest[cv2.CC_STAT_AREA]
-            other = differs.sum() - (area if area < _TOO_LARGE * differs.size else 0)
-            unrest.append(other / area)
+        if largest is None:
+            continue
+        area = largest[cv2.CC_STAT_AREA]
+        far = differs
+        if area < _TOO_LARGE * differs.size:
+            left, top, width, height = largest[:4]
+            v, u = np.ogrid[:differs.shape[0], :differs.shape[1]]
+            far = differs & (np.hypot(u - left - width / 2, v - top - height / 2) > _NEAR)
+        unrest.append(far.sum() / area)
     return float(np.median(unrest)) if unrest else 0.0
 
 

@@ -127,7 +127,7 @@ def follow(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") 
     if model.unrest <= _RESTLESS:
         return _follow_model(video_path, model, doubts)
     doubt = (
-        f"{name}: the background is not at rest: besides the largest thing that moves, "
+        f"{name}: the background is not at rest: far from the largest thing that moves, "
         f"{model.unrest:.1f} times its area changes in a typical frame"
     )
     if detector == "background":
