@@ -392,8 +392,8 @@ light = 1 + 0.1 * np.sin(k / 10)
 cases = {
     "bricks, at rest": ("bricks", still, None),
     "a trembling camera": ("bricks", tremble, None),
-    "a drifting sea": ("sea", drift, None),
-    "sea in changing light": ("sea", drift, light),
+    "drifting, in changing light": ("sea", drift, light),
+    "trembling, in changing light": ("bricks", tremble, light),
 }
 
 # %%
@@ -435,7 +435,7 @@ save_figure("detector_tracks", fig, caption=caption, numbers=dict(zip(names, fla
 # %% [markdown]
 # *One frame of each restless video, with the track that the learned detector found. Before a
 # background at rest the background model is far more exact, which is why `track` asks for the
-# detector only if it sees the background move.*
+# detector only if it sees the background move, and takes it only if it finds the target more often.*
 
 # %% [markdown]
 # ## Gaps

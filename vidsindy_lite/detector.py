@@ -30,7 +30,7 @@ WEIGHTS = Path(__file__).with_name("detector.pt")
 STRIDE = 4
 """Pixels between two anchors."""
 
-_WIDTHS = (16, 16, 48, 80)  # channels at strides 2, 4, 8, 16; multiples of 16 run fastest
+_WIDTHS = (16, 16, 32, 64)  # channels at strides 2, 4, 8, 16; multiples of 16 run fastest
 _COARSEST = 16  # pixels; the sides of an image are multiples of this
 _TYPICAL = 16.0  # pixels; a size of exp(0)
 _RARE = 0.01  # confidence of an untrained network: targets are rare among anchors
@@ -121,7 +121,8 @@ def anchors(rows: int, columns: int) -> torch.Tensor:
 
 def as_input(images: np.ndarray) -> torch.Tensor:
     """Blue-green-red images (b, height, width, 3) uint8 as what the network takes."""
-    planes = torch.from_numpy(np.ascontiguousarray(images[..., ::-1])).permute(0, 3, 1, 2)
+    colours = np.stack([cv2.cvtColor(image, cv2.COLOR_BGR2RGB) for image in images])
+    planes = torch.from_numpy(colours).permute(0, 3, 1, 2)
     return planes.float().div_(255)  # permuted, the channels stay last in memory: the fast order
 
 

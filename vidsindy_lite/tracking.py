@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,7 @@ DETECTORS = ("auto", "background", "learned")
 
 _RESTLESS = 0.3  # unrest above which a background is not at rest; before one at rest it is 0.03
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
+_SAME = 3.0  # pixels, within which two tracks are of the same thing
 _GAIN = 0.3  # of confidence, that a sighting has to exceed to be worth anything
 _GAP = 0.75  # price of a gap, in units of confidence: what is seen for a frame or two is an error
 _JUMP = 2.0  # price of a jump
@@ -75,7 +76,8 @@ def track(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") -
           moves away by about its own width is background.
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
-        * "auto": "learned" if the background is not at rest, else "background".
+        * "auto": "background"; if the background is not at rest, both, and "learned" is taken
+          unless the other finds the same target in as many frames.
 
     Returns
     -------
@@ -118,22 +120,30 @@ def follow(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") 
     if detector not in ("auto", "background"):
         return _link_detections(video_path, _detector(detector), str(detector))
     model = BackgroundModel(sample_frames(video_path))
+    found = _follow_model(video_path, model)
     name, doubts = Path(video_path).name, []
     if model.shake > _SHAKY:
         doubts.append(
             f"{name}: the camera moves, typically by {model.shake:.1f} px or more; its motion is "
             "part of the track"
         )
-    if model.unrest <= _RESTLESS:
-        return _follow_model(video_path, model, doubts)
-    doubt = (
-        f"{name}: the background is not at rest: far from the largest thing that moves, "
-        f"{model.unrest:.1f} times its area changes in a typical frame"
-    )
-    if detector == "background":
-        return _follow_model(video_path, model, [*doubts, doubt])
-    doubts.append(f"{doubt}; the learned detector is used, which is less exact")
-    return _link_detections(video_path, _detector("learned"), "learned", doubts)
+    if model.unrest > _RESTLESS:
+        doubts.append(
+            f"{name}: the background is not at rest; far from the largest thing that moves, "
+            f"{model.unrest:.1f} times its area changes in a typical frame"
+        )
+        if detector == "auto":
+            found = _surer(found, _link_detections(video_path, _detector("learned"), "learned"))
+    return replace(found, warnings=tuple(doubts))
+
+
+def _surer(model: Track, learned: Track) -> Track:
+    """The background model's track if it agrees with the other and has as many frames."""
+    apart = np.linalg.norm(model.pixels - learned.pixels, axis=1)
+    both = np.isfinite(apart)
+    agree = both.any() and np.median(apart[both]) < _SAME
+    more = np.isfinite(model.pixels).sum() >= np.isfinite(learned.pixels).sum()
+    return model if agree and more else learned
 
 
 def check_detector(name: str | os.PathLike) -> None:
@@ -153,22 +163,22 @@ def _detector(name):
     return LearnedDetector() if name == "learned" else OnnxDetector(name)
 
 
-def _follow_model(path, model, doubts):
+def _follow_model(path, model):
     blobs = list(follow_blobs(model, read_video(path)))
     strange = strangeness(blobs)
     centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
     centroids[~whole(strange)] = np.nan
-    return Track(centroids, np.exp(-strange), "background", tuple(doubts))
+    return Track(centroids, np.exp(-strange), "background")
 
 
-def _link_detections(path, detector, name, doubts=()):
+def _link_detections(path, detector, name):
     from .detector import detections
 
     sightings = [detections(detector.predict(frame)) for frame in read_video(path)]
     chain = link(sightings)
     pixels = np.array([d.centre if d else (np.nan, np.nan) for d in chain], float)
     confidence = np.array([d.confidence if d else 0.0 for d in chain])
-    return Track(pixels, confidence, name, tuple(doubts))
+    return Track(pixels, confidence, name)
 
 
 def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
