@@ -56,7 +56,7 @@ frames = {"full": 1500, "quick": 400}[profile]
 
 # %%
 folder = TemporaryDirectory()
-shot = film(system, folder.name, frames, seed)
+shot = film(system, folder.name, frames, seed, suffix=".avi")
 found = discover_from_videos(shot.paths, shot.rig.uncalibrated(keep=0), shot.t)
 print(found.equations("native"))
 

@@ -291,7 +291,7 @@ save_figure("videos_tracker_steps", fig, caption=caption, numbers={"coverage": c
 
 # %%
 def errors_of(scene, stream):
-    path = render_video(Path(folder.name) / "one.mkv", truth, scene, seed=stream)
+    path = render_video(Path(folder.name) / "one.avi", truth, scene, seed=stream)
     return np.linalg.norm(track(path) - truth, axis=1)
 
 
@@ -445,7 +445,7 @@ save_figure("detector_tracks", fig, caption=caption, numbers=dict(zip(names, fla
 
 # %%
 posts = ((160, 0, 40, 512), (330, 0, 40, 512))
-shot = film("SprottF", folder.name, frames, seed, occluders=posts)
+shot = film("SprottF", folder.name, frames, seed, suffix=".avi", occluders=posts)
 seen = [track(path) for path in shot.paths]
 rig = learn_cameras(seen, shot.rig.uncalibrated(keep=0))
 x = reconstruct(seen, rig)

@@ -178,7 +178,7 @@ gaps = [r for r in select(ours, system="SprottF") if r.trial.condition in ("bloc
 assert all(r.score.exact and r.score.l2 < 1e-4 for r in gaps)
 
 # %% [markdown]
-# The error grows with the noise. Missing samples cost next to nothing as long as the others are
+# By and large the error grows with the noise (five trials scatter). Missing samples cost next to nothing as long as the others are
 # exact: what is lost is their number, not their quality.
 #
 # ## PySINDy under the same (Fig. S4)
@@ -193,7 +193,9 @@ robustness("figure_S4", caption, results, ["PySINDy"], system="SprottF")
 
 # %%
 noisy = by_level(select(results, method="PySINDy"), "noise", system="SprottF")
-assert all(not r.score.exact for level, group in noisy.items() if level >= 0.1 for r in group)
+for level, group in noisy.items():
+    print(f"{level:.0%} noise: exact in {sum(r.score.exact for r in group)} of {len(group)} trials")
+assert not any(r.score.exact for level, group in noisy.items() if level >= 0.2 for r in group)
 
 # %% [markdown]
 # ## The other systems (Figs. S5-S10)
@@ -331,8 +333,9 @@ save_table("study_failures", rows, caption=caption)
 # Could they have been found? A term can be told from zero only if its coefficient is several of its
 # standard errors, and the least possible standard error is the Cramér-Rao bound
 # ([notebook 04](04_spline_ado.ipynb)). It grows in proportion to the noise. So for each system, its
-# weakest term sets a level beyond which no method can be expected to find it: where the square of
-# its coefficient, in bounds, is what our method charges for the term.
+# weakest term sets a level beyond which our method cannot be expected to find it, nor any other that
+# is as careful about false terms: where the square of its coefficient, in bounds, is what our method
+# charges for the term.
 
 
 # %%
@@ -417,7 +420,7 @@ caption = f"All methods under noise: means over {len(systems)} systems, {len(tri
 robustness("study_methods_all", caption, every, methods)
 
 # %% [markdown]
-# *The mean over the systems under noise. An $\ell_2$ error of 100 % is what no law at all would
+# *The mean over the systems under noise, two trials each. An $\ell_2$ error of 100 % is what no law at all would
 # have.*
 
 # %%
@@ -445,7 +448,7 @@ for level in noise["noise"][1:]:
 exact = {
     f"{100 * level:.0f} % noise": [r for r in group if r.score.exact]
     for level, group in by_level(ours, "noise").items()
-    if level
+    if level in (0.05, 0.1, 0.2, 0.3, 0.5)
 }
 
 # %%
@@ -520,8 +523,8 @@ assert doubted < 0.2
 
 # %% [markdown]
 # A wrong law without a warning is one that fits the data to within their noise, as the law of
-# Tsucs2 without its weakest term does. No look at the same data can find that out; longer records
-# or less noise can.
+# Tsucs2 without its weakest term does. Its fit gives nothing away; a longer record or less noise
+# would.
 #
 # ## Tracking or regression?
 #
@@ -565,7 +568,7 @@ for row in rows:
 # ## What we learned
 #
 # * Noise is what sets the methods apart. Ours has the smallest error and the largest share of exact
-#   laws at every level, because curve and law are fitted together: all samples take part in every
+#   laws at every level of it, because curve and law are fitted together: all samples take part in every
 #   derivative.
 # * Gaps in exact samples cost our method next to nothing.
 # * The limit is information, and the Cramér-Rao bound knows it in advance: Tsucs2 has one term that
