@@ -16,7 +16,7 @@ FLOORS = [
         "ado", "paper_ado", "baselines", "metrics", "limits",
     },
     {"pipeline", "sweeps"},
-    {"experiments", "audit", "lab"},
+    {"experiments", "audit", "lab", "realistic"},
     {
         "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "artifacts", "runner",
         "__main__",

@@ -388,6 +388,26 @@ def plot_gaps(t, x, truth):
     return figure
 
 
+def plot_confidence(visible, confidence):
+    """How much of the target can be seen in each frame, and how sure the tracker is of it.
+
+    Parameters
+    ----------
+    visible, confidence : sequence of ndarray, shape (n,)
+        In [0, 1], by camera.
+    """
+    figure, panels = plt.subplots(len(visible), 1, figsize=(9, 4.6), sharex=True, sharey=True)
+    for i, (axes, share, sure) in enumerate(zip(panels, visible, confidence, strict=True)):
+        axes.fill_between(
+            np.arange(len(share)), share, color="0.85", step="mid", label="visible share"
+        )
+        axes.plot(sure, color="C0", lw=1, label="confidence of the tracker")
+        axes.set(ylabel=f"camera {i + 1}", ylim=(0, 1.05))
+    panels[-1].set(xlabel="frame", xlim=(0, len(visible[0]) - 1))
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    return figure
+
+
 # ---------------------------------------------------------------------------------- discovered laws
 
 

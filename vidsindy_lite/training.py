@@ -27,7 +27,7 @@ SEEN_SHAPES = ("disc", "polygon")
 """What the detector is trained on. The other backgrounds and shapes are kept to test it."""
 STEPS = 5000
 BATCH = 16
-SIDE = 160
+SIDE = 128
 """Width and height of a training frame, pixels."""
 
 _POOLED = 512  # pixels; width and height of the backgrounds that frames are cut from

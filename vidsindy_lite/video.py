@@ -157,14 +157,34 @@ BACKGROUNDS = {
 }
 
 
-def _occluder(rng, size):
-    """A post (bark) if taller than wide, else a hedge (leaves)."""
+def _bark(rng, size):
     width, height = size
-    if height >= width:
-        light = 66 + 40 * (_texture(rng, size, (4, 8), stretch=(3, 1)) - 0.5)
-        light -= 22 * np.linspace(-1, 1, width, dtype=np.float32) ** 2
-        return _paint(light, -16, 18)
+    light = 66 + 40 * (_texture(rng, size, (4, 8), stretch=(3, 1)) - 0.5)
+    light -= 22 * np.linspace(-1, 1, width, dtype=np.float32) ** 2
+    return _paint(light, -16, 18)
+
+
+def _leaves(rng, size):
     return _paint(70 + 60 * (_texture(rng, size, (16, 32), stretch=(2, 1)) - 0.5), -30, -22)
+
+
+def _tree(rng, size):
+    """A tree in a rectangle: its image, (height, width, 3), and where it is, (height, width).
+
+    A trunk in the middle, and a crown of round tufts in the upper two thirds.
+    """
+    width, height = size
+    crown = np.array([width, 2 * height // 3])
+    v, u = np.mgrid[:height, :width]
+    radii = crown.min() * rng.uniform(0.14, 0.26, 20)
+    angle, reach = rng.uniform(0, 2 * np.pi, 20), np.sqrt(rng.random(20))
+    centres = reach * [np.cos(angle), np.sin(angle)] * (crown[:, None] / 2 - radii)
+    centres += crown[:, None] / 2
+    tufts = zip(*centres, radii, strict=True)
+    leafy = np.any([np.hypot(u - x, v - y) < radius for x, y, radius in tufts], axis=0)
+    trunk = (np.abs(u - (width - 1) / 2) < width / 14) & (v > crown[1] / 2)
+    image = np.where(leafy[..., None], _leaves(rng, size), _bark(rng, size))
+    return image, leafy | trunk
 
 
 # ------------------------------------------------------------------------------------------- scene
@@ -193,6 +213,8 @@ class Scene:
         Variance of the Gaussian image noise, for intensities in [0, 1]; the paper uses 0.01.
     occluders : tuple of (left, top, width, height)
         Rectangles in whole pixels in front of the target: posts if taller than wide, else hedges.
+    trees : tuple of (left, top, width, height)
+        Rectangles that are each filled by a tree in front of the target.
     shape_seed : int
         Chooses the outline, so that several cameras can look at one target.
     image_size : (width, height)
@@ -212,6 +234,7 @@ class Scene:
     size_variation: float = 0.0
     noise_variance: float = 0.0
     occluders: tuple[tuple[int, int, int, int], ...] = ()
+    trees: tuple[tuple[int, int, int, int], ...] = ()
     shape_seed: int = 0
     image_size: tuple[int, int] = (512, 512)
 
@@ -231,17 +254,8 @@ class Scene:
         check_integer("shape_seed", self.shape_seed)
         size = check_image_size(self.image_size, least=64)
         object.__setattr__(self, "image_size", size)
-        occluders = tuple(tuple(o) for o in self.occluders)
-        for occluder in occluders:
-            whole = len(occluder) == 4 and all(x == int(x) for x in occluder)
-            if not whole or min(occluder[:2]) < 0 or min(occluder[2:]) < 4:
-                raise ValueError(
-                    "occluders: each must be whole pixels (left >= 0, top >= 0, width >= 4, "
-                    f"height >= 4), got {occluder}"
-                )
-            if occluder[0] + occluder[2] > size[0] or occluder[1] + occluder[3] > size[1]:
-                raise ValueError(f"occluders: must lie in the {size} image, got {occluder}")
-        object.__setattr__(self, "occluders", occluders)
+        for name in ("occluders", "trees"):
+            object.__setattr__(self, name, _check_rectangles(name, getattr(self, name), size))
 
     @classmethod
     def random(cls, rng, **fixed) -> "Scene":
@@ -286,6 +300,20 @@ class Scene:
         points = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         area, centroid = _area_and_centroid(points)
         return (points - centroid) * np.sqrt(np.pi * self.size**2 / 4 / area)
+
+
+def _check_rectangles(name, rectangles, size):
+    rectangles = tuple(tuple(rectangle) for rectangle in rectangles)
+    for rectangle in rectangles:
+        whole = len(rectangle) == 4 and all(x == int(x) for x in rectangle)
+        if not whole or min(rectangle[:2]) < 0 or min(rectangle[2:]) < 4:
+            raise ValueError(
+                f"{name}: each must be whole pixels (left >= 0, top >= 0, width >= 4, "
+                f"height >= 4), got {rectangle}"
+            )
+        if rectangle[0] + rectangle[2] > size[0] or rectangle[1] + rectangle[3] > size[1]:
+            raise ValueError(f"{name}: must lie in the {size} image, got {rectangle}")
+    return rectangles
 
 
 def _area_and_centroid(polygon):
@@ -497,8 +525,13 @@ def _frames(track, scene, seed, shapes, scenery):
         background = scenery.copy()
     visible = np.ones((height, width), np.float32)
     for left, top, w, h in scene.occluders:
-        background[top:top + h, left:left + w] = _occluder(layout, (w, h))
+        texture = _bark if h >= w else _leaves
+        background[top:top + h, left:left + w] = texture(layout, (w, h))
         visible[top:top + h, left:left + w] = 0
+    for left, top, w, h in scene.trees:
+        image, here = _tree(layout, (w, h))
+        background[top:top + h, left:left + w][here] = image[here]
+        visible[top:top + h, left:left + w][here] = 0
     outline = scene.outline()
     colour = np.array(COLOURS[scene.colour], np.float32)
     sigma = np.float32(255 * np.sqrt(scene.noise_variance))
