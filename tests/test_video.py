@@ -1,5 +1,7 @@
 """Rendering against exact geometry, and video files by round trip and bad input."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -138,6 +140,21 @@ def test_target_behind_an_occluder_and_outside_leaves_no_trace():
     assert not changed[:, 40:60].any()
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tree_hides_what_is_behind_it_and_nothing_else(seed):
+    box = (30, 20, 60, 76)
+    scene = Scene("sky", size=90, colour="magenta", trees=(box,), image_size=(128, 96))
+    empty, full = render([[np.nan, np.nan], [63.5, 47.5]], scene, seed)
+    hidden = (full == empty).all(axis=-1)[27:69, 43:84]  # well inside the disc
+    assert 0.2 < hidden.mean() < 1
+    inside = np.s_[box[1]:box[1] + box[3], box[0]:box[0] + box[2]]
+    bare = next(render([[np.nan, np.nan]], replace(scene, trees=()), seed))
+    changed = (bare != empty).any(axis=-1)
+    assert changed[inside].sum() == changed.sum() > 0
+    assert changed[95, 58:62].all()  # the trunk stands on the lower side
+    assert np.array_equal(changed[27:69, 43:84], hidden)
+
+
 def test_target_across_the_border_is_clipped():
     scene = Scene("plain", size=20, image_size=SMALL)
     empty, corner = render([[np.nan, np.nan], [0, 0]], scene)
@@ -218,7 +235,7 @@ def test_a_failed_write_keeps_the_old_file(tmp_path):
         ("shape_seed", -1), ("shape_seed", 1.5), ("size", True), ("turns", "many"),
         ("image_size", 512), ("image_size", (10, 10)), ("image_size", (512,)),
         ("occluders", ((1, 2, 3),)), ("occluders", ((500, 0, 50, 50),)),
-        ("occluders", ((0, 0, 1, 50),)),
+        ("occluders", ((0, 0, 1, 50),)), ("trees", ((1, 2, 3),)), ("trees", ((0, 500, 50, 50),)),
     ],
 )
 def test_scene_rejects(field, value):

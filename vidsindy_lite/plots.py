@@ -226,7 +226,7 @@ def plot_frames(images, titles, tracks=None, index=0, columns=3):
     tracks : sequence of ndarray, shape (n, 2), optional
         Pixels of the target in all frames of each video.
     index : int
-        Frame number of the images: where the target is on its track.
+        Frame number of the images: where the target is on its track, if it is seen there.
     columns : int
     """
     rows = -(-len(images) // columns)
@@ -242,7 +242,8 @@ def plot_frames(images, titles, tracks=None, index=0, columns=3):
         if tracks is not None:
             halo = withStroke(linewidth=2.4, foreground="white")
             axes.plot(*tracks[k].T, color="C0", lw=1.0, path_effects=[halo])
-            _magnify(axes, image, tracks[k], index)
+            if np.isfinite(tracks[k][index]).all():
+                _magnify(axes, image, tracks[k], index)
     for axes in grid[-1]:
         axes.set_xlabel("u (px)")
     for axes in grid[:, 0]:

@@ -33,16 +33,16 @@ START = (-1.17, -1.1, 1.0)
 """Where the motion begins, in the native frame."""
 DISTURBANCES = {
     "shape": "irregular",
-    "size": 30.0,
     "tumbling": 1.0,
     "size_variation": 0.25,
     "noise_variance": 0.01,
 }
 """What all cameras have to cope with, as fields of `Scene`; the tree differs from view to view."""
 
-_TREE = 120, 340  # width and height of a tree, pixels
+_SIZE = 0.055  # diameter of the target, share of the image's width
+_TREE = 0.24, 0.66  # width and height of a tree, shares of the image
 _WHOLE = 0.999  # visible share from which a view counts as whole: edges are rounded
-_SHIFT = 60  # pixels by which a tree stands off the middle of the image at most
+_SHIFT = 0.12  # of the image: how far from its middle a tree stands at most
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,12 @@ class SceneTask:
         Seed of target, backgrounds, trees, tumbling and noise.
     frames : int
         Per camera.
+    image_size : (width, height)
     """
 
     trial: int = 0
     frames: int = 400
+    image_size: tuple[int, int] = (512, 512)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +143,7 @@ def run(task: SceneTask) -> SceneRun:
     """Film the scene, track it, learn cameras 2 and 3, reconstruct and discover."""
     truth = replace(SYSTEMS["SprottF"], x0=START).shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(task.frames, SAMPLES_PER_PERIOD)
-    rig = Rig.around(x)
+    rig = Rig.around(x, task.image_size)
     views = film(rig, x, task.trial)
     tracks = [view.track.pixels for view in views]
     path = reconstruct(tracks, learn_cameras(tracks, rig.uncalibrated(keep=0)))
@@ -169,7 +171,9 @@ def film(rig: Rig, x: np.ndarray, seed: int = 0) -> tuple[View, ...]:
     for camera, stream in zip(rig.cameras, streams, strict=True):
         rng = np.random.default_rng(stream)
         tree = _tree_before(camera, rng)
-        scene = Scene.random(rng, **common, trees=(tree,), image_size=camera.image_size)
+        size = _SIZE * camera.image_size[0]
+        own = {"size": size, "trees": (tree,), "image_size": camera.image_size}
+        scene = Scene.random(rng, **common, **own)
         views.append(_view(camera.project(x), scene, int(rng.integers(2**31))))
     return tuple(views)
 
@@ -177,8 +181,9 @@ def film(rig: Rig, x: np.ndarray, seed: int = 0) -> tuple[View, ...]:
 def _tree_before(camera, rng):
     """A tree that stands on the lower border, somewhere near the middle."""
     width, height = camera.image_size
-    left = (width - _TREE[0]) // 2 + int(rng.integers(-_SHIFT, _SHIFT + 1))
-    return left, height - _TREE[1], *_TREE
+    across, up = round(_TREE[0] * width), round(_TREE[1] * height)
+    left = round((0.5 + rng.uniform(-_SHIFT, _SHIFT)) * width - across / 2)
+    return left, height - up, across, up
 
 
 def _view(pixels, scene, seed):
