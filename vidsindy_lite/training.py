@@ -25,9 +25,9 @@ from .video import BACKGROUNDS, COLOURS, LabelledFrame, Scene, render_labelled
 SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
 SEEN_SHAPES = ("disc", "polygon")
 """What the detector is trained on. The other backgrounds and shapes are kept to test it."""
-STEPS = 5000
+STEPS = 2000
 BATCH = 16
-SIDE = 128
+SIDE = 96
 """Width and height of a training frame, pixels."""
 
 _POOLED = 512  # pixels; width and height of the backgrounds that frames are cut from
