@@ -281,6 +281,7 @@ def drifting(n):
     return np.column_stack([2 * np.arange(n), np.zeros(n, int)])
 
 
+@pytest.mark.filterwarnings("ignore:.*the camera moves")
 @pytest.mark.parametrize(
     ("background", "motion", "light"),
     [("bricks", shaking, 0.0), ("sea", drifting, 0.1), ("bricks", drifting, 0.0)],
