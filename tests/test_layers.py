@@ -10,13 +10,16 @@ import vidsindy_lite
 FLOORS = [
     {"repository", "checks", "polynomials", "splines", "geometry", "records", "information"},
     {"systems", "sights", "cameras", "perspective", "templates", "published"},
-    {"video", "tracking", "synchrony", "uncertainty", "corruption"},
+    {
+        "video", "background", "detector", "training", "tracking", "synchrony", "uncertainty",
+        "corruption",
+    },
     {
         "smoothing", "collocation", "regression", "frames", "bridges", "trust", "discovery",
         "ado", "paper_ado", "baselines", "metrics", "limits",
     },
     {"pipeline", "sweeps"},
-    {"experiments", "audit", "lab"},
+    {"experiments", "audit", "lab", "realistic"},
     {
         "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "plots_report",
         "report", "artifacts", "runner", "__main__",

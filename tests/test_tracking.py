@@ -5,16 +5,21 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiny_onnx import write_red_detector
 
+from vidsindy_lite.background import _shape
 from vidsindy_lite.cameras import Rig
+from vidsindy_lite.detector import LEAST, Detection
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
-from vidsindy_lite.tracking import _shape, track
+from vidsindy_lite.tracking import follow, link, track
 from vidsindy_lite.video import (
+    BACKGROUNDS,
     COLOURS,
     SHAPES,
     Scene,
     _coverage,
     render,
+    render_restless,
     render_video,
     write_video,
 )
@@ -263,3 +268,154 @@ def test_bad_files(tmp_path):
     empty.touch()
     with pytest.raises(ValueError, match="got the empty file"):
         track(empty)
+
+
+# ------------------------------------------------------------------- restless scenes and detectors
+
+
+def shaking(n, seed=0):
+    return np.random.default_rng(seed).normal(0, 3, (n, 2)).round().astype(int)
+
+
+def drifting(n):
+    return np.column_stack([2 * np.arange(n), np.zeros(n, int)])
+
+
+@pytest.mark.filterwarnings("ignore:.*the camera moves")
+@pytest.mark.parametrize(
+    ("background", "motion", "light"),
+    [("bricks", shaking, 0.0), ("sea", drifting, 0.1), ("bricks", drifting, 0.0)],
+)
+def test_auto_takes_the_learned_detector_where_the_background_moves(
+    tmp_path, background, motion, light
+):
+    truth = winding_path(60)
+    scene = Scene(background, shape="irregular", size=20, image_size=SIZE)
+    light = 1 + light * np.sin(np.arange(60) / 3)
+    path = write_video(tmp_path / "clip.mkv", render_restless(truth, scene, motion(60), light))
+    found = follow(path)
+    assert found.detector == "learned"
+    assert any("the background is not at rest" in w for w in found.warnings)
+    error = np.linalg.norm(found.pixels - truth, axis=1)
+    assert np.isfinite(error).mean() >= 0.97
+    assert np.sqrt(np.nanmean(error**2)) < 1
+    with pytest.warns(UserWarning, match=r"clip\.mkv: the background is not at rest"):
+        classical = np.linalg.norm(track(path, "background") - truth, axis=1)
+    assert np.mean(classical < 1) < np.mean(error < 1) - 0.1
+
+
+def test_auto_keeps_the_background_model_where_it_copes(tmp_path):
+    truth = winding_path(60)
+    scene = Scene("sea", size=20, image_size=SIZE)
+    path = write_video(tmp_path / "clip.mkv", render_restless(truth, scene, drifting(60)))
+    found = follow(path)
+    assert any("the background is not at rest" in w for w in found.warnings)
+    assert found.detector == "background"
+    assert np.linalg.norm(found.pixels - truth, axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize("background", BACKGROUNDS)
+def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
+    scene = Scene(background, size=30, noise_variance=0.01, image_size=SIZE)
+    path = render_video(tmp_path / "clip.mkv", winding_path(40), scene)
+    found = follow(path)
+    assert found.detector == "background"
+    assert found.warnings == ()
+    np.testing.assert_array_equal(found.pixels, follow(path, "background").pixels)
+
+
+def test_a_camera_that_trembles_is_told(tmp_path):
+    scene = Scene("sky", size=20, image_size=SIZE)
+    tremble = np.random.default_rng(1).integers(-1, 2, (60, 2))
+    frames = render_restless(winding_path(60), scene, tremble)
+    path = write_video(tmp_path / "clip.mkv", frames)
+    with pytest.warns(UserWarning, match=r"clip\.mkv: the camera moves, typically by [\d.]+ px"):
+        track(path)
+
+
+def test_the_learned_detector_invents_nothing_behind_a_post(tmp_path):
+    truth = winding_path(150)
+    post = (100, 0, 44, SIZE[1])
+    scene = Scene("bricks", "irregular", size=22, occluders=(post,), image_size=SIZE)
+    found = follow(render_video(tmp_path / "clip.mkv", truth, scene, seed=4), "learned")
+    inside = np.abs(truth[:, 0] - (post[0] + (post[2] - 1) / 2)) < post[2] / 2 - 13
+    assert inside.sum() > 5
+    assert np.isnan(found.pixels[inside]).all()
+    assert (found.confidence[inside] == 0).all()
+    clear = distance_to_rectangle(truth, post) > 16
+    again = np.flatnonzero(np.diff(clear.astype(int)) == 1)[:, None] + np.arange(1, 6)
+    assert np.isfinite(found.pixels[again[again[:, -1] < 150], 0]).any(axis=1).all()
+    assert np.isfinite(found.pixels[clear, 0]).mean() > 0.97
+    assert (found.confidence[clear] >= LEAST).mean() > 0.97
+
+
+def test_a_noisy_video_and_the_learned_detector(tmp_path):
+    truth = winding_path(60)
+    scene = Scene("sea", "irregular", size=22, noise_variance=0.01, image_size=SIZE)
+    difference = track(render_video(tmp_path / "clip.mkv", truth, scene), "learned") - truth
+    assert np.isfinite(difference).mean() >= 0.97
+    assert np.sqrt(np.nanmean(difference**2)) < 0.7
+
+
+def test_any_onnx_model_tracks(tmp_path):
+    truth = winding_path(40)
+    scene = Scene("sea", size=32, image_size=SIZE)
+    path = render_video(tmp_path / "clip.mkv", truth, scene)
+    model = write_red_detector(tmp_path / "red.onnx", (256, 256))
+    found = follow(path, model)
+    assert found.detector == str(model)
+    assert np.isfinite(found.pixels).mean() > 0.9
+    assert np.nanmedian(np.linalg.norm(found.pixels - truth, axis=1)) < 3  # its anchors: 8 px apart
+
+
+def test_confidence_is_that_the_target_is_seen_whole(tmp_path):
+    truth = winding_path()
+    truth[40:50] = np.nan
+    path = render_video(tmp_path / "clip.mkv", truth, Scene("sea", size=20, image_size=SIZE))
+    found = follow(path)
+    assert (found.confidence[40:50] == 0).all()
+    assert (np.delete(found.confidence, np.s_[40:50]) > np.exp(-1)).all()
+    assert found.confidence.max() <= 1
+
+
+@pytest.mark.parametrize("detector", ["yolo", "model.pt", 3, None, np.zeros(2)])
+def test_unknown_detectors(tmp_path, detector):
+    with pytest.raises(ValueError, match="detector: must be one of auto, background, learned, or"):
+        track(tmp_path / "clip.mkv", detector)
+
+
+# ---------------------------------------------------------------------------------- one motion
+
+
+def seen(u, confidence=0.9):
+    return Detection(np.array([u, 50.0]), np.array([20.0, 20.0]), confidence)
+
+
+def places(chain):
+    return [None if d is None else float(d.centre[0]) for d in chain]
+
+
+def test_a_chain_leaves_out_what_does_not_belong():
+    motion = [seen(100 + 5 * i) for i in range(20)]
+    sightings = [[d] for d in motion]
+    sightings[5].insert(0, seen(400, 0.99))  # surer than the target, once
+    sightings[9] = [seen(400, 0.99)]  # instead of it
+    sightings[14] = []
+    expected = places(motion)
+    expected[9] = expected[14] = None
+    assert places(link(sightings)) == expected
+
+
+def test_a_chain_takes_the_target_up_again():
+    motion = [[seen(100 + 5.0 * i)] for i in range(20)] + [[]] * 40
+    motion += [[seen(700 - 5.0 * i)] for i in range(20)]
+    assert places(link(motion)) == [places(m)[0] if m else None for m in motion]
+    assert link([]) == []
+    assert link([[], []]) == [None, None]
+
+
+def test_a_single_sighting_in_a_long_gap_is_not_believed():
+    motion = [[seen(100 + 5.0 * i)] for i in range(20)] + [[] for _ in range(30)]
+    motion += [[seen(200 + 5.0 * i)] for i in range(20)]
+    motion[35] = [seen(300)]
+    assert link(motion)[35] is None

@@ -1,5 +1,7 @@
 """Rendering against exact geometry, and video files by round trip and bad input."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ from vidsindy_lite.video import (
     Scene,
     read_video,
     render,
+    render_labelled,
+    render_restless,
     render_video,
     video_info,
     write_video,
@@ -41,6 +45,45 @@ def test_drawn_centroid_and_area(shape, size, u, v, seed):
     centroid, area = drawn_centroid_and_area(frame, empty, scene.colour)
     assert centroid == pytest.approx([u, v], abs=0.02)
     assert area == pytest.approx(np.pi * size**2 / 4, rel=0.01)
+
+
+def test_labels_of_a_frame():
+    scene = Scene("plain", size=20, occluders=((50, 0, 21, 80),), image_size=SMALL)
+    track = [[30.0, 40.0], [49.5, 40.0], [60.0, 40.0], [-0.5, 40.0], [np.nan, np.nan]]
+    drawn = list(render_labelled(track, scene))
+    whole, half, hidden, cut, absent = drawn
+    for labelled, visible in ((whole, 1), (half, 0.5), (hidden, 0), (cut, 0.5)):
+        np.testing.assert_allclose(labelled.extent, 20, atol=0.02)
+        assert labelled.visible == pytest.approx(visible, abs=1e-6)
+    assert np.isnan(absent.extent).all()
+    assert absent.visible == 0
+    for labelled, frame in zip(drawn, render(track, scene), strict=True):
+        np.testing.assert_array_equal(labelled.frame, frame)
+
+
+def test_scenery_stands_in_for_the_background():
+    scenery = np.random.default_rng(0).integers(0, 255, (80, 96, 3), np.uint8)
+    before = scenery.copy()
+    scene = Scene(occluders=((0, 0, 10, 10),), image_size=SMALL)
+    (drawn,) = render_labelled([[60.0, 40.0]], scene, scenery=scenery)
+    np.testing.assert_array_equal(drawn.frame[:, 10:40], scenery[:, 10:40])
+    assert (drawn.frame[:10, :10] != scenery[:10, :10]).any()
+    np.testing.assert_array_equal(scenery, before)
+    for bad in (scenery[:70], scenery.astype(float)):
+        with pytest.raises(ValueError, match=r"scenery: must be uint8 .* \(96, 80\), got"):
+            render_labelled([[60.0, 40.0]], scene, scenery=bad)
+
+
+def test_a_restless_background_moves_behind_the_target():
+    scene, track = Scene("bricks", size=16, image_size=SMALL), np.full((3, 2), [48.0, 40.0])
+    shifts = np.array([[0, 0], [5, -3], [0, 0]])
+    first, second, third = render_restless(track, scene, shifts, light=[1, 1, 0.5])
+    np.testing.assert_array_equal(first[:20, 5:], second[3:23, :-5])
+    np.testing.assert_array_equal(first[38:43, 46:51], second[38:43, 46:51])
+    np.testing.assert_allclose(third[:20].astype(float), first[:20] / 2, atol=0.51)
+    for bad in (shifts[:2], shifts / 2):
+        with pytest.raises(ValueError, match=r"shifts: must be integers .* \(3, 2\), got"):
+            next(render_restless(track, scene, bad))
 
 
 def test_size_variation_keeps_the_centroid():
@@ -95,6 +138,21 @@ def test_target_behind_an_occluder_and_outside_leaves_no_trace():
     changed = np.any(partly != empty, axis=-1)
     assert changed[:, :40].any()
     assert not changed[:, 40:60].any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tree_hides_what_is_behind_it_and_nothing_else(seed):
+    box = (30, 20, 60, 76)
+    scene = Scene("sky", size=90, colour="magenta", trees=(box,), image_size=(128, 96))
+    empty, full = render([[np.nan, np.nan], [63.5, 47.5]], scene, seed)
+    hidden = (full == empty).all(axis=-1)[27:69, 43:84]  # well inside the disc
+    assert 0.2 < hidden.mean() < 1
+    inside = np.s_[box[1]:box[1] + box[3], box[0]:box[0] + box[2]]
+    bare = next(render([[np.nan, np.nan]], replace(scene, trees=()), seed))
+    changed = (bare != empty).any(axis=-1)
+    assert changed[inside].sum() == changed.sum() > 0
+    assert changed[95, 58:62].all()  # the trunk stands on the lower side
+    assert np.array_equal(changed[27:69, 43:84], hidden)
 
 
 def test_target_across_the_border_is_clipped():
@@ -177,7 +235,7 @@ def test_a_failed_write_keeps_the_old_file(tmp_path):
         ("shape_seed", -1), ("shape_seed", 1.5), ("size", True), ("turns", "many"),
         ("image_size", 512), ("image_size", (10, 10)), ("image_size", (512,)),
         ("occluders", ((1, 2, 3),)), ("occluders", ((500, 0, 50, 50),)),
-        ("occluders", ((0, 0, 1, 50),)),
+        ("occluders", ((0, 0, 1, 50),)), ("trees", ((1, 2, 3),)), ("trees", ((0, 500, 50, 50),)),
     ],
 )
 def test_scene_rejects(field, value):

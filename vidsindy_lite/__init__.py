@@ -14,7 +14,7 @@ from .pipeline import VideoDiscovery, discover_from_videos
 from .polynomials import PolynomialSystem
 from .synchrony import Synchrony, align, learn_lags
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
-from .tracking import track
+from .tracking import Track, follow, track
 from .video import Scene, read_video, render_video, write_video
 
 __all__ = [
@@ -33,6 +33,8 @@ __all__ = [
     "write_video",
     "read_video",
     "track",
+    "follow",
+    "Track",
     "Synchrony",
     "align",
     "learn_lags",

@@ -1,4 +1,4 @@
-"""The command line, ``python -m vidsindy_lite COMMAND``: discover, rig-template, demo and run."""
+"""The command line, ``python -m vidsindy_lite COMMAND``; ``--help`` lists the commands."""
 
 import argparse
 import sys
@@ -57,6 +57,12 @@ Film a target that obeys a known law with three cameras, forget two of them and 
 both again from the video files: the whole pipeline in less than a minute.
 """
 
+TRAIN_DESCRIPTION = """\
+Train the learned detector from scratch on frames that the package renders, and write its weights
+(detector.pt) and the record of the training (detector.json) into the package. A few minutes on one
+core. Stopped, it goes on from its last checkpoint when it is started again.
+"""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
@@ -104,6 +110,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     discover.add_argument(
         "--degree", type=int, default=3, help="highest degree of the polynomials (default: 3)"
+    )
+    discover.add_argument(
+        "--detector",
+        default="auto",
+        metavar="NAME",
+        help="how to find the target: auto, background, learned, or the path of a YOLO-v8 ONNX file "
+        "(default: auto)",
     )
     discover.add_argument("--seed", type=int, default=0, help="of the search (default: 0)")
     discover.set_defaults(command=_discover)
@@ -167,6 +180,17 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument("--frames", type=int, default=500, help="per camera (default: 500)")
     demo.add_argument("--seed", type=int, default=0, help="of scenes and noise (default: 0)")
     demo.set_defaults(command=_demo)
+
+    train = commands.add_parser(
+        "train-detector",
+        help="train the learned detector from scratch",
+        description=TRAIN_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    train.add_argument("--seed", type=int, default=0, help="of weights and frames (default: 0)")
+    train.add_argument("--steps", type=int, help="batches of 16 frames (default: as shipped)")
+    train.add_argument("--output", metavar="FILE", help="weights (default: those of the package)")
+    train.set_defaults(command=_train)
     return parser
 
 
@@ -198,12 +222,14 @@ def _discover(options: argparse.Namespace) -> int:
         rig,
         t,
         lags=options.lag,
+        detector=options.detector,
         degree=options.degree,
         seed=options.seed,
         progress=True,
     )
     told = {"rig file": options.rig, "degree": options.degree, "seed": options.seed}
     told |= {"lags": "learned" if options.lag is None else options.lag}
+    told |= {"detector": options.detector}
     told |= {"frames in a unit of time": options.fps} if options.fps is not None else {}
     write_report(found, options.videos, options.out, told)
     print(found)
@@ -249,6 +275,16 @@ def _demo(options: argparse.Namespace) -> int:
     print(f"the same around the origin ({', '.join(f'{value:.4f}' for value in found.offset)}):")
     print(found.equations("native"))
     print(f"against the truth: {score(found, shot.truth)}")
+    return 0
+
+
+def _train(options: argparse.Namespace) -> int:
+    from vidsindy_lite import training  # torch takes a second to import
+
+    output = training.WEIGHTS if options.output is None else options.output
+    steps = training.STEPS if options.steps is None else options.steps
+    record = training.train(output, options.seed, steps, progress=True)
+    print(f"{record['frames']} frames, loss {record['loss'][0]} to {record['loss'][-1]}: {output}")
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from .cameras import Rig, check_learnable, learn_cameras, learn_normal, reconstr
 from .checks import check_integer, check_path, check_times, check_vector
 from .discovery import Discovery
 from .synchrony import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
-from .tracking import track
+from .tracking import Track, check_detector, follow
 from .uncertainty import systematic_errors
 from .video import VideoInfo, video_info
 
@@ -52,6 +53,7 @@ def discover_from_videos(
     t: np.ndarray | None = None,
     *,
     lags: Sequence[float] | None = None,
+    detector: str | os.PathLike = "auto",
     degree: int = 3,
     seed: int = 0,
     progress: bool = False,
@@ -74,6 +76,8 @@ def discover_from_videos(
     lags : array_like, shape (m,), optional
         By how many frames of the first video each one starts later; only differences count. By
         default they are learned, see `learn_lags`.
+    detector : str or path
+        See `track`.
     degree, seed : int
         See `discover`.
     progress : bool
@@ -82,7 +86,8 @@ def discover_from_videos(
     Returns
     -------
     VideoDiscovery
-        Its first warning is that the rig does not agree with the tracks, if it does not.
+        Its first warnings are that the rig does not agree with the tracks, if it does not, and
+        which backgrounds are not at rest.
 
     Raises
     ------
@@ -94,6 +99,7 @@ def discover_from_videos(
     check_learnable(rig)
     check_integer("degree", degree, 1)
     check_integer("seed", seed)
+    check_detector(detector)
     if isinstance(paths, str) or not isinstance(paths, Iterable):
         raise ValueError(f"paths: must be a list of files, one per camera, got {paths!r:.60}")
     paths = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
@@ -116,7 +122,8 @@ def discover_from_videos(
             )
     t, rates = _clock(shots, t)
     bar = tqdm(list(zip(paths, shots, strict=True)), desc="track", disable=not progress)
-    raw = [_track(path, shot.frames) for path, shot in bar]
+    followed = [_follow(path, shot.frames, detector) for path, shot in bar]
+    raw = [seen.pixels for seen in followed]
     synchrony = learn_lags(raw, rig, rates, start=lags)
     if lags is not None:
         synchrony = _given(lags, synchrony)
@@ -128,6 +135,7 @@ def discover_from_videos(
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
     parts["warnings"] = (
         *_rig_doubts(tracks, learned, rig, paths),
+        *(warning for seen in followed for warning in seen.warnings),
         *synchrony.doubts,
         *found.warnings,
     )
@@ -152,15 +160,16 @@ def _clock(
     return np.arange(shots[0].frames) / fps[0], fps / fps[0]
 
 
-def _track(path: Path, frames: int) -> np.ndarray:
+def _follow(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     """Track a video that should have so many frames and one moving target."""
-    found = track(path)
-    if len(found) != frames:
+    found = follow(path, detector)
+    if len(found.pixels) != frames:
         raise ValueError(
             f"paths: {path.name} must hold the {frames} frames that its header states, got "
-            f"{len(found)} that can be read: the file is cut off or damaged, or its header wrong"
+            f"{len(found.pixels)} that can be read: the file is cut off or damaged, or its header "
+            "wrong"
         )
-    if not np.isfinite(found).any():
+    if not np.isfinite(found.pixels).any():
         raise ValueError(
             f"paths: {path.name} must show one moving target, got none in any frame: what never "
             "moves away from a place by about its own width is taken for background"

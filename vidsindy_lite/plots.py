@@ -226,7 +226,7 @@ def plot_frames(images, titles, tracks=None, index=0, columns=3):
     tracks : sequence of ndarray, shape (n, 2), optional
         Pixels of the target in all frames of each video.
     index : int
-        Frame number of the images: where the target is on its track.
+        Frame number of the images: where the target is on its track, if it is seen there.
     columns : int
     """
     rows = -(-len(images) // columns)
@@ -242,7 +242,8 @@ def plot_frames(images, titles, tracks=None, index=0, columns=3):
         if tracks is not None:
             halo = withStroke(linewidth=2.4, foreground="white")
             axes.plot(*tracks[k].T, color="C0", lw=1.0, path_effects=[halo])
-            _magnify(axes, image, tracks[k], index)
+            if np.isfinite(tracks[k][index]).all():
+                _magnify(axes, image, tracks[k], index)
     for axes in grid[-1]:
         axes.set_xlabel("u (px)")
     for axes in grid[:, 0]:
@@ -337,6 +338,22 @@ def plot_track_errors(errors):
     return figure
 
 
+def plot_loss(loss, steps):
+    """The loss of a training over its steps.
+
+    Parameters
+    ----------
+    loss : sequence of float
+        Means over blocks of steps.
+    steps : int
+        Length of a block.
+    """
+    figure, axes = plt.subplots()
+    axes.semilogy(steps * (np.arange(len(loss)) + 1), loss)
+    axes.set(xlabel="step", ylabel="loss")
+    return figure
+
+
 def plot_gaps(t, x, truth):
     """A trajectory with missing stretches, shaded over time and left out in space (Fig. S3).
 
@@ -369,6 +386,26 @@ def plot_gaps(t, x, truth):
     panels["space"].plot([], [], color="0.85", lw=8, label="hidden")
     _finish(panels["space"], azimuth=-60, elevation=25, zoom=0.85)
     figure.legend(*panels["space"].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return figure
+
+
+def plot_confidence(visible, confidence):
+    """How much of the target can be seen in each frame, and how sure the tracker is of it.
+
+    Parameters
+    ----------
+    visible, confidence : sequence of ndarray, shape (n,)
+        In [0, 1], by camera.
+    """
+    figure, panels = plt.subplots(len(visible), 1, figsize=(9, 4.6), sharex=True, sharey=True)
+    for i, (axes, share, sure) in enumerate(zip(panels, visible, confidence, strict=True)):
+        axes.fill_between(
+            np.arange(len(share)), share, color="0.85", step="mid", label="visible share"
+        )
+        axes.plot(sure, color="C0", lw=1, label="confidence of the tracker")
+        axes.set(ylabel=f"camera {i + 1}", ylim=(0, 1.05))
+    panels[-1].set(xlabel="frame", xlim=(0, len(visible[0]) - 1))
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
 

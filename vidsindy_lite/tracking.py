@@ -1,288 +1,83 @@
 """Where the moving target is in each frame of a video file, to a fraction of a pixel.
 
-Classical: the background is the median over frames spread through the clip; the target is what
-differs from it. Where a frame mixes target and background, its colour lies on the line between the
-two, so that the *coverage* of each pixel,
+Two ways to find it stand behind one call. A *background model* (`background`) knows all frames and
+finds what differs from what is at rest: to 1/100 of a pixel, as long as camera and background stay
+as they are. A *detector* (`detector`) knows what targets look like and finds it in each frame on
+its own, whatever the background does, to a few tenths of a pixel. The paper has one of that kind,
+YOLO-v8; what such a detector sees in the single frames is linked here to one motion.
 
-    alpha = <frame - background, target - background> / |target - background|^2,
-
-is known even along an anti-aliased edge, and the centroid is the mean of the pixel positions
-weighted with it. Being linear in the frame, it stays unbiased under image noise.
-
-A frame gets NaN where the target is not seen whole: behind an occluder or across the image border
-the visible part has another centroid than the target. It also has another *shape*, whereas whole
-views are alike up to rotation and size. The paper tracks with YOLO-v8 instead.
+A frame gets NaN where the target is not seen, or not for sure.
 """
 
-from dataclasses import dataclass
+from __future__ import annotations
 
-import cv2
+import os
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy import ndimage
-from scipy.spatial.distance import cdist
 
-from .video import open_video, read_video, video_info
+from .background import BackgroundModel, follow_blobs, sample_frames, strangeness, whole
+from .video import read_video
 
-_SAMPLES = 21  # frames whose median is the background
-_SEEK_COST = 22  # a jump in a video file costs about as much as decoding this many frames
-_COARSE = 4  # factor by which the image is reduced for the search over the whole frame
-_RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
-_BORDER = 3  # coarse pixels around a place that show how its surroundings continue
-_OFTEN = 0.1  # share of the samples that must differ from the background to cast doubt on it
-_QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
-_BLIND = 0.1  # share of the target's outline that may lie on background of the same colour
-_ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
-_VIEWS = 200  # views among which the commonest one is sought
+if TYPE_CHECKING:
+    from .detector import Detection
 
+DETECTORS = ("auto", "background", "learned")
 
-# -------------------------------------------------------------------------------------- background
-
-
-def _sample_frames(path):
-    """About `_SAMPLES` frames spread evenly over the clip, (m, height, width, 3) uint8."""
-    count = video_info(path).frames
-    wanted = set(np.linspace(0, max(count - 1, 0), _SAMPLES).round().astype(int).tolist())
-    capture = open_video(path)
-    frames = []
-    try:
-        if count > _SEEK_COST * _SAMPLES:
-            for index in sorted(wanted):
-                capture.set(cv2.CAP_PROP_POS_FRAMES, index)
-                more, frame = capture.read()
-                if more:
-                    frames.append(frame)
-        else:
-            index = 0
-            while capture.grab():
-                if index in wanted:
-                    frames.append(capture.retrieve()[1])
-                index += 1
-    finally:
-        capture.release()
-    return np.stack(frames)
+_RESTLESS = 0.3  # unrest above which a background is not at rest; before one at rest it is 0.03
+_SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
+_SAME = 3.0  # pixels, within which two tracks are of the same thing
+_GAIN = 0.15  # of confidence, that a sighting has to exceed to be worth anything
+_GAP = 0.75  # price of a gap, in units of confidence: what is seen for a frame or two is an error
+_JUMP = 2.0  # price of a jump
+_REACH = 2.0, 24.0  # target sizes plus pixels per frame from which a motion is a jump
+_MEMORY = 25  # frames after which the target may be anywhere
 
 
-def _median(frames):
-    """Median over the first axis of uint8 images, by a sorting network (8 times numpy's speed)."""
-    images = list(frames)
-    for step in range(len(images)):
-        for j in range(step % 2, len(images) - 1, 2):
-            low = np.minimum(images[j], images[j + 1])
-            images[j + 1] = np.maximum(images[j], images[j + 1])
-            images[j] = low
-    return images[len(images) // 2]
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The target in each frame of a video.
 
-
-def _reduce(image):
-    """Means over squares of 4 x 4 pixels, as floats."""
-    height, width = image.shape[:2]
-    size = (-(-width // _COARSE), -(-height // _COARSE))
-    return cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-
-
-def _uncover(background, samples, floor):
-    """Correct in place a background that contains the target where it stayed for long.
-
-    Where many samples differ from the background, they show the same place with or without the
-    target. Of the two, the one that continues its surroundings is the background.
-    """
-    change = np.array([_reduce(s) - _reduce(background) for s in samples])
-    differs = np.linalg.norm(change, axis=-1) > floor
-    often = (differs.mean(axis=0) > _OFTEN).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(often)
-    for k in range(1, count):
-        group = differs[:, labels == k].mean(axis=1) > 0.5
-        if group.all() or not group.any():
-            continue
-        left, top, width, height = stats[k, :4]
-        rows = slice(max(top - _BORDER, 0), top + height + _BORDER)
-        columns = slice(max(left - _BORDER, 0), left + width + _BORDER)
-        place = cv2.dilate((labels[rows, columns] == k).astype(np.uint8), np.ones((3, 3), np.uint8))
-        window = np.s_[
-            rows.start * _COARSE:rows.stop * _COARSE, columns.start * _COARSE:columns.stop * _COARSE
-        ]
-        view = background[window]
-        mask = np.kron(place, np.ones((_COARSE, _COARSE), np.uint8))[:view.shape[0], :view.shape[1]]
-        inside = mask > 0
-        expected = cv2.inpaint(view, mask, 3, cv2.INPAINT_TELEA)[inside].astype(float)
-        looks = [_median(samples[g][:, *window])[inside] for g in (group, ~group)]
-        view[inside] = min(looks, key=lambda look: np.abs(look - expected).sum())
-
-
-# --------------------------------------------------------------------------------------- the model
-
-
-@dataclass(frozen=True)
-class _Blob:
-    """One look at the target: centroid (2,) in pixels, visible area, clear of the image border?
-
-    `shape` is None where frame, background and target do not fit together.
+    Parameters
+    ----------
+    pixels : ndarray, shape (n, 2)
+        Centroid of the target, (u right, v down) in pixels, pixel centres at integers; NaN in
+        frames where it is not seen, or only a part of it, or not for sure.
+    confidence : ndarray, shape (n,)
+        From 0, nothing seen, to 1. A detector says how sure it is of each frame; the background
+        model how much the view is like those of the whole target.
+    detector : str
+        What found it: "background", "learned" or the name of an .onnx file.
+    warnings : tuple of str
+        Reasons not to trust the track.
     """
 
-    centroid: np.ndarray
-    area: float
-    inside: bool
-    shape: np.ndarray | None
+    pixels: np.ndarray
+    confidence: np.ndarray
+    detector: str
+    warnings: tuple[str, ...] = ()
 
 
-class _Detector:
-    """Finds the target in a frame, given the background and what the target looks like."""
-
-    def __init__(self, samples):
-        self.background = _median(samples)
-        deviation = [cv2.absdiff(s, self.background)[::3, ::3] for s in samples]
-        self.noise = 1.4826 * float(np.median(deviation))
-        self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
-        _uncover(self.background, samples, self.coarse_floor)
-        self.size = np.array(self.background.shape[1::-1])
-        self.coarse_background = _reduce(self.background)
-        # The difference is smoothed over about the width of the ring: noise falls to a quarter.
-        self.blur = 1.2 if self.noise > _QUIET else 0.0
-        remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
-        self.floor = max(5 * remaining, 12.0)
-        self.contrast = None
-        self._learn_target(samples)
-
-    def _learn_target(self, samples):
-        """Colour and area of the target: the medians over the sampled frames."""
-        looks = []
-        for frame in samples:
-            near = self.search(frame)
-            if near is not None:
-                looks.append(self._look(frame, *near))
-        looks = [look for look in looks if look is not None]
-        if not looks:
-            self.area = 0.0
-            return
-        colour = np.median([look[0] for look in looks], axis=0)
-        self.area = float(np.median([look[1] for look in looks]))
-        self.contrast = (colour - self.background).astype(np.float32)
-        self.square = np.einsum("ijk,ijk->ij", self.contrast, self.contrast)
-        self.blind = self.square < max(self.floor**2, 0.1 * np.median(self.square))
-        self.coarse_contrast = (colour - self.coarse_background).astype(np.float32)
-        self.coarse_square = np.einsum(
-            "ijk,ijk->ij", self.coarse_contrast, self.coarse_contrast
-        )
-
-    def _window(self, centre, half):
-        low = np.clip(np.floor(centre - half).astype(int), 0, self.size - 1)
-        high = np.clip(np.ceil(centre + half).astype(int) + 1, low + 1, self.size)
-        return low, high, np.s_[low[1]:high[1], low[0]:high[0]]
-
-    def _difference(self, frame, window):
-        """Signed difference from the background, and its (smoothed) square summed over colours."""
-        change = frame[window].astype(np.float32) - self.background[window]
-        smooth = cv2.GaussianBlur(change, (0, 0), self.blur) if self.blur else change
-        return change, np.einsum("ijk,ijk->ij", smooth, smooth)
-
-    def _look(self, frame, centre, half):
-        """Colour and rough area of what differs most from the background near `centre`."""
-        _, _, window = self._window(centre, half)
-        _, energy = self._difference(frame, window)
-        mask = (energy > max(self.floor**2, 0.2 * energy.max())).astype(np.uint8)
-        label, stats = _components(mask)
-        if label is None:
-            return None
-        core = (_erode(label) > 0) if _erode(label).any() else label > 0
-        return np.median(frame[window][core], axis=0), stats[cv2.CC_STAT_AREA]
-
-    def search(self, frame):
-        """Centre and half width of the part of the whole frame where the target seems to be."""
-        change = _reduce(frame) - self.coarse_background
-        energy = np.einsum("ijk,ijk->ij", change, change)
-        weight = None
-        if self.contrast is not None:
-            match = np.einsum("ijk,ijk->ij", change, self.coarse_contrast)
-            weight = np.clip(match / (self.coarse_square + self.coarse_floor**2), 0, 1)
-        label, stats = _components((energy > self.coarse_floor**2).astype(np.uint8), weight)
-        if label is None:
-            return None
-        box = stats[[cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP, cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
-        centre = _COARSE * (box[:2] + (box[2:] - 1) / 2) + (_COARSE - 1) / 2
-        return centre, _COARSE * (box[2:].max() / 2 + 1) + 2 * _RING
-
-    def measure(self, frame, centre, half):
-        """The target within `half` pixels of `centre`, or None. -> _Blob"""
-        low, high, window = self._window(centre, half)
-        change, energy = self._difference(frame, window)
-        square = self.square[window]
-        mask = energy > np.maximum(self.floor**2, 0.1 * square)
-        label, stats = _components(mask.astype(np.uint8))
-        if label is None or not 0.2 < stats[cv2.CC_STAT_AREA] / self.area < 5:
-            return None
-        near = cv2.dilate(label, _DISC) > 0
-        match = np.einsum("ijk,ijk->ij", change, self.contrast[window])
-        alpha = match / (square + self.floor**2 / 9)
-        alpha[_erode(label) > 0] = 1
-        alpha[~near] = 0
-        area = float(alpha.sum())
-        if area <= 0:
-            return None
-        u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
-        centre = np.array([alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v]) / area
-        corner = stats[[cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP]]
-        extent = stats[[cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
-        first, last = low + corner, low + corner + extent - 1
-        if ((first == low) & (low > 0)).any() or ((last == high - 1) & (high < self.size)).any():
-            return None  # cut off by the window
-        inside = bool((first > 0).all() and (last < self.size - 1).all())
-        # A background that contains the target hides how far it goes, or makes coverages absurd:
-        # as they lie in [0, 1], their squares (with some noise) cannot sum up to more than they do.
-        blind = self.blind[window][near & (label == 0)].mean() > _BLIND
-        sound = not blind and (alpha**2).sum() < 1.2 * area
-        shape = _shape(alpha, u - centre[0], v - centre[1]) if sound else None
-        return _Blob(low + centre, area, inside, shape)
-
-
-_DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
-
-
-def _erode(label):
-    return cv2.erode(label, _DISC, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-
-
-def _components(mask, weight=None):
-    """Mask and statistics of the connected component of largest area or weight, or two Nones."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    if count < 2:
-        return None, None
-    total = stats[:, cv2.CC_STAT_AREA]
-    if weight is not None:
-        total = np.bincount(labels.ravel(), weight.ravel(), count)
-    largest = 1 + int(np.argmax(total[1:]))
-    return (labels == largest).astype(np.uint8), stats[largest]
-
-
-def _shape(alpha, u, v):
-    """Four numbers that tell shapes apart and stay the same under rotation and change of size.
-
-    With z = u + iv from the centroid, rotation changes only the phase of the complex moments
-    c_pq = sum of alpha z^p conj(z)^q. -> magnitudes of c_11, c_20, c_21, c_30, dimensionless
-    """
-    area = alpha.sum()
-    m = np.vander(v, 4, increasing=True).T @ alpha @ np.vander(u, 4, increasing=True)
-    # The pixels' own extent does not count; no shape has a smaller c_11 than a disc, area^2 / 2 pi.
-    c11 = max(m[0, 2] + m[2, 0] - area / 6, 0.01 * area**2)
-    c20 = m[0, 2] - m[2, 0] + 2j * m[1, 1]
-    c21 = m[0, 3] + m[2, 1] + 1j * (m[1, 2] + m[3, 0])
-    c30 = m[0, 3] - 3 * m[2, 1] + 1j * (3 * m[1, 2] - m[3, 0])
-    cube = c11**1.5 / np.sqrt(area)
-    return np.array([np.log(c11 / area**2), abs(c20) / c11, abs(c21) / cube, abs(c30) / cube])
-
-
-# ------------------------------------------------------------------------------------------- track
-
-
-def track(video_path) -> np.ndarray:
+def track(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") -> np.ndarray:
     """Track the one moving target of a video.
 
     Parameters
     ----------
     video_path : path
-        A video from a camera at rest. The target may turn and change its size, not its shape, and
-        is whole in at least a quarter of the frames that show any of it. It must stay away from
-        each place for at least a fifth of the frames: what never moves away by about its own width
-        is background.
+        A video of one target in colours unlike the background's.
+    detector : {"auto", "background", "learned"} or path
+        * "background": for a camera at rest, the most exact. The target may turn and change its
+          size, not its shape, and is whole in at least a quarter of the frames that show any of
+          it. It must stay away from each place for at least a fifth of the frames: what never
+          moves away by about its own width is background.
+        * "learned": the package's own network, for backgrounds that move or change.
+        * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
+        * "auto": "background"; if the background is not at rest, both, and "learned" is taken
+          unless the other finds the same target in as many frames.
 
     Returns
     -------
@@ -291,59 +86,143 @@ def track(video_path) -> np.ndarray:
         integers; NaN in frames where it is not seen, or only a part of it, or where it cannot be
         told from the background.
 
+    Warns
+    -----
+    UserWarning
+        If the camera or the background is not at rest.
+
     Raises
     ------
     FileNotFoundError, ValueError
-        If the file is missing, empty, not a video, or holds no frame.
+        If the file is missing, empty, not a video, or holds no frame, or if there is no such
+        detector.
+
+    See Also
+    --------
+    follow : the same with a confidence for each frame.
     """
-    detector = _Detector(_sample_frames(video_path))
-    blobs = list(_follow(detector, read_video(video_path)))
+    found = follow(video_path, detector)
+    for warning in found.warnings:
+        warnings.warn(warning, stacklevel=2)
+    return found.pixels
+
+
+def follow(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") -> Track:
+    """Track the one moving target of a video, and say how sure that is.
+
+    Parameters and errors are those of `track`; warnings are part of the result.
+
+    Returns
+    -------
+    Track
+    """
+    check_detector(detector)
+    if detector not in ("auto", "background"):
+        return _link_detections(video_path, _detector(detector), str(detector))
+    model = BackgroundModel(sample_frames(video_path))
+    found = _follow_model(video_path, model)
+    name, doubts = Path(video_path).name, []
+    if model.shake > _SHAKY:
+        doubts.append(
+            f"{name}: the camera moves, typically by {model.shake:.1f} px or more; its motion is "
+            "part of the track"
+        )
+    if model.unrest > _RESTLESS:
+        doubts.append(
+            f"{name}: the background is not at rest; far from the largest thing that moves, "
+            f"{model.unrest:.1f} times its area changes in a typical frame"
+        )
+        if detector == "auto":
+            found = _surer(found, _link_detections(video_path, _detector("learned"), "learned"))
+    return replace(found, warnings=tuple(doubts))
+
+
+def _surer(model: Track, learned: Track) -> Track:
+    """The background model's track if it agrees with the other and has as many frames."""
+    apart = np.linalg.norm(model.pixels - learned.pixels, axis=1)
+    both = np.isfinite(apart)
+    agree = both.any() and np.median(apart[both]) < _SAME
+    more = np.isfinite(model.pixels).sum() >= np.isfinite(learned.pixels).sum()
+    return model if agree and more else learned
+
+
+def check_detector(name: str | os.PathLike) -> None:
+    """The name of a way to find the target, or of an .onnx file."""
+    is_name = isinstance(name, str | os.PathLike)
+    if not is_name or (name not in DETECTORS and Path(name).suffix.lower() != ".onnx"):
+        raise ValueError(
+            f"detector: must be one of {', '.join(DETECTORS)}, or the name of an .onnx file, "
+            f"got {name!r:.60}"
+        )
+
+
+def _detector(name):
+    """The detector of that name. Torch takes a second to import, which most videos do not need."""
+    from .detector import LearnedDetector, OnnxDetector
+
+    return LearnedDetector() if name == "learned" else OnnxDetector(name)
+
+
+def _follow_model(path, model):
+    blobs = list(follow_blobs(model, read_video(path)))
+    strange = strangeness(blobs)
     centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
-    centroids[~_whole(blobs)] = np.nan
-    return centroids
+    centroids[~whole(strange)] = np.nan
+    return Track(centroids, np.exp(-strange), "background")
 
 
-def _follow(detector, frames):
-    """The target in each frame (None if not found): near its predicted position, else anywhere."""
-    position, velocity, age = None, np.zeros(2), 0
-    for frame in frames:
-        blob = None
-        if detector.contrast is not None:
-            if position is not None and age < 3:
-                radius = np.sqrt(detector.area / np.pi)
-                half = 2 * radius + 8 + 0.5 * np.abs(velocity).max()
-                blob = detector.measure(frame, position + (age + 1) * velocity, half)
-            if blob is None:
-                near = detector.search(frame)
-                blob = near and detector.measure(frame, *near)
-        if blob is None or blob.shape is None:
-            age += 1
-        else:
-            if position is not None:
-                velocity = (blob.centroid - position) / (age + 1)
-            position, age = blob.centroid, 0
-        yield blob
+def _link_detections(path, detector, name):
+    from .detector import detections
+
+    sightings = [detections(detector.predict(frame)) for frame in read_video(path)]
+    chain = link(sightings)
+    pixels = np.array([d.centre if d else (np.nan, np.nan) for d in chain], float)
+    confidence = np.array([d.confidence if d else 0.0 for d in chain])
+    return Track(pixels, confidence, name)
 
 
-def _whole(blobs):
-    """Frames (n,) in which the whole target is seen, given its blobs (None = not found).
+def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
+    """At most one sighting of each frame, such that together they are one motion.
 
-    Partial views differ from each other, whole views are alike: in the space of shapes they lie
-    close around one of them, at least a quarter of all views. As far as these also agree in size,
-    it is the target's. A view beside a strange one may be cut a little: it must be twice as close.
+    A chain gains the confidence of its sightings and pays for gaps and for jumps, so that one wrong
+    sighting, however sure, does not pay. Dynamic programming finds the best chain.
+
+    Parameters
+    ----------
+    sightings : sequence of sequence of Detection
+        What is seen in each frame.
+
+    Returns
+    -------
+    chain : list of Detection or None
+        One entry a frame.
     """
-    views = [i for i, b in enumerate(blobs) if b is not None and b.inside]
-    sound = [i for i in views if blobs[i].shape is not None]
-    quarter = len(views) // 4
-    strangeness = np.full(len(blobs), np.inf)
-    if len(sound) > quarter:
-        shape = np.array([blobs[i].shape for i in sound])
-        area = np.array([blobs[i].area for i in sound])
-        distance = cdist(shape[:: 1 + len(shape) // _VIEWS], shape)
-        radius = np.partition(distance, quarter, axis=1)[:, quarter]
-        alike = _ALIKE / np.sqrt(area)
-        odd = distance[radius.argmin()] / np.maximum(alike, 6 * radius.min())
-        size = np.abs(np.log(area / np.median(area[odd < 1])))
-        odd_size = size / np.maximum(alike, 10 * np.median(size[odd < 1]))
-        strangeness[sound] = np.maximum(odd, odd_size)
-    return ~ndimage.binary_propagation(strangeness > 1, mask=strangeness > 0.5)
+    # One row a sighting: frame, centre, size, gain.
+    rows = np.array([
+        (i, *d.centre, d.size.mean(), d.confidence - _GAIN)
+        for i, seen in enumerate(sightings) for d in seen
+    ]).reshape(-1, 5)
+    frame, centre, size, value = rows[:, 0], rows[:, 1:3], rows[:, 3], rows[:, 4].copy()
+    before = np.full(len(rows), -1)
+    old, oldest = -1, 0  # the best end of a chain that is longer ago than the memory
+    for j in range(len(rows)):
+        while frame[oldest] < frame[j] - _MEMORY:
+            old = oldest if old < 0 or value[oldest] > value[old] else old
+            oldest += 1
+        recent = np.arange(oldest, np.searchsorted(frame, frame[j]))
+        gap = frame[j] - frame[recent]
+        distance = np.hypot(*(centre[recent] - centre[j]).T)
+        jump = distance > gap * (_REACH[0] * size[recent] + _REACH[1])
+        worth = value[recent] - _GAP * (gap > 1) - _JUMP * jump
+        if old >= 0:
+            recent, worth = np.append(recent, old), np.append(worth, value[old] - _GAP)
+        if len(worth) and worth.max() > 0:
+            before[j] = recent[worth.argmax()]
+            value[j] += worth.max()
+    chain = [None] * len(sightings)
+    flat = [d for seen in sightings for d in seen]
+    j = int(value.argmax()) if len(rows) else -1
+    while j >= 0:
+        chain[int(frame[j])] = flat[j]
+        j = before[j]
+    return chain

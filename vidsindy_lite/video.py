@@ -157,14 +157,34 @@ BACKGROUNDS = {
 }
 
 
-def _occluder(rng, size):
-    """A post (bark) if taller than wide, else a hedge (leaves)."""
+def _bark(rng, size):
     width, height = size
-    if height >= width:
-        light = 66 + 40 * (_texture(rng, size, (4, 8), stretch=(3, 1)) - 0.5)
-        light -= 22 * np.linspace(-1, 1, width, dtype=np.float32) ** 2
-        return _paint(light, -16, 18)
+    light = 66 + 40 * (_texture(rng, size, (4, 8), stretch=(3, 1)) - 0.5)
+    light -= 22 * np.linspace(-1, 1, width, dtype=np.float32) ** 2
+    return _paint(light, -16, 18)
+
+
+def _leaves(rng, size):
     return _paint(70 + 60 * (_texture(rng, size, (16, 32), stretch=(2, 1)) - 0.5), -30, -22)
+
+
+def _tree(rng, size):
+    """A tree in a rectangle: its image, (height, width, 3), and where it is, (height, width).
+
+    A trunk in the middle, and a crown of round tufts in the upper two thirds.
+    """
+    width, height = size
+    crown = np.array([width, 2 * height // 3])
+    v, u = np.mgrid[:height, :width]
+    radii = crown.min() * rng.uniform(0.14, 0.26, 20)
+    angle, reach = rng.uniform(0, 2 * np.pi, 20), np.sqrt(rng.random(20))
+    centres = reach * [np.cos(angle), np.sin(angle)] * (crown[:, None] / 2 - radii)
+    centres += crown[:, None] / 2
+    tufts = zip(*centres, radii, strict=True)
+    leafy = np.any([np.hypot(u - x, v - y) < radius for x, y, radius in tufts], axis=0)
+    trunk = (np.abs(u - (width - 1) / 2) < width / 14) & (v > crown[1] / 2)
+    image = np.where(leafy[..., None], _leaves(rng, size), _bark(rng, size))
+    return image, leafy | trunk
 
 
 # ------------------------------------------------------------------------------------------- scene
@@ -193,6 +213,8 @@ class Scene:
         Variance of the Gaussian image noise, for intensities in [0, 1]; the paper uses 0.01.
     occluders : tuple of (left, top, width, height)
         Rectangles in whole pixels in front of the target: posts if taller than wide, else hedges.
+    trees : tuple of (left, top, width, height)
+        Rectangles that are each filled by a tree in front of the target.
     shape_seed : int
         Chooses the outline, so that several cameras can look at one target.
     image_size : (width, height)
@@ -212,6 +234,7 @@ class Scene:
     size_variation: float = 0.0
     noise_variance: float = 0.0
     occluders: tuple[tuple[int, int, int, int], ...] = ()
+    trees: tuple[tuple[int, int, int, int], ...] = ()
     shape_seed: int = 0
     image_size: tuple[int, int] = (512, 512)
 
@@ -231,17 +254,8 @@ class Scene:
         check_integer("shape_seed", self.shape_seed)
         size = check_image_size(self.image_size, least=64)
         object.__setattr__(self, "image_size", size)
-        occluders = tuple(tuple(o) for o in self.occluders)
-        for occluder in occluders:
-            whole = len(occluder) == 4 and all(x == int(x) for x in occluder)
-            if not whole or min(occluder[:2]) < 0 or min(occluder[2:]) < 4:
-                raise ValueError(
-                    "occluders: each must be whole pixels (left >= 0, top >= 0, width >= 4, "
-                    f"height >= 4), got {occluder}"
-                )
-            if occluder[0] + occluder[2] > size[0] or occluder[1] + occluder[3] > size[1]:
-                raise ValueError(f"occluders: must lie in the {size} image, got {occluder}")
-        object.__setattr__(self, "occluders", occluders)
+        for name in ("occluders", "trees"):
+            object.__setattr__(self, name, _check_rectangles(name, getattr(self, name), size))
 
     @classmethod
     def random(cls, rng, **fixed) -> "Scene":
@@ -286,6 +300,20 @@ class Scene:
         points = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         area, centroid = _area_and_centroid(points)
         return (points - centroid) * np.sqrt(np.pi * self.size**2 / 4 / area)
+
+
+def _check_rectangles(name, rectangles, size):
+    rectangles = tuple(tuple(rectangle) for rectangle in rectangles)
+    for rectangle in rectangles:
+        whole = len(rectangle) == 4 and all(x == int(x) for x in rectangle)
+        if not whole or min(rectangle[:2]) < 0 or min(rectangle[2:]) < 4:
+            raise ValueError(
+                f"{name}: each must be whole pixels (left >= 0, top >= 0, width >= 4, "
+                f"height >= 4), got {rectangle}"
+            )
+        if rectangle[0] + rectangle[2] > size[0] or rectangle[1] + rectangle[3] > size[1]:
+            raise ValueError(f"{name}: must lie in the {size} image, got {rectangle}")
+    return rectangles
 
 
 def _area_and_centroid(polygon):
@@ -336,16 +364,23 @@ def _coverage(polygon):
 
 
 def _blend(frame, background, visible, alpha, corner, colour):
-    """Blend the target into `frame` in place, over the part of its patch inside the image."""
+    """Blend the target into `frame` in place, over the part of its patch inside the image.
+
+    Returns
+    -------
+    float
+        The area of the target that can be seen, pixels.
+    """
     height, width = visible.shape
     left, top = np.maximum(corner, 0)
     right, bottom = np.minimum(corner + alpha.shape[::-1], (width, height))
     if left >= right or top >= bottom:
-        return
+        return 0.0
     window = np.s_[top:bottom, left:right]
     a = alpha[top - corner[1]:bottom - corner[1], left - corner[0]:right - corner[0]]
     a = (a * visible[window])[..., None]
     frame[window] = np.rint(background[window] * (1 - a) + a * colour)
+    return float(a.sum())
 
 
 def _poses(scene, n, rng):
@@ -384,6 +419,46 @@ def render(track, scene, seed=0, shapes=None) -> Iterator[np.ndarray]:
         If `track` or `shapes` has the wrong shape or infinite values, `scene` is none or `seed`
         is negative.
     """
+    return (drawn.frame for drawn in render_labelled(track, scene, seed, shapes))
+
+
+class LabelledFrame(NamedTuple):
+    """A frame and what a detector has to find in it.
+
+    Parameters
+    ----------
+    frame : ndarray, shape (height, width, 3), uint8
+        Blue-green-red.
+    extent : ndarray, shape (2,)
+        Width and height of the whole target in pixels; NaN in a frame without target.
+    visible : float
+        Share of the target's area that can be seen.
+    """
+
+    frame: np.ndarray
+    extent: np.ndarray
+    visible: float
+
+
+def render_labelled(track, scene, seed=0, shapes=None, scenery=None) -> Iterator[LabelledFrame]:
+    """Frames as of `render`, with what a detector has to find in them.
+
+    Parameters
+    ----------
+    track, scene, seed, shapes
+        See `render`.
+    scenery : ndarray, shape (height, width, 3), uint8, optional
+        An image in the place of the scene's background; occluders are drawn over it.
+
+    Yields
+    ------
+    LabelledFrame
+
+    Raises
+    ------
+    ValueError
+        As of `render`, or if `scenery` is no image of the scene's size.
+    """
     check_instance("scene", scene, Scene)
     seed = check_integer("seed", seed)
     track = check_array("track", track)
@@ -398,32 +473,81 @@ def render(track, scene, seed=0, shapes=None) -> Iterator[np.ndarray]:
             f"shapes: must be finite, of shape ({len(track)}, 2, 2), got shape {shapes.shape} and "
             f"{np.sum(~np.isfinite(shapes))} other values"
         )
-    return _frames(track, scene, seed, shapes)
+    if scenery is not None:
+        scenery = np.asarray(scenery)
+        if scenery.shape != (*scene.image_size[::-1], 3) or scenery.dtype != np.uint8:
+            raise ValueError(
+                f"scenery: must be uint8 of the scene's image size {scene.image_size}, "
+                f"got {scenery.dtype} of shape {scenery.shape}"
+            )
+    return _frames(track, scene, seed, shapes, scenery)
 
 
-def _frames(track, scene, seed, shapes):
-    spawned = np.random.SeedSequence(seed).spawn(3)
-    scenery, motion, noise = (np.random.default_rng(s) for s in spawned)
+def render_restless(track, scene, shifts, light=None, seed=0) -> Iterator[np.ndarray]:
+    """Frames as of `render`, of a scene whose background moves and whose light changes.
+
+    Parameters
+    ----------
+    track, scene, seed
+        See `render`; the target keeps its pose.
+    shifts : (n, 2) array of int
+        Where the view has moved to over the background in each frame, pixels (u, v).
+    light : (n,) array, optional
+        Factor of the background's brightness in each frame.
+
+    Yields
+    ------
+    frame : (height, width, 3) uint8, blue-green-red
+    """
+    track, shifts = check_array("track", track), np.asarray(shifts)
+    if shifts.shape != track.shape or shifts.dtype.kind != "i":
+        raise ValueError(
+            f"shifts: must be integers of the track's shape {track.shape}, "
+            f"got {shifts.dtype} of shape {shifts.shape}"
+        )
+    light = np.ones(len(track)) if light is None else check_array("light", light)
+    corners = shifts - shifts.min(axis=0)
     width, height = scene.image_size
-    background = BACKGROUNDS[scene.background](scenery, scene.image_size)
+    size = (width, height) + corners.max(axis=0)
+    large = BACKGROUNDS[scene.background](np.random.default_rng(seed), tuple(map(int, size)))
+    for place, (u, v), factor in zip(track, corners, light, strict=True):
+        scenery = cv2.convertScaleAbs(large[v:v + height, u:u + width], alpha=factor)
+        yield next(render_labelled(place[None], scene, seed, scenery=scenery)).frame
+
+
+def _frames(track, scene, seed, shapes, scenery):
+    spawned = np.random.SeedSequence(seed).spawn(3)
+    layout, motion, noise = (np.random.default_rng(s) for s in spawned)
+    width, height = scene.image_size
+    if scenery is None:
+        background = BACKGROUNDS[scene.background](layout, scene.image_size)
+    else:
+        background = scenery.copy()
     visible = np.ones((height, width), np.float32)
     for left, top, w, h in scene.occluders:
-        background[top:top + h, left:left + w] = _occluder(scenery, (w, h))
+        texture = _bark if h >= w else _leaves
+        background[top:top + h, left:left + w] = texture(layout, (w, h))
         visible[top:top + h, left:left + w] = 0
+    for left, top, w, h in scene.trees:
+        image, here = _tree(layout, (w, h))
+        background[top:top + h, left:left + w][here] = image[here]
+        visible[top:top + h, left:left + w][here] = 0
     outline = scene.outline()
     colour = np.array(COLOURS[scene.colour], np.float32)
     sigma = np.float32(255 * np.sqrt(scene.noise_variance))
     poses = zip(track, shapes, *_poses(scene, len(track), motion), strict=True)
     for centre, shape, angle, scale in poses:
-        frame = background.copy()
+        frame, extent, seen = background.copy(), np.full(2, np.nan), 0.0
         if np.isfinite(centre).all():
             turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-            alpha, corner = _coverage(centre + scale * outline @ turn @ shape.T)
-            _blend(frame, background, visible, alpha, corner, colour)
+            polygon = centre + scale * outline @ turn @ shape.T
+            alpha, corner = _coverage(polygon)
+            extent = np.ptp(polygon, axis=0)
+            seen = _blend(frame, background, visible, alpha, corner, colour) / alpha.sum()
         if sigma > 0:
             grain = sigma * noise.standard_normal(frame.shape, np.float32)
             frame = cv2.add(frame, grain, dtype=cv2.CV_8U)
-        yield frame
+        yield LabelledFrame(frame, extent, seen)
 
 
 def render_video(path, track, scene, fps=25, seed=0, shapes=None) -> Path:

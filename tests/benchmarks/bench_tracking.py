@@ -10,8 +10,19 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.tracking import track
-from vidsindy_lite.video import BACKGROUNDS, Scene, read_video, render_video
+from vidsindy_lite.detector import LearnedDetector, detections
+from vidsindy_lite.tracking import follow, track
+from vidsindy_lite.training import SEEN_BACKGROUNDS, SEEN_SHAPES
+from vidsindy_lite.video import (
+    BACKGROUNDS,
+    SHAPES,
+    Scene,
+    read_video,
+    render,
+    render_restless,
+    render_video,
+    write_video,
+)
 
 FRAMES = 1500
 REPEATS = 3
@@ -75,3 +86,65 @@ def test_unseen_random_scenes(tmp_path):
     for error in errors:
         assert np.isfinite(error).mean() >= 0.99
         assert np.nanmedian(error) <= 0.15
+
+
+@pytest.mark.parametrize("seed", range(400, 403))
+def test_noise(tmp_path, seed):
+    truth = lorenz_track(seed)[:300]
+    scene = Scene.random(seed, noise_variance=0.01)
+    path = render_video(tmp_path / "clip.avi", truth, scene, seed=seed)
+    for detector in ("auto", "learned"):
+        error = np.linalg.norm(track(path, detector) - truth, axis=1)
+        rms = np.sqrt(np.nanmean(error**2))
+        print(f"\n{detector}: rms {rms:.3f} px, found {np.isfinite(error).mean():.3f}", end="")
+        assert rms <= (0.5 if detector == "auto" else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("background", "light"), [("bricks", 0.0), ("bricks", 0.1), ("sea", 0.1), ("hills", 0.1)]
+)
+@pytest.mark.parametrize("motion", ["tremble", "drift"])
+def test_restless(tmp_path, background, light, motion):
+    truth, k = lorenz_track(500)[:200], np.arange(200)
+    shifts = np.random.default_rng(500).normal(0, 3, (200, 2)).round().astype(int)
+    if motion == "drift":
+        shifts = np.column_stack([2 * k, 0 * k])
+    scene = Scene(background, "irregular", size=20, shape_seed=500)
+    frames = render_restless(truth, scene, shifts, 1 + light * np.sin(k / 10), seed=500)
+    path = write_video(tmp_path / "clip.avi", frames)
+    found = {name: follow(path, name) for name in ("background", "learned", "auto")}
+    error = {name: np.linalg.norm(f.pixels - truth, axis=1) for name, f in found.items()}
+    print(f"\n{background}, {motion}, light {light}: auto takes {found['auto'].detector}", end="")
+    for name, values in error.items():
+        rms = np.sqrt(np.nanmean(values**2))
+        print(f"; {name} {np.mean(values < 1):.3f} within 1 px, rms {rms:.3f} px", end="")
+    assert found["auto"].warnings
+    assert np.sqrt(np.nanmean(error["learned"] ** 2)) <= 1
+    assert np.mean(error["learned"] < 2) >= 0.97
+    assert np.mean(error["auto"] < 2) >= 0.97
+
+
+@pytest.mark.parametrize("variance", [0, 0.01])
+def test_learned_detector_on_unseen_kinds_of_scenes(variance):
+    detector = LearnedDetector()
+    backgrounds = sorted(set(BACKGROUNDS) - set(SEEN_BACKGROUNDS))
+    shapes = sorted(set(SHAPES) - set(SEEN_SHAPES))
+    errors, times = [], []
+    for seed in range(300, 330):
+        rng = np.random.default_rng(seed)
+        fixed = {"background": str(rng.choice(backgrounds)), "shape": str(rng.choice(shapes))}
+        scene = Scene.random(rng, noise_variance=variance, **fixed)
+        truth = rng.uniform(30, 481, (10, 2))
+        for frame, true in zip(render(truth, scene, seed), truth, strict=True):
+            began = time.perf_counter()
+            found = detections(detector.predict(frame))
+            times.append(time.perf_counter() - began)
+            errors.append(np.linalg.norm(found[0].centre - true) if found else np.inf)
+    errors = np.array(errors)
+    print(
+        f"\nvariance {variance}: median {np.median(errors):.3f} px, found "
+        f"{np.mean(errors < 5):.4f}, {1e3 * np.median(times):.1f} ms a frame"
+    )
+    assert np.median(errors) <= 0.5
+    assert np.mean(errors < 5) >= 0.99
+    assert np.median(times) < 0.03

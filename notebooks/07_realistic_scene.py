@@ -1,0 +1,252 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # The realistic scene: a tumbling target behind trees
+#
+# In this notebook, we present the hardest videos of the paper: an irregular target tumbles, comes
+# nearer and recedes, the images are noisy, and a tree stands in the way of every camera. From them
+# the equations are discovered as before, by the same calls.
+#
+# **What you will see**
+#
+# * the scene, with the tracks over the frames;
+# * what the tracker says of a target that vanishes behind a tree, and how fast it is found again;
+# * the reconstructed path with its gaps;
+# * the equations, term by term with standard errors, in five trials.
+#
+# **What you need**: the [tour](00_tour.ipynb); how the target is tracked is the subject of
+# [notebook 02](02_videos_and_tracking.ipynb).
+#
+# **Covers** Fig. 4 and Appendix "Simulating Realistic Scenarios".
+
+# %% tags=["parameters"]
+profile: str = "full"  # full or quick
+seed: int = 0  # number of the first trial: seeds targets, backgrounds, trees and noise
+jobs: int = 2  # trials at a time
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from vidsindy_lite import plots
+from vidsindy_lite.artifacts import save_figure, save_table
+from vidsindy_lite.metrics import pulls
+from vidsindy_lite.realistic import DISTURBANCES, START, SceneTask, run
+from vidsindy_lite.sweeps import sweep
+from vidsindy_lite.systems import SYSTEMS
+
+plt.style.use("vidsindy_lite.vidsindy")
+full = profile == "full"
+frames = 400 if full else 250
+trials = range(seed, seed + (5 if full else 1))
+
+# %% [markdown]
+# ## The scene
+#
+# The paper takes SprottF and lets it start at (-1.17, -1.1, 1). Every camera sees a target of irregular
+# shape that turns at random, changes in size as if it came nearer and receded, and is covered by image
+# noise of variance 0.01 (for intensities from 0 to 1). All else that the paper leaves open is drawn at
+# random: shape and colour of the target, backgrounds, the trees and where they stand.
+
+# %%
+print(SYSTEMS["SprottF"].text(), f"from {START}", sep="\n")
+for name, value in DISTURBANCES.items():
+    print(f"{name:15} {value}")
+
+# %% [markdown]
+# `run` makes the videos, tracks them, learns cameras 2 and 3, reconstructs the path and discovers the
+# law. Nothing is told to it but the times of the frames, where the cameras stand, and the calibration of
+# the first. Each trial has another scene.
+
+# %%
+runs = sweep(run, [SceneTask(n, frames) for n in trials], jobs=jobs, desc="trials")
+first = runs[0]
+
+# %%
+images = [view.image for view in first.views]
+tracks = [view.track.pixels for view in first.views]
+titles = [f"camera {i}" for i in (1, 2, 3)]
+fig = plots.plot_frames(images, titles, tracks, frames // 2)
+caption = "The realistic scene: one frame of each video, with the track of the target."
+save_figure("fig_4a", fig, caption=caption, numbers=dict(zip(titles, tracks, strict=True)))
+
+# %% [markdown]
+# *Fig. 4a: one frame of each video of the first trial, with the track over it and the target magnified.
+# The track breaks off where the tree is.*
+
+# %% [markdown]
+# ## Behind the tree
+#
+# A tracker may lose what it cannot see. It must not invent it, and it should find it again. The target
+# may also be seen in part, through the leaves or beside the trunk; what can be seen then has another
+# centroid than the target, so these views are not trusted either. Cameras and backgrounds are at rest
+# here, and so the tracker keeps to its background model.
+
+# %%
+views = [view for run in runs for view in run.views]
+assert all(view.track.detector == "background" for view in views)
+assert all(view.track.warnings == () for view in views)
+
+# %%
+fig = plots.plot_confidence(
+    [view.visible for view in first.views], [view.track.confidence for view in first.views]
+)
+caption = "How much of the target can be seen, and how sure the tracker is."
+numbers = {title: view.track.confidence for title, view in zip(titles, first.views, strict=True)}
+save_figure("scene_confidence", fig, caption=caption, numbers=numbers)
+
+# %% [markdown]
+# *Where the tree hides the target (white between the grey), the confidence is zero. It is low for partial
+# views, and it varies with the noise even where all of the target is seen.*
+
+# %%
+rows = []
+for n, trial in zip(trials, runs, strict=True):
+    for i, view in enumerate(trial.views, start=1):
+        error, hidden = view.errors, view.hidden
+        rows.append({
+            "trial": n, "camera": i, "background": view.scene.background,
+            "hidden (%)": 100 * hidden.mean(),
+            "found while hidden": int(np.isfinite(error[hidden]).sum()),
+            "frames until found again": int(view.delays.max(initial=0)),
+            "found (%)": 100 * np.isfinite(error).mean(),
+            "rms error (px)": np.sqrt(np.nanmean(error**2)),
+            "largest error (px)": np.nanmax(error),
+        })  # fmt: skip
+save_table("scene_tracks", rows, caption="Tracks of the realistic scene, by trial and camera.")
+
+# %%
+assert sum(row["hidden (%)"] > 0 for row in rows) > len(rows) / 2
+assert all(row["found while hidden"] == 0 for row in rows)
+assert all(row["frames until found again"] <= 5 for row in rows)
+assert all(row["rms error (px)"] <= 0.5 for row in rows)
+
+# %% [markdown]
+# Not one position is invented while the target is hidden. Errors of more than a pixel are rare; they are
+# views in which a little of the target is missing, which the noise conceals.
+
+# %%
+whole = np.concatenate([view.errors[view.visible == 1] for view in views])
+error = np.concatenate([view.errors for view in views])
+off = np.mean(error[np.isfinite(error)] > 1)
+print(f"off by more than 1 px: {off:.2%} of all positions, of whole views {np.nanmax(whole):.2f} px at most")
+assert off < 0.01
+
+# %% [markdown]
+# ## The path
+#
+# Two cameras suffice for a point in space. So a single tree makes no gap; the shaded intervals are those
+# in which two trees, or the views that were not trusted, leave fewer than two.
+
+# %%
+gap = np.isnan(first.path).any(axis=1)
+alone = [np.isnan(view.track.pixels).any(axis=1).mean() for view in first.views]
+print(f"no position in {gap.mean():.0%} of the frames; single cameras: {', '.join(f'{a:.0%}' for a in alone)}")
+error = np.sqrt(np.nanmean((first.path - first.x) ** 2, axis=0))
+print(f"rms error of the path: {error} scene units, where it spreads by {first.x.std(axis=0)}")
+assert 0 < gap.mean() < np.mean(alone)
+assert (error < 0.01 * first.x.std(axis=0)).all()
+
+# %%
+fig = plots.plot_gaps(first.t, first.path, first.x)
+caption = "The reconstructed path of the realistic scene; shaded: hidden from all cameras but one."
+save_figure("fig_4b", fig, caption=caption, numbers={"t": first.t, "path": first.path, "truth": first.x})
+
+# %% [markdown]
+# *Fig. 4b: the reconstructed path over time and in space, with the truth (dashed). Shaded: no two cameras
+# found the target.*
+
+# %% [markdown]
+# ## The equations
+#
+# Gaps are left out, not filled: the spline has one piece for each stretch of data, and the law that all
+# pieces obey carries the curve across ([notebook 04](04_spline_ado.ipynb)).
+
+# %%
+print(f"native frame, offset {first.found.offset.round(4)}:", first.found.equations("native"), sep="\n")
+print("\nin the frame of the cameras:", first.found.equations(), "\ntruth:", first.truth.text(), sep="\n")
+
+# %%
+fig = plots.plot_coefficients(first.found, first.truth)
+caption = "Errors of the coefficients of the realistic scene, with their standard errors."
+save_figure("scene_coefficients", fig, caption=caption, numbers={"pulls": pulls(first.found, first.truth)})
+
+# %% [markdown]
+# *How far each coefficient is from the truth, with its standard error.*
+
+# %%
+rows = [
+    {
+        "trial": n, "exact terms": trial.score.exact, "l2 (e-2)": 100 * trial.score.l2,
+        "worst coefficient (%)": 100 * trial.score.max_coefficient_error,
+        "gaps (%)": 100 * np.isnan(trial.path).any(axis=1).mean(),
+        "status": trial.found.status, "seconds for the law": trial.seconds,
+    }
+    for n, trial in zip(trials, runs, strict=True)
+]  # fmt: skip
+save_table("scene_equations", rows, caption="Laws discovered from the realistic scene, by trial.")
+
+# %%
+assert all(trial.score.exact for trial in runs)
+assert all(trial.score.l2 <= 2e-2 for trial in runs)
+
+# %% [markdown]
+# ## What we learned
+#
+# * Tumbling, change of size, image noise and trees leave the terms as they are: in every trial exactly
+#   those of SprottF, with errors far below a percent.
+# * The tracker says when it does not know: nothing is found while the target is hidden, and it is found
+#   again within five whole views.
+# * Three cameras are more than the geometry needs. What one of them loses the other two replace.
+#
+# **What the paper says and what we found.**
+#
+# * The paper shows that the equations can be found under these conditions and prints neither them nor
+#   their errors, so there is no number to compare with.
+# * It says that the law is found "from sparse observation points". So it is here; what makes it possible
+#   is that gaps are no obstacle for a law, as long as it can be carried across them.
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** How much of the error comes from the noise? Film the first trial without it.
+#
+# <details><summary>Solution</summary>
+#
+# ```python
+# from vidsindy_lite import realistic
+#
+# realistic.DISTURBANCES["noise_variance"] = 0.0
+# quiet = realistic.run(SceneTask(seed, frames))
+# print(quiet.score, [np.sqrt(np.nanmean(view.errors**2)) for view in quiet.views])
+# ```
+#
+# QUIET
+# </details>
+#
+# **2.** Only the first two cameras were there. Does the law survive?
+#
+# <details><summary>Solution</summary>
+#
+# ```python
+# from vidsindy_lite import Rig, discover, learn_cameras, reconstruct, score
+#
+# pair = Rig(Rig.around(first.x).uncalibrated(keep=0).cameras[:2])
+# path = reconstruct(tracks[:2], learn_cameras(tracks[:2], pair))
+# print(np.isnan(path).any(axis=1).mean(), score(discover(first.t, path), first.truth))
+# ```
+#
+# PAIR
+# </details>

@@ -1,0 +1,382 @@
+"""The background model: what differs from a background at rest is the target, to 1/100 of a pixel.
+
+The background is the median over frames spread through the clip; the target is what
+differs from it. Where a frame mixes target and background, its colour lies on the line between the
+two, so that the *coverage* of each pixel,
+
+    alpha = <frame - background, target - background> / |target - background|^2,
+
+is known even along an anti-aliased edge, and the centroid is the mean of the pixel positions
+weighted with it. Being linear in the frame, it stays unbiased under image noise.
+
+Behind an occluder or across the image border the visible part of the target has another centroid
+than the target. It also has another *shape*, whereas whole views are alike up to rotation and size:
+that is how `strangeness` tells the one from the other.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy import ndimage
+from scipy.spatial.distance import cdist
+
+from .video import open_video, video_info
+
+_SAMPLES = 21  # frames whose median is the background
+_SEEK_COST = 22  # a jump in a video file costs about as much as decoding this many frames
+_COARSE = 4  # factor by which the image is reduced for the search over the whole frame
+_RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
+_BORDER = 3  # coarse pixels around a place that show how its surroundings continue
+_OFTEN = 0.1  # share of the samples that must differ from the background to cast doubt on it
+_NEAR = 16  # coarse pixels, within which several things that differ may be one target
+_TOO_LARGE = 0.25  # share of the image that no target fills
+_ROUNDING = 0.05  # grey levels squared; variance of coarse differences without any noise
+_QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
+_BLIND = 0.1  # share of the target's outline that may lie on background of the same colour
+_ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
+_VIEWS = 200  # views among which the commonest one is sought
+
+
+# -------------------------------------------------------------------------------------- background
+
+
+def sample_frames(path):
+    """About `_SAMPLES` frames spread evenly over the clip, (m, height, width, 3) uint8."""
+    count = video_info(path).frames
+    wanted = set(np.linspace(0, max(count - 1, 0), _SAMPLES).round().astype(int).tolist())
+    capture = open_video(path)
+    frames = []
+    try:
+        if count > _SEEK_COST * _SAMPLES:
+            for index in sorted(wanted):
+                capture.set(cv2.CAP_PROP_POS_FRAMES, index)
+                more, frame = capture.read()
+                if more:
+                    frames.append(frame)
+        else:
+            index = 0
+            while capture.grab():
+                if index in wanted:
+                    frames.append(capture.retrieve()[1])
+                index += 1
+    finally:
+        capture.release()
+    return np.stack(frames)
+
+
+def _median(frames):
+    """Median over the first axis of uint8 images, by a sorting network (8 times numpy's speed)."""
+    images = list(frames)
+    for step in range(len(images)):
+        for j in range(step % 2, len(images) - 1, 2):
+            low = np.minimum(images[j], images[j + 1])
+            images[j + 1] = np.maximum(images[j], images[j + 1])
+            images[j] = low
+    return images[len(images) // 2]
+
+
+def _reduce(image):
+    """Means over squares of 4 x 4 pixels, as floats."""
+    height, width = image.shape[:2]
+    size = (-(-width // _COARSE), -(-height // _COARSE))
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+
+
+def _uncover(background, samples, floor):
+    """Correct in place a background that contains the target where it stayed for long.
+
+    Where many samples differ from the background, they show the same place with or without the
+    target. Of the two, the one that continues its surroundings is the background.
+    """
+    change = np.array([_reduce(s) - _reduce(background) for s in samples])
+    differs = np.linalg.norm(change, axis=-1) > floor
+    often = (differs.mean(axis=0) > _OFTEN).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(often)
+    for k in range(1, count):
+        group = differs[:, labels == k].mean(axis=1) > 0.5
+        if group.all() or not group.any():
+            continue
+        left, top, width, height = stats[k, :4]
+        rows = slice(max(top - _BORDER, 0), top + height + _BORDER)
+        columns = slice(max(left - _BORDER, 0), left + width + _BORDER)
+        place = cv2.dilate((labels[rows, columns] == k).astype(np.uint8), np.ones((3, 3), np.uint8))
+        window = np.s_[
+            rows.start * _COARSE:rows.stop * _COARSE, columns.start * _COARSE:columns.stop * _COARSE
+        ]
+        view = background[window]
+        mask = np.kron(place, np.ones((_COARSE, _COARSE), np.uint8))[:view.shape[0], :view.shape[1]]
+        inside = mask > 0
+        expected = cv2.inpaint(view, mask, 3, cv2.INPAINT_TELEA)[inside].astype(float)
+        looks = [_median(samples[g][:, *window])[inside] for g in (group, ~group)]
+        view[inside] = min(looks, key=lambda look: np.abs(look - expected).sum())
+
+
+def _unrest(changes, floor):
+    """How much differs from the background far from the largest thing that does, in its areas.
+
+    Of a target before a background at rest nothing does: 0. Something that fills much of the image
+    is no target. The median over the samples, given their differences from the background.
+    """
+    unrest = []
+    for change in changes:
+        differs = np.linalg.norm(change, axis=-1) > floor
+        _, largest = _components(differs.astype(np.uint8))
+        if largest is None:
+            continue
+        area = largest[cv2.CC_STAT_AREA]
+        far = differs
+        if area < _TOO_LARGE * differs.size:
+            left, top, width, height = largest[:4]
+            v, u = np.ogrid[:differs.shape[0], :differs.shape[1]]
+            far = differs & (np.hypot(u - left - width / 2, v - top - height / 2) > _NEAR)
+        unrest.append(far.sum() / area)
+    return float(np.median(unrest)) if unrest else 0.0
+
+
+def _shake(background, changes, floor):
+    """Pixels by which the whole background is displaced, where that is certain, else 0.
+
+    To first order a displacement changes the image by minus that times its slope: least squares,
+    with a prior of one coarse pixel where there is little to see. The median over the samples.
+    """
+    slope = np.stack(np.gradient(background, axis=(1, 0)))
+    shake = []
+    for change in changes:
+        calm = np.linalg.norm(change, axis=-1) <= floor
+        g, d = slope[:, calm].reshape(2, -1), change[calm].ravel()
+        variance = d.var() + _ROUNDING
+        information = g @ g.T / variance + np.eye(2)
+        displacement = np.linalg.solve(information, g @ d / variance)
+        error = np.sqrt(np.trace(np.linalg.inv(information)))
+        distance = np.linalg.norm(displacement)
+        shake.append(_COARSE * distance if distance > 5 * error else 0.0)
+    return float(np.median(shake))
+
+
+# --------------------------------------------------------------------------------------- the model
+
+
+@dataclass(frozen=True)
+class Blob:
+    """One look at the target: centroid (2,) in pixels, visible area, clear of the image border?
+
+    `shape` is None where frame, background and target do not fit together.
+    """
+
+    centroid: np.ndarray
+    area: float
+    inside: bool
+    shape: np.ndarray | None
+
+
+class BackgroundModel:
+    """Finds the target in a frame, given the background and what the target looks like.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (m, height, width, 3), uint8
+        Frames spread evenly over the clip, see `sample_frames`.
+    """
+
+    def __init__(self, samples):
+        self.background = _median(samples)
+        deviation = [cv2.absdiff(s, self.background)[::3, ::3] for s in samples]
+        self.noise = 1.4826 * float(np.median(deviation))
+        self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
+        _uncover(self.background, samples, self.coarse_floor)
+        self.size = np.array(self.background.shape[1::-1])
+        self.coarse_background = _reduce(self.background)
+        changes = [_reduce(sample) - self.coarse_background for sample in samples]
+        self.unrest = _unrest(changes, self.coarse_floor)
+        self.shake = _shake(self.coarse_background, changes, self.coarse_floor)
+        # The difference is smoothed over about the width of the ring: noise falls to a quarter.
+        self.blur = 1.2 if self.noise > _QUIET else 0.0
+        remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
+        self.floor = max(5 * remaining, 12.0)
+        self.contrast = None
+        self._learn_target(samples)
+
+    def _learn_target(self, samples):
+        """Colour and area of the target: the medians over the sampled frames."""
+        looks = []
+        for frame in samples:
+            near = self.search(frame)
+            if near is not None:
+                looks.append(self._look(frame, *near))
+        looks = [look for look in looks if look is not None]
+        if not looks:
+            self.area = 0.0
+            return
+        colour = np.median([look[0] for look in looks], axis=0)
+        self.area = float(np.median([look[1] for look in looks]))
+        self.contrast = (colour - self.background).astype(np.float32)
+        self.square = np.einsum("ijk,ijk->ij", self.contrast, self.contrast)
+        self.blind = self.square < max(self.floor**2, 0.1 * np.median(self.square))
+        self.coarse_contrast = (colour - self.coarse_background).astype(np.float32)
+        self.coarse_square = np.einsum(
+            "ijk,ijk->ij", self.coarse_contrast, self.coarse_contrast
+        )
+
+    def _window(self, centre, half):
+        low = np.clip(np.floor(centre - half).astype(int), 0, self.size - 1)
+        high = np.clip(np.ceil(centre + half).astype(int) + 1, low + 1, self.size)
+        return low, high, np.s_[low[1]:high[1], low[0]:high[0]]
+
+    def _difference(self, frame, window):
+        """Signed difference from the background, and its (smoothed) square summed over colours."""
+        change = frame[window].astype(np.float32) - self.background[window]
+        smooth = cv2.GaussianBlur(change, (0, 0), self.blur) if self.blur else change
+        return change, np.einsum("ijk,ijk->ij", smooth, smooth)
+
+    def _look(self, frame, centre, half):
+        """Colour and rough area of what differs most from the background near `centre`."""
+        _, _, window = self._window(centre, half)
+        _, energy = self._difference(frame, window)
+        mask = (energy > max(self.floor**2, 0.2 * energy.max())).astype(np.uint8)
+        label, stats = _components(mask)
+        if label is None:
+            return None
+        core = (_erode(label) > 0) if _erode(label).any() else label > 0
+        return np.median(frame[window][core], axis=0), stats[cv2.CC_STAT_AREA]
+
+    def search(self, frame):
+        """Centre and half width of the part of the whole frame where the target seems to be."""
+        change = _reduce(frame) - self.coarse_background
+        energy = np.einsum("ijk,ijk->ij", change, change)
+        weight = None
+        if self.contrast is not None:
+            match = np.einsum("ijk,ijk->ij", change, self.coarse_contrast)
+            weight = np.clip(match / (self.coarse_square + self.coarse_floor**2), 0, 1)
+        label, stats = _components((energy > self.coarse_floor**2).astype(np.uint8), weight)
+        if label is None:
+            return None
+        box = stats[[cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP, cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
+        centre = _COARSE * (box[:2] + (box[2:] - 1) / 2) + (_COARSE - 1) / 2
+        return centre, _COARSE * (box[2:].max() / 2 + 1) + 2 * _RING
+
+    def measure(self, frame, centre, half):
+        """The target within `half` pixels of `centre`, or None. -> Blob"""
+        low, high, window = self._window(centre, half)
+        change, energy = self._difference(frame, window)
+        square = self.square[window]
+        mask = energy > np.maximum(self.floor**2, 0.1 * square)
+        label, stats = _components(mask.astype(np.uint8))
+        if label is None or not 0.2 < stats[cv2.CC_STAT_AREA] / self.area < 5:
+            return None
+        near = cv2.dilate(label, _DISC) > 0
+        match = np.einsum("ijk,ijk->ij", change, self.contrast[window])
+        alpha = match / (square + self.floor**2 / 9)
+        alpha[_erode(label) > 0] = 1
+        alpha[~near] = 0
+        area = float(alpha.sum())
+        if area <= 0:
+            return None
+        u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
+        centre = np.array([alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v]) / area
+        corner = stats[[cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP]]
+        extent = stats[[cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
+        first, last = low + corner, low + corner + extent - 1
+        if ((first == low) & (low > 0)).any() or ((last == high - 1) & (high < self.size)).any():
+            return None  # cut off by the window
+        inside = bool((first > 0).all() and (last < self.size - 1).all())
+        # A background that contains the target hides how far it goes, or makes coverages absurd:
+        # as they lie in [0, 1], their squares (with some noise) cannot sum up to more than they do.
+        blind = self.blind[window][near & (label == 0)].mean() > _BLIND
+        sound = not blind and (alpha**2).sum() < 1.2 * area
+        shape = _shape(alpha, u - centre[0], v - centre[1]) if sound else None
+        return Blob(low + centre, area, inside, shape)
+
+
+_DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
+
+
+def _erode(label):
+    return cv2.erode(label, _DISC, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+
+
+def _components(mask, weight=None):
+    """Mask and statistics of the connected component of largest area or weight, or two Nones."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    if count < 2:
+        return None, None
+    total = stats[:, cv2.CC_STAT_AREA]
+    if weight is not None:
+        total = np.bincount(labels.ravel(), weight.ravel(), count)
+    largest = 1 + int(np.argmax(total[1:]))
+    return (labels == largest).astype(np.uint8), stats[largest]
+
+
+def _shape(alpha, u, v):
+    """Four numbers that tell shapes apart and stay the same under rotation and change of size.
+
+    With z = u + iv from the centroid, rotation changes only the phase of the complex moments
+    c_pq = sum of alpha z^p conj(z)^q. -> magnitudes of c_11, c_20, c_21, c_30, dimensionless
+    """
+    area = alpha.sum()
+    m = np.vander(v, 4, increasing=True).T @ alpha @ np.vander(u, 4, increasing=True)
+    # The pixels' own extent does not count; no shape has a smaller c_11 than a disc, area^2 / 2 pi.
+    c11 = max(m[0, 2] + m[2, 0] - area / 6, 0.01 * area**2)
+    c20 = m[0, 2] - m[2, 0] + 2j * m[1, 1]
+    c21 = m[0, 3] + m[2, 1] + 1j * (m[1, 2] + m[3, 0])
+    c30 = m[0, 3] - 3 * m[2, 1] + 1j * (3 * m[1, 2] - m[3, 0])
+    cube = c11**1.5 / np.sqrt(area)
+    return np.array([np.log(c11 / area**2), abs(c20) / c11, abs(c21) / cube, abs(c30) / cube])
+
+
+# ------------------------------------------------------------------------------------------- track
+
+
+def follow_blobs(model: BackgroundModel, frames: Iterable[np.ndarray]) -> Iterator[Blob | None]:
+    """The target in each frame (None if not found): near its predicted position, else anywhere."""
+    position, velocity, age = None, np.zeros(2), 0
+    for frame in frames:
+        blob = None
+        if model.contrast is not None:
+            if position is not None and age < 3:
+                radius = np.sqrt(model.area / np.pi)
+                half = 2 * radius + 8 + 0.5 * np.abs(velocity).max()
+                blob = model.measure(frame, position + (age + 1) * velocity, half)
+            if blob is None:
+                near = model.search(frame)
+                blob = near and model.measure(frame, *near)
+        if blob is None or blob.shape is None:
+            age += 1
+        else:
+            if position is not None:
+                velocity = (blob.centroid - position) / (age + 1)
+            position, age = blob.centroid, 0
+        yield blob
+
+
+def strangeness(blobs: Sequence[Blob | None]) -> np.ndarray:
+    """How far each view (None = not found) is from those of the whole target, (n,).
+
+    Partial views differ from each other, whole views are alike: in the space of shapes they lie
+    close around one of them, at least a quarter of all views. As far as these also agree in size,
+    it is the target's. Up to 1 a view may be whole, infinite is no view at all.
+    """
+    views = [i for i, b in enumerate(blobs) if b is not None and b.inside]
+    sound = [i for i in views if blobs[i].shape is not None]
+    quarter = len(views) // 4
+    strange = np.full(len(blobs), np.inf)
+    if len(sound) > quarter:
+        shape = np.array([blobs[i].shape for i in sound])
+        area = np.array([blobs[i].area for i in sound])
+        distance = cdist(shape[:: 1 + len(shape) // _VIEWS], shape)
+        radius = np.partition(distance, quarter, axis=1)[:, quarter]
+        alike = _ALIKE / np.sqrt(area)
+        odd = distance[radius.argmin()] / np.maximum(alike, 6 * radius.min())
+        size = np.abs(np.log(area / np.median(area[odd < 1])))
+        odd_size = size / np.maximum(alike, 10 * np.median(size[odd < 1]))
+        strange[sound] = np.maximum(odd, odd_size)
+    return strange
+
+
+def whole(strange: np.ndarray) -> np.ndarray:
+    """Frames (n,) in which the whole target is seen, given their `strangeness`.
+
+    A view beside a strange one may be cut a little: it must be twice as close.
+    """
+    return ~ndimage.binary_propagation(strange > 1, mask=strange > 0.5)
