@@ -19,7 +19,7 @@ FLOORS = [
     {"experiments", "audit", "lab"},
     {
         "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "artifacts", "runner",
-        "__main__",
+        "site", "__main__",
     },
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent

@@ -1,4 +1,4 @@
-"""The command line: ``python -m vidsindy_lite run`` and ``python -m vidsindy_lite demo``."""
+"""The command line: ``python -m vidsindy_lite`` with the commands run, demo and site."""
 
 import argparse
 import sys
@@ -91,6 +91,16 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument("--frames", type=int, default=500, help="per camera (default: 500)")
     demo.add_argument("--seed", type=int, default=0, help="of scenes and noise (default: 0)")
     demo.set_defaults(command=_demo)
+
+    site = commands.add_parser(
+        "site",
+        help="README, notebooks, figures and reference as web pages",
+        description="Write README, notebooks, figures and reference as web pages for offline use.",
+    )
+    site.add_argument(
+        "--output", metavar="DIR", default="build/site", help="folder (default: build/site)"
+    )
+    site.set_defaults(command=_site)
     return parser
 
 
@@ -123,6 +133,14 @@ def _demo(options: argparse.Namespace) -> int:
     print(f"the same around the origin ({', '.join(f'{value:.4f}' for value in found.offset)}):")
     print(found.equations("native"))
     print(f"against the truth: {score(found, shot.truth)}")
+    return 0
+
+
+def _site(options: argparse.Namespace) -> int:
+    from vidsindy_lite.site import build_site
+
+    pages = build_site(options.output)
+    print(f"{len(pages)} pages: open {options.output}/index.html")
     return 0
 
 
