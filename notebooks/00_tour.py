@@ -40,7 +40,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from vidsindy_lite import discover_from_videos, plots, read_video, score
-from vidsindy_lite.artifacts import save_figure, save_table
+from vidsindy_lite.animation import draw_tour
+from vidsindy_lite.artifacts import save_animation, save_figure, save_table
 from vidsindy_lite.experiments import film
 from vidsindy_lite.metrics import trajectory_error
 from vidsindy_lite.systems import SYSTEMS
@@ -227,6 +228,23 @@ save_figure("tour_attractor", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # *Five periods of the discovered law (blue), started where the target was in the first frame, lie on
 # the true path (grey). Much later the two part, as any two paths of a chaotic system do.*
+
+# %% [markdown]
+# ## The tour in ten seconds
+
+# %%
+moments = np.arange(0, 300, 6)
+films = [[f for i, f in enumerate(read_video(p)) if i in moments] for p in shot.paths]
+laws = found.equations("native").splitlines()
+pictures = draw_tour(films, moments, found.tracks, found.x, laws)
+caption = "Three videos, the tracks in them, the path in space, and its law."
+save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "equations": laws})
+
+# %% [markdown]
+# ![Three videos, the tracks in them, the path in space, and its law](../figures/tour.gif)
+#
+# *Three periods of the videos with the tracks that are found in them, the path in space that the three
+# agree on, and the law that follows from all fifteen periods.*
 
 # %%
 folder.cleanup()

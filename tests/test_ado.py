@@ -17,6 +17,7 @@ def measured(name, noise, n=600, seed=11):
     return truth, t, add_noise(x, noise, np.random.default_rng(seed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_clean_systems_are_recovered_exactly(name):
     truth, t, x = measured(name, 0.0)
@@ -153,6 +154,7 @@ def test_curve_follows_the_truth_better_than_the_data():
     assert np.isnan(discover(t, x).curve(np.array([t[-1] + 1]))).all()
 
 
+@pytest.mark.slow
 def test_standard_errors_are_calibrated():
     truth = PolynomialSystem.from_terms(PLANAR["oscillator"][0], degree=3)
     t = np.linspace(0, 25, 300)
