@@ -18,7 +18,7 @@ FLOORS = [
     {"pipeline", "sweeps"},
     {"experiments", "audit", "lab"},
     {
-        "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "animation", "artifacts",
+        "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "animation", "artifacts", "compare",
         "readme", "runner", "site", "__main__",
     },
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The command line: ``python -m vidsindy_lite`` with the commands run, demo and site."""
+"""The command line: ``python -m vidsindy_lite`` with a command: run, demo, site or compare."""
 
 import argparse
 import sys
@@ -101,6 +101,17 @@ def _parser() -> argparse.ArgumentParser:
         "--output", metavar="DIR", default="build/site", help="folder (default: build/site)"
     )
     site.set_defaults(command=_site)
+
+    compare = commands.add_parser(
+        "compare",
+        help="two folders of figures, by their numbers",
+        description="Compare the numbers of two folders of figures, and lay out what differs.",
+        epilog="exit status: 0 if all numbers agree, 1 if not.",
+    )
+    compare.add_argument("committed", metavar="COMMITTED", help="a folder like figures/")
+    compare.add_argument("regenerated", metavar="REGENERATED", help="the same from another run")
+    compare.add_argument("--output", metavar="DIR", required=True, help="for both sides, with a page")
+    compare.set_defaults(command=_compare)
     return parser
 
 
@@ -142,6 +153,16 @@ def _site(options: argparse.Namespace) -> int:
     pages = build_site(options.output)
     print(f"{len(pages)} pages: open {options.output}/index.html")
     return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from vidsindy_lite.compare import side_by_side
+
+    found = side_by_side(options.committed, options.regenerated, options.output)
+    for name, place in found.items():
+        print(f"{name}: {place}")
+    print(f"{len(found)} with other numbers")
+    return 1 if found else 0
 
 
 if __name__ == "__main__":

@@ -3,9 +3,15 @@
 import ast
 import hashlib
 import os
+import platform
+from importlib import metadata
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent
+# What results depend on.
+LIBRARIES = (
+    "numpy", "scipy", "scikit-learn", "torch", "pysindy", "opencv-python-headless", "matplotlib"
+)  # fmt: skip
 
 
 def repository_root(start: str | os.PathLike | None = None) -> Path:
@@ -37,6 +43,12 @@ def write_file(path: Path, content: bytes) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     beside.write_bytes(content)
     beside.replace(path)
+
+
+def versions() -> str:
+    """Python and the libraries that results depend on, as they are here, a line each."""
+    lines = [f"{name} {metadata.version(name)}" for name in LIBRARIES]
+    return "\n".join([f"Python {platform.python_version()}", *lines])
 
 
 def package_stamp(root: str | os.PathLike | None = None) -> str:
