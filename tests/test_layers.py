@@ -18,8 +18,8 @@ FLOORS = [
     {"pipeline", "sweeps"},
     {"experiments", "audit", "lab"},
     {
-        "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "animation", "artifacts", "compare",
-        "readme", "runner", "site", "__main__",
+        "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "animation",
+        "artifacts", "compare", "readme", "runner", "site", "__main__",
     },
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent

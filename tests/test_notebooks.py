@@ -17,8 +17,9 @@ LONGEST = 15  # lines of a code cell
 
 # What a notebook says at its opening and its close, in this order.
 SECTIONS = (
-    r"\*\*What you will see\*\*", r"\*\*What you need\*\*", r"\*\*Covers\*\*", r"^## What we learned",
-    r"What the paper says,? and what we found", r"^## Exercises", r"^## Run time and versions",
+    r"\*\*What you will see\*\*", r"\*\*What you need\*\*", r"\*\*Covers\*\*",
+    r"^## What we learned", r"What the paper says,? and what we found", r"^## Exercises",
+    r"^## Run time and versions",
 )  # fmt: skip
 PARAMETER = re.compile(r"\w+: \w+ = .+  # .+")
 GLOBAL_RANDOM = re.compile(

@@ -85,7 +85,8 @@ def test_every_link_leads_to_a_file(site):
 # ------------------------------------------------------------------------------- the gate can fail
 
 
-GOOD = "<!DOCTYPE html><link rel='icon' href='data:,'><body>{}</body>"
+GOOD = """<!DOCTYPE html><link rel='icon' href='data:,'>
+<meta name='viewport' content='width=device-width'><body>{}</body>"""
 
 
 @needs_browser
@@ -119,7 +120,7 @@ def test_a_dead_link_is_seen(tmp_path):
     assert dead_links(tmp_path) == ["a.html: b.png"]
 
 
-# --------------------------------------------------------------------------------------------- parts
+# -------------------------------------------------------------------------------------------- parts
 
 
 @pytest.mark.parametrize(

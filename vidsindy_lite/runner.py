@@ -2,8 +2,8 @@
 
 The .py half of a pair is the source. The .ipynb half is made here: executed, stripped of all that
 differs between two runs, and stamped with a hash of the code that made it. The full profile
-writes notebooks/*.ipynb and figures/ of the repository and its README's tables, the quick profile the same layout under
-build/quick/.
+writes notebooks/*.ipynb and figures/ of the repository, and the tables of its README; the quick
+profile writes the layout of the former two under build/quick/.
 
 A ledger beside them, build/ledger.json, which is never committed, keeps what was executed here. A
 notebook is not executed again if its stamp and its source are the same, its prose included, and its

@@ -45,8 +45,8 @@ PAGE = """\
 """
 
 
-# MathJax's own font, so that the pages look the same everywhere; its style "@font-face" asks for
-# the page about:blank, which browsers refuse, and assistive MathML for fonts that Jupyter leaves out.
+# MathJax's own font, so that the pages look the same everywhere. Its style "@font-face" asks for
+# the page about:blank, which browsers refuse; assistive MathML for fonts that are not there.
 FORMULAS = """\
 <script type="text/x-mathjax-config">
 MathJax.Hub.Config({{
