@@ -11,6 +11,8 @@ from vidsindy_lite.metrics import score
 from vidsindy_lite.smoothing import smooth
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
 
+pytestmark = pytest.mark.slow  # fits ensembles
+
 TRUTH = SYSTEMS["Lorenz"]
 T, X = TRUTH.trajectory(600)
 
@@ -129,7 +131,6 @@ def test_no_difference_is_taken_across_a_gap():
     assert found.coefficients[found.terms.index("1"), 0] == pytest.approx(1, abs=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["E-SINDy", "WeakSINDy"])
 def test_seeds_are_local_and_repeatable(name, short_grid):
     t, x = T[:300], add_noise(X[:300], 0.05, np.random.default_rng(0))

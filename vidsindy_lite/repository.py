@@ -4,6 +4,7 @@ import ast
 import hashlib
 import os
 import platform
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -73,6 +74,7 @@ def package_stamp(root: str | os.PathLike | None = None) -> str:
     return digest.hexdigest()[:16]
 
 
+@cache
 def _meaning(source: str) -> bytes:
     """What a Python source does, as text: its syntax tree without bare constants (docstrings)."""
 
