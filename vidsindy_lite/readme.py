@@ -17,7 +17,7 @@ from .repository import write_file
 
 __all__ = ["fill", "write_readme"]
 
-PART = re.compile(r"(?<=^<!-- )(\w+) -->\n.*?(?=<!-- end -->$)", re.DOTALL | re.MULTILINE)
+PART = re.compile(r"(?<=^<!-- )(?!end )(\w+) -->\n.*?(?=<!-- end -->$)", re.DOTALL | re.MULTILINE)
 
 
 def write_readme(root: Path) -> None:
