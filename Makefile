@@ -6,17 +6,18 @@ READY  := $(VENV)/.installed
 PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test test-fast bench lint demo lab clean
+.PHONY: help figures test test-fast bench lint demo site lab clean
 
 help:
 	@echo "make figures          run all notebooks, regenerate figures/ and the notebooks' outputs"
 	@echo "make figures QUICK=1  the same code in its small profile, into build/quick/"
 	@echo "make figures FORCE=1  also those that this clone has executed and nothing has changed"
 	@echo "make test             all tests, the notebooks in the quick profile among them"
-	@echo "make test-fast        all tests but the notebook runs"
+	@echo "make test-fast        the quick ones of the tests, in less than 90 seconds"
 	@echo "make bench            speed and memory, as ratios"
 	@echo "make lint             ruff"
 	@echo "make demo             three videos of one target, and its equations, in a minute"
+	@echo "make site             README, notebooks, figures and reference as web pages, in build/site/"
 	@echo "make lab              JupyterLab on the notebooks"
 	@echo "make clean            remove $(VENV), build and caches"
 
@@ -36,7 +37,7 @@ test: $(READY)
 	$(BIN)/python -m pytest
 
 test-fast: $(READY)
-	$(BIN)/python -m pytest -m "not notebooks"
+	$(BIN)/python -m pytest -m "not notebooks and not slow"
 
 bench: $(READY)
 	$(BIN)/python -m pytest -s -o python_files="bench_*.py" tests/benchmarks
@@ -46,6 +47,9 @@ lint: $(READY)
 
 demo: $(READY)
 	$(BIN)/python -m vidsindy_lite demo
+
+site: $(READY)
+	$(BIN)/python -m vidsindy_lite site --output build/site
 
 lab: $(READY)
 	$(BIN)/jupyter lab --ServerApp.root_dir=. --LabApp.default_url=/lab/tree/notebooks

@@ -27,6 +27,22 @@
 # * what the law is good for: a forecast, and how far ahead it holds.
 #
 # **What you need**: nothing but curiosity. The later notebooks take one step each.
+#
+# **Covers** the framework of the paper (Fig. 1), on one system.
+#
+# **Names.** The code has the paper's quantities under these names, in all notebooks:
+#
+# | paper | code | meaning, shape |
+# |---|---|---|
+# | $\mathbf x(t)$ | `x` | path in space, (n, 3), scene units; NaN where it is lost |
+# | $\mathbf x_c$ | `tracks` | path in each image, (n, 2), pixels |
+# | $s$, $\vartheta$ | `Camera.scale`, `Camera.angle` | scene units per pixel, radians |
+# | $\Delta_c$ | `Camera.offset` | offset in the view plane, (2,) |
+# | $\mathbf R$, $\mathbf R^-$ | `rotation_to_z(normal)` | takes the normal to the z axis; its first two rows |
+# | $\mathbf G$, $\mathbf P$ | `basis`, `control_points` | B-splines and their coefficients, (r, 3) |
+# | $\boldsymbol\phi$, $\boldsymbol\Lambda$ | `library`, `coefficients` | candidate terms, sparse matrix (l, 3) |
+# | $\Delta$ | `offset` | origin of the frame in which the law is sparse, (3,) |
+# | $\alpha$, $\beta$ | `physics_weight`, `sparsity_weight` | weights of law and sparsity |
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
@@ -40,7 +56,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from vidsindy_lite import discover_from_videos, plots, read_video, score
-from vidsindy_lite.artifacts import save_figure, save_table
+from vidsindy_lite.animation import draw_tour
+from vidsindy_lite.artifacts import save_animation, save_figure, save_table
 from vidsindy_lite.experiments import film
 from vidsindy_lite.metrics import trajectory_error
 from vidsindy_lite.systems import SYSTEMS
@@ -228,6 +245,23 @@ save_figure("tour_attractor", fig, caption=caption, numbers=numbers)
 # *Five periods of the discovered law (blue), started where the target was in the first frame, lie on
 # the true path (grey). Much later the two part, as any two paths of a chaotic system do.*
 
+# %% [markdown]
+# ## The tour in ten seconds
+
+# %%
+moments = np.arange(0, 300, 6)
+films = [[f for i, f in enumerate(read_video(p)) if i in moments] for p in shot.paths]
+laws = found.equations("native").splitlines()
+pictures = draw_tour(films, moments, found.tracks, found.x, laws)
+caption = "Three videos, the tracks in them, the path in space, and its law."
+save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "equations": laws})
+
+# %% [markdown]
+# ![Three videos, the tracks in them, the path in space, and its law](../figures/tour.gif)
+#
+# *Three periods of the videos with the tracks that are found in them, the path in space that the three
+# agree on, and the law that follows from all fifteen periods.*
+
 # %%
 folder.cleanup()
 
@@ -283,3 +317,14 @@ folder.cleanup()
 # Yes, the same terms with similar errors: two views leave one condition per frame, the epipolar one,
 # and there are hundreds of frames for two unknowns. (Run it before the folder is cleaned up.)
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

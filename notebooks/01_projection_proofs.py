@@ -296,6 +296,9 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 # * A view plane is turned flat by the rotation that takes its **normal to** $\mathbf e_z$. Then
 #   the last row of R is the normal, the first two are the axes of the plane, and the position of the
 #   plane along its normal drops out because $\mathbf R\mathbf n\parallel\mathbf e_z$.
+#
+# **What the paper says and what we found.**
+#
 # * With the paper's $\mathbf v_1=\mathbf R\mathbf v_0$ this fails; the proof's own cancellation
 #   silently uses the other direction.
 # * The matrix of the proof has a wrong sign in row 2, column 3; the axis is $0/0$ along z; and the
@@ -330,3 +333,14 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 # $-\mathbf e_z$ the in-plane angle of a camera jumps as its normal moves; learn the angle with the
 # normal at hand, do not carry it over.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

@@ -523,3 +523,14 @@ folder.cleanup()
 # docstring says, the target must stay away from each place for at least a fifth of the frames. A
 # radius of 10 px is enough: 0.001 px on average, in every frame.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

@@ -343,6 +343,10 @@ assert "cameras[1] and cameras[2]" in message
 # * Whole pixels cost about 0.2 px in space, nearly all of it the rounding of the views
 #   themselves, hardly any of it the learned cameras.
 #
+# **What the paper says and what we found.** The paper minimises Eq. (4) by gradients, and writes inverses
+# in Eq. (5) and (6); the loss is linear in four numbers, and the inverses are least squares. Its way ends at the
+# same cameras, as the table of methods shows.
+#
 # Next: [splines and alternating optimisation](04_spline_ado.ipynb), from the path to its law.
 
 # %% [markdown]
@@ -379,3 +383,14 @@ assert "cameras[1] and cameras[2]" in message
 # hundreds of equations. From whole pixels the path is off by 0.38 px rms along x instead of 0.23 px, and
 # only one number of four per frame is left to raise an alarm.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

@@ -777,3 +777,14 @@ save_table("solver_pendulum", rows, caption=caption)
 # With degree 3 the curve now misses the data, and says so. With degree 5 the series of the sine appears:
 # about $x-0.16\,x^3+0.006\,x^5$ (and two small terms that the cut-off series leaves over).
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

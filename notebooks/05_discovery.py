@@ -427,3 +427,14 @@ for method in baselines.BASELINES:
 # For Lorenz and 1,500 frames, ours and Model-A keep exactly the true terms, with errors of 0.2 %
 # and 0.9 %; PySINDy and E-SINDy find one false term, and WeakSINDy misses three.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

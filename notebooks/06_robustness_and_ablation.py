@@ -618,3 +618,14 @@ for row in rows:
 # The function reads the global `frames`. The bound falls at least as fast as one over the square
 # root of the length, so four times the record carry twice the noise.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

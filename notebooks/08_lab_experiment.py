@@ -431,3 +431,14 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 # Yes: 0.83 mm rms from whole pixels instead of 0.64 mm, and from the tracks as good as with three. But
 # with one condition per frame left, little would tell that a camera was measured wrong.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

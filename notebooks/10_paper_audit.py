@@ -802,3 +802,14 @@ save_table("audit", findings, caption=caption)
 # It takes nine tenths of $\ell_2$ away, by stretching z to the double. That is why a small misfit alone proves
 # nothing: this one is 25 times what rounding explains. Only a misfit below rounding is evidence.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

@@ -17,6 +17,7 @@ def measured(name, noise, n=600, seed=11):
     return truth, t, add_noise(x, noise, np.random.default_rng(seed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_clean_systems_are_recovered_exactly(name):
     truth, t, x = measured(name, 0.0)
@@ -29,6 +30,7 @@ def test_clean_systems_are_recovered_exactly(name):
     assert found.status == "ok"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SprottE", "NoseHoover", "WangSun"])
 def test_noisy_systems_are_recovered(name):
     truth, t, x = measured(name, 0.1, n=1000)
@@ -111,6 +113,7 @@ def test_four_dimensions():
     assert score(found, truth).exact
 
 
+@pytest.mark.slow
 def test_gaps_are_bridged():
     truth, t, x = measured("Lorenz", 0.01, n=1000)
     found = discover(t, drop_fibers(x, 0.2, np.random.default_rng(4)))
@@ -118,6 +121,7 @@ def test_gaps_are_bridged():
     assert len(found.curves) == 1
 
 
+@pytest.mark.slow
 def test_missing_single_rows_are_no_gaps():
     truth, t, x = measured("WangSun", 0.02)
     x[np.random.default_rng(0).random(len(t)) < 0.3] = np.nan
@@ -125,6 +129,7 @@ def test_missing_single_rows_are_no_gaps():
     assert score(found, truth).exact
 
 
+@pytest.mark.slow
 def test_several_trajectories_share_one_law():
     truth = SYSTEMS["Lorenz"]
     rng = np.random.default_rng(3)
@@ -135,6 +140,7 @@ def test_several_trajectories_share_one_law():
     assert len(found.curves) == 3
 
 
+@pytest.mark.slow
 def test_units_do_not_matter():
     truth, t, x = measured("SprottE", 0.05)
     found = discover(t, x)
@@ -153,6 +159,7 @@ def test_curve_follows_the_truth_better_than_the_data():
     assert np.isnan(discover(t, x).curve(np.array([t[-1] + 1]))).all()
 
 
+@pytest.mark.slow
 def test_standard_errors_are_calibrated():
     truth = PolynomialSystem.from_terms(PLANAR["oscillator"][0], degree=3)
     t = np.linspace(0, 25, 300)

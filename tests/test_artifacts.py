@@ -5,9 +5,17 @@ import json
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from PIL import Image
 
 from vidsindy_lite import artifacts
-from vidsindy_lite.artifacts import check_folder, load_table, save_figure, save_table
+from vidsindy_lite.artifacts import (
+    check_folder,
+    load_run_times,
+    load_table,
+    save_animation,
+    save_figure,
+    save_table,
+)
 
 ROWS = [
     {"system": "Lorenz", "terms": 12, "l2": 0.00123456789, "exact": True, "seconds": 2.345},
@@ -62,6 +70,21 @@ def test_figure_is_the_same_bytes_twice(folder, figure):
     assert contents(folder) == first
     assert b"Matplotlib" not in first["fig_2.png"]
     assert b"dc:date" not in first["fig_2.svg"]
+
+
+def test_animation_is_written_registered_and_the_same_bytes_twice(folder):
+    stripes = np.broadcast_to(np.arange(0, 240, 8, np.uint8)[:, None], (20, 30, 3))
+    pictures = [np.roll(stripes, step, axis=1) for step in range(3)]
+    save_animation("tour", pictures, caption="Stripes.", numbers={"step": [0, 1, 2]})
+    first = contents(folder)
+    assert set(first) == {"tour.gif", "tour.json"}
+    with Image.open(folder / "tour.gif") as image:
+        assert (image.n_frames, image.size) == (3, (30, 20))
+    save_animation("tour", pictures, caption="Stripes.", numbers={"step": [0, 1, 2]})
+    assert contents(folder) == first
+    artifacts.write_index(folder)
+    assert "![tour](tour.gif)\n\nStripes." in (folder / "README.md").read_text()
+    assert check_folder(folder, {"01_first": "stamp-1"}) == []
 
 
 def test_table_round_trip(folder):
@@ -145,6 +168,7 @@ def test_run_time_is_that_of_the_first_run_of_the_code(folder):
     artifacts.record_run_time(folder, "01_first", "stamp-1", 9.0)
     times = folder / artifacts.RUN_TIMES
     assert json.loads(times.read_text()) == {"01_first": {"seconds": 120, "stamp": "stamp-1"}}
+    assert load_run_times(folder) == {"01_first": 120}
     artifacts.record_run_time(folder, "01_first", "stamp-2", 9.0)
     assert json.loads(times.read_text())["01_first"]["seconds"] == 9
 

@@ -11,6 +11,8 @@ from vidsindy_lite.metrics import score
 from vidsindy_lite.smoothing import smooth
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
 
+pytestmark = pytest.mark.slow  # fits ensembles
+
 TRUTH = SYSTEMS["Lorenz"]
 T, X = TRUTH.trajectory(600)
 

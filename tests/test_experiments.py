@@ -21,6 +21,8 @@ from vidsindy_lite.experiments import (
 )  # fmt: skip
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
 
+pytestmark = pytest.mark.slow  # films and discovers
+
 FRAMES = 300
 CORRUPT = [("noise", 0.1), ("blocks", 0.2), ("fibers", 0.2)]
 

@@ -75,6 +75,7 @@ def test_learn_from_ball_finds_its_centre(x):
     assert np.abs(calibration_errors(learned, rig)).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_film(tmp_path):
     rig, paths = lab.cameras(), lab.paths(30)[:1]
     tracks = lab.film(rig, paths, tmp_path)

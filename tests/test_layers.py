@@ -22,7 +22,7 @@ FLOORS = [
     {"experiments", "audit", "lab", "realistic"},
     {
         "plots", "plots_solver", "plots_study", "plots_audit", "plots_lab", "plots_report",
-        "report", "artifacts", "runner", "__main__",
+        "animation", "report", "artifacts", "compare", "readme", "runner", "site", "__main__",
     },
 ]  # fmt: skip
 PACKAGE = Path(vidsindy_lite.__file__).parent

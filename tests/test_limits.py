@@ -9,6 +9,8 @@ from vidsindy_lite.limits import cramer_rao
 from vidsindy_lite.polynomials import PolynomialSystem
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
 
+pytestmark = pytest.mark.slow  # discovers
+
 
 def test_constant_drift_is_a_straight_line_fit():
     drift = PolynomialSystem.from_terms({"x": {"1": 2.0}})

@@ -15,6 +15,12 @@ LARGEST = 600_000  # bytes of an executed notebook; a code host shows no more
 RUN = "python -m vidsindy_lite run {}"
 LONGEST = 15  # lines of a code cell
 
+# What a notebook says at its opening and its close, in this order.
+SECTIONS = (
+    r"\*\*What you will see\*\*", r"\*\*What you need\*\*", r"\*\*Covers\*\*",
+    r"^## What we learned", r"What the paper says,? and what we found", r"^## Exercises",
+    r"^## Run time and versions",
+)  # fmt: skip
 PARAMETER = re.compile(r"\w+: \w+ = .+  # .+")
 GLOBAL_RANDOM = re.compile(
     r"\b(np|numpy)\.random\.(?!default_rng\b|Generator\b|SeedSequence\b)\w+"
@@ -88,6 +94,29 @@ def anatomy_problems(path):
     return problems
 
 
+def story_problems(path):
+    """What the prose of a notebook lacks, and claims that nothing computes."""
+    notebook = jupytext.read(path)
+    prose = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    code = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
+    places = [re.search(section, prose, re.MULTILINE) for section in SECTIONS]
+    problems = [
+        f"no {section}" for section, place in zip(SECTIONS, places, strict=True) if place is None
+    ]
+    starts = [place.start() for place in places if place]
+    if starts != sorted(starts):
+        problems.append("opening and closing are not in the order of SECTIONS")
+    solutions = len(re.findall(r"<details><summary>", prose))
+    exercises = len(re.findall(r"^\*\*\d\.\*\*", prose, re.MULTILINE))
+    if not 2 <= exercises == solutions <= 3:
+        problems.append(f"{exercises} exercises with {solutions} hidden solutions, not 2 or 3 each")
+    if not re.search(r"^\s*assert ", code, re.MULTILINE):
+        problems.append("no claim is asserted")
+    if not code.rstrip().endswith("print(versions())"):
+        problems.append("does not close with print(versions())")
+    return problems
+
+
 def output_problems(path):
     """What an executed half must not hold: too much, or what changes from run to run."""
     executed = executed_half(path)
@@ -116,7 +145,8 @@ def test_there_are_notebooks():
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 @pytest.mark.parametrize(
-    "gate", [anatomy_problems, pair_problems, freshness_problems, output_problems]
+    "gate",
+    [anatomy_problems, story_problems, pair_problems, freshness_problems, output_problems],
 )
 def test_notebook(path, gate):
     assert gate(path) == []
@@ -234,6 +264,52 @@ def test_anatomy_gate_fails(pair, old, new, problem):
 def test_anatomy_gate_accepts_a_generator_and_fifteen_lines(pair):
     edit(pair, "x = 1", "rng = np.random.default_rng(0)\n" * LONGEST)
     assert anatomy_problems(pair) == []
+
+
+STORY = """\
+# # A tiny notebook
+# **What you will see** **What you need** **Covers**
+
+# %%
+assert True
+
+# %% [markdown]
+# ## What we learned
+# **What the paper says and what we found.**
+# ## Exercises
+# **1.** <details><summary>Solution</summary></details>
+#
+# **2.** <details><summary>Solution</summary></details>
+# ## Run time and versions
+
+# %%
+print(versions())
+"""
+
+
+def test_story_gate_accepts_a_whole_story(tmp_path):
+    path = tmp_path / "story.py"
+    path.write_text("# %% [markdown]\n" + STORY)
+    assert story_problems(path) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("**Covers**", ""),
+        ("## What we learned", ""),
+        ("**What the paper says and what we found.**", ""),
+        ("**2.** <details><summary>Solution</summary></details>", ""),
+        ("**2.** <details><summary>Solution</summary></details>", "**2.** Why?"),
+        ("assert True", "True"),
+        ("print(versions())", "versions"),
+        ("## Exercises", "## Run time and versions\n# ## Exercises"),
+    ],
+)
+def test_story_gate_fails(tmp_path, old, new):
+    path = tmp_path / "story.py"
+    path.write_text("# %% [markdown]\n" + STORY.replace(old, new, 1))
+    assert story_problems(path)
 
 
 @pytest.mark.parametrize("text", ["<Axes at 0x7f3a5c0d2e90>", "/tmp/abc/camera_1.mkv"])

@@ -10,6 +10,8 @@ import vidsindy_lite as vl
 from vidsindy_lite.experiments import film
 from vidsindy_lite.geometry import rodrigues
 
+pytestmark = pytest.mark.slow  # films its videos
+
 
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory):

@@ -3,7 +3,7 @@
 import pytest
 
 from vidsindy_lite import repository
-from vidsindy_lite.repository import package_stamp, repository_root, write_file
+from vidsindy_lite.repository import package_stamp, repository_root, versions, write_file
 
 CODE = '"""A module."""\ndef f(x):\n    """Add one."""\n    return x + 1\n'
 
@@ -64,3 +64,11 @@ def test_stamp_follows_other_files_and_requirements(package, tiny):
     (package / "look.mplstyle").rename(package / "other.mplstyle")
     stamps.add(package_stamp())
     assert len(stamps) == 5
+
+
+def test_versions_are_those_that_are_imported():
+    import numpy
+
+    lines = versions().splitlines()
+    assert lines[0].startswith("Python 3.")
+    assert f"numpy {numpy.__version__}" in lines

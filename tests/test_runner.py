@@ -13,6 +13,8 @@ from vidsindy_lite import artifacts, repository, runner
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.runner import NotebookError
 
+pytestmark = pytest.mark.slow  # starts kernels
+
 LEDGER = runner.LEDGER.as_posix()
 
 PLOT = (

@@ -19,6 +19,8 @@ from vidsindy_lite.__main__ import main
 from vidsindy_lite.sweeps import remember, sweep
 from vidsindy_lite.video import Scene, video_info
 
+pytestmark = pytest.mark.slow  # starts processes
+
 # A module of the package, with a function that takes notes of its calls.
 TOY = '''\
 import os

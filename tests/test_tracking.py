@@ -24,6 +24,8 @@ from vidsindy_lite.video import (
     write_video,
 )
 
+pytestmark = pytest.mark.slow  # renders and tracks videos
+
 SIZE = (256, 192)
 
 

@@ -191,6 +191,28 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--steps", type=int, help="batches of 16 frames (default: as shipped)")
     train.add_argument("--output", metavar="FILE", help="weights (default: those of the package)")
     train.set_defaults(command=_train)
+    site = commands.add_parser(
+        "site",
+        help="README, notebooks, figures and reference as web pages",
+        description="Write README, notebooks, figures and reference as web pages for offline use.",
+    )
+    site.add_argument(
+        "--output", metavar="DIR", default="build/site", help="folder (default: build/site)"
+    )
+    site.set_defaults(command=_site)
+
+    compare = commands.add_parser(
+        "compare",
+        help="two folders of figures, by their numbers",
+        description="Compare the numbers of two folders of figures, and lay out what differs.",
+        epilog="exit status: 0 if all numbers agree, 1 if not.",
+    )
+    compare.add_argument("committed", metavar="COMMITTED", help="a folder like figures/")
+    compare.add_argument("regenerated", metavar="REGENERATED", help="the same from another run")
+    compare.add_argument(
+        "--output", metavar="DIR", required=True, help="for both sides, with a page"
+    )
+    compare.set_defaults(command=_compare)
     return parser
 
 
@@ -286,6 +308,24 @@ def _train(options: argparse.Namespace) -> int:
     record = training.train(output, options.seed, steps, progress=True)
     print(f"{record['frames']} frames, loss {record['loss'][0]} to {record['loss'][-1]}: {output}")
     return 0
+
+
+def _site(options: argparse.Namespace) -> int:
+    from vidsindy_lite.site import build_site
+
+    pages = build_site(options.output)
+    print(f"{len(pages)} pages: open {options.output}/index.html")
+    return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from vidsindy_lite.compare import side_by_side
+
+    found = side_by_side(options.committed, options.regenerated, options.output)
+    for name, place in found.items():
+        print(f"{name}: {place}")
+    print(f"{len(found)} with other numbers")
+    return 1 if found else 0
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from PIL import Image
 
 from .repository import repository_root, write_file
 
@@ -40,9 +41,11 @@ __all__ = [
     "check_folder",
     "figures_folder",
     "files_of",
+    "load_run_times",
     "load_table",
     "prune",
     "record_run_time",
+    "save_animation",
     "save_figure",
     "save_table",
     "write_index",
@@ -192,6 +195,44 @@ def save_figure(
     _write_record(record)
 
 
+def save_animation(
+    animation_id: str,
+    pictures: Sequence[np.ndarray],
+    *,
+    caption: str,
+    numbers: Mapping[str, object],
+    rate: float = 12,
+) -> None:
+    """Write pictures as an animated GIF, which every code host plays, and register it.
+
+    Parameters
+    ----------
+    animation_id : str
+        As of `save_figure`.
+    pictures : sequence of ndarray of uint8, shape (height, width, 3)
+        The last one gives the 256 colours of all.
+    caption, numbers
+        As of `save_figure`.
+    rate : float
+        Pictures per second. The last one stays for three seconds.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `save_figure` does.
+    """
+    record = _new_record("animation", animation_id, caption, [f"{animation_id}.gif"])
+    record["numbers"] = _plain(dict(numbers), "numbers")
+    images = [Image.fromarray(picture) for picture in pictures]
+    palette = images[-1].quantize(256, Image.Quantize.MEDIANCUT)
+    first, *rest = (im.quantize(palette=palette, dither=Image.Dither.NONE) for im in images)
+    durations = [round(1000 / rate)] * len(rest) + [3000]
+    file = io.BytesIO()
+    first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
+    write_file(figures_folder() / f"{animation_id}.gif", file.getvalue())
+    _write_record(record)
+
+
 def save_table(table_id: str, rows: Iterable[Mapping[str, object]], *, caption: str) -> Table:
     """Write a table as CSV and Markdown, and register it.
 
@@ -248,6 +289,11 @@ def files_of(folder: str | os.PathLike, notebook: str) -> list[str]:
     """Names of the files that a notebook's figures and tables consist of."""
     records = [r for r in _records(Path(folder)).values() if r["notebook"] == notebook]
     return [name for record in records for name in (f"{record['id']}.json", *record["files"])]
+
+
+def load_run_times(folder: str | os.PathLike) -> dict[str, float]:
+    """Seconds that each notebook ran, two digits: what `record_run_time` has recorded."""
+    return {name: entry["seconds"] for name, entry in _run_times(Path(folder)).items()}
 
 
 def record_run_time(folder: str | os.PathLike, notebook: str, stamp: str, seconds: float) -> None:
@@ -467,6 +513,9 @@ def _contents_line(notebook: str, records: dict, times: dict) -> str:
 
 def _exhibit(record: dict) -> str:
     artifact_id = record["id"]
+    if record["kind"] == "animation":
+        body = f"![{artifact_id}]({artifact_id}.gif)\n\n{record['caption']}"
+        return f"{body}\n\n[numbers]({artifact_id}.json)"
     if record["kind"] == "figure":
         body = f"![{artifact_id}]({artifact_id}.png)\n\n{record['caption']}"
         return f"{body}\n\n[SVG]({artifact_id}.svg) · [numbers]({artifact_id}.json)"

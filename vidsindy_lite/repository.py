@@ -3,9 +3,16 @@
 import ast
 import hashlib
 import os
+import platform
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent
+# What results depend on.
+LIBRARIES = (
+    "numpy", "scipy", "scikit-learn", "torch", "pysindy", "opencv-python-headless", "matplotlib"
+)  # fmt: skip
 
 
 def repository_root(start: str | os.PathLike | None = None) -> Path:
@@ -39,6 +46,12 @@ def write_file(path: Path, content: bytes) -> None:
     beside.replace(path)
 
 
+def versions() -> str:
+    """Python and the libraries that results depend on, as they are here, a line each."""
+    lines = [f"{name} {metadata.version(name)}" for name in LIBRARIES]
+    return "\n".join([f"Python {platform.python_version()}", *lines])
+
+
 def package_stamp(root: str | os.PathLike | None = None) -> str:
     """Hash of the code that results depend on.
 
@@ -61,6 +74,7 @@ def package_stamp(root: str | os.PathLike | None = None) -> str:
     return digest.hexdigest()[:16]
 
 
+@cache
 def _meaning(source: str) -> bytes:
     """What a Python source does, as text: its syntax tree without bare constants (docstrings)."""
 

@@ -2,8 +2,8 @@
 
 The .py half of a pair is the source. The .ipynb half is made here: executed, stripped of all that
 differs between two runs, and stamped with a hash of the code that made it. The full profile
-writes notebooks/*.ipynb and figures/ of the repository, the quick profile the same layout under
-build/quick/.
+writes notebooks/*.ipynb and figures/ of the repository, and the tables of its README; the quick
+profile writes the layout of the former two under build/quick/.
 
 A ledger beside them, build/ledger.json, which is never committed, keeps what was executed here. A
 notebook is not executed again if its stamp and its source are the same, its prose included, and its
@@ -37,6 +37,7 @@ from PIL import Image
 from traitlets.config import Config
 
 from vidsindy_lite import artifacts
+from vidsindy_lite.readme import write_readme
 from vidsindy_lite.repository import PACKAGE, package_stamp, repository_root, write_file
 
 __all__ = [
@@ -248,6 +249,11 @@ def run(
 
     artifacts.write_index(figures)
     problems = artifacts.check_folder(figures, stamps)
+    if output == root and (root / "README.md").exists():
+        try:
+            write_readme(root)
+        except (ValueError, FileNotFoundError) as missing:
+            problems.append(f"README.md: {missing}")
     table, memory = _systems_table(figures, outcomes), _largest_process()
     return Report(tuple(outcomes), tuple(problems), table, memory)
 

@@ -1,0 +1,89 @@
+"""Two folders of figures, number by number: what a run on another machine or day has changed."""
+
+import json
+import math
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from .artifacts import RUN_TIMES, SECONDS
+
+__all__ = ["differences", "side_by_side"]
+
+# Of a number; and of the largest of its list, as what is zero but for rounding has no digits.
+TOLERANCE = 1e-3
+
+
+def differences(committed: str | os.PathLike, regenerated: str | os.PathLike) -> dict[str, str]:
+    """Which figures and tables hold other numbers, and where each first differs.
+
+    Wall times, captions and stamps do not count.
+
+    Parameters
+    ----------
+    committed, regenerated : path
+        Folders as notebooks write them.
+
+    Returns
+    -------
+    dict of str to str
+        By id, in words.
+    """
+    ours, theirs = (_numbers(Path(folder)) for folder in (committed, regenerated))
+    found = {}
+    for name in sorted(ours | theirs):
+        if name not in ours or name not in theirs:
+            found[name] = "only " + ("committed" if name in ours else "regenerated")
+        elif place := next(_unlike(ours[name], theirs[name], "", 0.0), None):
+            found[name] = place
+    return found
+
+
+def side_by_side(
+    committed: str | os.PathLike, regenerated: str | os.PathLike, output: str | os.PathLike
+) -> dict[str, str]:
+    """Copy what `differences` finds, and a page that shows both images and the places.
+
+    Returns
+    -------
+    dict of str to str
+        As of `differences`.
+    """
+    found, output = differences(committed, regenerated), Path(output)
+    page = ["<!DOCTYPE html>", "<meta charset='utf-8'>", "<title>Differences</title>"]
+    for side, folder in (("committed", committed), ("regenerated", regenerated)):
+        (output / side).mkdir(parents=True, exist_ok=True)
+        for name in found:
+            for file in Path(folder).glob(f"{name}.*"):
+                shutil.copy(file, output / side)
+    for name, place in found.items():
+        page.append(f"<h2>{name}</h2>\n<p>{place}</p>")
+        for side in ("committed", "regenerated"):
+            if (output / side / f"{name}.png").exists():
+                page.append(f"<img src='{side}/{name}.png' alt='{side}' style='width: 49%'>")
+    (output / "index.html").write_text("\n".join(page) + "\n", encoding="utf-8")
+    return found
+
+
+def _numbers(folder: Path) -> dict[str, object]:
+    """What each figure plots and each table holds, by id."""
+    paths = (path for path in folder.glob("*.json") if path.name != RUN_TIMES)
+    records = {path.stem: json.loads(path.read_text("utf-8")) for path in paths}
+    return {name: record.get("rows", record.get("numbers")) for name, record in records.items()}
+
+
+def _unlike(one: object, other: object, place: str, size: float) -> Iterator[str]:
+    """Where two contents differ; `size` is that of the largest number beside this one."""
+    if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
+        for key in one.keys() - {SECONDS}:
+            yield from _unlike(one[key], other[key], f"{place} {key}", 0.0)
+    elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        largest = max((abs(v) for v in one if isinstance(v, int | float)), default=0.0)
+        for index, pair in enumerate(zip(one, other, strict=True)):
+            yield from _unlike(*pair, f"{place}[{index}]", largest)
+    elif isinstance(one, float | int) and isinstance(other, float | int):
+        if not math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=TOLERANCE * size):
+            yield f"{place.strip()}: {one} committed, {other} regenerated"
+    elif one != other:
+        yield f"{place.strip()}: {one!r:.60} committed, {other!r:.60} regenerated"
