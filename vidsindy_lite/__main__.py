@@ -115,8 +115,8 @@ def _parser() -> argparse.ArgumentParser:
         "--detector",
         default="auto",
         metavar="NAME",
-        help="how to find the target: auto, background, learned, or the path of a YOLO-v8 ONNX file "
-        "(default: auto)",
+        help="how to find the target: auto, background, learned, or the path of a YOLO-v8 ONNX "
+        "file (default: auto)",
     )
     discover.add_argument("--seed", type=int, default=0, help="of the search (default: 0)")
     discover.set_defaults(command=_discover)
