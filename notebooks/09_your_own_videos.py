@@ -59,7 +59,7 @@ from vidsindy_lite.video import Scene, read_video, render, video_info, write_vid
 # %%
 plt.style.use("vidsindy_lite.vidsindy")
 full = profile == "full"
-names = ("Lorenz",)  # others: any of SYSTEMS
+names = ("Lorenz", "SprottE") if full else ("Lorenz",)
 frames = 1000 if full else 300
 late, fps = 7, 30
 
