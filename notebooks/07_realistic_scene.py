@@ -108,7 +108,7 @@ numbers = {title: view.track.confidence for title, view in zip(titles, first.vie
 save_figure("scene_confidence", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
-# *Where the tree hides the target (white between the grey), the confidence is zero. It is low for partial
+# *Where the tree hides the target (white between the grey), the confidence is nil. It is low for partial
 # views, and it varies with the noise even where all of the target is seen.*
 
 # %%
@@ -130,18 +130,22 @@ save_table("scene_tracks", rows, caption="Tracks of the realistic scene, by tria
 # %%
 assert sum(row["hidden (%)"] > 0 for row in rows) > len(rows) / 2
 assert all(row["found while hidden"] == 0 for row in rows)
+assert all((view.track.confidence[view.hidden] < 0.05).all() for view in views)
 assert all(row["frames until found again"] <= 5 for row in rows)
-assert all(row["rms error (px)"] <= 0.5 for row in rows)
+assert all(row["rms error (px)"] < 0.5 for row in rows)
 
 # %% [markdown]
-# Not one position is invented while the target is hidden. Errors of more than a pixel are rare; they are
-# views in which a little of the target is missing, which the noise conceals.
+# Not one position is invented while the target is hidden. The others are good to about a tenth of a
+# pixel; larger errors are rare. Views in which a little of the target is missing can hardly be told from
+# whole ones in this noise.
 
 # %%
-whole = np.concatenate([view.errors[view.visible == 1] for view in views])
 error = np.concatenate([view.errors for view in views])
-off = np.mean(error[np.isfinite(error)] > 1)
-print(f"off by more than 1 px: {off:.2%} of all positions, of whole views {np.nanmax(whole):.2f} px at most")
+whole = np.concatenate([view.visible == 1 for view in views])
+off = np.mean(error[np.isfinite(error)] > 0.5)
+print(f"off by more than half a pixel: {off:.2%}; largest error {np.nanmax(error):.2f} px, "
+      f"of whole views {np.nanmax(error[whole]):.2f} px")  # fmt: skip
+assert np.sqrt(np.nanmean(error**2)) < 0.15
 assert off < 0.01
 
 # %% [markdown]
@@ -184,7 +188,9 @@ caption = "Errors of the coefficients of the realistic scene, with their standar
 save_figure("scene_coefficients", fig, caption=caption, numbers={"pulls": pulls(first.found, first.truth)})
 
 # %% [markdown]
-# *How far each coefficient is from the truth, with its standard error.*
+# *How far each coefficient is from the truth, with its standard error. They lean together: a small error
+# of the learned cameras is one error of all coefficients, and the standard errors, which are those of the
+# path, do not know it (exercise 1).*
 
 # %%
 rows = [
@@ -200,7 +206,7 @@ save_table("scene_equations", rows, caption="Laws discovered from the realistic 
 
 # %%
 assert all(trial.score.exact for trial in runs)
-assert all(trial.score.l2 <= 2e-2 for trial in runs)
+assert all(trial.score.l2 <= 1e-2 for trial in runs)
 
 # %% [markdown]
 # ## What we learned
@@ -221,19 +227,19 @@ assert all(trial.score.l2 <= 2e-2 for trial in runs)
 # %% [markdown]
 # ## Exercises
 #
-# **1.** How much of the error comes from the noise? Film the first trial without it.
+# **1.** How much of the error comes from the learned cameras? Reconstruct with the true ones.
 #
 # <details><summary>Solution</summary>
 #
 # ```python
-# from vidsindy_lite import realistic
+# from vidsindy_lite import Rig, discover, reconstruct, score
 #
-# realistic.DISTURBANCES["noise_variance"] = 0.0
-# quiet = realistic.run(SceneTask(seed, frames))
-# print(quiet.score, [np.sqrt(np.nanmean(view.errors**2)) for view in quiet.views])
+# law = discover(first.t, reconstruct(tracks, Rig.around(first.x)))
+# print(first.score, score(law, first.truth), sep="\n")
+# print(pulls(first.found, first.truth), pulls(law, first.truth), sep="\n")
 # ```
 #
-# QUIET
+# TRUE
 # </details>
 #
 # **2.** Only the first two cameras were there. Does the law survive?
