@@ -198,7 +198,7 @@ rows = [
         "trial": n, "exact terms": trial.score.exact, "l2 (e-2)": 100 * trial.score.l2,
         "worst coefficient (%)": 100 * trial.score.max_coefficient_error,
         "gaps (%)": 100 * np.isnan(trial.path).any(axis=1).mean(),
-        "status": trial.found.status, "seconds for the law": trial.seconds,
+        "status": trial.found.status, "seconds": trial.seconds,
     }
     for n, trial in zip(trials, runs, strict=True)
 ]  # fmt: skip
@@ -239,7 +239,8 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # print(pulls(first.found, first.truth), pulls(law, first.truth), sep="\n")
 # ```
 #
-# TRUE
+# The relative l2 error of the first trial falls from 2.1e-4 to 1.5e-4, and the largest error from 3.3
+# to 2.4 standard errors: about a third of it came from the cameras.
 # </details>
 #
 # **2.** Only the first two cameras were there. Does the law survive?
@@ -254,5 +255,16 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # print(np.isnan(path).any(axis=1).mean(), score(discover(first.t, path), first.truth))
 # ```
 #
-# PAIR
+# Not untouched: a quarter of the path is missing, and the law has all true terms and two false ones.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

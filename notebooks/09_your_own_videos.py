@@ -363,3 +363,14 @@ else:
 # It is refused: one position is left, and the scene could be moved along the line of view of that camera
 # without any change in the images, if the two others are moved with it.
 # </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+from vidsindy_lite.repository import versions
+
+print(versions())

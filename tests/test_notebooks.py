@@ -1,5 +1,6 @@
 """Gates that keep the notebooks honest, each with a test in which it fails, and their quick run."""
 
+import json
 import re
 
 import jupytext
@@ -7,10 +8,12 @@ import nbformat
 import pytest
 
 from vidsindy_lite import artifacts, runner
+from vidsindy_lite.compare import differences
 from vidsindy_lite.repository import PACKAGE
 
 ROOT = PACKAGE.parent
 NOTEBOOKS = runner.find_notebooks(ROOT)
+REFERENCES = ROOT / "tests" / "quick"  # tables of a quick run
 LARGEST = 600_000  # bytes of an executed notebook; a code host shows no more
 RUN = "python -m vidsindy_lite run {}"
 LONGEST = 15  # lines of a code cell
@@ -130,6 +133,20 @@ def output_problems(path):
     return problems
 
 
+def number_problems(path, figures, references=REFERENCES):
+    """Where the tables of a quick run hold other numbers than the committed ones.
+
+    By more than a fifth: other processors round otherwise, and chaos makes something of it.
+    """
+    tables = set()
+    for file in (*figures.glob("*.json"), *references.glob("*.json")):
+        record = json.loads(file.read_text("utf-8"))
+        if "rows" in record and record["notebook"] == path.stem:
+            tables.add(file.stem)
+    found = differences(references, figures, tolerance=0.2)
+    return [f"{name}: {place}" for name, place in found.items() if name in tables]
+
+
 def orphan_problems(notebooks):
     """Executed halves without a source."""
     sources = {path.stem for path in runner.find_notebooks(notebooks.parent)}
@@ -172,6 +189,8 @@ def quick(tmp_path_factory):
 def test_quick_run(path, quick):
     report = runner.run([path.stem], "quick", quick, root=ROOT)
     assert report.ok, str(report)
+    problems = number_problems(path, quick / "figures")
+    assert not problems, f"{problems}; if that is meant, copy the tables to {REFERENCES}"
 
 
 # ------------------------------------------------------------------------------ each gate can fail
@@ -336,3 +355,49 @@ def test_orphan_gate_fails_on_an_executed_half_alone(pair):
 def test_quick_run_fails_with_its_notebook(tiny):
     tiny.write("01_bad", "assert 1 + 1 == 3")
     assert not runner.run(["01"], "quick", tiny.root / "build", root=tiny.root).ok
+
+
+@pytest.fixture
+def tables(tmp_path):
+    """The same table, committed and of a quick run; and one of another notebook."""
+    row = {"system": "Lorenz", "false": 0, "l2 (e-2)": 0.5, "seconds": 3.0}
+    for folder in ("committed", "quick"):
+        (tmp_path / folder).mkdir()
+        write_table(tmp_path / folder, "found", "01_first", row)
+    write_table(tmp_path / "committed", "other", "02_second", row)
+    return tmp_path
+
+
+def write_table(folder, name, notebook, row):
+    record = {"id": name, "notebook": notebook, "rows": [row]}
+    (folder / f"{name}.json").write_text(json.dumps(record))
+
+
+def test_numbers_of_the_same_quick_run_agree(tables):
+    edit(tables / "quick" / "found.json", "0.5", "0.51")
+    edit(tables / "quick" / "found.json", "3.0", "9.0")
+    path = tables / "01_first.py"
+    assert number_problems(path, tables / "quick", tables / "committed") == []
+
+
+@pytest.mark.parametrize(
+    ("folder", "old", "new"),
+    [
+        ("committed", "0.5", "0.9"),
+        ("quick", '"false": 0', '"false": 1'),
+        ("quick", "Lorenz", "SprottE"),
+    ],
+)
+def test_numbers_of_another_quick_run_are_named(tables, folder, old, new):
+    edit(tables / folder / "found.json", old, new)
+    path = tables / "01_first.py"
+    problems = number_problems(path, tables / "quick", tables / "committed")
+    assert [problem.partition(":")[0] for problem in problems] == ["found"]
+
+
+@pytest.mark.parametrize("folder", ["committed", "quick"])
+def test_a_table_on_one_side_only_is_named(tables, folder):
+    (tables / folder / "found.json").unlink()
+    path = tables / "01_first.py"
+    problems = number_problems(path, tables / "quick", tables / "committed")
+    assert [problem.partition(":")[0] for problem in problems] == ["found"]

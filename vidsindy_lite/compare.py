@@ -13,9 +13,12 @@ __all__ = ["differences", "side_by_side"]
 
 # Of a number; and of the largest of its list, as what is zero but for rounding has no digits.
 TOLERANCE = 1e-3
+ROUNDING = 1e-9
 
 
-def differences(committed: str | os.PathLike, regenerated: str | os.PathLike) -> dict[str, str]:
+def differences(
+    committed: str | os.PathLike, regenerated: str | os.PathLike, tolerance: float = TOLERANCE
+) -> dict[str, str]:
     """Which figures and tables hold other numbers, and where each first differs.
 
     Wall times, captions and stamps do not count.
@@ -24,6 +27,8 @@ def differences(committed: str | os.PathLike, regenerated: str | os.PathLike) ->
     ----------
     committed, regenerated : path
         Folders as notebooks write them.
+    tolerance : float
+        Relative difference of two numbers that passes.
 
     Returns
     -------
@@ -35,7 +40,7 @@ def differences(committed: str | os.PathLike, regenerated: str | os.PathLike) ->
     for name in sorted(ours | theirs):
         if name not in ours or name not in theirs:
             found[name] = "only " + ("committed" if name in ours else "regenerated")
-        elif place := next(_unlike(ours[name], theirs[name], "", 0.0), None):
+        elif place := next(_unlike(ours[name], theirs[name], "", 0.0, tolerance), None):
             found[name] = place
     return found
 
@@ -73,17 +78,20 @@ def _numbers(folder: Path) -> dict[str, object]:
     return {name: record.get("rows", record.get("numbers")) for name, record in records.items()}
 
 
-def _unlike(one: object, other: object, place: str, size: float) -> Iterator[str]:
+def _unlike(
+    one: object, other: object, place: str, size: float, tolerance: float
+) -> Iterator[str]:
     """Where two contents differ; `size` is that of the largest number beside this one."""
     if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
         for key in one.keys() - {SECONDS}:
-            yield from _unlike(one[key], other[key], f"{place} {key}", 0.0)
+            yield from _unlike(one[key], other[key], f"{place} {key}", 0.0, tolerance)
     elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
         largest = max((abs(v) for v in one if isinstance(v, int | float)), default=0.0)
         for index, pair in enumerate(zip(one, other, strict=True)):
-            yield from _unlike(*pair, f"{place}[{index}]", largest)
+            yield from _unlike(*pair, f"{place}[{index}]", largest, tolerance)
     elif isinstance(one, float | int) and isinstance(other, float | int):
-        if not math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=TOLERANCE * size):
+        nothing = max(tolerance * size, ROUNDING)
+        if not math.isclose(one, other, rel_tol=tolerance, abs_tol=nothing):
             yield f"{place.strip()}: {one} committed, {other} regenerated"
     elif one != other:
         yield f"{place.strip()}: {one!r:.60} committed, {other!r:.60} regenerated"
