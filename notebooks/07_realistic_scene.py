@@ -205,14 +205,20 @@ rows = [
 save_table("scene_equations", rows, caption="Laws discovered from the realistic scene, by trial.")
 
 # %%
+for n, trial in zip(trials, runs, strict=True):
+    print(f"trial {n}:", trial.found.status, *trial.found.warnings)
 assert all(trial.score.exact for trial in runs)
 assert all(trial.score.l2 <= 1e-2 for trial in runs)
+
+# %% [markdown]
+# Where a trial is *suspect*, the law is right all the same: the few periods of the record leave a second
+# law possible, with a term more, and the warning says so.
 
 # %% [markdown]
 # ## What we learned
 #
 # * Tumbling, change of size, image noise and trees leave the terms as they are: in every trial exactly
-#   those of SprottF, with errors far below a percent.
+#   those of SprottF, with a relative error below a percent.
 # * The tracker says when it does not know: nothing is found while the target is hidden, and it is found
 #   again within five whole views.
 # * Three cameras are more than the geometry needs. What one of them loses the other two replace.
@@ -239,7 +245,8 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # print(pulls(first.found, first.truth), pulls(law, first.truth), sep="\n")
 # ```
 #
-# TRUE
+# With 400 frames, $\ell_2$ falls from 0.00021 to 0.00015, and the coefficients, up to three standard errors
+# from the truth before, come to within two and a half.
 # </details>
 #
 # **2.** Only the first two cameras were there. Does the law survive?
@@ -254,5 +261,6 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # print(np.isnan(path).any(axis=1).mean(), score(discover(first.t, path), first.truth))
 # ```
 #
-# PAIR
+# Nearly. With 400 frames all true terms are there, their errors as before, and two false ones join them;
+# nothing warns of it. A quarter of the frames is without a position.
 # </details>
