@@ -78,7 +78,7 @@ first = runs[0]
 images = [view.image for view in first.views]
 tracks = [view.track.pixels for view in first.views]
 titles = [f"camera {i}" for i in (1, 2, 3)]
-fig = plots.plot_frames(images, titles, tracks, frames // 2)
+fig = plots.plot_frames(images, titles, tracks, [view.shown for view in first.views])
 caption = "The realistic scene: one frame of each video, with the track of the target."
 save_figure("fig_4a", fig, caption=caption, numbers=dict(zip(titles, tracks, strict=True)))
 

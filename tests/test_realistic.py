@@ -51,7 +51,7 @@ def test_delays_count_whole_views_until_the_target_is_found():
     seen = np.array([1, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 0])
     pixels = np.where(seen[:, None] == 1, 5.0, np.nan) * np.ones(2)
     track = Track(pixels, seen.astype(float), "background")
-    view = View(None, None, track, np.full((13, 2), 5.0), visible)
+    view = View(None, 0, None, track, np.full((13, 2), 5.0), visible)
     np.testing.assert_array_equal(view.delays, [2, 0, 2])
     np.testing.assert_array_equal(np.flatnonzero(view.hidden), [1, 6, 9])
 

@@ -225,10 +225,11 @@ def plot_frames(images, titles, tracks=None, index=0, columns=3):
     titles : sequence of str
     tracks : sequence of ndarray, shape (n, 2), optional
         Pixels of the target in all frames of each video.
-    index : int
+    index : int or sequence of int
         Frame number of the images: where the target is on its track, if it is seen there.
     columns : int
     """
+    indices = np.broadcast_to(index, len(images))
     rows = -(-len(images) // columns)
     size = (2.7 * columns + 0.6, 3.0 * rows + 0.5)
     shared = {"sharex": True, "sharey": True, "squeeze": False}
@@ -242,8 +243,8 @@ def plot_frames(images, titles, tracks=None, index=0, columns=3):
         if tracks is not None:
             halo = withStroke(linewidth=2.4, foreground="white")
             axes.plot(*tracks[k].T, color="C0", lw=1.0, path_effects=[halo])
-            if np.isfinite(tracks[k][index]).all():
-                _magnify(axes, image, tracks[k], index)
+            if np.isfinite(tracks[k][indices[k]]).all():
+                _magnify(axes, image, tracks[k], indices[k])
     for axes in grid[-1]:
         axes.set_xlabel("u (px)")
     for axes in grid[:, 0]:

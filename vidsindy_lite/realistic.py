@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,7 +28,7 @@ from .experiments import SAMPLES_PER_PERIOD
 from .metrics import Score, score
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
 from .tracking import Track, follow
-from .video import Scene, render_labelled, write_video
+from .video import Scene, read_video, render_labelled, write_video
 
 START = (-1.17, -1.1, 1.0)
 """Where the motion begins, in the native frame."""
@@ -70,8 +71,10 @@ class View:
     Parameters
     ----------
     scene : Scene
+    shown : int
+        Number of the frame in the middle of those in which the target was found.
     image : ndarray, shape (height, width, 3), uint8
-        The frame in the middle of the video, blue-green-red.
+        That frame, blue-green-red.
     track : Track
         As found in the video file.
     truth : ndarray, shape (n, 2)
@@ -81,6 +84,7 @@ class View:
     """
 
     scene: Scene
+    shown: int
     image: np.ndarray
     track: Track
     truth: np.ndarray
@@ -187,15 +191,17 @@ def _tree_before(camera, rng):
 
 
 def _view(pixels, scene, seed):
-    visible, images = [], []
+    visible = []
 
     def frames():
-        for i, drawn in enumerate(render_labelled(pixels, scene, seed)):
+        for drawn in render_labelled(pixels, scene, seed):
             visible.append(drawn.visible)
-            if i == len(pixels) // 2:
-                images.append(drawn.frame)
             yield drawn.frame
 
     with TemporaryDirectory() as folder:
-        track = follow(write_video(Path(folder) / "view.avi", frames()))
-    return View(scene, images[0], track, pixels, np.array(visible))
+        video = write_video(Path(folder) / "view.avi", frames())
+        track = follow(video)
+        seen = np.flatnonzero(np.isfinite(track.pixels).all(axis=1))
+        shown = int(seen[len(seen) // 2]) if len(seen) else 0
+        image = next(islice(read_video(video), shown, None))
+    return View(scene, shown, image, track, pixels, np.array(visible))
