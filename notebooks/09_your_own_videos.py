@@ -47,6 +47,7 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
+# %%
 from vidsindy_lite import PolynomialSystem, plots_report, score
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.artifacts import save_figure, save_table
@@ -85,7 +86,7 @@ def shoot(name, folder):
     rig.uncalibrated(keep=0).save(folder / "rig.toml")
     return truth, t, rig
 
-
+# %%
 home = TemporaryDirectory()
 folders = {name: Path(home.name) / name for name in names}
 for folder in folders.values():
