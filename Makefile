@@ -3,6 +3,10 @@
 VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
+# As many processes as cores. A file of tests goes to one of them, so that what its tests share is
+# made once, the longest files first. The notebooks, one after the other, take as long as a quarter
+# of all tests: more than four processes would wait for them.
+SPREAD := -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
 
 .DEFAULT_GOAL := help
@@ -34,10 +38,10 @@ figures: $(READY)
 	$(BIN)/python -m vidsindy_lite run --profile $(if $(QUICK),quick,full) $(if $(FORCE),--force)
 
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(SPREAD)
 
 test-fast: $(READY)
-	$(BIN)/python -m pytest -m "not notebooks and not slow"
+	$(BIN)/python -m pytest $(SPREAD) -m "not notebooks and not slow"
 
 bench: $(READY)
 	$(BIN)/python -m pytest -s -o python_files="bench_*.py" tests/benchmarks

@@ -1,6 +1,8 @@
 """What all tests share: settings, random curves, and a repository of tiny notebooks."""
 
 import os
+from collections import Counter
+from functools import cache
 from pathlib import Path
 
 # Before numpy is imported: results then do not depend on the number of cores.
@@ -10,9 +12,21 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from vidsindy_lite import pipeline
+
 # The same examples in every run, so that a red test stays red; no deadline on a busy machine.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the files of long tests, so that no worker ends with one of them, alone."""
+    marked = [
+        Counter(item.path for item in items if item.get_closest_marker(mark))
+        for mark in ("notebooks", "slow")
+    ]
+    items.sort(key=lambda item: [-count[item.path] for count in marked])
+
 
 HEADER = """\
 # ---
@@ -63,6 +77,14 @@ class TinyRepository:
         path = self.notebooks / f"{name}.py"
         path.write_text(HEADER + "".join(f"\n# %%\n{cell}\n" for cell in cells))
         return path
+
+
+@pytest.fixture(scope="module")
+def tracked_once():
+    """Tracks each video file once, however many tests of a module discover from it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "follow", cache(pipeline.follow))
+        yield
 
 
 @pytest.fixture

@@ -17,6 +17,13 @@ def measured(name, noise, n=600, seed=11):
     return truth, t, add_noise(x, noise, np.random.default_rng(seed))
 
 
+@pytest.fixture(scope="module")
+def lorenz():
+    """What is found in noisy samples of Lorenz: the truth, the samples, the discovery."""
+    truth, t, x = measured("Lorenz", 0.05)
+    return truth, t, x, discover(t, x)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_clean_systems_are_recovered_exactly(name):
@@ -89,7 +96,7 @@ TIED = {  # what is conserved ties the candidates together along the record
 
 
 @pytest.mark.parametrize("name", TIED)
-@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("noise", [0.0, pytest.param(0.01, marks=pytest.mark.slow)])
 def test_conserved_quantities_do_not_hide_the_law(name, noise):
     terms, offset, x0, duration, degree = TIED[name]
     truth = PolynomialSystem.from_terms(terms).shift(offset)
@@ -151,12 +158,12 @@ def test_units_do_not_matter():
     np.testing.assert_allclose(scaled.standard_errors, found.standard_errors * factor, rtol=1e-4)
 
 
-def test_curve_follows_the_truth_better_than_the_data():
-    truth, t, x = measured("Lorenz", 0.1)
+def test_curve_follows_the_truth_better_than_the_data(lorenz):
+    truth, t, x, found = lorenz
     clean = truth.trajectory(600)[1]
-    fitted = discover(t, x).curve(t)
+    fitted = found.curve(t)
     assert np.sqrt(np.mean((fitted - clean) ** 2)) < 0.3 * np.sqrt(np.mean((x - clean) ** 2))
-    assert np.isnan(discover(t, x).curve(np.array([t[-1] + 1]))).all()
+    assert np.isnan(found.curve(np.array([t[-1] + 1]))).all()
 
 
 @pytest.mark.slow
@@ -183,9 +190,8 @@ def test_same_seed_same_result():
     assert (first.covariance == second.covariance).all()
 
 
-def test_history_tells_the_fit():
-    _, t, x = measured("Lorenz", 0.05)
-    history = discover(t, x).history
+def test_history_tells_the_fit(lorenz):
+    history = lorenz[-1].history
     assert history[0].terms == 30
     assert history[-1].terms == 7
     assert history[-1].physics_loss < 1e-4 * history[0].physics_loss

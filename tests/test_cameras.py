@@ -319,6 +319,7 @@ class TestLearning:
         assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
         np.testing.assert_allclose(reconstruct(tracks, learned), x, atol=1e-9 * np.ptp(x))
 
+    @pytest.mark.slow
     @given(SEEDS, st.integers(0, 2))
     @settings(max_examples=25)
     def test_integer_pixels_give_a_third_of_a_pixel(self, seed, keep):
@@ -336,6 +337,7 @@ class TestLearning:
         descended, closed = (learn_cameras(tracks, start, m) for m in ("gradient", "paper"))
         assert np.abs(calibration_errors(descended, closed)).max() < 1e-6
 
+    @pytest.mark.slow
     @given(SEEDS, st.integers(2, 6), st.data())
     @settings(max_examples=20)
     def test_any_number_of_cameras_with_missing_views(self, seed, cameras, data):
@@ -365,6 +367,7 @@ class TestLearning:
         with pytest.raises(ValueError, match="common views must give at least 4 equations"):
             learn_cameras(tracks, truth.uncalibrated(), "paper")
 
+    @pytest.mark.slow
     def test_joint_is_closer_and_less_biased_than_eq_4(self):
         errors = {"joint": [], "paper": []}
         for seed in range(30):

@@ -186,6 +186,7 @@ def small(monkeypatch):
     monkeypatch.setattr(training, "_CHECKPOINT", 2)
 
 
+@pytest.mark.slow
 def test_training_goes_on_where_it_was_stopped(small, tmp_path, monkeypatch, capsys):
     whole = training.train(tmp_path / "whole.pt", seed=3, steps=5, progress=False)
     step, batch = [], training._batch

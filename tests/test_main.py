@@ -40,6 +40,7 @@ def here(folder, tmp_path, monkeypatch):
 VIDEOS = ["a.avi", "b.avi", "c.avi"]
 
 
+@pytest.mark.slow
 def test_from_videos_to_a_report(here, capsys):
     status = main(["discover", *VIDEOS, "--rig", "rig.toml", "--degree", "2", "--out", "law"])
     shown = capsys.readouterr()

@@ -87,6 +87,7 @@ def test_a_spiral_is_found_away_from_its_origin():
     np.testing.assert_array_equal(found.system.coefficients, kept)
 
 
+@pytest.mark.slow
 def test_lorenz_is_found_from_clean_data():
     truth = SYSTEMS["Lorenz"].shift((10, 10, 0))
     t, x = truth.trajectory(300)

@@ -187,6 +187,7 @@ class TestRig:
 
 
 class TestLearning:
+    @pytest.mark.slow
     @given(SEEDS, st.integers(3, 6), st.data())
     @settings(max_examples=30)
     def test_exact_pixels_give_exact_cameras(self, seed, cameras, data):

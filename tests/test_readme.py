@@ -19,6 +19,7 @@ def blocks(language):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("tracked_once")
 def test_the_code_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     smallest, own_videos, test_videos = blocks("python")
@@ -59,6 +60,7 @@ def test_an_edited_result_is_seen(old, new):
     assert fill(README.replace(old, new, 1), ROOT) != README.replace(old, new, 1)
 
 
+@pytest.mark.slow
 def test_another_result_is_seen(tmp_path):
     shutil.copytree(ROOT / "figures", tmp_path / "figures")
     shutil.copytree(ROOT / "notebooks", tmp_path / "notebooks")

@@ -11,11 +11,15 @@ from vidsindy_lite.tracking import Track
 SIZE = (256, 256)
 
 
+films = pytest.mark.slow  # films a scene and tracks it
+
+
 @pytest.fixture(scope="module")
 def result():
     return run(SceneTask(trial=1, frames=200, image_size=SIZE))
 
 
+@films
 def test_one_target_before_three_backgrounds_behind_three_trees(result):
     views = result.views
     assert len({view.scene.trees for view in views}) == 3
@@ -30,6 +34,7 @@ def test_one_target_before_three_backgrounds_behind_three_trees(result):
         assert abs(left + width / 2 - 128) <= 0.12 * 256 + 1
 
 
+@films
 def test_nothing_is_invented_behind_the_tree_and_the_target_is_found_again(result):
     assert sum(view.hidden.any() for view in result.views) >= 2
     for view in result.views:
@@ -39,6 +44,7 @@ def test_nothing_is_invented_behind_the_tree_and_the_target_is_found_again(resul
         assert np.sqrt(np.nanmean(view.errors**2)) < 0.5
 
 
+@films
 def test_a_seed_is_a_scene(result):
     x, rig = result.x[:8], Rig.around(result.x, SIZE)
     again, other = film(rig, x, seed=1), film(rig, x, seed=2)
@@ -56,6 +62,7 @@ def test_delays_count_whole_views_until_the_target_is_found():
     np.testing.assert_array_equal(np.flatnonzero(view.hidden), [1, 6, 9])
 
 
+@films
 def test_from_videos_to_the_law(result):
     np.testing.assert_allclose(result.x[0], np.add(START, REFERENCE_OFFSET))
     seen = sum(np.isfinite(view.errors).astype(int) for view in result.views)

@@ -77,7 +77,7 @@ def test_nothing_is_made_up_in_gaps(motion):
 # ----------------------------------------------------------------------------------------- learning
 
 
-@pytest.mark.parametrize("keep", [0, 2])
+@pytest.mark.parametrize("keep", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_fractional_lags_and_different_lengths(motion, keep):
     lags = (0, 7.4, -12.7)
     tracks = filmed(motion, (250, 230, 240), lags)
@@ -90,7 +90,9 @@ def test_fractional_lags_and_different_lengths(motion, keep):
     assert found.errors[0] == 0
 
 
-@pytest.mark.parametrize("lags", [(0, 0, 0), (0, 7, 0), (0, -20, 35)])
+@pytest.mark.parametrize(
+    "lags", [(0, 0, 0), (0, 7, 0), pytest.param((0, -20, 35), marks=pytest.mark.slow)]
+)
 def test_whole_lags_come_out_whole(motion, lags):
     found = learn_lags(filmed(motion, (250, 240, 230), lags), motion[1].uncalibrated())
     assert found.lags.tolist() == list(lags)
@@ -119,6 +121,7 @@ def test_calibrated_rig_and_outliers(motion):
     np.testing.assert_allclose(found.lags, (0, 7, -4), atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_camera_without_a_position(motion):
     first, second, third = motion[1].uncalibrated().cameras
     rig = vl.Rig([first, replace(second, position=None), third])
@@ -126,6 +129,7 @@ def test_a_camera_without_a_position(motion):
     assert found.lags.tolist() == [0, 7, -4]
 
 
+@pytest.mark.slow
 def test_perspective_cameras():
     x = trajectory(np.random.default_rng(5), 300)
     middle, reach = x.mean(axis=0), np.linalg.norm(np.ptp(x, axis=0))
@@ -154,6 +158,7 @@ def periodic(k):
     )
 
 
+@pytest.mark.slow
 def test_a_motion_that_repeats_itself_leaves_several_lags():
     rig = vl.Rig.around(periodic(np.arange(61)))
     tracks = filmed((periodic, rig), (180, 180, 180), (0, 20, 5))
@@ -185,6 +190,7 @@ def test_a_wrong_rig_is_not_explained_by_lags(motion):
     assert np.isinf(found.errors).all()
 
 
+@pytest.mark.slow
 def test_lags_that_are_given_are_the_start(motion):
     tracks = filmed(motion, (250,) * 3, (0, 7, 0))
     rig = motion[1].uncalibrated()

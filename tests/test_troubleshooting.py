@@ -15,6 +15,7 @@ from vidsindy_lite.repository import PACKAGE
 from vidsindy_lite.video import render
 
 README = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
+pytestmark = pytest.mark.usefixtures("tracked_once")
 TABLE = README.split("## When something is wrong")[1].split("\n## ")[0]
 MESSAGES = re.findall(r"^\| `(.+?)` \|", TABLE, re.MULTILINE)
 SIZE, FRAMES = (96, 96), 120

@@ -32,7 +32,7 @@ def learned_rig(rng, memory, frames=250):
     return camera_parameters(rig, learned) - camera_parameters(rig, truth), modes, x, learned
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.6])
+@pytest.mark.parametrize("memory", [0.0, pytest.param(0.6, marks=pytest.mark.slow)])
 def test_errors_of_cameras_are_as_large_as_stated(memory):
     pulls = []
     for seed in np.random.SeedSequence(5).spawn(15):
@@ -86,7 +86,9 @@ def distorted(name, seed, size):
     return truth, t, x + np.tensordot(rng.normal(size=4), modes, 1) + noise, modes
 
 
-@pytest.mark.parametrize(("name", "seed"), [("SprottE", 0), ("WangSun", 4)])
+@pytest.mark.parametrize(
+    ("name", "seed"), [("SprottE", 0), pytest.param("WangSun", 4, marks=pytest.mark.slow)]
+)
 def test_a_slightly_wrong_map_makes_false_terms_unless_it_is_told(name, seed):
     truth, t, x, modes = distorted(name, seed, 1e-4)
     blind = vl.score(vl.discover(t, x), truth)
@@ -123,6 +125,7 @@ def test_error_bars_grow_with_systematic_errors():
     assert without.standard_errors.max() < 2e-4
 
 
+@pytest.mark.slow
 def test_missing_rows_and_several_trajectories():
     truth, t, x, modes = distorted("SprottE", 0, 1e-4)
     x[100:104] = np.nan
