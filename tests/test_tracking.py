@@ -227,7 +227,7 @@ def circle(radius, n=150):
 @pytest.mark.parametrize("radius", [0, 2, 5])
 @pytest.mark.parametrize("form", ["disc", "polygon"])
 def test_a_target_that_never_leaves_its_place_is_background(tmp_path, form, radius, variance):
-    truth = circle(radius)
+    truth = circle(radius, 100)
     scene = Scene("sea", form, size=18, turns=2, noise_variance=variance, image_size=SIZE)
     assert np.isnan(track(render_video(tmp_path / "clip.mkv", truth, scene, seed=2))).all()
 
