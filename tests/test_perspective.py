@@ -187,7 +187,6 @@ class TestRig:
 
 
 class TestLearning:
-    @pytest.mark.slow
     @given(SEEDS, st.integers(3, 6), st.data())
     @settings(max_examples=30)
     def test_exact_pixels_give_exact_cameras(self, seed, cameras, data):
@@ -202,6 +201,7 @@ class TestLearning:
         np.testing.assert_allclose(found[enough], x[enough], atol=1e-8 * np.ptp(x))
         assert np.isnan(found[~enough]).all()
 
+    @pytest.mark.slow
     @given(SEEDS, st.integers(3, 6))
     @settings(max_examples=10)
     def test_whole_pixels_give_half_a_pixel(self, seed, cameras):
