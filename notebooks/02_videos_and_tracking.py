@@ -291,9 +291,9 @@ save_figure("videos_tracker_steps", fig, caption=caption, numbers={"coverage": c
 
 
 # %%
-def errors_of(scene, stream):
-    path = render_video(Path(folder.name) / "one.avi", truth, scene, seed=stream)
-    return np.linalg.norm(track(path) - truth, axis=1)
+def errors_of(scene, stream, places=truth):
+    path = render_video(Path(folder.name) / "one.avi", places, scene, seed=stream)
+    return np.linalg.norm(track(path) - places, axis=1)
 
 
 scene, number = shot.scenes[0], {"full": 20, "quick": 3}[profile]
@@ -306,7 +306,8 @@ errors = {
 }
 
 # %%
-drawn = [errors_of(Scene.random(seed + k), seed + k) for k in range(1, number + 1)]
+brief = truth[: frames // 2]
+drawn = [errors_of(Scene.random(seed + k), seed + k, brief) for k in range(1, number + 1)]
 errors[f"{number} random scenes"] = np.concatenate(drawn)
 
 # %%
@@ -386,7 +387,6 @@ save_figure("detector_training", fig, caption=caption, numbers={"loss": record["
 # The sea, the bricks and the irregular shapes are none of those: here they are, at rest and restless.
 
 # %%
-brief = truth[: frames // 2]
 k, centre = np.arange(len(brief)), len(brief) // 2
 tremble = np.random.default_rng(seed).normal(0, 3, (len(k), 2)).round().astype(int)
 still, drift = np.zeros((len(k), 2), int), np.column_stack([2 * k, 0 * k])
@@ -403,7 +403,7 @@ found, last = {}, []
 for name, (background, shifts, brightness) in cases.items():
     view = Scene(background, "irregular", size=20, shape_seed=seed)
     clip = render_restless(brief, view, shifts, brightness, seed)
-    path = write_video(Path(folder.name) / "restless.mkv", clip)
+    path = write_video(Path(folder.name) / "restless.avi", clip)
     last.append(next(islice(read_video(path), centre, None)))
     found[name] = {way: follow(path, way) for way in ("background", "learned", "auto")}
     print(f"{name}: auto takes {found[name]['auto'].detector}", *found[name]["auto"].warnings, sep="\n  ")

@@ -634,8 +634,8 @@ def attempt(setting, value, stream):
 
 
 sweeps = {
-    "samples_per_period": (25, 12, 8, 6) if full else (25,),
-    "noise": (0.1, 0.2, 0.4, 0.6, 0.8) if full else (0.1,),
+    "samples_per_period": (25, 12, 6) if full else (25,),
+    "noise": (0.1, 0.2, 0.4, 0.8) if full else (0.1,),
     "degree": (1, 2, 4) if full else (1,),
 }
 

@@ -169,6 +169,14 @@ def test_killed_half_way_it_goes_on_with_the_rest(clone, tmp_path):
     assert clone.called() == list(range(10))
 
 
+def test_sweeps_that_run_at_once_share_their_tasks(clone):
+    tasks = [[number, 0.5] for number in range(6)]
+    together = [clone.start(tasks) for _ in range(2)]
+    first, second = (process.communicate(timeout=120)[0] for process in together)
+    assert json.loads(first) == json.loads(second)
+    assert clone.called() == list(range(6))
+
+
 def test_progress_starts_at_what_is_stored(clone):
     clone.sweep([[1, 0.0]])
     process = clone.start([[1, 0.0], [2, 1.0]])

@@ -226,7 +226,7 @@ def _least_squares(threshold: float, ridge: float = RIDGE) -> BaseOptimizer:
 
 def _fit(optimizer: BaseOptimizer, rows: Rows) -> np.ndarray:
     # Without the checks of arguments, which take longer than such small regressions.
-    unchecked = config_context(skip_parameter_validation=True)
+    unchecked = config_context(skip_parameter_validation=True, assume_finite=True)
     with unchecked, warnings.catch_warnings():
         # A threshold above all coefficients is a normal member of the grid.
         warnings.filterwarnings("ignore", "Sparsity parameter is too big")

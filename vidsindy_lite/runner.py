@@ -1,4 +1,4 @@
-"""Run the notebooks: each notebooks/NN_name.py through papermill, in order, outputs cleaned.
+"""Run the notebooks: each notebooks/NN_name.py through papermill, two at a time, outputs cleaned.
 
 The .py half of a pair is the source. The .ipynb half is made here: executed, stripped of all that
 differs between two runs, and stamped with a hash of the code that made it. The full profile
@@ -18,9 +18,12 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
 from queue import Empty
 
@@ -34,6 +37,7 @@ from papermill.clientwrap import PapermillNotebookClient
 from papermill.engines import Engine, papermill_engines
 from papermill.exceptions import PapermillExecutionError, strip_color
 from PIL import Image
+from tqdm import tqdm
 from traitlets.config import Config
 
 from vidsindy_lite import artifacts
@@ -54,7 +58,8 @@ __all__ = [
 ]
 
 PROFILES = ("full", "quick")
-CELL_TIMEOUT = 1800  # seconds; papermill's own default is to wait for ever
+AT_ONCE = 2  # notebooks: most of them work on one core for most of their time
+CELL_TIMEOUT = 3600  # seconds; papermill's own default is to wait for ever
 ENGINE = "vidsindy_lite"  # under which papermill knows ours
 LEDGER = Path("build", "ledger.json")
 SYSTEMS_TABLE = "table_systems"  # printed after a run that wrote it
@@ -158,7 +163,7 @@ def run(
     dask: str | None = None,
     root: str | os.PathLike | None = None,
 ) -> Report:
-    """Execute notebooks one after the other and write what they make; goes on after a failure.
+    """Execute notebooks, two at a time, and write what they make; goes on after a failure.
 
     Parameters
     ----------
@@ -172,7 +177,7 @@ def run(
         executed half as it was.
     force : bool
         Execute also what is up to date: executed here by the same code, with all its outputs in
-        place. (A notebook that reads another's tables is always executed.)
+        place. (A notebook that reads another's tables is always executed, after those before it.)
     dask : str, optional
         Address of a Dask scheduler: what a notebook sweeps runs on its workers (see `sweep`).
     root : path, optional
@@ -201,51 +206,40 @@ def run(
             f"output: the quick profile needs a folder of its own, got {str(output)!r}"
         )
     chosen = select_notebooks(notebooks, root)
-    parameters = {"profile": profile}
     for path in chosen:
-        check_parameters(path, parameters)
+        check_parameters(path, ["profile"])
 
     figures = output / "figures"
     figures.mkdir(parents=True, exist_ok=True)
     stamps = dict.fromkeys((path.stem for path in find_notebooks(root)), None)
     artifacts.prune(figures, stamps)  # what a notebook left that has gone
 
-    outcomes = []
+    outcomes, due = {}, []
     for number, path in enumerate(chosen, start=1):
-        progress = f"[{number}/{len(chosen)}] {path.stem}"
-        print(progress, flush=True)
-        stamp, error, started = code_stamp(path, profile), None, time.perf_counter()
-        known = None if force or _reads_tables(path) else _ledger(output).get(path.stem)
+        label, stamp = f"[{number}/{len(chosen)}] {path.stem}", code_stamp(path, profile)
+        reads = _reads_tables(path)
+        known = None if force or reads else _ledger(output).get(path.stem)
         if known and known == _ledger_entry(output, path, stamp, known["seconds"]):
             stamps[path.stem] = stamp
-            outcomes.append(Outcome(path.stem, known["seconds"], up_to_date=True))
+            outcomes[path.stem] = Outcome(path.stem, known["seconds"], up_to_date=True)
             artifacts.record_run_time(figures, path.stem, stamp, known["seconds"])
-            print(f"    up to date ({known['seconds']:.1f} s when it ran)", flush=True)
+            print(f"{label}: up to date ({known['seconds']:.1f} s when it ran)", flush=True)
             continue
-        try:
-            executed = execute(
-                path,
-                parameters,
-                environment={
-                    "VIDSINDY_FIGURES": str(figures),
-                    "VIDSINDY_NOTEBOOK": path.stem,
-                    "VIDSINDY_STAMP": stamp,
-                    **({"VIDSINDY_DASK": dask} if dask else {}),
-                },
-                progress=progress,
-            )
-        except NotebookError as failure:
-            error = str(failure)
-        seconds = time.perf_counter() - started
-        outcomes.append(Outcome(path.stem, seconds, error))
-        if error is None:
-            stamps[path.stem] = stamp
-            half = nbformat.writes(clean(executed, path, profile, stamp)) + "\n"
-            write_file(output / "notebooks" / f"{path.stem}.ipynb", half.encode())
+        environment = {
+            "VIDSINDY_FIGURES": str(figures),
+            "VIDSINDY_NOTEBOOK": path.stem,
+            "VIDSINDY_STAMP": stamp,
+            **({"VIDSINDY_DASK": dask} if dask else {}),
+        }
+        due.append(_Task(path, label, stamp, profile, output, environment, reads))
+    for task, outcome in _executed(due):
+        name = task.path.stem
+        outcomes[name] = outcome
+        if outcome.error is None:
+            stamps[name] = task.stamp
             artifacts.prune(figures, stamps)  # what an earlier version of it left
-            artifacts.record_run_time(figures, path.stem, stamp, seconds)
-            _enter(output, path, stamp, seconds)
-        print(f"    {seconds:.1f} s" if error is None else f"    FAILED\n\n{error}\n", flush=True)
+            artifacts.record_run_time(figures, name, task.stamp, outcome.seconds)
+            _enter(output, task.path, task.stamp, outcome.seconds)
 
     artifacts.write_index(figures)
     problems = artifacts.check_folder(figures, stamps)
@@ -254,8 +248,65 @@ def run(
             write_readme(root)
         except (ValueError, FileNotFoundError) as missing:
             problems.append(f"README.md: {missing}")
-    table, memory = _systems_table(figures, outcomes), _largest_process()
-    return Report(tuple(outcomes), tuple(problems), table, memory)
+    in_order = tuple(outcomes[path.stem] for path in chosen)
+    table, memory = _systems_table(figures, in_order), _largest_process()
+    return Report(in_order, tuple(problems), table, memory)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """One notebook to execute, and all that a process of its own has to know of it."""
+
+    path: Path
+    label: str
+    stamp: str
+    profile: str
+    output: Path
+    environment: dict[str, str] = field(repr=False)
+    reads_tables: bool = False
+
+
+def _executed(tasks: Sequence[_Task]) -> Iterator[tuple[_Task, Outcome]]:
+    """The notebooks as they end; one that reads tables waits for all before it.
+
+    Each runs in a process of its own: the folder and the environment that papermill and its kernel
+    start from are those of a process.
+    """
+    waiting, running = deque(tasks), {}
+    pool = ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn"))
+    # The bar stands still while a notebook runs, but for the clock and what is running.
+    with pool, tqdm(total=len(tasks), desc="notebooks", leave=False, disable=None) as bar:
+        while waiting or running:
+            while waiting and len(running) < AT_ONCE and not (running and waiting[0].reads_tables):
+                task = waiting.popleft()
+                _say(task.label)
+                running[pool.submit(_attempt, task)] = task
+            bar.set_postfix_str(", ".join(task.path.stem for task in running.values()))
+            ended, _ = wait(running, timeout=1, return_when=FIRST_COMPLETED)
+            for future in ended:
+                task, outcome = running.pop(future), future.result()
+                failed = f"FAILED\n\n{outcome.error}\n" if outcome.error else ""
+                _say(f"{task.label}: {failed or f'{outcome.seconds:.1f} s'}")
+                bar.update()
+                yield task, outcome
+
+
+def _say(line: str) -> None:
+    with tqdm.external_write_mode():
+        print(line, flush=True)
+
+
+def _attempt(task: _Task) -> Outcome:
+    """Execute a notebook and write its executed half."""
+    error, started = None, time.perf_counter()
+    try:
+        executed = execute(task.path, {"profile": task.profile}, environment=task.environment)
+    except NotebookError as failure:
+        error = str(failure)
+    else:
+        half = nbformat.writes(clean(executed, task.path, task.profile, task.stamp)) + "\n"
+        write_file(task.output / "notebooks" / f"{task.path.stem}.ipynb", half.encode())
+    return Outcome(task.path.stem, time.perf_counter() - started, error)
 
 
 # --------------------------------------------------------------------------------- one notebook
@@ -285,7 +336,6 @@ def execute(
     *,
     environment: Mapping[str, str] | None = None,
     timeout: float = CELL_TIMEOUT,
-    progress: str = "",
 ) -> NotebookNode:
     """Run a notebook's source half through papermill, in its own folder.
 
@@ -299,8 +349,6 @@ def execute(
         Environment variables for the kernel, beside those of this process.
     timeout : float
         Seconds that one cell may take.
-    progress : str
-        Label of the progress bar over the cells, which only a terminal shows.
 
     Returns
     -------
@@ -329,7 +377,7 @@ def execute(
                 cwd=path.parent,
                 timeout=timeout,
                 startup_timeout=120,
-                progress_bar={"desc": progress, "leave": False, "disable": None},
+                progress_bar=False,
                 config=ENCRYPTED,
             )
     except PapermillExecutionError as error:
@@ -541,7 +589,7 @@ def _largest_process() -> float | None:
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit / 1e9
 
 
-def _systems_table(figures: Path, outcomes: list[Outcome]) -> artifacts.Table | None:
+def _systems_table(figures: Path, outcomes: Sequence[Outcome]) -> artifacts.Table | None:
     """The table of the systems, if this run wrote it."""
     try:
         table = artifacts.load_table(SYSTEMS_TABLE, figures)

@@ -10,7 +10,9 @@ repository, or in place of build/cache the folder that the environment variable 
 names. The stamp is that of the package's code and requirements: other code finds no results. A
 package installed outside a clone of its repository stores nothing.
 
-The tasks run in processes of this machine, or on a Dask cluster of any size.
+The tasks run in processes of this machine, or on a Dask cluster of any size. Two sweeps of this
+machine that share tasks may run at the same time: who comes second waits for the first one's
+result.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from typing import TypeVar
 from uuid import uuid4
 
 import cv2
+from filelock import FileLock
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
@@ -86,12 +89,13 @@ def sweep(
     files = _files(function, tasks)
     results = _stored(files)
     todo = {number: task for number, task in enumerate(tasks) if number not in results}
-    work = _on_cluster(function, todo, address) if address else _here(function, todo, jobs)
+    if address:
+        work = _on_cluster(function, todo, address, files)
+    else:
+        work = _here(function, todo, jobs, files)
     with tqdm(total=len(tasks), initial=len(results), desc=desc) as bar:
         for number, result in work if todo else ():
             results[number] = result
-            if number in files:
-                _store(files[number], result)
             bar.update()
     return [results[number] for number in range(len(tasks))]
 
@@ -99,7 +103,8 @@ def sweep(
 def remember(function: Callable[[Task], Result], task: Task) -> Result:
     """Call a function for one task in this process, or read the stored result back.
 
-    For a task that builds on the results of another sweep.
+    For a task that builds on the results of another sweep. While another process of this machine
+    is at the same task, this one waits for its result.
 
     Parameters
     ----------
@@ -107,13 +112,7 @@ def remember(function: Callable[[Task], Result], task: Task) -> Result:
         As for `sweep`.
     """
     _check(function, [task], jobs=1)
-    files = _files(function, [task])
-    results = _stored(files)
-    if not results:
-        results[0] = function(task)
-        for file in files.values():
-            _store(file, results[0])
-    return results[0]
+    return _remember(function, task, _files(function, [task]).get(0))
 
 
 def _check(function: Callable, tasks: list, jobs: int) -> None:
@@ -143,16 +142,32 @@ def _is_hashable(task: object) -> bool:
     return True
 
 
-def _call(function: Callable, number: int, task: object) -> tuple[int, object]:
+def _remember(function: Callable, task: object, file: Path | None) -> object:
+    if file is None:
+        return function(task)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(f"{file}.lock"):
+        results = _stored({0: file})
+        if not results:
+            results[0] = function(task)
+            _store(file, results[0])
+    return results[0]
+
+
+def _call(
+    function: Callable, number: int, task: object, file: Path | None = None
+) -> tuple[int, object]:
     try:
-        return number, function(task)
+        return number, _remember(function, task, file)
     except Exception as error:
         raise TaskError(
             f"{function.__name__}({task!r}) raised {type(error).__name__}: {error}"
         ) from error
 
 
-def _here(function: Callable, todo: dict[int, object], jobs: int) -> Iterator[tuple[int, object]]:
+def _here(
+    function: Callable, todo: dict[int, object], jobs: int, files: dict[int, Path]
+) -> Iterator[tuple[int, object]]:
     """Numbers and results of the tasks as they come, from processes of this machine."""
     one_thread = {
         "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
@@ -162,15 +177,19 @@ def _here(function: Callable, todo: dict[int, object], jobs: int) -> Iterator[tu
     with parallel_config("loky", n_jobs=jobs, **one_thread):
         # One task a batch: a result comes when it is there, not when its batch is.
         parallel = Parallel(return_as="generator_unordered", batch_size=1)
-        yield from parallel(delayed(_call)(function, *item) for item in todo.items())
+        yield from parallel(
+            delayed(_call)(function, number, task, files.get(number))
+            for number, task in todo.items()
+        )
 
 
 def _on_cluster(
-    function: Callable, todo: dict[int, object], address: str
+    function: Callable, todo: dict[int, object], address: str, files: dict[int, Path]
 ) -> Iterator[tuple[int, object]]:
     """Numbers and results of the tasks as they come, from the workers of a Dask cluster.
 
-    Not by joblib's Dask backend: that waits for ever for a task that ends its worker.
+    The workers need not see the files of this machine, so the results are stored here. Not by
+    joblib's Dask backend: that waits for ever for a task that ends its worker.
     """
     try:
         from distributed import Client, as_completed
@@ -191,8 +210,10 @@ def _on_cluster(
         # The key is what Dask calls a task, in its errors too.
         keys = [f"{function.__name__}({task!r}) {uuid4().hex}" for task in todo.values()]
         futures = client.map(partial(_call, function), todo, todo.values(), key=keys)
-        for _, result in as_completed(futures, with_results=True):
-            yield result
+        for _, (number, result) in as_completed(futures, with_results=True):
+            if number in files:
+                _store(files[number], result)
+            yield number, result
 
 
 # ----------------------------------------------------------------------------------- stored results
