@@ -17,14 +17,14 @@ A motion that repeats itself fits at several lags, one that hardly moves at all 
 result says so.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from .cameras import Rig, check_learnable, learn_cameras, residuals
-from .checks import check_positive, check_vector
+from .checks import check_instance, check_positive, check_rows, check_vector
 from .sights import epipolar_equations
 
 DISAGREEMENT = 1.0
@@ -108,8 +108,10 @@ def align(
     Raises
     ------
     ValueError
-        If there is not one finite lag, or positive rate, per track.
+        If a track has a wrong shape or an infinite value, or there is not one finite lag, or
+        positive rate, per track.
     """
+    tracks = _check_tracks(tracks)
     lags = check_vector("lags", lags, len(tracks))
     rates = _check_rates(rates, len(tracks))
     clock = np.arange(len(tracks[0]))
@@ -158,10 +160,11 @@ def learn_lags(
     Raises
     ------
     ValueError
-        If the rig has no calibrated camera, there is not one track, rate and lag per camera, or
-        the first track never shows the target.
+        If the rig has no calibrated camera, there is not one track, rate and lag per camera, a
+        track has a wrong shape, or the first track never shows the target.
     """
     check_learnable(rig)
+    tracks = _check_tracks(tracks)
     if len(tracks) != len(rig.cameras):
         raise ValueError(
             f"tracks: must be one per camera, got {len(tracks)} for {len(rig.cameras)} cameras"
@@ -372,6 +375,11 @@ def _curve(track: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         return values
 
     return at
+
+
+def _check_tracks(tracks):
+    check_instance("tracks", tracks, Sized)
+    return [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
 
 
 def _check_rates(rates, count):
