@@ -251,7 +251,7 @@ save_figure("tour_attractor", fig, caption=caption, numbers=numbers)
 # %%
 moments = np.arange(0, 300, 6)
 readers = [enumerate(read_video(path)) for path in shot.paths]
-films = [[image[..., ::-1] for i, image in video if i in moments] for video in readers]  # RGB
+films = [[image for i, image in video if i in moments] for video in readers]
 laws = found.equations("native").splitlines()
 pictures = draw_tour(films, moments, found.tracks, found.x, laws)
 caption = "Three videos, the tracks in them, the path in space, and its law."

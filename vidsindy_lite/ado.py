@@ -282,9 +282,11 @@ class _Search:
     def _leaves_something_over(self, state: State, problem: Collocation) -> bool:
         """Would the terms of higher degree together explain more of the data than chance does?"""
         left_out = self.exponents.size - state.active.sum()
+        if not left_out:
+            return False
         problem = self._weighted(problem, FIRST_WEIGHTS[-1])
         _, gain = problem.linearise(state, np.arange(self.exponents.size)).newton()
-        return left_out > 0 and gain > chi2.isf(NEEDLESS_START, left_out)
+        return gain > chi2.isf(NEEDLESS_START, left_out)
 
     def _select(
         self, state: State, problem: Collocation, weight: float, stage: str
