@@ -36,15 +36,17 @@ ALIKE = 2.0
 """Ratio of disagreements up to which two lags fit equally well, ..."""
 FINE = 0.05
 """... and disagreement in pixels below which all do: real tracks are no better than that."""
+PROBE = 0.05
+"""Frames; slopes in a lag are taken over twice that."""
+OUTLIER = 12.0
+"""Medians of the residuals; one beyond that moves neither a lag nor its error."""
 
 _OVERLAP = 0.5  # share of the shorter of two videos that both must show
 _INSTANTS = 200  # at which the first step compares two views
 _PROMISING = 5  # lags of each camera that pass the first step
 _TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
-_PROBE = 0.05  # frames; the slope of the residuals is taken over twice that
 _STEPS = 10  # of one frame at most, from the best whole lags to the best ones
 _SETTLED = 1e-3  # frames
-_OUTLIER = 12.0  # medians; a residual beyond that does not move a lag
 _SHOWN = 3  # of the lags that fit equally well
 _ROUNDING = 1e-6  # pixels; residuals below that are none
 
@@ -241,16 +243,16 @@ class _Views:
     def refined(self, whole):
         """The lags of the smallest reprojection error near whole ones, as `Synchrony`."""
         lags, step = np.array(whole, float), np.inf
-        shifts = _PROBE * np.eye(len(lags))[1:]  # the first video is the clock
+        shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
         for _ in range(_STEPS):
             tried = [self.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)]
             if any(part is None for part in tried):
                 return Synchrony(lags, self.rates, np.full(len(lags), np.inf), self.missed(lags))
             here, ahead, behind = tried[0], *np.split(np.array(tried[1:]), 2)
             used = np.isfinite(tried).all(axis=0)
-            limit = max(_OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
+            limit = max(OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
             used &= np.abs(np.where(used, here, 0)) <= limit
-            slope = (ahead - behind)[:, used].T / (2 * _PROBE)
+            slope = (ahead - behind)[:, used].T / (2 * PROBE)
             step, *_ = np.linalg.lstsq(slope, -here[used])
             size = np.abs(step).max()
             lags[1:] += step / max(size, 1)  # further than a frame the slope does not hold
