@@ -225,12 +225,13 @@ def save_animation(
     """
     record = _new_record("animation", animation_id, caption, [f"{animation_id}.gif"])
     record["numbers"] = as_json(dict(numbers), "numbers", DIGITS)
-    images = [Image.fromarray(picture) for picture in pictures]
-    # A few pictures hold the colours of all. Those that lie farthest apart are the start of the
-    # clusters: so a small target keeps its own, which the cuts of MEDIANCUT give to the background.
-    sample = Image.fromarray(np.concatenate(pictures[::-8]))
-    palette = sample.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1)
-    first, *rest = (im.quantize(palette=palette, dither=Image.Dither.NONE) for im in images)
+    # All as one strip get one palette. It starts from the colours that lie farthest apart: so a
+    # small target keeps its own, which MEDIANCUT gives to the background.
+    height, width = pictures[0].shape[:2]
+    strip = Image.fromarray(np.concatenate(pictures))
+    strip = strip.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1)
+    tops = range(0, strip.height, height)
+    first, *rest = (strip.crop((0, top, width, top + height)) for top in tops)
     durations = [round(1000 / rate)] * len(rest) + [3000]
     file = io.BytesIO()
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
