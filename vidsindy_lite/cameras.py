@@ -393,6 +393,9 @@ def learn_cameras(tracks, rig, method="joint"):
     Frames in which the views contradict each other by more than eight robust standard deviations
     are left out, so that a few outliers of the tracker do not bend the cameras.
 
+    Two cameras are enough, but raise no alarm at a normal that is turned about the cross product of
+    both: the path is then wrong without a residual. Three do.
+
     Parameters
     ----------
     tracks : sequence of array_like, shape (n, 2)
