@@ -177,7 +177,10 @@ turned = {"R takes n to $e_z$": feet @ R.T, "as in the text: $e_z$ to n": feet @
 spread = [np.ptp(values[:, :2], axis=0).max() for values in turned.values()]
 assert spread[0] < 1e-12
 assert spread[1] > 1
-print("spread of x_rp, y_rp over all D:", [f"{value:.2g}" for value in spread])
+names = "R takes n to e_z", "as in the text: e_z to n"
+rows = [{"rotation": a, "shift of the image": b} for a, b in zip(names, spread, strict=True)]
+caption = "How far the image moves while the plane moves along its normal through all D (scene units)."
+save_table("projection_shift", rows, caption=caption)
 
 # %%
 fig = plots.plot_independence(d, turned)

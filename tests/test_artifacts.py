@@ -87,6 +87,22 @@ def test_animation_is_written_registered_and_the_same_bytes_twice(folder):
     assert check_folder(folder, {"01_first": "stamp-1"}) == []
 
 
+def test_a_small_thing_keeps_its_colour_in_an_animation(folder):
+    rng = np.random.default_rng(0)
+    sky = rng.integers((90, 130, 170), (140, 180, 255), (100, 150, 3)).astype(np.uint8)
+    pictures = []
+    for step in range(20):
+        pictures.append(sky.copy())
+        pictures[-1][50:53, 5 * step : 5 * step + 3] = (255, 120, 0)
+    pictures.append(np.full_like(sky, 255))  # without it
+    save_animation("tour", pictures, caption="A target.", numbers={})
+    with Image.open(folder / "tour.gif") as image:
+        for step in range(20):
+            image.seek(step)
+            shown = np.asarray(image.convert("RGB"))[51, 5 * step + 1]
+            assert np.abs(shown - [255.0, 120, 0]).max() < 30
+
+
 def test_table_round_trip(folder):
     saved = save_table("table_1", ROWS, caption="Two systems.")
     assert load_table("table_1") == saved

@@ -700,3 +700,17 @@ class TestPosition:
             reconstruct(tracks, loose)
         with pytest.raises(ValueError, match="camera: position must be known, got None"):
             loose.cameras[1].project(x)
+
+
+def test_two_cameras_do_not_see_what_three_do():
+    x = trajectory(np.random.default_rng(6), 200)
+    first, second, third = Rig.around(x).cameras
+    tracks = [camera.project(x) for camera in (first, second, third)]
+    found = learn_cameras(tracks[:2], Rig([first, second]).uncalibrated())
+    np.testing.assert_allclose(reconstruct(tracks[:2], found), x, atol=1e-8 * np.ptp(x))
+    turn = rodrigues(np.cross(first.normal, second.normal), np.deg2rad(5))
+    wrong = replace(second, normal=turn @ second.normal)
+    pair = learn_cameras(tracks[:2], Rig([first, wrong]).uncalibrated())
+    assert np.abs(np.hstack(residuals(tracks[:2], pair))).max() < 1e-6
+    assert np.abs(reconstruct(tracks[:2], pair) - x).max() > 0.02 * np.ptp(x)
+    assert np.abs(np.hstack(residuals(tracks, Rig([*pair.cameras, third])))).max() > 1

@@ -14,6 +14,7 @@ from vidsindy_lite.checks import (
     check_number,
     check_path,
     check_positive,
+    check_rows,
     check_times,
     check_vector,
 )
@@ -103,3 +104,14 @@ def test_instances():
     check_instance("name", "rig.toml", str)
     with pytest.raises(ValueError, match="rig: must be of type dict, got 'rig.toml'"):
         check_instance("rig", "rig.toml", dict)
+
+
+@pytest.mark.parametrize("values", [np.zeros(3), np.zeros((3, 3)), np.zeros((1, 3, 2)), 1.0])
+def test_rows_of_a_wrong_shape(values):
+    rows = check_rows("x", [[1, 2], [np.nan, 0]], 2)
+    np.testing.assert_array_equal(rows, [[1, 2], [np.nan, 0]])
+    shape = re.escape(str(np.shape(values)))
+    with pytest.raises(ValueError, match=rf"x: must have shape \(n, 2\), got {shape}"):
+        check_rows("x", values, 2)
+    with pytest.raises(ValueError, match="x: must be finite or NaN, got 1 infinite values"):
+        check_rows("x", [[0, np.inf]], 2)

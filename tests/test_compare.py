@@ -81,3 +81,17 @@ def test_the_command_fails_on_a_difference(folders, tmp_path, capsys):
     write(folders[1], RECORD | {"rows": []})
     assert main(command) == 1
     assert "table_1: " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_nothing_to_compare_is_an_error(folders, tmp_path, capsys, wrong):
+    name = ("committed", "regenerated")[wrong]
+    asked = list(map(str, folders))
+    asked[wrong] = str(tmp_path / "nowhere")
+    assert main(["compare", *asked, "--output", str(tmp_path / "out")]) == 2
+    assert f"error: {name}: must be a folder, got '{asked[wrong]}'" in capsys.readouterr().err
+    (tmp_path / "nowhere").mkdir()
+    (tmp_path / "nowhere" / "run_times.json").write_text("{}")
+    assert main(["compare", *asked, "--output", str(tmp_path / "out")]) == 2
+    assert f"error: {name}: must hold figures or tables" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -115,7 +115,15 @@ def test_bad_options_are_told_before_anything_is_tracked(here, capsys, options, 
 def test_lags_that_are_no_numbers(here, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["discover", *VIDEOS, "--rig", "rig.toml", "--lag", "0,soon,0"])
-    assert "argument --lag: invalid" in capsys.readouterr().err
+    message = "argument --lag: must be numbers with commas between them, got '0,soon,0'"
+    assert message in capsys.readouterr().err
+
+
+def test_a_size_that_is_none(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["rig-template", "--size", "640"])
+    message = "argument --size: must be two integers like 1920x1080, got '640'"
+    assert message in capsys.readouterr().err
 
 
 def test_the_help_helps(capsys):

@@ -1,12 +1,13 @@
 """The README's code runs, its generated parts are current, its links lead somewhere."""
 
+import json
 import re
 import shutil
 
 import pytest
 
 from vidsindy_lite.cameras import Rig
-from vidsindy_lite.readme import PARTS, fill
+from vidsindy_lite.readme import HEADLINES, PARTS, fill
 from vidsindy_lite.repository import PACKAGE
 from vidsindy_lite.site import heading_anchor
 
@@ -60,7 +61,37 @@ def test_an_edited_result_is_seen(old, new):
     assert fill(README.replace(old, new, 1), ROOT) != README.replace(old, new, 1)
 
 
-@pytest.mark.slow
+def test_every_notebook_has_one_headline():
+    sources = {path.stem: path.read_text("utf-8") for path in (ROOT / "notebooks").glob("*.py")}
+    saved = [[name for name in HEADLINES if f'"{name}"' in text] for text in sources.values()]
+    assert [len(names) for names in saved] == [1] * len(sources)
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "headline"),
+    [
+        (
+            "tour_score",
+            [{"true terms": 12, "missing": 1, "false": 2, "l2": 3.2e-4, "worst coefficient": 0.1}],
+            "11 of 12 terms, 2 false, l2 3e-04",
+        ),
+        (
+            "projection_shift",
+            [{"rotation": r, "shift of the image": s} for r, s in (("R", 2e-15), ("text", 31.4))],
+            "the plane's D moves the image by 2e-15; with the text's rotation by 31",
+        ),
+    ],
+)
+def test_a_headline_says_what_its_table_holds(tmp_path, name, rows, headline):
+    figures = tmp_path / "figures"
+    figures.mkdir()
+    (tmp_path / "notebooks").mkdir()
+    (tmp_path / "notebooks" / "00_one.py").write_text("# # One\n")
+    record = {"id": name, "kind": "table", "caption": "A table.", "notebook": "00_one"}
+    (figures / f"{name}.json").write_text(json.dumps({**record, "rows": rows}))
+    assert f"| One | {headline} |" in PARTS["notebooks"](tmp_path)
+
+
 def test_another_result_is_seen(tmp_path):
     shutil.copytree(ROOT / "figures", tmp_path / "figures")
     shutil.copytree(ROOT / "notebooks", tmp_path / "notebooks")

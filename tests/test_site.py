@@ -1,7 +1,9 @@
 """Every page of the site in a browser, at two widths, without a network."""
 
 import re
+import warnings
 
+import pdoc
 import pytest
 from browser import CHROMIUM, Browser
 
@@ -87,6 +89,13 @@ def test_every_link_leads_to_a_file(site):
 
 GOOD = """<!DOCTYPE html><link rel='icon' href='data:,'>
 <meta name='viewport' content='width=device-width'><body>{}</body>"""
+
+
+def test_the_reference_reads_all_annotations(tmp_path):
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message="Error parsing type annotation")
+        pdoc.pdoc(PACKAGE.name, output_directory=tmp_path)
+    assert (tmp_path / f"{PACKAGE.name}.html").exists()
 
 
 @needs_browser

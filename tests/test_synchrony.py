@@ -232,3 +232,20 @@ def test_one_track_per_camera_and_lag(motion):
         learn_lags(tracks[:2], motion[1])
     with pytest.raises(ValueError, match="lags: must be 3 finite numbers"):
         align(tracks, (0, 1))
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "message"),
+    [
+        (np.zeros(30), r"tracks\[1\]: must have shape \(n, 2\), got \(30,\)"),
+        (np.zeros((30, 3)), r"tracks\[1\]: must have shape \(n, 2\), got \(30, 3\)"),
+        (np.full((30, 2), np.inf), r"tracks\[1\]: must be finite or NaN, got 60 infinite values"),
+        ("abc", r"tracks\[1\]: must be an array of real numbers, got 'abc'"),
+    ],
+)
+def test_tracks_of_a_wrong_shape_are_named(motion, spoilt, message):
+    tracks = filmed(motion, (30,) * 3, (0, 0, 0))
+    tracks[1] = spoilt
+    for use in (lambda: learn_lags(tracks, motion[1]), lambda: align(tracks, (0, 0, 0))):
+        with pytest.raises(ValueError, match=message):
+            use()

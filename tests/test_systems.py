@@ -84,9 +84,10 @@ def test_bad_steps_are_refused():
     law = SYSTEMS["Lorenz"]
     for t, x0, substeps, name in [
         ([0, np.inf], law.x0, 1, "t"), ([0, 1], [1, 2, np.nan], 1, "x0"),
+        ([0, 1], [1, 2], 1, "x0"), ([0, 1], 1.0, 1, "x0"), ([0, 1], np.ones((3, 2)), 1, "x0"),
         ([0, 1], law.x0, 0, "substeps"),
     ]:  # fmt: skip
-        with pytest.raises(ValueError, match=f"^{name}: must be"):
+        with pytest.raises(ValueError, match=f"^{name}: must (be|have)"):
             runge_kutta_4(law, t, x0, substeps)
 
 

@@ -125,6 +125,13 @@ def dependent_errors(studio):
     return told(vl.discover, t, x + 0.0115 * smooth, degree=2)
 
 
+def jumping(studio):
+    t = np.linspace(0, 20, 200)
+    x = np.column_stack((np.cos(t), -np.sin(t)))
+    x[100, 1] = 1e6
+    return "\n".join(vl.discover(t, x, degree=2).warnings)
+
+
 def occupied(studio):
     return told(check_folder_is_free, studio.folder)
 
@@ -144,6 +151,7 @@ TROUBLES = {
     "lags: must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
     "the curve misses the data": lambda studio: pendulum(degree=1),
     "another law fits almost as well": dependent_errors,
+    "a sample lies far from those before and after it": jumping,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
     "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
     "must be a new folder or hold an earlier report": occupied,

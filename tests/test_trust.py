@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from vidsindy_lite import corruption
 from vidsindy_lite.ado import term_charges
 from vidsindy_lite.collocation import Collocation, Segment, State
 from vidsindy_lite.polynomials import PolynomialSystem
+from vidsindy_lite.records import check_records
 from vidsindy_lite.splines import DEGREE
-from vidsindy_lite.trust import doubts, frame_doubts
+from vidsindy_lite.systems import SYSTEMS
+from vidsindy_lite.trust import doubts, frame_doubts, strays
 
 NOISE = 0.03
 
@@ -62,3 +65,28 @@ def test_a_coordinate_that_lost_its_law_is_told(duffing):
     law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
     (doubt,) = frame_doubts(law, np.full(law.coefficients.size, 100.0))
     assert "no term was found for dy/dt" in doubt
+
+
+@pytest.mark.parametrize("size", [1e3, -1e6])
+def test_a_single_sample_far_off_is_named(duffing, size):
+    _, t, x = duffing
+    x = x.copy()
+    x[200:220] = np.nan
+    x[300, 1] = size
+    (doubt,) = strays(check_records(t, x))
+    assert f"a sample lies far from those before and after it: t = {t[300]:g}, x = (" in doubt
+    assert f", {size:g})" in doubt
+    x[[310, 320, 330, 340], 0] = size
+    (doubt,) = strays(check_records(t, x))
+    assert "and 2 more" in doubt
+
+
+@pytest.mark.parametrize("law", SYSTEMS.values(), ids=SYSTEMS)
+def test_noise_and_gaps_are_no_strays(law):
+    rng = np.random.default_rng(0)
+    t, clean = law.trajectory(1500, samples_per_period=25)
+    noisy = corruption.add_noise(clean, 0.5, rng)
+    uneven = np.sort(rng.choice(1500, 400, replace=False))
+    for x in (clean, noisy, corruption.drop_blocks(noisy, 0.5, rng)):
+        assert strays(check_records(t, x)) == []
+        assert strays(check_records(t[uneven], x[uneven])) == []

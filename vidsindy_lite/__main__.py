@@ -205,7 +205,7 @@ def _parser() -> argparse.ArgumentParser:
         "compare",
         help="two folders of figures, by their numbers",
         description="Compare the numbers of two folders of figures, and lay out what differs.",
-        epilog="exit status: 0 if all numbers agree, 1 if not.",
+        epilog="exit status: 0 if all numbers agree, 1 if not, 2 if there is nothing to compare.",
     )
     compare.add_argument("committed", metavar="COMMITTED", help="a folder like figures/")
     compare.add_argument("regenerated", metavar="REGENERATED", help="the same from another run")
@@ -217,12 +217,22 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _numbers(text: str) -> list[float]:
-    return [float(part) for part in text.split(",")]
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"must be numbers with commas between them, got {text!r:.60}"
+        ) from None
 
 
 def _size(text: str) -> tuple[int, int]:
-    width, height = text.split("x")
-    return int(width), int(height)
+    try:
+        width, height = text.split("x")
+        return int(width), int(height)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"must be two integers like 1920x1080, got {text!r:.60}"
+        ) from None
 
 
 def _discover(options: argparse.Namespace) -> int:

@@ -37,7 +37,7 @@ from .records import Record, check_records, check_systematic, cut, typical_step
 from .regression import subset_search
 from .smoothing import smooth
 from .splines import DEGREE, clamped_knots
-from .trust import doubts
+from .trust import doubts, strays
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
 """Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
@@ -162,6 +162,7 @@ class _Search:
                 f"x: must hold at least as many samples as unknowns per equation "
                 f"({unknowns} for degree {self.degree} and d = {self.d}), got {n} samples"
             )
+        self.strays = strays(self.records)
         self._standardise()
         self.home = self.units.standard(np.zeros(self.d))
         self.charges = term_charges(self.exponents)
@@ -222,6 +223,7 @@ class _Search:
             bar.update()
         law = PolynomialSystem(variable_names(self.d), self.exponents, state.coefficients)
         warnings = doubts(law, state, problem, self.charges, self.records, self.smoothed_noise)
+        warnings = self.strays + warnings
         return report(state, problem, self.units, self.charges, warnings, self.history)
 
     def _measure_slack(self, problem: Collocation, control: np.ndarray) -> None:
@@ -282,9 +284,11 @@ class _Search:
     def _leaves_something_over(self, state: State, problem: Collocation) -> bool:
         """Would the terms of higher degree together explain more of the data than chance does?"""
         left_out = self.exponents.size - state.active.sum()
+        if not left_out:
+            return False
         problem = self._weighted(problem, FIRST_WEIGHTS[-1])
         _, gain = problem.linearise(state, np.arange(self.exponents.size)).newton()
-        return left_out > 0 and gain > chi2.isf(NEEDLESS_START, left_out)
+        return gain > chi2.isf(NEEDLESS_START, left_out)
 
     def _select(
         self, state: State, problem: Collocation, weight: float, stage: str

@@ -20,7 +20,7 @@ def draw_tour(
     Parameters
     ----------
     films : sequence of sequence of ndarray, shape (height, width, 3)
-        By camera, the frames to show.
+        By camera, the frames to show; blue-green-red, as a video reader gives them.
     moments : ndarray of int, shape (k,)
         Which frames of the videos these are.
     tracks : sequence of ndarray, shape (n, 2)
@@ -42,7 +42,7 @@ def draw_tour(
     pictures = []
     for number, moment in enumerate(moments):
         for image, film in zip(images, films, strict=True):
-            image.set_data(film[number])
+            image.set_data(film[number][..., ::-1])
         for line, track in zip(lines, tracks, strict=True):
             line.set_data(*track[: moment + 1].T)
         path.set_data_3d(*x[: moment + 1].T)
@@ -60,7 +60,7 @@ def _panels(figure, films, tracks):
     for i, (film, track) in enumerate(zip(films, tracks, strict=True)):
         axes = figure.add_axes((0.01 + 0.235 * i, 0.29, 0.225, 0.675))
         axes.set_axis_off()
-        images.append(axes.imshow(film[0], interpolation="antialiased"))
+        images.append(axes.imshow(film[0][..., ::-1], interpolation="antialiased"))
         lines += axes.plot(*track[:1].T, color="white", lw=1.4)
     return images, lines
 

@@ -38,6 +38,7 @@ from .repository import repository_root, write_file
 
 __all__ = [
     "Table",
+    "as_json",
     "check_folder",
     "figures_folder",
     "files_of",
@@ -53,6 +54,7 @@ __all__ = [
 
 INDEX = "README.md"
 RUN_TIMES = "run_times.json"
+DIGITS = 6  # of the numbers in the records
 SECONDS = "seconds"  # the column of a table that holds wall times
 
 
@@ -184,7 +186,7 @@ def save_figure(
         If something in `numbers` is none of the above.
     """
     record = _new_record("figure", figure_id, caption, [f"{figure_id}.png", f"{figure_id}.svg"])
-    record["numbers"] = _plain(dict(numbers), "numbers")
+    record["numbers"] = as_json(dict(numbers), "numbers", DIGITS)
     for name in record["files"]:
         image = io.BytesIO()
         # Without these three, a PNG names the library and an SVG the date, with random ids.
@@ -210,7 +212,7 @@ def save_animation(
     animation_id : str
         As of `save_figure`.
     pictures : sequence of ndarray of uint8, shape (height, width, 3)
-        The last one gives the 256 colours of all.
+        One palette of 256 colours serves all of them.
     caption, numbers
         As of `save_figure`.
     rate : float
@@ -222,10 +224,14 @@ def save_animation(
         As `save_figure` does.
     """
     record = _new_record("animation", animation_id, caption, [f"{animation_id}.gif"])
-    record["numbers"] = _plain(dict(numbers), "numbers")
-    images = [Image.fromarray(picture) for picture in pictures]
-    palette = images[-1].quantize(256, Image.Quantize.MEDIANCUT)
-    first, *rest = (im.quantize(palette=palette, dither=Image.Dither.NONE) for im in images)
+    record["numbers"] = as_json(dict(numbers), "numbers", DIGITS)
+    # All as one strip get one palette. It starts from the colours that lie farthest apart: so a
+    # small target keeps its own, which MEDIANCUT gives to the background.
+    height, width = pictures[0].shape[:2]
+    strip = Image.fromarray(np.concatenate(pictures))
+    strip = strip.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1)
+    tops = range(0, strip.height, height)
+    first, *rest = (strip.crop((0, top, width, top + height)) for top in tops)
     durations = [round(1000 / rate)] * len(rest) + [3000]
     file = io.BytesIO()
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
@@ -258,7 +264,7 @@ def save_table(table_id: str, rows: Iterable[Mapping[str, object]], *, caption: 
         a scalar, or an id that another notebook of this run owns.
     """
     record = _new_record("table", table_id, caption, [f"{table_id}.csv", f"{table_id}.md"])
-    plain = [_plain(dict(row), "rows") for row in rows]
+    plain = [as_json(dict(row), "rows", DIGITS) for row in rows]
     record["rows"] = _with_steady_seconds(record, plain)
     table = _table(record)
     write_file(figures_folder() / f"{table_id}.csv", table.csv().encode())
@@ -276,13 +282,14 @@ def load_table(table_id: str, folder: str | os.PathLike | None = None) -> Table:
         If the folder holds no table of that id; the message lists those it holds.
     """
     folder = figures_folder() if folder is None else Path(folder)
-    tables = {r["id"]: r for r in _records(folder).values() if r["kind"] == "table"}
-    if table_id not in tables:
+    record = _read(folder / f"{table_id}.json")
+    if record.get("kind") != "table":
+        tables = [r["id"] for r in _records(folder).values() if r["kind"] == "table"]
         raise FileNotFoundError(
             f"table_id: expected one of the tables in {folder} ({', '.join(tables) or 'none'}), "
             f"got {table_id!r}"
         )
-    return _table(tables[table_id])
+    return _table(record)
 
 
 def files_of(folder: str | os.PathLike, notebook: str) -> list[str]:
@@ -436,18 +443,33 @@ def _without_seconds(row: dict) -> dict:
     return {column: value for column, value in row.items() if column != SECONDS}
 
 
-def _plain(value: object, name: str) -> object:
-    """A value as JSON has it: six significant digits, null for what is not finite."""
+def as_json(value: object, name: str, digits: int = 17) -> object:
+    """A value as JSON has it.
+
+    Parameters
+    ----------
+    value : object
+        Numbers, text, None, and arrays and nestings of them. What is not finite becomes None.
+    name : str
+        Of the argument, for the error.
+    digits : int
+        Significant ones of a float; the default keeps it exactly.
+
+    Raises
+    ------
+    TypeError
+        If there is anything else in it.
+    """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):
-        return float(f"{value:.6g}") if math.isfinite(value) else None
+        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): _plain(item, f"{name}[{key!r}]") for key, item in value.items()}
+        return {str(k): as_json(item, f"{name}[{k!r}]", digits) for k, item in value.items()}
     if isinstance(value, Sequence):
-        return [_plain(item, name) for item in value]
+        return [as_json(item, name, digits) for item in value]
     raise TypeError(
         f"{name}: expected numbers, text, None, or arrays and mappings of them, got {value!r}"
     )

@@ -29,13 +29,13 @@ from scipy.linalg import null_space
 from scipy.optimize import least_squares
 
 from .checks import (
-    check_array,
     check_image_size,
     check_instance,
     check_integer,
     check_number,
     check_path,
     check_positive,
+    check_rows,
     check_vector,
 )
 from .geometry import in_plane_offset, rotation_to_z, unit_vector
@@ -163,7 +163,7 @@ class Camera:
             If the camera is not calibrated, or x has a wrong shape or an infinite value.
         """
         self._require_calibrated()
-        x = _rows_of("x", x, 3)
+        x = check_rows("x", x, 3)
         matrix = self.matrix
         image = x @ matrix[:, :3].T + matrix[:, 3]
         image[~(image[:, 2] > 0)] = np.nan
@@ -200,7 +200,7 @@ class Camera:
 
     def centred(self, pixels):
         """Pixels measured from the middle of the image, right and *up*: x_c, shape (n, 2)."""
-        pixels = _rows_of("pixels", pixels, 2)
+        pixels = check_rows("pixels", pixels, 2)
         width, height = self.image_size
         return np.column_stack((pixels[:, 0] - (width - 1) / 2, (height - 1) / 2 - pixels[:, 1]))
 
@@ -270,7 +270,7 @@ class Rig:
         ValueError
             If x has a wrong shape or all its points coincide.
         """
-        x = _rows_of("x", x, 3)
+        x = check_rows("x", x, 3)
         x = x[~np.isnan(x).any(axis=1)]
         if len(np.unique(x, axis=0)) < 2:
             points = f"{x.tolist()!r:.60}" if len(x) else "only rows with NaN"
@@ -392,6 +392,9 @@ def learn_cameras(tracks, rig, method="joint"):
 
     Frames in which the views contradict each other by more than eight robust standard deviations
     are left out, so that a few outliers of the tracker do not bend the cameras.
+
+    Two cameras are enough, but raise no alarm at a normal that is turned about the cross product of
+    both: the path is then wrong without a residual. Three do.
 
     Parameters
     ----------
@@ -938,7 +941,7 @@ def _check_tracks(tracks, rig):
         raise ValueError(
             f"tracks: must be one per camera, got {len(tracks)} for {len(rig.cameras)} cameras"
         )
-    tracks = [_rows_of(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    tracks = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
     lengths = [len(track) for track in tracks]
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
@@ -948,17 +951,6 @@ def _check_tracks(tracks, rig):
         if unseen.all():
             raise ValueError(f"tracks[{i}]: must see the target in some frame, got only NaN rows")
     return tracks
-
-
-def _rows_of(name, value, width):
-    value = check_array(name, value)
-    if value.ndim != 2 or value.shape[1] != width:
-        raise ValueError(f"{name}: must have shape (n, {width}), got {value.shape}")
-    if np.isinf(value).any():
-        raise ValueError(
-            f"{name}: must be finite or NaN, got {np.isinf(value).sum()} infinite values"
-        )
-    return value
 
 
 def _to_table(camera):

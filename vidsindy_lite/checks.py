@@ -65,6 +65,18 @@ def check_vector(name: str, values: np.ndarray, size: int) -> np.ndarray:
     return vector
 
 
+def check_rows(name: str, values: np.ndarray, width: int) -> np.ndarray:
+    """Points or pixels row by row, shape (n, width); a row holding NaN is a missing one."""
+    rows = check_array(name, values)
+    if rows.ndim != 2 or rows.shape[1] != width:
+        raise ValueError(f"{name}: must have shape (n, {width}), got {rows.shape}")
+    if np.isinf(rows).any():
+        raise ValueError(
+            f"{name}: must be finite or NaN, got {np.isinf(rows).sum()} infinite values"
+        )
+    return rows
+
+
 def check_times(t: np.ndarray) -> np.ndarray:
     """Finite, increasing times, at least one, shape (n,)."""
     t = check_array("t", t)

@@ -176,6 +176,9 @@ class Collocation:
         self.physics_weights = np.asarray(physics_weights, dtype=float)
         self._data_band = np.zeros((WIDTH * self.d, self.r * self.d))
         self._data_band[:: self.d] = np.kron(self._sample_band, self.data_weights)
+        self._shared = self.data_weights[:, None] * self.systematic
+        self._shared_information = np.einsum("nik,nil->kl", self._shared, self.systematic)
+        self._shared_information += np.eye(self.systematic.shape[-1])
 
     def _basis(self, times: list[np.ndarray], order: int = 0) -> sparse.csr_array:
         """Basis functions of all segments at the given times of each, shape (times, r)."""
@@ -201,9 +204,8 @@ class Collocation:
     def data_residual(self, control_points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,)."""
         residual = self.curve(control_points) - self.x
-        weighted = self.data_weights[:, None] * self.systematic
-        matrix = np.einsum("nik,nil->kl", weighted, self.systematic) + np.eye(weighted.shape[-1])
-        sizes = -np.linalg.solve(matrix, np.einsum("nik,ni->k", weighted, residual))
+        pull = np.einsum("nik,ni->k", self._shared, residual)
+        sizes = -np.linalg.solve(self._shared_information, pull)
         return residual + self.systematic @ sizes, sizes
 
     def data_loss(self, control_points: np.ndarray) -> float:
@@ -269,8 +271,8 @@ class Collocation:
         data_residual, sizes = self.data_residual(state.control_points)
         right = physics.T @ unknowns
         right[:, 0] += (self.samples.T @ (data_residual * self.data_weights)).ravel()
-        weighted = (self.data_weights[:, None] * self.systematic).reshape(len(self.x), -1)
-        right[:, shared] = (self.samples.T @ weighted).reshape(r * d, -1)
+        pull = self.samples.T @ self._shared.reshape(len(self.x), -1)
+        right[:, shared] = pull.reshape(r * d, -1)
 
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
         solved = cho_solve_banded((factor, True), right, check_finite=False)

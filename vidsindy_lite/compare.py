@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .artifacts import RUN_TIMES, SECONDS
+from .checks import check_path
 
 __all__ = ["differences", "side_by_side"]
 
@@ -34,8 +35,13 @@ def differences(
     -------
     dict of str to str
         By id, in words.
+
+    Raises
+    ------
+    ValueError
+        If one of them is no folder, or holds no figure or table.
     """
-    ours, theirs = (_numbers(Path(folder)) for folder in (committed, regenerated))
+    ours, theirs = _numbers("committed", committed), _numbers("regenerated", regenerated)
     found = {}
     for name in sorted(ours | theirs):
         if name not in ours or name not in theirs:
@@ -71,9 +77,14 @@ def side_by_side(
     return found
 
 
-def _numbers(folder: Path) -> dict[str, object]:
+def _numbers(name: str, folder: str | os.PathLike) -> dict[str, object]:
     """What each figure plots and each table holds, by id."""
-    paths = (path for path in folder.glob("*.json") if path.name != RUN_TIMES)
+    folder = check_path(name, folder)
+    if not folder.is_dir():
+        raise ValueError(f"{name}: must be a folder, got '{folder}'")
+    paths = [path for path in folder.glob("*.json") if path.name != RUN_TIMES]
+    if not paths:
+        raise ValueError(f"{name}: must hold figures or tables (*.json), got none in '{folder}'")
     records = {path.stem: json.loads(path.read_text("utf-8")) for path in paths}
     return {name: record.get("rows", record.get("numbers")) for name, record in records.items()}
 

@@ -1,7 +1,5 @@
 """The result of a discovery: the law in two frames, its uncertainty, and whether to trust it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

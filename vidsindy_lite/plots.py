@@ -350,8 +350,8 @@ def plot_loss(loss, steps):
         Length of a block.
     """
     figure, axes = plt.subplots()
-    axes.semilogy(steps * (np.arange(len(loss)) + 1), loss)
-    axes.set(xlabel="step", ylabel="loss")
+    axes.plot(steps * (np.arange(len(loss)) + 1), loss)
+    axes.set(xlabel="step", ylabel="loss", ylim=(0, None))
     return figure
 
 
@@ -366,28 +366,11 @@ def plot_gaps(t, x, truth):
         Reconstructed positions, scene units; NaN where missing.
     truth : ndarray, shape (n, 3)
     """
-    figure = plt.figure(figsize=(10.5, 4.6))
-    panels = figure.subplot_mosaic(
-        [["x", "space"], ["y", "space"], ["z", "space"]],
-        per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}, width_ratios=(1.1, 1),
-    )  # fmt: skip
-    missing = np.isnan(x).any(axis=1)
-    for i, name in enumerate("xyz"):
-        axes = panels[name]
-        axes.fill_between(
-            t, 0, 1, where=missing, color="0.85", step="mid", transform=axes.get_xaxis_transform()
-        )
-        axes.plot(t, truth[:, i], "--", color="0.4", lw=1)
-        axes.plot(t, x[:, i], color="C0")
-        axes.set_ylabel(name)
-        axes.label_outer()
-    panels["z"].set_xlabel("time (time units); x, y, z in scene units")
-    panels["space"].plot(*truth.T, "--", color="0.4", lw=0.8, label="truth")
-    panels["space"].plot(*x.T, color="C0", lw=1.4, label="reconstructed")
-    panels["space"].plot([], [], color="0.85", lw=8, label="hidden")
-    _finish(panels["space"], azimuth=-60, elevation=25, zoom=0.85)
-    figure.legend(*panels["space"].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return figure
+    curves = {
+        "truth": (truth, {"color": "0.4", "ls": "--", "lw": 0.8}),
+        "reconstructed": (x, {"color": "C0", "lw": 1.4}),
+    }
+    return _over_time_and_in_space(t, curves, np.isnan(x).any(axis=1), "hidden", "time units")
 
 
 def plot_confidence(visible, confidence):
@@ -530,6 +513,32 @@ def _space(size):
     figure = plt.figure(figsize=size)
     axes = figure.add_subplot(projection="3d", proj_type="ortho")
     return figure, axes
+
+
+def _over_time_and_in_space(t, curves, missing, word, unit):
+    """Curves by coordinate and in space, by label with their style; what is missing is shaded."""
+    figure = plt.figure(figsize=(10.5, 4.7))
+    panels = figure.subplot_mosaic(
+        [["x", "space"], ["y", "space"], ["z", "space"]],
+        per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}, width_ratios=(1.1, 1),
+    )  # fmt: skip
+    space = panels["space"]
+    for i, name in enumerate("xyz"):
+        axes = panels[name]
+        axes.fill_between(
+            t, 0, 1, where=missing, color="0.85", step="mid", transform=axes.get_xaxis_transform()
+        )
+        for curve, style in curves.values():
+            axes.plot(t, curve[:, i], **style)
+        axes.set_ylabel(name)
+        axes.label_outer()
+    panels["z"].set_xlabel(f"time ({unit}); x, y, z in scene units")
+    for label, (curve, style) in curves.items():
+        space.plot(*curve.T, label=label, **style)
+    space.plot([], [], color="0.85", lw=8, label=word)
+    _finish(space, azimuth=-60, elevation=25, zoom=0.85)
+    figure.legend(*space.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return figure
 
 
 def _finish(axes, azimuth, elevation, zoom=1.05):

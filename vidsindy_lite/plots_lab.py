@@ -23,10 +23,11 @@ def plot_table(rig, x, found, marked):
     marked : dict of str to ndarray, shape (3,)
         Points that are drawn as pentagrams.
     """
-    figure = plt.figure(figsize=(10.5, 4.4))
+    figure = plt.figure(figsize=(10.5, 4.2), layout="compressed")
     panels = figure.subplot_mosaic(
-        [["above", "space"]], per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}
-    )
+        [["above", "space"]], width_ratios=(1, 1.15),
+        per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}},
+    )  # fmt: skip
     above, space = panels["above"], panels["space"]
     for path in x:
         space.plot(*path.T, color="k", lw=1.2)
@@ -40,9 +41,9 @@ def plot_table(rig, x, found, marked):
     space.set_zlim3d(0, space.get_zlim3d()[1])
     space.locator_params(nbins=3)
     for axis in (space.xaxis, space.yaxis, space.zaxis):
-        axis.labelpad = 10
+        axis.labelpad = 8
     extent = np.ptp([space.get_xlim3d(), space.get_ylim3d(), space.get_zlim3d()], axis=1)
-    space.set_box_aspect(extent, zoom=0.74)
+    space.set_box_aspect(extent, zoom=1.12)
     space.view_init(elev=25, azim=-65)
     for k, path in enumerate(x):
         above.plot(*path[:, :2].T, color="0.75", lw=5, label="truth" if k == 0 else None)

@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patheffects import withStroke
 
-from .plots import _finish, _show
+from .plots import _over_time_and_in_space, _show
 
 
 def plot_path(t, x, curve):
@@ -19,28 +19,12 @@ def plot_path(t, x, curve):
     curve : ndarray, shape (n, 3)
         The fitted curve; NaN outside its stretches.
     """
-    figure = plt.figure(figsize=(10.5, 4.8))
-    panels = figure.subplot_mosaic(
-        [["x", "space"], ["y", "space"], ["z", "space"]],
-        per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}, width_ratios=(1.1, 1),
-    )  # fmt: skip
-    missing = np.isnan(x).any(axis=1)
-    for i, name in enumerate("xyz"):
-        axes = panels[name]
-        axes.fill_between(
-            t, 0, 1, where=missing, color="0.85", step="mid", transform=axes.get_xaxis_transform()
-        )
-        axes.plot(t, x[:, i], color="0.75", lw=4)
-        axes.plot(t, curve[:, i], color="C0", lw=1)
-        axes.set_ylabel(name)
-        axes.label_outer()
-    panels["z"].set_xlabel("time (units of the equations); x, y, z in scene units")
-    panels["space"].plot(*x.T, color="0.75", lw=4, label="reconstructed")
-    panels["space"].plot(*curve.T, color="C0", lw=1, label="curve that obeys the law")
-    panels["space"].plot([], [], color="0.85", lw=8, label="not seen")
-    _finish(panels["space"], azimuth=-60, elevation=25, zoom=0.85)
-    figure.legend(*panels["space"].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return figure
+    curves = {
+        "reconstructed": (x, {"color": "0.75", "lw": 4}),
+        "curve that obeys the law": (curve, {"color": "C0", "lw": 1}),
+    }
+    missing, unit = np.isnan(x).any(axis=1), "units of the equations"
+    return _over_time_and_in_space(t, curves, missing, "not seen", unit)
 
 
 def plot_views(images, titles, tracks, index):

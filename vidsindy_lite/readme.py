@@ -118,6 +118,17 @@ def _cell(l2: float, false: float, found: str = "") -> str:
 # ------------------------------------------------------------------------------------- headlines
 
 
+def _tour(table: Table) -> str:
+    (row,) = table.rows
+    found = row["true terms"] - row["missing"]
+    return f"{found} of {row['true terms']} terms, {row['false']} false, l2 {row['l2']:.0e}"
+
+
+def _projection(table: Table) -> str:
+    right, text = (row["shift of the image"] for row in table.rows)
+    return f"the plane's D moves the image by {right:.0e}; with the text's rotation by {text:.2g}"
+
+
 def _tracker(table: Table) -> str:
     rms = {row["videos"]: row["rms error (px)"] for row in table.rows}
     return f"rms error {rms['clean']:.1g} px clean, {rms['noise, variance 0.01']:.1g} px with noise"
@@ -170,6 +181,8 @@ def _audit(table: Table) -> str:
 
 # One line for a notebook: by the table it is read from, which names its notebook.
 HEADLINES: dict[str, Callable[[Table], str]] = {
+    "tour_score": _tour,
+    "projection_shift": _projection,
     "videos_tracker": _tracker,
     "cameras_methods": _cameras,
     "solver_optimisers": _optimisers,

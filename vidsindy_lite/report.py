@@ -19,6 +19,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+from .artifacts import as_json
 from .cameras import residuals
 from .checks import check_path
 from .pipeline import VideoDiscovery
@@ -153,7 +154,7 @@ def summary(
         "tracks": list(found.tracks),
         "residuals": missed,
     }
-    return _plain(content)
+    return as_json(content, "found")
 
 
 def _law(found, frame, origin, errors):
@@ -173,19 +174,6 @@ def _law(found, frame, origin, errors):
     ]  # fmt: skip
     equations = found.equations(frame)
     return {"equations": equations, "origin": origin, "origin_errors": errors, "terms": terms}
-
-
-def _plain(value):
-    """Arrays as lists, numbers as Python's, and None for what is not finite."""
-    if isinstance(value, dict):
-        return {key: _plain(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(part) for part in value]
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value.item() if isinstance(value, np.generic) else value
 
 
 # ---------------------------------------------------------------------------------------- the page

@@ -17,14 +17,14 @@ A motion that repeats itself fits at several lags, one that hardly moves at all 
 result says so.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from .cameras import Rig, check_learnable, learn_cameras, residuals
-from .checks import check_positive, check_vector
+from .checks import check_instance, check_positive, check_rows, check_vector
 from .sights import epipolar_equations
 
 DISAGREEMENT = 1.0
@@ -36,15 +36,17 @@ ALIKE = 2.0
 """Ratio of disagreements up to which two lags fit equally well, ..."""
 FINE = 0.05
 """... and disagreement in pixels below which all do: real tracks are no better than that."""
+PROBE = 0.05
+"""Frames; slopes in a lag are taken over twice that."""
+OUTLIER = 12.0
+"""Medians of the residuals; one beyond that moves neither a lag nor its error."""
 
 _OVERLAP = 0.5  # share of the shorter of two videos that both must show
 _INSTANTS = 200  # at which the first step compares two views
 _PROMISING = 5  # lags of each camera that pass the first step
 _TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
-_PROBE = 0.05  # frames; the slope of the residuals is taken over twice that
 _STEPS = 10  # of one frame at most, from the best whole lags to the best ones
 _SETTLED = 1e-3  # frames
-_OUTLIER = 12.0  # medians; a residual beyond that does not move a lag
 _SHOWN = 3  # of the lags that fit equally well
 _ROUNDING = 1e-6  # pixels; residuals below that are none
 
@@ -108,8 +110,10 @@ def align(
     Raises
     ------
     ValueError
-        If there is not one finite lag, or positive rate, per track.
+        If a track has a wrong shape or an infinite value, or there is not one finite lag, or
+        positive rate, per track.
     """
+    tracks = _check_tracks(tracks)
     lags = check_vector("lags", lags, len(tracks))
     rates = _check_rates(rates, len(tracks))
     clock = np.arange(len(tracks[0]))
@@ -158,10 +162,11 @@ def learn_lags(
     Raises
     ------
     ValueError
-        If the rig has no calibrated camera, there is not one track, rate and lag per camera, or
-        the first track never shows the target.
+        If the rig has no calibrated camera, there is not one track, rate and lag per camera, a
+        track has a wrong shape, or the first track never shows the target.
     """
     check_learnable(rig)
+    tracks = _check_tracks(tracks)
     if len(tracks) != len(rig.cameras):
         raise ValueError(
             f"tracks: must be one per camera, got {len(tracks)} for {len(rig.cameras)} cameras"
@@ -238,16 +243,16 @@ class _Views:
     def refined(self, whole):
         """The lags of the smallest reprojection error near whole ones, as `Synchrony`."""
         lags, step = np.array(whole, float), np.inf
-        shifts = _PROBE * np.eye(len(lags))[1:]  # the first video is the clock
+        shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
         for _ in range(_STEPS):
             tried = [self.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)]
             if any(part is None for part in tried):
                 return Synchrony(lags, self.rates, np.full(len(lags), np.inf), self.missed(lags))
             here, ahead, behind = tried[0], *np.split(np.array(tried[1:]), 2)
             used = np.isfinite(tried).all(axis=0)
-            limit = max(_OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
+            limit = max(OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
             used &= np.abs(np.where(used, here, 0)) <= limit
-            slope = (ahead - behind)[:, used].T / (2 * _PROBE)
+            slope = (ahead - behind)[:, used].T / (2 * PROBE)
             step, *_ = np.linalg.lstsq(slope, -here[used])
             size = np.abs(step).max()
             lags[1:] += step / max(size, 1)  # further than a frame the slope does not hold
@@ -372,6 +377,11 @@ def _curve(track: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         return values
 
     return at
+
+
+def _check_tracks(tracks):
+    check_instance("tracks", tracks, Sized)
+    return [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
 
 
 def _check_rates(rates, count):

@@ -81,6 +81,8 @@ def runge_kutta_4(
     ndarray, shape (n, d) or (n, m, d)
     """
     states = [check_array("x0", x0)]
+    if isinstance(rate, PolynomialSystem) and states[0].shape[-1:] != (rate.d,):
+        raise ValueError(f"x0: must have shape ({rate.d},) or (m, {rate.d}), got {states[0].shape}")
     if not np.isfinite(states[0]).all():
         raise ValueError(f"x0: must be finite, got {x0!r:.60}")
     for step in np.diff(check_times(t)) / check_integer("substeps", substeps, 1):

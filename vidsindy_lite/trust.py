@@ -26,6 +26,9 @@ COARSE = 1.0
 """Longest typical time step, in time scales of the motion (about 6 to a turn)."""
 RESOLVED = 1e-3
 """Residual, relative to the spread of the data, below which a misfit does not matter."""
+STRAY = 100.0
+"""Distance of a sample from those before and after it, over the median distance of all samples
+from their median, that no motion explains; noise of 50 % and seven samples a turn make 40."""
 CHANCE = 1e-4
 """Probability below which what the left-out terms explain together is no chance."""
 UNMET = 1e-2
@@ -64,6 +67,34 @@ def doubts(
         *_unmet(state, problem),
         *_selection(law, state, problem, charges),
         *_sampling(records),
+    ]
+
+
+def strays(records: Sequence[Record]) -> list[str]:
+    """Single samples so far from both their neighbours that they must be errors.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The data in the user's units.
+
+    Returns
+    -------
+    list of str
+    """
+    found = []
+    for t, x in records:
+        spread = np.median(np.abs(x - np.median(x, axis=0)), axis=0)
+        before, after = x[1:-1] - x[:-2], x[1:-1] - x[2:]
+        away = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+        far = 1 + np.flatnonzero(((away > STRAY * spread) & (spread > 0)).any(axis=1))
+        found += [f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in far]
+    if not found:
+        return []
+    more = f" and {len(found) - 3} more" if len(found) > 3 else ""
+    return [
+        f"a sample lies far from those before and after it: {'; '.join(found[:3])}{more}: no "
+        "motion explains that; put NaN in its place"
     ]
 
 

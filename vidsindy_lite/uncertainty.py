@@ -19,11 +19,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from .cameras import Rig, camera_parameters, reconstruct, residuals, with_parameters
-from .synchrony import Synchrony, align
+from .synchrony import OUTLIER, PROBE, Synchrony, align
 
-_PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width; and in frames ...
-_PROBE_LAG = 0.05  # ... as for the slopes of `learn_lags`
-_OUTLIER = 12.0  # medians; a frame with a residual beyond that does not count
+_PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width
 
 
 def systematic_errors(
@@ -48,7 +46,7 @@ def systematic_errors(
     """
     start = camera_parameters(rig, learned)
     moving = np.flatnonzero((lags.errors > 0) & np.isfinite(lags.errors))
-    steps = np.concatenate([np.full(len(start), _PROBE), np.full(len(moving), _PROBE_LAG)])
+    steps = np.concatenate([np.full(len(start), _PROBE), np.full(len(moving), PROBE)])
 
     def both(change):
         shifted = lags.lags.copy()
@@ -63,7 +61,7 @@ def systematic_errors(
     slopes = np.reshape(slopes, (len(steps), *here.shape))
     missed, slope = here[:, :-3], np.moveaxis(slopes[:, :, :-3], 0, -1)
     used = np.isfinite(missed) & np.isfinite(slope).all(axis=-1)
-    limit = _OUTLIER * np.median(np.abs(missed[used])) if used.any() else 0.0
+    limit = OUTLIER * np.median(np.abs(missed[used])) if used.any() else 0.0
     used &= ~(np.abs(missed) > limit).any(axis=1, keepdims=True)
     factor = _sandwich(np.where(used, missed, 0), np.where(used[..., None], slope, 0))
     return np.einsum("ik,inj->knj", factor, np.nan_to_num(slopes[:, :, -3:]))
