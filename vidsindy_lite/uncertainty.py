@@ -26,7 +26,7 @@ from .synchrony import Synchrony, align
 _PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width; and in frames ...
 _PROBE_LAG = 0.05  # ... as for the slopes of `learn_lags`
 _OUTLIER = 12.0  # medians; a frame with a residual beyond that does not count
-_TRAIL = 0.5  # of the tracks' noise; mp4v made .2 to .7 of it, Motion JPEG less than .1
+_TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 
 
 def systematic_errors(
