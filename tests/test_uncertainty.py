@@ -7,7 +7,7 @@ from conftest import trajectory
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import camera_parameters
 from vidsindy_lite.synchrony import Synchrony
-from vidsindy_lite.uncertainty import long_run_covariance, systematic_errors
+from vidsindy_lite.uncertainty import long_run_covariance, systematic_errors, trailing_errors
 
 NOISE = 0.05  # pixels
 
@@ -67,6 +67,43 @@ def test_an_uncertain_lag_moves_the_path_along_its_motion():
     assert np.corrcoef(speed[2:-2], shift[2:-2])[0, 1] > 0.8
 
 
+def trailing(rig, x, trail, noise=NOISE, seed=0):
+    """Tracks that stay behind the motion by so many pixels."""
+    rng = np.random.default_rng(seed)
+    clean = [camera.project(x) for camera in rig.cameras]
+    steps = [np.gradient(track, axis=0) for track in clean]
+    return [
+        track - trail * step / np.linalg.norm(step, axis=1, keepdims=True)
+        + noise * rng.normal(size=track.shape)
+        for track, step in zip(clean, steps, strict=True)
+    ]  # fmt: skip
+
+
+def test_trails_are_half_the_noise_of_the_tracks():
+    x = trajectory(np.random.default_rng(3), 400)
+    rig = vl.Rig.around(x)
+    modes = trailing_errors(trailing(rig, x, 0), rig)
+    assert modes.shape == (3, 400, 3)
+    behind = vl.reconstruct(trailing(rig, x, NOISE / 2, noise=0), rig) - x
+    apart = modes.sum(axis=0) - behind
+    assert np.sqrt(np.mean(apart**2)) < 0.2 * np.sqrt(np.mean(behind**2))
+    np.testing.assert_allclose(trailing_errors(trailing(rig, x, 0, noise=0), rig), 0, atol=1e-9)
+
+
+def test_no_trail_where_nothing_moves_or_is_seen():
+    x = trajectory(np.random.default_rng(4), 100)
+    x[40:60] = x[40]
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) for camera in rig.cameras]
+    for track in tracks:
+        track[80:] = np.nan
+    tracks[0][:20] += NOISE * np.random.default_rng(0).normal(size=(20, 2))
+    modes = trailing_errors(tracks, rig)
+    assert np.isfinite(modes).all()
+    np.testing.assert_allclose(modes[:, 41:59], 0, atol=1e-12)
+    np.testing.assert_array_equal(modes[:, 80:], 0)
+
+
 def test_long_run_covariance_of_an_autoregressive_series():
     series = dependent(np.random.default_rng(0), 20000, 0.6)
     np.testing.assert_allclose(np.diag(long_run_covariance(series)), 4, rtol=0.15)  # 1.6 / 0.4
@@ -99,6 +136,19 @@ def test_a_slightly_wrong_map_makes_false_terms_unless_it_is_told(name, seed):
     inside = truth.support
     pulls = (told.coefficients - truth.coefficients)[inside] / told.standard_errors[inside]
     assert np.sqrt(np.mean(pulls**2)) < 2.5
+    assert told.status == "ok"
+
+
+def test_trailing_tracks_make_false_terms_unless_it_is_told():
+    truth = vl.SYSTEMS["SprottF"].shift(vl.REFERENCE_OFFSET)
+    t, x = truth.trajectory(600)
+    rig = vl.Rig.around(x)
+    tracks = trailing(rig, x, 0.5 * NOISE)
+    seen = vl.reconstruct(tracks, rig)
+    blind = vl.discover(t, seen)
+    told = vl.discover(t, seen, systematic=trailing_errors(tracks, rig))
+    assert vl.score(blind, truth).false_positives > 0
+    assert vl.score(told, truth).exact
     assert told.status == "ok"
 
 

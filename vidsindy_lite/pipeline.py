@@ -16,7 +16,7 @@ from .checks import check_integer, check_path, check_times, check_vector
 from .discovery import Discovery
 from .synchrony import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
 from .tracking import Track, check_detector, follow
-from .uncertainty import systematic_errors
+from .uncertainty import systematic_errors, trailing_errors
 from .video import VideoInfo, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
@@ -130,7 +130,9 @@ def discover_from_videos(
     tracks = align(raw, synchrony.lags, rates)
     learned = learn_cameras(tracks, rig)
     x = reconstruct(tracks, learned)
-    shared = systematic_errors(raw, rig, learned, synchrony)
+    shared = np.concatenate(
+        (systematic_errors(raw, rig, learned, synchrony), trailing_errors(tracks, learned))
+    )
     found = discover(t, x, degree=degree, seed=seed, progress=progress, systematic=shared)
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
     parts["warnings"] = (
