@@ -48,7 +48,7 @@ LONGEST_STEP = 3.0
 SHORTEST_SEGMENT = 5
 """Segments of fewer samples are left out: their differences are mostly one-sided."""
 WEAK_WINDOWS = 500
-"""Windows of the weak form, shared by the segments in proportion to their length."""
+"""Windows of the weak form in a whole record; a part of it has its share of them."""
 WEAK_WIDTH = 0.05
 """Full width of a weak window over the length of the record.
 
@@ -141,7 +141,7 @@ def weak(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> Polyno
     half_width = WEAK_WIDTH / 2 * (t[-1] - t[0])
     with _numpy_seed(seed):
         return _discover(
-            t, x, library, lambda s: _weak_rows(s, library, half_width), _least_squares
+            t, x, library, lambda s: _weak_rows(s, library, half_width, len(t)), _least_squares
         )
 
 
@@ -245,10 +245,12 @@ def _difference_rows(segments: Sequence[Record], library: pysindy.PolynomialLibr
 
 
 def _weak_rows(
-    segments: Sequence[Record], library: pysindy.PolynomialLibrary, half_width: float
+    segments: Sequence[Record], library: pysindy.PolynomialLibrary, half_width: float, total: int
 ) -> Rows:
-    """The weak form of every segment: pysindy's takes one grid, so each has a library."""
-    total = sum(len(t) for t, _ in segments)
+    """The weak form of every segment: pysindy's takes one grid, so each has a library.
+
+    A segment has its share of the windows among the samples of the whole record, ``total``.
+    """
     terms, derivatives = [], []
     for t, x in segments:
         # A window has to be smaller than its segment.
