@@ -359,12 +359,13 @@ def test_quick_run_fails_with_its_notebook(tiny):
 
 @pytest.fixture
 def tables(tmp_path):
-    """The same table, committed and of a quick run; and one of another notebook."""
+    """The same table, committed and of a quick run; and those of two other notebooks."""
     row = {"system": "Lorenz", "false": 0, "l2 (e-2)": 0.5, "seconds": 3.0}
     for folder in ("committed", "quick"):
         (tmp_path / folder).mkdir()
         write_table(tmp_path / folder, "found", "01_first", row)
     write_table(tmp_path / "committed", "other", "02_second", row)
+    write_table(tmp_path / "quick", "another", "03_third", row)
     return tmp_path
 
 
