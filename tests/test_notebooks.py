@@ -352,6 +352,7 @@ def test_orphan_gate_fails_on_an_executed_half_alone(pair):
     assert orphan_problems(pair.parent) == ["01_first.ipynb"]
 
 
+@pytest.mark.slow
 def test_quick_run_fails_with_its_notebook(tiny):
     tiny.write("01_bad", "assert 1 + 1 == 3")
     assert not runner.run(["01"], "quick", tiny.root / "build", root=tiny.root).ok

@@ -81,6 +81,7 @@ def test_a_single_sample_far_off_is_named(duffing, size):
     assert "and 2 more" in doubt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", SYSTEMS.values(), ids=SYSTEMS)
 def test_noise_and_gaps_are_no_strays(law):
     rng = np.random.default_rng(0)

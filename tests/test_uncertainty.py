@@ -139,6 +139,7 @@ def test_a_slightly_wrong_map_makes_false_terms_unless_it_is_told(name, seed):
     assert told.status == "ok"
 
 
+@pytest.mark.slow
 def test_trailing_tracks_make_false_terms_unless_it_is_told():
     truth = vl.SYSTEMS["SprottF"].shift(vl.REFERENCE_OFFSET)
     t, x = truth.trajectory(600)
