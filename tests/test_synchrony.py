@@ -77,7 +77,8 @@ def test_nothing_is_made_up_in_gaps(motion):
 # ----------------------------------------------------------------------------------------- learning
 
 
-@pytest.mark.parametrize("keep", [0, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("keep", [0, 2])
 def test_fractional_lags_and_different_lengths(motion, keep):
     lags = (0, 7.4, -12.7)
     tracks = filmed(motion, (250, 230, 240), lags)
@@ -104,6 +105,7 @@ def test_a_small_fraction_is_not_rounded_away(motion):
     np.testing.assert_allclose(found.lags, (0, 0.1, 0), atol=0.01)
 
 
+@pytest.mark.slow
 def test_different_frame_rates(motion):
     lags, rates = (0, 10.3, -20), (1, 1.2, 0.5)
     tracks = filmed(motion, (250, 250, 120), lags, rates)
