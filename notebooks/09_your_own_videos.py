@@ -59,6 +59,7 @@ from vidsindy_lite.video import Scene, read_video, render, video_info, write_vid
 
 # %%
 plt.style.use("vidsindy_lite.vidsindy")
+plt.ion()  # the report below makes its figures with settings of its own, which would undo this
 full = profile == "full"
 names = ("Lorenz", "SprottE") if full else ("Lorenz",)
 frames = 1000 if full else 300
@@ -183,16 +184,16 @@ for name in names:
     plain = sum(path.stat().st_size for path in folders[name].glob("*.avi"))
     scored = score(found, truth)
     rows.append({
-        "system": name, "files, as part of motion JPEG (%)": 100 * size / plain, "l2": scored.l2,
+        "system": name, "size (% of motion JPEG)": 100 * size / plain, "l2": scored.l2,
         "missing": scored.missing, "false": scored.false_positives, "verdict": found.status,
     })  # fmt: skip
     assert scored.exact or not full
 save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rate.")
 
 # %% [markdown]
-# The laws are right, as the solver allows for trails (`uncertainty.trailing_errors`). The verdict may
-# still be "suspect": the errors of the tracks last for several frames, so that they look like terms that
-# were left out. Film at a high bit rate if you can.
+# These laws are exact, as the solver allows for trails (`uncertainty.trailing_errors`); that does not
+# always go so well. The verdict may be "suspect": the errors of the tracks last for several frames, so
+# that they look like terms that were left out. Film at a high bit rate if you can.
 
 # %% [markdown]
 # ### The path

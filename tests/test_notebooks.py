@@ -121,7 +121,7 @@ def story_problems(path):
 
 
 def output_problems(path):
-    """What an executed half must not hold: too much, or what changes from run to run."""
+    """What an executed half must not hold, too much or what changes, and pictures that it lacks."""
     executed = executed_half(path)
     size = len(nbformat.writes(executed).encode())
     problems = [f"{size} bytes, at most {LARGEST}"] if size > LARGEST else []
@@ -130,6 +130,9 @@ def output_problems(path):
             text = output.get("text", "") + output.get("data", {}).get("text/plain", "")
             if found := VOLATILE.search(text):
                 problems.append(f"cell {index} prints an address or a path: {found[0]}")
+        pictures = [o for o in cell.get("outputs", []) if "image/png" in o.get("data", {})]
+        if re.search(r"^save_figure\(", cell.source, re.MULTILINE) and not pictures:
+            problems.append(f"cell {index} saves a figure that nobody sees")
     return problems
 
 
@@ -345,6 +348,11 @@ def test_output_gate_fails_on_a_large_notebook(pair):
     executed.cells[2].outputs = [nbformat.v4.new_output("display_data", data=data)]
     nbformat.write(executed, pair.with_suffix(".ipynb"))
     assert "at most 600000" in output_problems(pair)[0]
+
+
+def test_output_gate_fails_on_a_figure_that_is_not_shown(pair):
+    edit(pair.with_suffix(".ipynb"), '"x + 1"', '"save_figure(\'waves\', figure)"')
+    assert output_problems(pair) == ["cell 3 saves a figure that nobody sees"]
 
 
 def test_orphan_gate_fails_on_an_executed_half_alone(pair):
