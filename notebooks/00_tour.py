@@ -61,6 +61,7 @@ from vidsindy_lite.artifacts import save_animation, save_figure, save_table
 from vidsindy_lite.experiments import film
 from vidsindy_lite.metrics import trajectory_error
 from vidsindy_lite.systems import SYSTEMS
+from vidsindy_lite.video import read_frame
 
 plt.style.use("vidsindy_lite.vidsindy")
 frames = {"full": 1500, "quick": 400}[profile]
@@ -73,7 +74,7 @@ frames = {"full": 1500, "quick": 400}[profile]
 
 # %%
 folder = TemporaryDirectory()
-shot = film(system, folder.name, frames, seed, suffix=".avi")
+shot = film(system, folder.name, frames, seed)
 found = discover_from_videos(shot.paths, shot.rig.uncalibrated(keep=0), shot.t)
 print(found.equations("native"))
 
@@ -94,7 +95,7 @@ assert found.status == "ok"
 
 # %%
 middle = frames // 2
-images = [next(f for i, f in enumerate(read_video(p)) if i == middle) for p in shot.paths]
+images = [read_frame(path, middle) for path in shot.paths]
 titles = [f"camera {number}" for number in (1, 2, 3)]
 fig = plots.plot_frames(images, titles, found.tracks, middle)
 caption = "One frame of each camera: the track of the target (line), and the target magnified."

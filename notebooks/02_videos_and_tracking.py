@@ -39,7 +39,6 @@ seed: int = 0  # of the scenes and the image noise
 # %%
 import json
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -61,7 +60,7 @@ from vidsindy_lite.artifacts import save_figure, save_table
 from vidsindy_lite.detector import WEIGHTS
 from vidsindy_lite.experiments import SAMPLES_PER_PERIOD, film
 from vidsindy_lite.systems import SYSTEMS, runge_kutta_4
-from vidsindy_lite.video import BACKGROUNDS, SHAPES, Scene, render, render_restless
+from vidsindy_lite.video import BACKGROUNDS, SHAPES, Scene, read_frame, render, render_restless
 
 # %%
 plt.style.use("vidsindy_lite.vidsindy")
@@ -183,12 +182,12 @@ save_figure("videos_disturbances", fig, caption=caption, numbers={"place": spot[
 
 # %%
 names = {"full": ("SprottE", "NoseHoover", "WangSun"), "quick": ("SprottE",)}[profile]
-shots = [film(n, folder.name, frames, seed + i, suffix=".avi") for i, n in enumerate(names)]
+shots = [film(n, folder.name, frames, seed + i) for i, n in enumerate(names)]
 tracks = [[track(path) for path in shot.paths] for shot in shots]
 
 # %%
 middle = frames // 2
-images = [next(islice(read_video(path), middle, None)) for shot in shots for path in shot.paths]
+images = [read_frame(path, middle) for shot in shots for path in shot.paths]
 titles = [f"{name}, $C_{number}$" for name in names for number in (1, 2, 3)]
 flat = [seen for three in tracks for seen in three]
 fig = plots.plot_frames(images, titles, flat, middle)
@@ -202,16 +201,17 @@ save_figure("figure_S2", fig, caption=caption, numbers=dict(zip(titles, flat, st
 # %% [markdown]
 # ## Files that lose nothing
 #
-# FFV1 and HuffYUV are lossless codecs: what is read is what was written, to the last bit. The first
-# makes small files (.mkv), the second is quick (.avi). Codecs for films are not like that; they move
-# the edges of a small target.
+# QuickTime's run-length code (.mov) and FFV1 (.mkv) are lossless: what is read is what was written, to
+# the last bit. The first writes only what has changed since the last frame, which is little before a
+# background at rest: it is quick, and its files are small. The second codes each frame on its own.
+# Codecs for films are not lossless; they move the edges of a small target.
 
 # %%
 shot = shots[0]
 clip = list(read_video(shot.paths[0]))
 again = write_video(Path(folder.name) / "again.mkv", clip)
 lossy = write_video(Path(folder.name) / "lossy.mp4", clip, codec="mp4v")
-for path in (again, lossy):
+for path in (shot.paths[0], again, lossy):
     change = max(np.abs(a.astype(int) - b).max() for a, b in zip(clip, read_video(path), strict=True))
     print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB, pixels off by up to {change} of 255")
 assert all(np.array_equal(a, b) for a, b in zip(clip, read_video(again), strict=True))
@@ -292,7 +292,7 @@ save_figure("videos_tracker_steps", fig, caption=caption, numbers={"coverage": c
 
 # %%
 def errors_of(scene, stream, places=truth):
-    path = render_video(Path(folder.name) / "one.avi", places, scene, seed=stream)
+    path = render_video(Path(folder.name) / "one.mov", places, scene, seed=stream)
     return np.linalg.norm(track(path) - places, axis=1)
 
 
@@ -403,8 +403,8 @@ found, last = {}, []
 for name, (background, shifts, brightness) in cases.items():
     view = Scene(background, "irregular", size=20, shape_seed=seed)
     clip = render_restless(brief, view, shifts, brightness, seed)
-    path = write_video(Path(folder.name) / "restless.avi", clip)
-    last.append(next(islice(read_video(path), centre, None)))
+    path = write_video(Path(folder.name) / "restless.mov", clip)
+    last.append(read_frame(path, centre))
     found[name] = {way: follow(path, way) for way in ("background", "learned", "auto")}
     print(f"{name}: auto takes {found[name]['auto'].detector}", *found[name]["auto"].warnings, sep="\n  ")
 
@@ -447,7 +447,7 @@ save_figure("detector_tracks", fig, caption=caption, numbers=dict(zip(names, fla
 
 # %%
 posts = ((160, 0, 40, 512), (330, 0, 40, 512))
-shot = film("SprottF", folder.name, frames, seed, suffix=".avi", occluders=posts)
+shot = film("SprottF", folder.name, frames, seed, occluders=posts)
 seen = [track(path) for path in shot.paths]
 rig = learn_cameras(seen, shot.rig.uncalibrated(keep=0))
 x = reconstruct(seen, rig)

@@ -40,7 +40,6 @@ import io
 import json
 from contextlib import chdir, redirect_stderr
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -55,7 +54,7 @@ from vidsindy_lite.cameras import Rig, learn_cameras
 from vidsindy_lite.synchrony import DISAGREEMENT, align, disagreement
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.templates import rig_template
-from vidsindy_lite.video import Scene, read_video, render, video_info, write_video
+from vidsindy_lite.video import Scene, read_frame, render, video_info, write_video
 
 # %%
 plt.style.use("vidsindy_lite.vidsindy")
@@ -223,7 +222,7 @@ tracks = [np.array(track, dtype=float) for track in result["tracks"]]
 lags = np.array([camera["lag"] for camera in result["cameras"]])
 instant = 10
 places = [(path, instant - round(lag)) for path, lag in zip("abc", lags, strict=True)]
-images = [next(islice(read_video(folders[shown] / f"{p}.avi"), n, None)) for p, n in places]
+images = [read_frame(folders[shown] / f"{p}.avi", n) for p, n in places]
 fig = plots_report.plot_views(images, [f"{p}.avi, frame {n}" for p, n in places], tracks, instant)
 caption = "One instant in the three videos, each with the whole track."
 save_figure("own_views", fig, caption=caption, numbers=dict(zip("abc", tracks, strict=True)))

@@ -40,7 +40,7 @@ def test_a_wrong_normal_is_named_first(shot, wrong, calibrated):
     assert found.status == "suspect"
     text = found.warnings[0]
     assert text.startswith("the rig does not agree with the tracks: ")
-    assert f"of cameras[{wrong}] (Lorenz_{wrong + 1}.mkv) would explain it best" in text
+    assert f"of cameras[{wrong}] (Lorenz_{wrong + 1}.mov) would explain it best" in text
     proposed = [float(number) for number in text.split("normal (")[1].split(")")[0].split(",")]
     np.testing.assert_allclose(proposed, normal, atol=5e-3)
 
@@ -66,15 +66,6 @@ def test_same_seed_same_film(tmp_path):
     for ours, theirs in zip(films[0].paths, films[1].paths, strict=True):
         pairs = zip(vl.read_video(ours), vl.read_video(theirs), strict=True)
         assert all((a == b).all() for a, b in pairs)
-
-
-def test_fast_files_hold_the_same_film(tmp_path):
-    small, fast = (film("Lorenz", tmp_path, 40, seed=3, suffix=s) for s in (".mkv", ".avi"))
-    for ours, theirs in zip(fast.paths, small.paths, strict=True):
-        assert ours.suffix == ".avi"
-        pairs = zip(vl.read_video(ours), vl.read_video(theirs), strict=True)
-        assert all((a == b).all() for a, b in pairs)
-    np.testing.assert_array_equal(vl.track(fast.paths[0]), vl.track(small.paths[0]))
 
 
 def test_unknown_benchmark_or_seed_is_named(tmp_path):
@@ -169,7 +160,7 @@ def test_wrong_number_of_times(shot):
 def cut_off(shot):
     """The first video without its second half; its header still states all frames."""
     path = shot.paths[0].with_name("cut_off.mkv")
-    content = shot.paths[0].read_bytes()
+    content = vl.write_video(path, vl.read_video(shot.paths[0])).read_bytes()
     path.write_bytes(content[: len(content) // 2])
     return path
 

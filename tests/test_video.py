@@ -13,6 +13,7 @@ from vidsindy_lite.video import (
     COLOURS,
     SHAPES,
     Scene,
+    read_frame,
     read_video,
     render,
     render_labelled,
@@ -181,7 +182,7 @@ def test_a_seed_gives_the_same_frames_and_another_seed_others():
     assert not np.array_equal(first[0], other[0])
 
 
-@pytest.mark.parametrize("suffix", [".mkv", ".avi"])
+@pytest.mark.parametrize("suffix", [".mov", ".mkv"])
 @pytest.mark.parametrize("size", [SMALL, (128, 96), (102, 66)])
 def test_lossless_files_are_exact(tmp_path, suffix, size):
     rng = np.random.default_rng(0)
@@ -209,13 +210,40 @@ def test_render_video_writes_what_render_yields(tmp_path):
         assert np.array_equal(a, b)
 
 
-def test_nothing_half_written_is_left(tmp_path):
+@pytest.mark.parametrize("fps", [25, 1 / 3, 66.67, 29.97])
+def test_frame_rate_is_kept(tmp_path, fps):
+    path = write_video(tmp_path / "clip.mov", [np.zeros((64, 64, 3), np.uint8)] * 3, fps)
+    assert video_info(path).fps == pytest.approx(fps, rel=1e-4)
+
+
+def test_files_of_still_backgrounds_are_small_and_all_alike(tmp_path):
+    scene, track = Scene("hills", size=12), np.linspace([100, 100], [200, 180], 120)
+    paths = [render_video(tmp_path / name, track, scene) for name in ("a.mov", "b.mov", "c.mkv")]
+    first, again, other = (path.read_bytes() for path in paths)
+    assert first == again
+    assert len(first) < 0.1 * len(other)
+
+
+@pytest.mark.parametrize("suffix", [".mov", ".mkv"])
+def test_one_frame_is_that_of_all(tmp_path, suffix):
+    frames = list(render(np.linspace([20, 20], [70, 60], 120), Scene(image_size=SMALL)))
+    path = write_video(tmp_path / f"clip{suffix}", frames)
+    for number in (119, 0, 1, 49, 50, 51, 75):
+        assert np.array_equal(read_frame(path, number), frames[number])
+    with pytest.raises(ValueError, match=r"number: .* must have that frame, got 120"):
+        read_frame(path, 120)
+    with pytest.raises(ValueError, match="number: must be an integer of at least 0, got -1"):
+        read_frame(path, -1)
+
+
+@pytest.mark.parametrize("suffix", [".mov", ".mkv"])
+def test_nothing_half_written_is_left(tmp_path, suffix):
     def frames():
         yield np.zeros((64, 64, 3), np.uint8)
         raise RuntimeError("interrupted")
 
     with pytest.raises(RuntimeError, match="interrupted"):
-        write_video(tmp_path / "clip.mkv", frames())
+        write_video(tmp_path / f"clip{suffix}", frames())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -259,7 +287,7 @@ def test_render_rejects(track, message):
 @pytest.mark.parametrize(
     ("name", "options", "error", "message"),
     [
-        ("clip.txt", {}, ValueError, "path: must end in .mkv or .avi"),
+        ("clip.txt", {}, ValueError, "path: must end in .mov or .mkv"),
         ("clip.mkv", {"codec": "XVID"}, ValueError, "codec: must be one of"),
         ("clip.mkv", {"codec": "mp4v"}, ValueError, "path: must end in .mp4"),
         ("clip.mkv", {"fps": 0}, ValueError, "fps: must be positive, got 0"),

@@ -89,7 +89,6 @@ def film(
     folder: str | Path,
     frames: int = 1500,
     seed: int = 0,
-    suffix: str = ".mkv",
     **disturbances,
 ) -> Film:
     """Film a benchmark with three cameras against random backgrounds.
@@ -104,9 +103,6 @@ def film(
         Frames per camera.
     seed : int
         Of the scenes: one target (shape, colour, size) before three backgrounds.
-    suffix : {".mkv", ".avi"}
-        The same frames in small files (FFV1), or in files five times as large that are written and
-        read in a third of the time (HFYU).
     **disturbances
         Fields of `Scene` common to all cameras, e.g. ``noise_variance=0.01``.
 
@@ -128,7 +124,7 @@ def film(
         draw, disturb = view.spawn(2)
         disturbance_seed = int(disturb.generate_state(1)[0])
         scene = Scene.random(np.random.default_rng(draw), **common | disturbances)
-        path = Path(folder) / f"{name}_{number}{suffix}"
+        path = Path(folder) / f"{name}_{number}.mov"
         render_video(path, camera.project(x), scene, seed=disturbance_seed)
         paths.append(path)
         scenes.append(scene)
@@ -203,7 +199,7 @@ class Recording:
 def record(task: FilmTask) -> Recording:
     """Film a benchmark, track it, learn the cameras and reconstruct; the videos are removed."""
     with TemporaryDirectory() as folder:
-        shot = film(task.system, folder, task.frames, task.trial, suffix=".avi")
+        shot = film(task.system, folder, task.frames, task.trial)
         began = time.perf_counter()
         tracks = tuple(track(path) for path in shot.paths)
     rig = learn_cameras(tracks, shot.rig.uncalibrated(keep=0))

@@ -194,7 +194,7 @@ def film(rig, x, folder, seed=0):
     x : ndarray, shape (k, n, 3)
         Centre of the ball in each frame of each path.
     folder : path
-        Where the videos go: path_1_camera_1.mkv and so on.
+        Where the videos go: path_1_camera_1.mov and so on.
     seed : int
         Draws the shade of the cloth.
 
@@ -209,7 +209,7 @@ def film(rig, x, folder, seed=0):
         parts = []
         for k, path in enumerate(x):
             centroids, shapes = camera.ball_image(path, RADIUS)
-            file = Path(folder) / f"path_{k + 1}_camera_{i + 1}.mkv"
+            file = Path(folder) / f"path_{k + 1}_camera_{i + 1}.mov"
             # All clips of one camera show the same cloth.
             number = len(rig.cameras) * seed + i
             render_video(file, centroids, scene, FPS, number, 2 / scene.size * shapes)

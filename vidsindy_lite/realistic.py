@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -28,7 +27,7 @@ from .experiments import SAMPLES_PER_PERIOD
 from .metrics import Score, score
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
 from .tracking import Track, follow
-from .video import Scene, read_video, render_labelled, write_video
+from .video import Scene, read_frame, render_labelled, write_video
 
 START = (-1.17, -1.1, 1.0)
 """Where the motion begins, in the native frame."""
@@ -199,9 +198,9 @@ def _view(pixels, scene, seed):
             yield drawn.frame
 
     with TemporaryDirectory() as folder:
-        video = write_video(Path(folder) / "view.avi", frames())
+        video = write_video(Path(folder) / "view.mov", frames())
         track = follow(video)
         seen = np.flatnonzero(np.isfinite(track.pixels).all(axis=1))
         shown = int(seen[len(seen) // 2]) if len(seen) else 0
-        image = next(islice(read_video(video), shown, None))
+        image = read_frame(video, shown)
     return View(scene, shown, image, track, pixels, np.array(visible))

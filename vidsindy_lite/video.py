@@ -6,7 +6,9 @@ Pixel convention: u to the right, v down, pixel centres at integer coordinates, 
 of the top left pixel is (0, 0).
 
 The files are lossless unless a lossy codec is asked for, because a lossy codec moves the edges of a
-small target by more than the tracker's own error. FFV1 codes green and the differences blue - green
+small target by more than the tracker's own error. QuickTime's run-length code (.mov) writes of each
+frame only the pixels that differ from the last one: before a background at rest it is quick, and
+its files are small. FFV1 (.mkv) codes each frame on its own, green and the differences blue - green
 and red - green; the backgrounds put their texture into the brightness and keep those differences
 constant over large areas, which costs little in looks and makes the files much smaller.
 """
@@ -14,9 +16,11 @@ constant over large areas, which costs little in looks and makes the files much 
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
+import av
 import cv2
 import numpy as np
 
@@ -46,15 +50,16 @@ COLOURS = {
 }
 
 # Lossless codecs by file suffix (the default), and the suffixes each codec is usually kept in.
-LOSSLESS = {".mkv": "FFV1", ".avi": "HFYU"}
+LOSSLESS = {".mov": "qtrle", ".mkv": "FFV1"}
 CODECS = {
+    "qtrle": (".mov",),
     "FFV1": (".mkv", ".avi"),
-    "HFYU": (".mkv", ".avi"),
     "mp4v": (".mp4",),
     "MJPG": (".avi", ".mkv"),
 }
 
 _SCANLINES = 16  # per row of pixels, when the target is drawn
+_KEY_FRAMES = 50  # frames from one that stands on its own to the next: a jump costs half of that
 
 
 # ------------------------------------------------------------------------------------- backgrounds
@@ -574,11 +579,11 @@ def write_video(path, frames: Iterable[np.ndarray], fps=25, codec=None) -> Path:
     Parameters
     ----------
     path : path
-        .mkv (FFV1) or .avi (HFYU), both lossless; .mp4 only with the lossy codec "mp4v".
+        .mov (qtrle) or .mkv (FFV1), both lossless; .mp4 only with the lossy codec "mp4v".
     frames : iterable of (height, width, 3) uint8
         Blue-green-red, all of one size, of even width and height.
     fps : float
-    codec : {"FFV1", "HFYU", "mp4v", "MJPG"}, optional
+    codec : {"qtrle", "FFV1", "mp4v", "MJPG"}, optional
         Lossless by default; "mp4v" and "MJPG" are lossy.
 
     Returns
@@ -597,7 +602,7 @@ def write_video(path, frames: Iterable[np.ndarray], fps=25, codec=None) -> Path:
     check_instance("frames", frames, Iterable)
     suffix = path.suffix.lower()
     if codec is None and suffix not in LOSSLESS:
-        raise ValueError(f"path: must end in .mkv or .avi unless codec is given, got '{path}'")
+        raise ValueError(f"path: must end in .mov or .mkv unless codec is given, got '{path}'")
     codec = codec or LOSSLESS[suffix]
     if codec not in CODECS:
         raise ValueError(f"codec: must be one of {', '.join(CODECS)}, got {codec!r}")
@@ -630,9 +635,8 @@ def _encode(partial, frames, fps, codec, path):
                 size = frame.shape[1::-1]
                 if size[0] % 2 or size[1] % 2:  # OpenCV would cut off a row or column, silently
                     raise ValueError(f"frames: width and height must be even, got {size}")
-                fourcc = cv2.VideoWriter_fourcc(*codec)
-                writer = cv2.VideoWriter(str(partial), cv2.CAP_FFMPEG, fourcc, fps, size)
-                if not writer.isOpened():
+                writer = _open_writer(partial, codec, fps, size)
+                if writer is None:
                     raise OSError(f"path: cannot write {codec} video of size {size} to '{path}'")
             if frame.shape[1::-1] != size:
                 raise ValueError(
@@ -644,6 +648,35 @@ def _encode(partial, frames, fps, codec, path):
             writer.release()
     if writer is None:
         raise ValueError("frames: at least one frame is needed, got none")
+
+
+def _open_writer(path, codec, fps, size):
+    if codec == "qtrle":
+        return _RunLengthWriter(path, fps, size)
+    fourcc = cv2.VideoWriter_fourcc(*codec)
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, fourcc, fps, size)
+    return writer if writer.isOpened() else None
+
+
+class _RunLengthWriter:
+    """Writes QuickTime's run-length code, which OpenCV only reads; methods as of its writer."""
+
+    def __init__(self, path, fps, size):
+        self.file = av.open(str(path), "w")
+        rate = Fraction(fps).limit_denominator(10_000)
+        self.stream = self.file.add_stream("qtrle", rate, options={"g": str(_KEY_FRAMES)})
+        self.stream.width, self.stream.height = size
+        self.stream.pix_fmt = "rgb24"
+
+    def write(self, frame):
+        self._put(av.VideoFrame.from_ndarray(frame, "bgr24"))
+
+    def release(self):
+        self._put(None)
+        self.file.close()
+
+    def _put(self, frame):
+        self.file.mux(self.stream.encode(frame))
 
 
 def open_video(path) -> cv2.VideoCapture:
@@ -694,6 +727,36 @@ def _decode(capture):
             yield frame
     finally:
         capture.release()
+
+
+def read_frame(path, number) -> np.ndarray:
+    """One frame of a video file, without decoding all before it.
+
+    Parameters
+    ----------
+    path : path
+    number : int
+        From 0.
+
+    Returns
+    -------
+    frame : (height, width, 3) uint8, blue-green-red
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If the file is missing, empty, not a video, or holds no such frame.
+    """
+    number = check_integer("number", number)
+    capture = open_video(path)
+    try:
+        capture.set(cv2.CAP_PROP_POS_FRAMES, number)
+        more, frame = capture.read()
+    finally:
+        capture.release()
+    if not more:
+        raise ValueError(f"number: '{path}' must have that frame, got {number}")
+    return frame
 
 
 def video_info(path) -> VideoInfo:

@@ -92,7 +92,7 @@ def test_unseen_random_scenes(tmp_path):
 def test_noise(tmp_path, seed):
     truth = lorenz_track(seed)[:300]
     scene = Scene.random(seed, noise_variance=0.01)
-    path = render_video(tmp_path / "clip.avi", truth, scene, seed=seed)
+    path = render_video(tmp_path / "clip.mov", truth, scene, seed=seed)
     for detector in ("auto", "learned"):
         error = np.linalg.norm(track(path, detector) - truth, axis=1)
         rms = np.sqrt(np.nanmean(error**2))
@@ -111,7 +111,7 @@ def test_restless(tmp_path, background, light, motion):
         shifts = np.column_stack([2 * k, 0 * k])
     scene = Scene(background, "irregular", size=20, shape_seed=500)
     frames = render_restless(truth, scene, shifts, 1 + light * np.sin(k / 10), seed=500)
-    path = write_video(tmp_path / "clip.avi", frames)
+    path = write_video(tmp_path / "clip.mov", frames)
     found = {name: follow(path, name) for name in ("background", "learned", "auto")}
     error = {name: np.linalg.norm(f.pixels - truth, axis=1) for name, f in found.items()}
     print(f"\n{background}, {motion}, light {light}: auto takes {found['auto'].detector}", end="")
