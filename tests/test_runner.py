@@ -222,6 +222,19 @@ def test_notebook_that_reads_tables_of_another_is_always_executed(good):
         assert executed(runner.run(root=good.root)) == ["02_second"]
 
 
+def test_longest_notebook_begins_first_and_what_reads_tables_last(good, capsys):
+    good.write("02_long", "print(2)")
+    read = "from vidsindy_lite import artifacts\nartifacts.load_table('table_systems')"
+    good.write("03_reads", read)
+    figures = good.root / "figures"
+    for name, seconds in {"01_first": 1, "02_long": 100, "03_reads": 1000}.items():
+        artifacts.record_run_time(figures, name, "of an earlier run", seconds)
+    report = runner.run(root=good.root, force=True)
+    begun = [line.split()[1] for line in capsys.readouterr().out.splitlines() if ": " not in line]
+    assert begun == ["02_long", "01_first", "03_reads"]
+    assert executed(report) == ["01_first", "02_long", "03_reads"]
+
+
 def test_failed_notebook_is_not_up_to_date(good):
     good.write("02_bad", "1 / 0")
     for _ in range(2):

@@ -179,12 +179,14 @@ class _Search:
         step = typical_step(self.records)
         records = [(t / step, (values - centre) / scale) for t, values in self.records]
         # Where the record pauses is a gap or not depending on how fast the target moves, which
-        # a first smoothing tells; the second one then respects the gaps.
-        coarse = [piece for _, piece in _stretches(records, 5.0)]
-        speed = _rms_speed(smooth(coarse, rng).splines)
-        stretches = _stretches(records, max(2.5, GAP / speed))
-        smoothed = smooth([piece for _, piece in stretches], rng)
+        # a first smoothing tells; if there are other gaps, a second one respects them.
+        first = _stretches(records, 5.0)
+        smoothed = smooth([piece for _, piece in first], rng)
         speed = _rms_speed(smoothed.splines)
+        stretches = _stretches(records, max(2.5, GAP / speed))
+        if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:
+            smoothed = smooth([piece for _, piece in stretches], rng)
+            speed = _rms_speed(smoothed.splines)
         self.units = Units(centre, scale, step / speed)
         self.step = speed
         self.records = [(t * speed, values) for t, values in records]

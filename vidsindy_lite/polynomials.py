@@ -68,9 +68,9 @@ def monomials(x: np.ndarray, exponents: np.ndarray) -> np.ndarray:
     powers = np.ones((exponents.max(initial=0) + 1, *x.T.shape))
     for k in range(1, len(powers)):
         np.multiply(powers[k - 1], x.T, out=powers[k])
-    values = np.ones((len(exponents), len(x)))
-    for i, rows in enumerate(exponents.T):
-        values *= powers[rows, i]
+    values = powers[exponents[:, 0], 0]
+    for i in range(1, exponents.shape[1]):
+        values *= powers[exponents[:, i], i]
     return values.T
 
 

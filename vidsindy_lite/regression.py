@@ -88,7 +88,7 @@ def closest_rival(
     model = _Quadratic(information, gradient, present, charge)
     fit = model.fit(support)
     rivals = []
-    for cost, dropped, added in _single_changes(model, fit):
+    for cost, dropped, added in _single_changes(model, _Tableau.of(model, fit)):
         if np.isfinite(cost):  # a rough one where terms are tied together: work it out again
             cost = model.fit(_changed(support, dropped, added)).value - fit.value
         rivals.append((cost, dropped, added))
@@ -139,7 +139,8 @@ def _descend(model: _Quadratic, start: np.ndarray) -> _Fit:
     """Take the best of all drops, adds and swaps until none helps."""
     best = model.fit(start)
     while True:
-        change, dropped, added = min(_single_changes(model, best), key=lambda item: item[0])
+        changes = _single_changes(model, _Tableau.of(model, best))
+        change, dropped, added = min(changes, key=lambda item: item[0])
         if not change < -PLATEAU:
             return best
         # Rounding may promise a fall that does not come: what counts is the value itself.
@@ -152,7 +153,13 @@ def _descend(model: _Quadratic, start: np.ndarray) -> _Fit:
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """A lower value reached by forcing one entry in, which may let several others go."""
     none = np.array([], dtype=int)
-    for entry in np.flatnonzero(~best.support):
+    tableau = _Tableau.of(model, best)
+    for i, entry in enumerate(tableau.outside):
+        # Most newcomers change nothing for the others, which a rank-one update tells.
+        if tableau.room[i] > COLLINEAR:
+            changes = _single_changes(model, tableau.joined(model, i))
+            if not min(cost for cost, _, _ in changes) < -PLATEAU:
+                continue
         forced = copy(model)
         forced.charge = model.charge.copy()
         forced.charge[entry] = -np.inf
@@ -169,17 +176,61 @@ def _changed(support: np.ndarray, dropped: np.ndarray, added: np.ndarray) -> np.
     return changed
 
 
-def _single_changes(model: _Quadratic, fit: _Fit) -> list[tuple[float, np.ndarray, np.ndarray]]:
+@dataclass(frozen=True)
+class _Tableau:
+    """What single changes of a support hang on: entries that may leave, and that may join.
+
+    ``spread`` is the inverse's diagonal, ``response`` (outside, inside) how far those inside give
+    way to a newcomer, ``left`` the gradient that is left to it, ``room`` the share of it that is no
+    combination of those inside.
+    """
+
+    inside: np.ndarray
+    outside: np.ndarray
+    fitted: np.ndarray
+    spread: np.ndarray
+    response: np.ndarray
+    left: np.ndarray
+    room: np.ndarray
+
+    @classmethod
+    def of(cls, model: _Quadratic, fit: _Fit) -> _Tableau:
+        inside, outside = fit.inside, np.flatnonzero(~fit.support)
+        shared = model.matrix[outside[:, None], inside]
+        response = shared @ fit.inverse
+        room = 1 - (response * shared).sum(axis=1)
+        return cls(
+            inside, outside, fit.fitted, np.diag(fit.inverse), response, fit.left[outside], room
+        )
+
+    def joined(self, model: _Quadratic, i: int) -> _Tableau:
+        """The same after outside entry number i has joined to stay: rank-one updates."""
+        others, entry = np.arange(len(self.outside)) != i, self.outside[i]
+        response, outside = self.response[others], self.outside[others]
+        common = model.matrix[outside, entry] - response @ model.matrix[self.inside, entry]
+        weight = common / self.room[i]
+        return _Tableau(
+            inside=self.inside,
+            outside=outside,
+            fitted=self.fitted - self.response[i] * (self.left[i] / self.room[i]),
+            spread=self.spread + self.response[i] ** 2 / self.room[i],
+            response=response - weight[:, None] * self.response[i],
+            left=self.left[others] - weight * self.left[i],
+            room=self.room[others] - weight * common,
+        )
+
+
+def _single_changes(
+    model: _Quadratic, tableau: _Tableau
+) -> list[tuple[float, np.ndarray, np.ndarray]]:
     """Best drop, add and swap: change of the function, entries dropped, entries added."""
-    inside, outside = fit.inside, np.flatnonzero(~fit.support)
+    inside, outside, fitted, spread = (
+        tableau.inside, tableau.outside, tableau.fitted, tableau.spread
+    )
+    response, left, room = tableau.response, tableau.left, tableau.room
     none = np.array([], dtype=int)
     charge = model.charge
-    spread = np.diag(fit.inverse)
-    shared = model.matrix[outside[:, None], inside]
-    response = shared @ fit.inverse
-    left = fit.left[outside]
-    room = 1 - (response * shared).sum(axis=1)
-    loss = fit.fitted**2 / spread - charge[inside]
+    loss = fitted**2 / spread - charge[inside]
     cost = charge[outside] - _gain(left, room)
     changes = [(np.inf, none, none)]
     if len(inside):
@@ -188,7 +239,7 @@ def _single_changes(model: _Quadratic, fit: _Fit) -> list[tuple[float, np.ndarra
         changes.append((cost.min(), none, outside[[cost.argmin()]]))
     if len(inside) and len(outside):
         # A drop changes what the others leave over, and the room a newcomer has, by rank one.
-        swapped_left = left[:, None] + response * (fit.fitted / spread)
+        swapped_left = left[:, None] + response * (fitted / spread)
         swapped_room = room[:, None] + response**2 / spread
         swap = loss + charge[outside][:, None] - _gain(swapped_left, swapped_room)
         add, drop = np.unravel_index(swap.argmin(), swap.shape)

@@ -214,6 +214,7 @@ def run(
     stamps = dict.fromkeys((path.stem for path in find_notebooks(root)), None)
     artifacts.prune(figures, stamps)  # what a notebook left that has gone
 
+    usual = artifacts.load_run_times(figures)
     outcomes, due = {}, []
     for number, path in enumerate(chosen, start=1):
         label, stamp = f"[{number}/{len(chosen)}] {path.stem}", code_stamp(path, profile)
@@ -232,6 +233,8 @@ def run(
             **({"VIDSINDY_DASK": dask} if dask else {}),
         }
         due.append(_Task(path, label, stamp, profile, output, environment, reads))
+    # The longest first, so that none runs on alone for long; what reads tables comes after them all.
+    due.sort(key=lambda task: (task.reads_tables, -usual.get(task.path.stem, 0.0)))
     for task, outcome in _executed(due):
         name = task.path.stem
         outcomes[name] = outcome
@@ -267,7 +270,7 @@ class _Task:
 
 
 def _executed(tasks: Sequence[_Task]) -> Iterator[tuple[_Task, Outcome]]:
-    """The notebooks as they end; one that reads tables waits for all before it.
+    """The notebooks as they end, begun in this order; one that reads tables waits for all before.
 
     Each runs in a process of its own: the folder and the environment that papermill and its kernel
     start from are those of a process.
