@@ -233,7 +233,7 @@ def run(
             **({"VIDSINDY_DASK": dask} if dask else {}),
         }
         due.append(_Task(path, label, stamp, profile, output, environment, reads))
-    # The longest first, so that none runs on alone for long; what reads tables comes after them all.
+    # The longest first, so that none runs on alone for long; after all, what reads their tables.
     due.sort(key=lambda task: (task.reads_tables, -usual.get(task.path.stem, 0.0)))
     for task, outcome in _executed(due):
         name = task.path.stem

@@ -552,7 +552,7 @@ def _frames(track, scene, seed, shapes, scenery):
             extent = np.ptp(polygon, axis=0)
             seen = _blend(frame, background, visible, alpha, corner, colour) / alpha.sum()
         if scene.noise_variance > 0:
-            # Less than half the time of a normal generator; grey levels are far coarser than the table.
+            # Takes less than half the time of normal numbers; grey levels are coarser by far.
             grain = grains[noise.integers(0, len(grains), frame.shape, np.uint16)]
             frame = cv2.add(frame, grain, dtype=cv2.CV_8U)
         yield LabelledFrame(frame, extent, seen)
