@@ -210,7 +210,10 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("committed", metavar="COMMITTED", help="a folder like figures/")
     compare.add_argument("regenerated", metavar="REGENERATED", help="the same from another run")
     compare.add_argument(
-        "--output", metavar="DIR", required=True, help="for both sides, with a page"
+        "--output",
+        metavar="DIR",
+        required=True,
+        help="for both sides, with a page; an earlier comparison there is replaced",
     )
     compare.set_defaults(command=_compare)
     return parser
