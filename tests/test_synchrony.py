@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
+from vidsindy_lite import synchrony
 from vidsindy_lite.synchrony import DISAGREEMENT, align, disagreement, learn_lags, list_lags
 
 NOISE = 0.05  # pixels
@@ -190,6 +191,21 @@ def test_a_wrong_rig_is_not_explained_by_lags(motion):
     assert found.missed > DISAGREEMENT
     assert found.lags.tolist() == [0, 0, 0]
     assert np.isinf(found.errors).all()
+
+
+def test_no_lags_are_tried_twice(motion, monkeypatch):
+    first, second, third = motion[1].uncalibrated().cameras
+    turned = replace(second, normal=second.normal + 0.3 * second.rows[0])
+    tried = []
+
+    def watched(tracks, rig):
+        tried.append(np.hstack(tracks).tobytes())
+        return vl.learn_cameras(tracks, rig)
+
+    monkeypatch.setattr(synchrony, "learn_cameras", watched)
+    learn_lags(filmed(motion, (100,) * 3, (0, 0, 0)), vl.Rig([first, turned, third]))
+    assert len(tried) > 10
+    assert len(set(tried)) == len(tried)
 
 
 @pytest.mark.slow

@@ -220,25 +220,30 @@ class _Views:
         seen = [track[np.isfinite(track).all(axis=1)] for track in tracks]
         steps = np.concatenate([np.hypot(*np.diff(track, axis=0).T) for track in seen])
         self.speed = np.quantile(steps, _TRIMMED) if len(steps) else 0.0  # pixels in a frame
+        self.known = {}  # the cameras learned at lags that were tried
 
     def at(self, lags):
         return align(self.tracks, lags, self.rates)
 
+    def learned(self, lags):
+        """The cameras that fit best at these lags; None if none do."""
+        key = tuple(lags)
+        if key not in self.known:
+            try:
+                self.known[key] = learn_cameras(self.at(lags), self.rig)
+            except ValueError:  # these lags leave too little in common, or nothing that agrees
+                self.known[key] = None
+        return self.known[key]
+
     def residuals(self, lags):
         """Reprojection residuals of the cameras that fit best, (n_0, 2 m); None if none do."""
-        tracks = self.at(lags)
-        try:
-            return np.hstack(residuals(tracks, learn_cameras(tracks, self.rig)))
-        except ValueError:  # these lags leave too little in common, or nothing that agrees
-            return None
+        rig = self.learned(lags)
+        return None if rig is None else np.hstack(residuals(self.at(lags), rig))
 
     def missed(self, lags):
         """The worst camera's disagreement, pixels; infinite where no cameras fit."""
-        tracks = self.at(lags)
-        try:
-            return max(disagreement(tracks, learn_cameras(tracks, self.rig)))
-        except ValueError:
-            return np.inf
+        rig = self.learned(lags)
+        return np.inf if rig is None else max(disagreement(self.at(lags), rig))
 
     def refined(self, whole):
         """The lags of the smallest reprojection error near whole ones, as `Synchrony`."""
