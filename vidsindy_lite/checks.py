@@ -6,10 +6,14 @@ Booleans are no numbers here, and text is none even where numpy would read it as
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from numbers import Integral, Real
 from pathlib import Path
 
 import numpy as np
+
+FARTHEST_PIXEL = 1e100
+"""Largest coordinate of a track: the squares of larger ones are no numbers any more."""
 
 
 def check_instance(name: str, value: object, kind: type) -> None:
@@ -75,6 +79,25 @@ def check_rows(name: str, values: np.ndarray, width: int) -> np.ndarray:
             f"{name}: must be finite or NaN, got {np.isinf(rows).sum()} infinite values"
         )
     return rows
+
+
+def check_tracks(tracks: Sequence[np.ndarray], cameras: int | None = None) -> list[np.ndarray]:
+    """Pixels of the target in each camera, (n_i, 2) each; so many if given."""
+    is_array = isinstance(tracks, np.ndarray) and tracks.ndim
+    if not (is_array or isinstance(tracks, list | tuple)) or not len(tracks):
+        raise ValueError(
+            f"tracks: must be a list of arrays (n, 2), one per camera, got {tracks!r:.60}"
+        )
+    if cameras is not None and len(tracks) != cameras:
+        raise ValueError(f"tracks: must be one per camera, got {len(tracks)} for {cameras} cameras")
+    tracks = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    for i, track in enumerate(tracks):
+        largest = np.nanmax(np.abs(track), initial=0.0)
+        if largest > FARTHEST_PIXEL:
+            raise ValueError(
+                f"tracks[{i}]: must be pixels of at most {FARTHEST_PIXEL:g}, got {largest:g}"
+            )
+    return tracks
 
 
 def check_times(t: np.ndarray) -> np.ndarray:
