@@ -246,8 +246,10 @@ def _discover(options: argparse.Namespace) -> int:
     from vidsindy_lite.pipeline import discover_from_videos
     from vidsindy_lite.report import PAGE, check_folder_is_free, write_report
     from vidsindy_lite.synchrony import list_lags
+    from vidsindy_lite.tracking import check_detector
     from vidsindy_lite.video import video_info
 
+    check_detector(options.detector)
     check_folder_is_free(options.out)
     rig, t = Rig.load(options.rig), None
     if options.fps is not None:
