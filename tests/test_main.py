@@ -135,6 +135,12 @@ def test_a_size_that_is_none(capsys):
     assert message in capsys.readouterr().err
 
 
+def test_a_size_that_no_camera_has(capsys):
+    assert main(["rig-template", "--size", "10000000x64"]) == 2
+    message = "error: image_size: must be at most 32768 a side, got (10000000, 64)"
+    assert message in capsys.readouterr().err
+
+
 def test_the_help_helps(capsys):
     with pytest.raises(SystemExit, match="0"):
         main(["discover", "--help"])

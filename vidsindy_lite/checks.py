@@ -14,6 +14,8 @@ import numpy as np
 
 FARTHEST_PIXEL = 1e100
 """Largest coordinate of a track: the squares of larger ones are no numbers any more."""
+LARGEST_SIDE = 32768
+"""Pixels of a camera's image, in width and in height: no sensor has more."""
 
 
 def check_instance(name: str, value: object, kind: type) -> None:
@@ -119,8 +121,11 @@ def check_image_size(size: tuple[int, int], least: int = 1) -> tuple[int, int]:
     """Width and height in whole pixels."""
     try:
         width, height = size
-        return check_integer("", width, least), check_integer("", height, least)
+        sides = check_integer("", width, least), check_integer("", height, least)
     except (TypeError, ValueError):
         raise ValueError(
             f"image_size: must be two integers of at least {least}, got {size!r:.60}"
         ) from None
+    if max(sides) > LARGEST_SIDE:
+        raise ValueError(f"image_size: must be at most {LARGEST_SIDE} a side, got {size!r:.60}")
+    return sides
