@@ -93,6 +93,13 @@ def test_image_sizes(size):
         check_image_size(size, least=64)
 
 
+@pytest.mark.parametrize("size", [(32769, 64), (64, 10_000_000)])
+def test_absurd_image_sizes(size):
+    assert check_image_size((32768, 32768)) == (32768, 32768)
+    with pytest.raises(ValueError, match="image_size: must be at most 32768 a side, got "):
+        check_image_size(size)
+
+
 def test_paths():
     assert check_path("path", "a.mkv") == Path("a.mkv")
     for value in (None, 5, ["a.mkv"]):

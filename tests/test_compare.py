@@ -75,6 +75,64 @@ def test_differences_are_laid_out_side_by_side(folders, tmp_path):
     assert not (tmp_path / "out" / "committed" / "table_1.json").exists()
 
 
+def test_the_first_difference_is_told_in_the_order_of_the_file(folders):
+    keys = [f"number_{k}" for k in range(20)]
+    write(folders[0], FIGURE | {"numbers": dict.fromkeys(keys, 1.0)})
+    write(folders[1], FIGURE | {"numbers": dict.fromkeys(keys, 2.0)})
+    assert differences(*folders) == {"fig_1": "number_0: 1.0 committed, 2.0 regenerated"}
+
+
+def test_an_earlier_comparison_is_replaced(folders, tmp_path):
+    output = tmp_path / "out"
+    write(folders[1], FIGURE | {"numbers": {}})
+    write(folders[1], RECORD | {"rows": [{"name": "<b>"}]})
+    side_by_side(*folders, output)
+    assert "<b>" not in (output / "index.html").read_text()
+    write(folders[1], FIGURE)
+    side_by_side(*folders, output)
+    names = {str(path.relative_to(output)) for path in output.rglob("*.*")}
+    assert names == {"index.html", "committed/table_1.json", "regenerated/table_1.json"}
+
+
+@pytest.mark.parametrize(
+    "mine",
+    ["notes.txt", "committed/notes.txt", "committed/table_1.json", "regenerated", "index.html"],
+)
+def test_other_peoples_files_are_not_touched(folders, tmp_path, mine):
+    output = tmp_path / "out"
+    if mine == "committed/notes.txt":
+        side_by_side(*folders, output)
+    (output / mine).parent.mkdir(parents=True, exist_ok=True)
+    (output / mine).write_text("mine")
+    message = f"output: must be a new folder or hold an earlier comparison, .* with .*{mine}"
+    with pytest.raises(ValueError, match=message):
+        side_by_side(*folders, output)
+    assert (output / mine).read_text() == "mine"
+
+
+def test_what_is_compared_is_not_replaced(folders, tmp_path):
+    output = tmp_path / "out"
+    write(folders[1], FIGURE | {"numbers": {}})
+    side_by_side(*folders, output)
+    with pytest.raises(ValueError, match="output: must not hold what is compared"):
+        side_by_side(output / "committed", output / "regenerated", output)
+    assert (output / "committed" / "fig_1.json").exists()
+    with pytest.raises(ValueError, match="output: must be a folder, got the file"):
+        side_by_side(*folders, folders[0] / "fig_1.png")
+
+
+@pytest.mark.parametrize("content", ["{", "[1]", "3", "null", "{}", '"rows"', b"\xff\xfe"])
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_a_strange_file_is_named(folders, tmp_path, capsys, content, wrong):
+    path = folders[wrong] / "strange.json"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert main(["compare", *map(str, folders), "--output", str(tmp_path / "out")]) == 2
+    name = ("committed", "regenerated")[wrong]
+    message = f"error: {name}: must hold figures and tables (*.json), got '{path}', which is none"
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_command_fails_on_a_difference(folders, tmp_path, capsys):
     command = ["compare", *map(str, folders), "--output", str(tmp_path / "out")]
     assert main(command) == 0

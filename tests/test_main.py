@@ -99,6 +99,15 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
         (["--rig", "none.toml"], "none.toml"),
         (["--rig", "a.avi"], "a.avi: must be a TOML file"),
         (["--rig", "rig.toml", "--lag", "0,7"], "lags: must be 3 finite numbers"),
+        (
+            ["--rig", "rig.toml", "--lag", "0,9999,0"],
+            "lags: every video must overlap with the first (220 frames), got 9999 for b.avi (208",
+        ),
+        (
+            ["--rig", "rig.toml", "--lag=0,0,-210"],
+            "lags: every video must overlap with the first (220 frames), got -210 for c.avi (210",
+        ),
+        (["--rig", "none.toml", "--detector", "none.onnx"], "detector: no such file, got"),
         (["--rig", "rig.toml", "--fps", "0"], "fps: must be positive, got 0"),
         (["--rig", "rig.toml", "--degree", "0"], "degree: must be an integer of at least 1"),
         (["--rig", "rig.toml", "--seed", "-1"], "seed: must be an integer of at least 0"),
@@ -123,6 +132,12 @@ def test_a_size_that_is_none(capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["rig-template", "--size", "640"])
     message = "argument --size: must be two integers like 1920x1080, got '640'"
+    assert message in capsys.readouterr().err
+
+
+def test_a_size_that_no_camera_has(capsys):
+    assert main(["rig-template", "--size", "10000000x64"]) == 2
+    message = "error: image_size: must be at most 32768 a side, got (10000000, 64)"
     assert message in capsys.readouterr().err
 
 

@@ -125,6 +125,17 @@ def test_a_wrong_lag_of_zero_is_not_accepted(shot, late):
             vl.discover_from_videos(paths, rig, lags=(0, 0, 0))
 
 
+def test_a_lag_that_is_slightly_wrong_is_not_blamed_on_the_rig(shot):
+    found = vl.discover_from_videos(shot.paths, shot.rig, lags=(0, 0.4, 0), degree=2)
+    assert found.lags.lags.tolist() == [0, 0.4, 0]
+    assert found.warnings[0].startswith(
+        "the rig does not agree with the tracks at the lags that are given: in one frame of ten, "
+    )
+    assert found.warnings[0].endswith(
+        "apart, where tracking explains 1: the lags (0, 0, 0) would explain it best"
+    )
+
+
 def test_different_frame_rates(shot, tmp_path):
     half = tmp_path / "half.mkv"
     vl.write_video(half, list(vl.read_video(shot.paths[2]))[::2], fps=12.5)

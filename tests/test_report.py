@@ -1,7 +1,10 @@
 """The report: complete, readable without network, and whole or not there."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from dataclasses import fields, replace
 from html.parser import HTMLParser
 
@@ -151,6 +154,29 @@ def test_other_peoples_files_are_not_overwritten(tmp_path):
         check_folder_is_free(tmp_path / "thesis.tex")
     with pytest.raises(ValueError, match="out: the folder around it must exist"):
         check_folder_is_free(tmp_path / "a" / "b")
+
+
+IN_A_NOTEBOOK = """
+from types import SimpleNamespace
+import matplotlib
+import numpy as np
+from IPython.core.interactiveshell import InteractiveShell
+InteractiveShell.instance()
+from vidsindy_lite import report
+t = np.linspace(0, 1, 20)
+x = np.column_stack((t, t**2, t**3))
+figures = report._figures(SimpleNamespace(t=t, x=x, curve=lambda t: x), [])
+assert "<img" in next(figures)
+figures.close()
+print("interactive:", matplotlib.is_interactive())
+"""
+
+
+def test_a_notebook_still_shows_its_figures_after_a_report():
+    environment = os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"}
+    command = [sys.executable, "-c", IN_A_NOTEBOOK]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert "interactive: True" in done.stdout
 
 
 def test_one_video_per_camera(case, tmp_path):

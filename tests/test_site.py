@@ -92,10 +92,16 @@ GOOD = """<!DOCTYPE html><link rel='icon' href='data:,'>
 
 
 def test_the_reference_reads_all_annotations(tmp_path):
+    modules = [path.stem for path in PACKAGE.glob("*.py") if not path.stem.startswith("__")]
     with warnings.catch_warnings():
         warnings.filterwarnings("error", message="Error parsing type annotation")
-        pdoc.pdoc(PACKAGE.name, output_directory=tmp_path)
-    assert (tmp_path / f"{PACKAGE.name}.html").exists()
+        pdoc.pdoc(
+            PACKAGE.name,
+            *(f"{PACKAGE.name}.{name}" for name in modules),
+            output_directory=tmp_path,
+        )
+    for name in modules:
+        assert (tmp_path / PACKAGE.name / f"{name}.html").exists()
 
 
 @needs_browser

@@ -1,5 +1,6 @@
 """Lags of videos: exact, to a fraction of a frame, and known to be unknown."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
+from vidsindy_lite import synchrony
 from vidsindy_lite.synchrony import DISAGREEMENT, align, disagreement, learn_lags, list_lags
 
 NOISE = 0.05  # pixels
@@ -49,6 +51,15 @@ def test_only_differences_of_lags_count(motion):
     tracks = filmed(motion, (40, 40, 40), (0, 0, 0))
     for ours, theirs in zip(align(tracks, (3, 5, 0)), align(tracks, (0, 2, -3)), strict=True):
         np.testing.assert_array_equal(ours, theirs)
+
+
+@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9), st.floats(1e-6, 1e6), st.floats(1e-6, 1e6))
+def test_far_lags_and_fast_rates_are_no_trouble(first, second, slow, fast):
+    with warnings.catch_warnings(action="error"):
+        ours, theirs = align([np.ones((9, 2)), np.ones((5, 2))], (first, second), (slow, fast))
+    assert (ours == 1).all()
+    if second - first > 9:
+        assert np.isnan(theirs).all()
 
 
 @given(st.floats(-5, 5), st.floats(0.4, 2.5))
@@ -192,6 +203,21 @@ def test_a_wrong_rig_is_not_explained_by_lags(motion):
     assert np.isinf(found.errors).all()
 
 
+def test_no_lags_are_tried_twice(motion, monkeypatch):
+    first, second, third = motion[1].uncalibrated().cameras
+    turned = replace(second, normal=second.normal + 0.3 * second.rows[0])
+    tried = []
+
+    def watched(tracks, rig):
+        tried.append(np.hstack(tracks).tobytes())
+        return vl.learn_cameras(tracks, rig)
+
+    monkeypatch.setattr(synchrony, "learn_cameras", watched)
+    learn_lags(filmed(motion, (100,) * 3, (0, 0, 0)), vl.Rig([first, turned, third]))
+    assert len(tried) > 10
+    assert len(set(tried)) == len(tried)
+
+
 @pytest.mark.slow
 def test_lags_that_are_given_are_the_start(motion):
     tracks = filmed(motion, (250,) * 3, (0, 7, 0))
@@ -219,6 +245,9 @@ def test_lags_as_text():
     [
         ({"rates": (1, 1)}, "rates: must be 3 finite numbers"),
         ({"rates": (1, 0, 1)}, "rates: must be positive, got 0"),
+        ({"rates": (1, 1e300, 1)}, r"rates: must be between 1e-06 and 1e\+06, got 1e\+300"),
+        ({"rates": (1, 1, 1e-310)}, r"rates: must be between 1e-06 and 1e\+06, got 1e-310"),
+        ({"start": (0, -1e300, 0)}, r"start: must be at most 1e\+09 frames, got 1e\+300"),
         ({"start": (0, np.nan, 0)}, "start: must be 3 finite numbers"),
     ],
 )
@@ -234,6 +263,8 @@ def test_one_track_per_camera_and_lag(motion):
         learn_lags(tracks[:2], motion[1])
     with pytest.raises(ValueError, match="lags: must be 3 finite numbers"):
         align(tracks, (0, 1))
+    with pytest.raises(ValueError, match=r"lags: must be at most 1e\+09 frames, got 1e\+300"):
+        align(tracks, (0, 1e300, 0))
 
 
 @pytest.mark.parametrize(
@@ -242,6 +273,7 @@ def test_one_track_per_camera_and_lag(motion):
         (np.zeros(30), r"tracks\[1\]: must have shape \(n, 2\), got \(30,\)"),
         (np.zeros((30, 3)), r"tracks\[1\]: must have shape \(n, 2\), got \(30, 3\)"),
         (np.full((30, 2), np.inf), r"tracks\[1\]: must be finite or NaN, got 60 infinite values"),
+        (np.full((30, 2), 1e300), r"tracks\[1\]: must be pixels of at most 1e\+100, got 1e\+300"),
         ("abc", r"tracks\[1\]: must be an array of real numbers, got 'abc'"),
     ],
 )
@@ -251,3 +283,19 @@ def test_tracks_of_a_wrong_shape_are_named(motion, spoilt, message):
     for use in (lambda: learn_lags(tracks, motion[1]), lambda: align(tracks, (0, 0, 0))):
         with pytest.raises(ValueError, match=message):
             use()
+
+
+@pytest.mark.parametrize("wrong", [None, "a.mkv", {}, [], np.array(3.0)])
+def test_what_are_no_tracks(motion, wrong):
+    for use in (lambda: learn_lags(wrong, motion[1]), lambda: align(wrong, (0, 0, 0))):
+        message = r"tracks: must be a list of arrays \(n, 2\), one per camera, got "
+        with pytest.raises(ValueError, match=message):
+            use()
+
+
+@pytest.mark.parametrize("blind", [0, 2])
+def test_a_camera_that_never_sees_the_target(motion, blind):
+    tracks = filmed(motion, (30,) * 3, (0, 0, 0))
+    tracks[blind][::2, 0] = tracks[blind][1::2, 1] = np.nan  # half a pixel tells nothing
+    with pytest.raises(ValueError, match=rf"tracks\[{blind}\]: must show the target in some frame"):
+        learn_lags(tracks, motion[1])

@@ -11,7 +11,7 @@ from vidsindy_lite.background import _shape
 from vidsindy_lite.cameras import Rig
 from vidsindy_lite.detector import LEAST, Detection
 from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
-from vidsindy_lite.tracking import follow, link, track
+from vidsindy_lite.tracking import check_detector, follow, link, track
 from vidsindy_lite.video import (
     BACKGROUNDS,
     COLOURS,
@@ -384,6 +384,13 @@ def test_confidence_is_that_the_target_is_seen_whole(tmp_path):
 def test_unknown_detectors(tmp_path, detector):
     with pytest.raises(ValueError, match="detector: must be one of auto, background, learned, or"):
         track(tmp_path / "clip.mkv", detector)
+
+
+def test_a_missing_detector_is_told_at_once(tmp_path):
+    for name in ("none.onnx", tmp_path / "none.onnx", tmp_path / "NONE.ONNX"):
+        with pytest.raises(FileNotFoundError, match=rf"detector: no such file, got '{name}'"):
+            check_detector(name)
+    assert check_detector(write_red_detector(tmp_path / "red.onnx", (256, 256))) is None
 
 
 # ---------------------------------------------------------------------------------- one motion

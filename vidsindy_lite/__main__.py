@@ -210,7 +210,10 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("committed", metavar="COMMITTED", help="a folder like figures/")
     compare.add_argument("regenerated", metavar="REGENERATED", help="the same from another run")
     compare.add_argument(
-        "--output", metavar="DIR", required=True, help="for both sides, with a page"
+        "--output",
+        metavar="DIR",
+        required=True,
+        help="for both sides, with a page; an earlier comparison there is replaced",
     )
     compare.set_defaults(command=_compare)
     return parser
@@ -243,8 +246,10 @@ def _discover(options: argparse.Namespace) -> int:
     from vidsindy_lite.pipeline import discover_from_videos
     from vidsindy_lite.report import PAGE, check_folder_is_free, write_report
     from vidsindy_lite.synchrony import list_lags
+    from vidsindy_lite.tracking import check_detector
     from vidsindy_lite.video import video_info
 
+    check_detector(options.detector)
     check_folder_is_free(options.out)
     rig, t = Rig.load(options.rig), None
     if options.fps is not None:

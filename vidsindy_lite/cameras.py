@@ -19,7 +19,7 @@ Paper: Section "Coordinates Transformation", Eq. (4)-(6).
 """
 
 import tomllib
-from collections.abc import Iterable, Sized
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from math import hypot
 from typing import ClassVar
@@ -36,6 +36,7 @@ from .checks import (
     check_path,
     check_positive,
     check_rows,
+    check_tracks,
     check_vector,
 )
 from .geometry import in_plane_offset, rotation_to_z, unit_vector
@@ -936,12 +937,7 @@ def _require_all_calibrated(name, cameras):
 
 def _check_tracks(tracks, rig):
     check_instance("rig", rig, Rig)
-    check_instance("tracks", tracks, Sized)
-    if len(tracks) != len(rig.cameras):
-        raise ValueError(
-            f"tracks: must be one per camera, got {len(tracks)} for {len(rig.cameras)} cameras"
-        )
-    tracks = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    tracks = check_tracks(tracks, len(rig.cameras))
     lengths = [len(track) for track in tracks]
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")

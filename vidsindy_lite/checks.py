@@ -6,10 +6,16 @@ Booleans are no numbers here, and text is none even where numpy would read it as
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from numbers import Integral, Real
 from pathlib import Path
 
 import numpy as np
+
+FARTHEST_PIXEL = 1e100
+"""Largest coordinate of a track: the squares of larger ones are no numbers any more."""
+LARGEST_SIDE = 32768
+"""Pixels of a camera's image, in width and in height: no sensor has more."""
 
 
 def check_instance(name: str, value: object, kind: type) -> None:
@@ -77,6 +83,25 @@ def check_rows(name: str, values: np.ndarray, width: int) -> np.ndarray:
     return rows
 
 
+def check_tracks(tracks: Sequence[np.ndarray], cameras: int | None = None) -> list[np.ndarray]:
+    """Pixels of the target in each camera, (n_i, 2) each; so many if given."""
+    is_array = isinstance(tracks, np.ndarray) and tracks.ndim
+    if not (is_array or isinstance(tracks, list | tuple)) or not len(tracks):
+        raise ValueError(
+            f"tracks: must be a list of arrays (n, 2), one per camera, got {tracks!r:.60}"
+        )
+    if cameras is not None and len(tracks) != cameras:
+        raise ValueError(f"tracks: must be one per camera, got {len(tracks)} for {cameras} cameras")
+    tracks = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    for i, track in enumerate(tracks):
+        largest = np.nanmax(np.abs(track), initial=0.0)
+        if largest > FARTHEST_PIXEL:
+            raise ValueError(
+                f"tracks[{i}]: must be pixels of at most {FARTHEST_PIXEL:g}, got {largest:g}"
+            )
+    return tracks
+
+
 def check_times(t: np.ndarray) -> np.ndarray:
     """Finite, increasing times, at least one, shape (n,)."""
     t = check_array("t", t)
@@ -96,8 +121,11 @@ def check_image_size(size: tuple[int, int], least: int = 1) -> tuple[int, int]:
     """Width and height in whole pixels."""
     try:
         width, height = size
-        return check_integer("", width, least), check_integer("", height, least)
+        sides = check_integer("", width, least), check_integer("", height, least)
     except (TypeError, ValueError):
         raise ValueError(
             f"image_size: must be two integers of at least {least}, got {size!r:.60}"
         ) from None
+    if max(sides) > LARGEST_SIDE:
+        raise ValueError(f"image_size: must be at most {LARGEST_SIDE} a side, got {size!r:.60}")
+    return sides

@@ -1,8 +1,10 @@
 """Two folders of figures, number by number: what a run on another machine or day has changed."""
 
+import html
 import json
 import math
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +13,11 @@ from .artifacts import RUN_TIMES, SECONDS
 from .checks import check_path
 
 __all__ = ["differences", "side_by_side"]
+
+SIDES = ("committed", "regenerated")
+PAGE = "index.html"
+
+_HEAD = "<!DOCTYPE html>\n<meta charset='utf-8'>\n<title>Differences</title>\n"
 
 # Of a number; and of the largest of its list, as what is zero but for rounding has no digits.
 TOLERANCE = 1e-3
@@ -39,7 +46,7 @@ def differences(
     Raises
     ------
     ValueError
-        If one of them is no folder, or holds no figure or table.
+        If one of them is no folder, holds no figure or table, or a JSON file that is none.
     """
     ours, theirs = _numbers("committed", committed), _numbers("regenerated", regenerated)
     found = {}
@@ -56,25 +63,63 @@ def side_by_side(
 ) -> dict[str, str]:
     """Copy what `differences` finds, and a page that shows both images and the places.
 
+    Parameters
+    ----------
+    committed, regenerated : path
+        As of `differences`.
+    output : path
+        Where; an earlier comparison is replaced.
+
     Returns
     -------
     dict of str to str
         As of `differences`.
+
+    Raises
+    ------
+    ValueError
+        As of `differences`, or if the output holds anything but an earlier comparison.
     """
-    found, output = differences(committed, regenerated), Path(output)
-    page = ["<!DOCTYPE html>", "<meta charset='utf-8'>", "<title>Differences</title>"]
-    for side, folder in (("committed", committed), ("regenerated", regenerated)):
+    output = check_path("output", output)
+    for folder in (committed, regenerated):
+        if Path(folder).resolve().is_relative_to(output.resolve()):
+            raise ValueError(f"output: must not hold what is compared, got '{output}'")
+    found, earlier = differences(committed, regenerated), _earlier(output)
+    for file in earlier:
+        file.unlink()
+    page = []
+    for side, folder in zip(SIDES, (committed, regenerated), strict=True):
         (output / side).mkdir(parents=True, exist_ok=True)
         for name in found:
             for file in Path(folder).glob(f"{name}.*"):
                 shutil.copy(file, output / side)
     for name, place in found.items():
-        page.append(f"<h2>{name}</h2>\n<p>{place}</p>")
-        for side in ("committed", "regenerated"):
+        page.append(f"<h2>{name}</h2>\n<p>{html.escape(place)}</p>\n")
+        for side in SIDES:
             if (output / side / f"{name}.png").exists():
-                page.append(f"<img src='{side}/{name}.png' alt='{side}' style='width: 49%'>")
-    (output / "index.html").write_text("\n".join(page) + "\n", encoding="utf-8")
+                page.append(f"<img src='{side}/{name}.png' alt='{side}' style='width: 49%'>\n")
+    (output / PAGE).write_text(_HEAD + "".join(page), encoding="utf-8")
     return found
+
+
+def _earlier(output: Path) -> set[Path]:
+    """The files of an earlier comparison, checked to be all that is there."""
+    if output.exists() and not output.is_dir():
+        raise ValueError(f"output: must be a folder, got the file '{output}'")
+    page, folders, files = output / PAGE, [output / side for side in SIDES], set()
+    text = page.read_text("utf-8", errors="replace") if page.is_file() else ""
+    if text.startswith(_HEAD):
+        names = re.findall("<h2>(.*)</h2>", text)
+        files = {file for part in folders for name in names for file in part.glob(f"{name}.*")}
+        files.add(page)
+    strange = sorted(set(output.rglob("*")) - files - set(folders if files else ()))
+    if strange:
+        shown = ", ".join(str(path.relative_to(output)) for path in strange[:3])
+        raise ValueError(
+            f"output: must be a new folder or hold an earlier comparison, got '{output}' with "
+            f"{shown}"
+        )
+    return files
 
 
 def _numbers(name: str, folder: str | os.PathLike) -> dict[str, object]:
@@ -85,8 +130,17 @@ def _numbers(name: str, folder: str | os.PathLike) -> dict[str, object]:
     paths = [path for path in folder.glob("*.json") if path.name != RUN_TIMES]
     if not paths:
         raise ValueError(f"{name}: must hold figures or tables (*.json), got none in '{folder}'")
-    records = {path.stem: json.loads(path.read_text("utf-8")) for path in paths}
-    return {name: record.get("rows", record.get("numbers")) for name, record in records.items()}
+    return {path.stem: _content(name, path) for path in paths}
+
+
+def _content(name: str, path: Path) -> object:
+    try:
+        record = json.loads(path.read_text("utf-8"))
+        return record["rows"] if "rows" in record else record["numbers"]
+    except (ValueError, TypeError, KeyError):
+        raise ValueError(
+            f"{name}: must hold figures and tables (*.json), got '{path}', which is none"
+        ) from None
 
 
 def _unlike(
@@ -94,8 +148,9 @@ def _unlike(
 ) -> Iterator[str]:
     """Where two contents differ; `size` is that of the largest number beside this one."""
     if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
-        for key in one.keys() - {SECONDS}:
-            yield from _unlike(one[key], other[key], f"{place} {key}", 0.0, tolerance)
+        for key in one:
+            if key != SECONDS:
+                yield from _unlike(one[key], other[key], f"{place} {key}", 0.0, tolerance)
     elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
         largest = max((abs(v) for v in one if isinstance(v, int | float)), default=0.0)
         for index, pair in enumerate(zip(one, other, strict=True)):

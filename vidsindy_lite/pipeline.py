@@ -121,12 +121,13 @@ def discover_from_videos(
                 f"{camera.image_size}, got {shot.size}"
             )
     t, rates = _clock(shots, t)
+    if lags is not None:
+        _check_overlap(lags, rates, shots, paths)
     bar = tqdm(list(zip(paths, shots, strict=True)), desc="track", disable=not progress)
     followed = [_follow(path, shot.frames, detector) for path, shot in bar]
     raw = [seen.pixels for seen in followed]
-    synchrony = learn_lags(raw, rig, rates, start=lags)
-    if lags is not None:
-        synchrony = _given(lags, synchrony)
+    learned_lags = learn_lags(raw, rig, rates, start=lags)
+    synchrony = learned_lags if lags is None else _given(lags, learned_lags)
     tracks = align(raw, synchrony.lags, rates)
     learned = learn_cameras(tracks, rig)
     x = reconstruct(tracks, learned)
@@ -136,7 +137,7 @@ def discover_from_videos(
     found = discover(t, x, degree=degree, seed=seed, progress=progress, systematic=shared)
     parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
     parts["warnings"] = (
-        *_rig_doubts(tracks, learned, rig, paths),
+        *_rig_doubts(tracks, learned, rig, paths, learned_lags),
         *(warning for seen in followed for warning in seen.warnings),
         *synchrony.doubts,
         *found.warnings,
@@ -160,6 +161,19 @@ def _clock(
     if not (np.isfinite(fps) & (fps > 0)).all():
         raise ValueError(f"t: must be given if a file states no frame rate, got {fps.tolist()}")
     return np.arange(shots[0].frames) / fps[0], fps / fps[0]
+
+
+def _check_overlap(
+    lags: np.ndarray, rates: np.ndarray | None, shots: Sequence[VideoInfo], paths: Sequence[Path]
+) -> None:
+    """That every video runs, at its given lag, during some of the first."""
+    rates = np.ones(len(lags)) if rates is None else rates
+    for path, shot, lag, rate in zip(paths, shots, lags, rates, strict=True):
+        if not -shot.frames / rate < lag < shots[0].frames:
+            raise ValueError(
+                f"lags: every video must overlap with the first ({shots[0].frames} frames), got "
+                f"{lag:g} for {path.name} ({shot.frames} frames)"
+            )
 
 
 def _follow(path: Path, frames: int, detector: str | os.PathLike) -> Track:
@@ -191,12 +205,26 @@ def _given(lags: np.ndarray, learned: Synchrony) -> Synchrony:
 
 
 def _rig_doubts(
-    tracks: Sequence[np.ndarray], learned: Rig, given: Rig, paths: Sequence[Path]
+    tracks: Sequence[np.ndarray],
+    learned: Rig,
+    given: Rig,
+    paths: Sequence[Path],
+    synchrony: Synchrony,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
     missed = disagreement(tracks, learned)
     if max(missed) <= DISAGREEMENT:
         return []
+    sizes = ", ".join(f"{size:.1f}" for size in missed)
+    apart = (
+        "in one frame of ten, tracked and reconstructed target lie more than "
+        f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
+    )
+    if synchrony.agree:  # at lags that differ by too little from the given ones to refuse these
+        return [
+            f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
+            f"({list_lags(synchrony.lags)}) would explain it best"
+        ]
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
     others = [learn_normal(tracks, given, i) for i in range(len(paths))]
     left = [max(disagreement(tracks, other)) for other in others]
@@ -208,9 +236,4 @@ def _rig_doubts(
         else "no single wrong normal explains it; check the positions, the scales and angles that "
         "are given, and that at least half of the shortest video is in common with the others"
     )
-    sizes = ", ".join(f"{size:.1f}" for size in missed)
-    return [
-        "the rig does not agree with the tracks: in one frame of ten, tracked and reconstructed "
-        f"target lie more than {sizes} pixels apart, where tracking explains {DISAGREEMENT:g}: "
-        + advice
-    ]
+    return [f"the rig does not agree with the tracks: {apart}: {advice}"]

@@ -271,6 +271,9 @@ def _table(rows):
 
 def _figures(found, paths):
     """The figures as HTML, one after the other."""
+    # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
+    # switched on meanwhile off again: so this comes first.
+    plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.vidsindy"):
         yield _figure(
             plot_path(found.t, found.x, found.curve(found.t)),

@@ -17,14 +17,14 @@ A motion that repeats itself fits at several lags, one that hardly moves at all 
 result says so.
 """
 
-from collections.abc import Callable, Sequence, Sized
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from .cameras import Rig, check_learnable, learn_cameras, residuals
-from .checks import check_instance, check_positive, check_rows, check_vector
+from .checks import check_positive, check_tracks, check_vector
 from .sights import epipolar_equations
 
 DISAGREEMENT = 1.0
@@ -48,6 +48,8 @@ _TRIMMED = 0.9  # share of the instants that must agree; the others may hold any
 _STEPS = 10  # of one frame at most, from the best whole lags to the best ones
 _SETTLED = 1e-3  # frames
 _SHOWN = 3  # of the lags that fit equally well
+_FARTHEST = 1e9  # frames by which a video may start later; and ...
+_FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _ROUNDING = 1e-6  # pixels; residuals below that are none
 
 
@@ -111,15 +113,14 @@ def align(
     ------
     ValueError
         If a track has a wrong shape or an infinite value, or there is not one finite lag, or
-        positive rate, per track.
+        positive rate, per track, or one of them is absurdly large or small.
     """
-    tracks = _check_tracks(tracks)
-    lags = check_vector("lags", lags, len(tracks))
+    tracks = check_tracks(tracks)
+    lags = _check_lags("lags", lags, len(tracks))
     rates = _check_rates(rates, len(tracks))
     clock = np.arange(len(tracks[0]))
     at = [_curve(track) for track in tracks]
-    starts = lags - lags[0]
-    return tuple(c((clock - lag) * r) for c, lag, r in zip(at, starts, rates, strict=True))
+    return tuple(c((clock - lag) * r) for c, lag, r in zip(at, lags, rates, strict=True))
 
 
 def disagreement(tracks: Sequence[np.ndarray], rig: Rig) -> list[float]:
@@ -163,16 +164,14 @@ def learn_lags(
     ------
     ValueError
         If the rig has no calibrated camera, there is not one track, rate and lag per camera, a
-        track has a wrong shape, or the first track never shows the target.
+        track has a wrong shape, or a track never shows the target.
     """
     check_learnable(rig)
-    tracks = _check_tracks(tracks)
-    if len(tracks) != len(rig.cameras):
-        raise ValueError(
-            f"tracks: must be one per camera, got {len(tracks)} for {len(rig.cameras)} cameras"
-        )
-    first = check_vector("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
-    first -= first[0]
+    tracks = check_tracks(tracks, len(rig.cameras))
+    for i, track in enumerate(tracks):
+        if not np.isfinite(track).all(axis=1).any():
+            raise ValueError(f"tracks[{i}]: must show the target in some frame, got none")
+    first = _check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
     views = _Views(tracks, rig, _check_rates(rates, len(tracks)))
     missed = views.missed(first)
     if missed <= DISAGREEMENT:
@@ -220,25 +219,30 @@ class _Views:
         seen = [track[np.isfinite(track).all(axis=1)] for track in tracks]
         steps = np.concatenate([np.hypot(*np.diff(track, axis=0).T) for track in seen])
         self.speed = np.quantile(steps, _TRIMMED) if len(steps) else 0.0  # pixels in a frame
+        self.known = {}  # the cameras learned at lags that were tried
 
     def at(self, lags):
         return align(self.tracks, lags, self.rates)
 
+    def learned(self, lags):
+        """The cameras that fit best at these lags; None if none do."""
+        key = tuple(lags)
+        if key not in self.known:
+            try:
+                self.known[key] = learn_cameras(self.at(lags), self.rig)
+            except ValueError:  # these lags leave too little in common, or nothing that agrees
+                self.known[key] = None
+        return self.known[key]
+
     def residuals(self, lags):
         """Reprojection residuals of the cameras that fit best, (n_0, 2 m); None if none do."""
-        tracks = self.at(lags)
-        try:
-            return np.hstack(residuals(tracks, learn_cameras(tracks, self.rig)))
-        except ValueError:  # these lags leave too little in common, or nothing that agrees
-            return None
+        rig = self.learned(lags)
+        return None if rig is None else np.hstack(residuals(self.at(lags), rig))
 
     def missed(self, lags):
         """The worst camera's disagreement, pixels; infinite where no cameras fit."""
-        tracks = self.at(lags)
-        try:
-            return max(disagreement(tracks, learn_cameras(tracks, self.rig)))
-        except ValueError:
-            return np.inf
+        rig = self.learned(lags)
+        return np.inf if rig is None else max(disagreement(self.at(lags), rig))
 
     def refined(self, whole):
         """The lags of the smallest reprojection error near whole ones, as `Synchrony`."""
@@ -365,8 +369,9 @@ def _curve(track: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     spline = make_interp_spline(seen, track[seen], k=min(3, len(seen) - 1)) if len(seen) else None
 
     def at(frames):
+        inside = (frames >= 0) & (frames <= len(track) - 1)
+        frames = np.where(inside, frames, 0)
         low, high = np.floor(frames).astype(int), np.ceil(frames).astype(int)
-        inside = (low >= 0) & (high < len(track))
         inside[inside] = shown[low[inside]] & shown[high[inside]]
         values = np.full((len(frames), 2), np.nan)
         whole = inside & (low == high)
@@ -379,13 +384,19 @@ def _curve(track: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     return at
 
 
-def _check_tracks(tracks):
-    check_instance("tracks", tracks, Sized)
-    return [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+def _check_lags(name, lags, count):
+    lags = check_vector(name, lags, count)
+    far = np.abs(lags).max()
+    if far > _FARTHEST:
+        raise ValueError(f"{name}: must be at most {_FARTHEST:g} frames, got {far:g}")
+    return lags - lags[0]
 
 
 def _check_rates(rates, count):
     rates = np.ones(count) if rates is None else check_vector("rates", rates, count)
     for rate in rates:
-        check_positive("rates", rate)
+        if not 1 / _FASTEST <= check_positive("rates", rate) <= _FASTEST:
+            raise ValueError(
+                f"rates: must be between {1 / _FASTEST:g} and {_FASTEST:g}, got {rate:g}"
+            )
     return rates / rates[0]

@@ -95,7 +95,7 @@ def track(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") -
     ------
     FileNotFoundError, ValueError
         If the file is missing, empty, not a video, or holds no frame, or if there is no such
-        detector.
+        detector or .onnx file.
 
     See Also
     --------
@@ -147,13 +147,22 @@ def _surer(model: Track, learned: Track) -> Track:
 
 
 def check_detector(name: str | os.PathLike) -> None:
-    """The name of a way to find the target, or of an .onnx file."""
-    is_name = isinstance(name, str | os.PathLike)
-    if not is_name or (name not in DETECTORS and Path(name).suffix.lower() != ".onnx"):
+    """The name of a way to find the target, or of an .onnx file that is there.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If it is neither.
+    """
+    if isinstance(name, str) and name in DETECTORS:
+        return
+    if not isinstance(name, str | os.PathLike) or Path(name).suffix.lower() != ".onnx":
         raise ValueError(
             f"detector: must be one of {', '.join(DETECTORS)}, or the name of an .onnx file, "
             f"got {name!r:.60}"
         )
+    if not Path(name).is_file():
+        raise FileNotFoundError(f"detector: no such file, got '{name}'")
 
 
 def _detector(name):
