@@ -58,7 +58,6 @@ from vidsindy_lite.video import Scene, read_frame, render, video_info, write_vid
 
 # %%
 plt.style.use("vidsindy_lite.vidsindy")
-plt.ion()  # the report below makes its figures with settings of its own, which would undo this
 full = profile == "full"
 names = ("Lorenz", "SprottE") if full else ("Lorenz",)
 frames = 1000 if full else 300
