@@ -28,7 +28,7 @@ RESOLVED = 1e-3
 """Residual, relative to the spread of the data, below which a misfit does not matter."""
 STRAY = 30.0
 """Distance of a sample from those around it, over how far nine samples in ten are from the median,
-and over the typical distance of those around it, that no motion explains. Noise of 50 % makes 7."""
+and over the typical distance of those around it, that no motion explains. Noise of 50 % makes 6."""
 GUARD, REACH = 2, 8
 """The samples around one are those from 3 to 8 before and after it: so up to three errors in a row
 are compared with what is none."""
