@@ -81,13 +81,37 @@ def test_a_single_sample_far_off_is_named(duffing, size):
     assert "and 2 more" in doubt
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("rows", [[0], [599], [0, 1, 2], [597, 598, 599], [300, 301], [7, 8, 9]])
+def test_outliers_at_the_ends_and_in_a_row_are_named(duffing, rows, sign):
+    _, t, x = duffing
+    x = x.copy()
+    x[rows, 1] = 1e3 * sign ** np.arange(len(rows))
+    (doubt,) = strays(check_records(t, x))
+    places = doubt.split("after it: ")[1].split(": no motion")[0].split("; ")
+    assert [float(place.split(",")[0].removeprefix("t = ")) for place in places] == pytest.approx(
+        t[rows], rel=1e-4
+    )
+
+
+@pytest.mark.parametrize("rate", [0.03, 0.3])
+def test_a_motion_that_comes_to_rest_is_no_stray(rate):
+    k = np.arange(3000)
+    x = np.exp(-rate * k)[:, None] * np.column_stack((np.cos(0.2 * k), np.sin(0.2 * k)))
+    for states in (x, x[::-1], np.exp(-rate * k)[:, None]):
+        assert strays(check_records(k, states)) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("law", SYSTEMS.values(), ids=SYSTEMS)
 def test_noise_and_gaps_are_no_strays(law):
     rng = np.random.default_rng(0)
-    t, clean = law.trajectory(1500, samples_per_period=25)
-    noisy = corruption.add_noise(clean, 0.5, rng)
-    uneven = np.sort(rng.choice(1500, 400, replace=False))
-    for x in (clean, noisy, corruption.drop_blocks(noisy, 0.5, rng)):
-        assert strays(check_records(t, x)) == []
-        assert strays(check_records(t[uneven], x[uneven])) == []
+    for period in ({}, {"samples_per_period": 25}):
+        t, clean = law.trajectory(1500, **period)
+        noisy = [corruption.add_noise(clean, level, rng) for level in (0.05, 0.2, 0.5)]
+        hidden = [corruption.drop_blocks(x, 0.3, rng) for x in (clean, *noisy)]
+        uneven = [np.sort(rng.choice(1500, size, replace=False)) for size in (400, 100)]
+        parts = (slice(None), slice(0, 100), slice(1400, 1500), slice(0, 400), *uneven)
+        for x in (clean, *noisy, *hidden):
+            for part in parts:
+                assert strays(check_records(t[part], x[part])) == []

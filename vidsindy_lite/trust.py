@@ -26,9 +26,12 @@ COARSE = 1.0
 """Longest typical time step, in time scales of the motion (about 6 to a turn)."""
 RESOLVED = 1e-3
 """Residual, relative to the spread of the data, below which a misfit does not matter."""
-STRAY = 100.0
-"""Distance of a sample from those before and after it, over the median distance of all samples
-from their median, that no motion explains; noise of 50 % and seven samples a turn make 40."""
+STRAY = 30.0
+"""Distance of a sample from those around it, over how far nine samples in ten are from the median,
+and over the typical distance of those around it, that no motion explains. Noise of 50 % makes 6."""
+GUARD, REACH = 2, 8
+"""The samples around one are those from 3 to 8 before and after it: so up to three errors in a row
+are compared with what is none."""
 CHANCE = 1e-4
 """Probability below which what the left-out terms explain together is no chance."""
 UNMET = 1e-2
@@ -71,7 +74,7 @@ def doubts(
 
 
 def strays(records: Sequence[Record]) -> list[str]:
-    """Single samples so far from both their neighbours that they must be errors.
+    """Samples so far from those around them that they must be errors.
 
     Parameters
     ----------
@@ -84,11 +87,13 @@ def strays(records: Sequence[Record]) -> list[str]:
     """
     found = []
     for t, x in records:
-        spread = np.median(np.abs(x - np.median(x, axis=0)), axis=0)
-        before, after = x[1:-1] - x[:-2], x[1:-1] - x[2:]
-        away = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-        far = 1 + np.flatnonzero(((away > STRAY * spread) & (spread > 0)).any(axis=1))
-        found += [f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in far]
+        away = np.abs(x - np.median(x, axis=0))
+        spread = np.quantile(away, 0.9, axis=0)
+        rows, columns = np.nonzero((away > STRAY * spread) & (spread > 0))
+        far = {row for row, j in zip(rows, columns, strict=True) if _leaps(x[:, j], row)}
+        found += [
+            f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in sorted(far)
+        ]
     if not found:
         return []
     more = f" and {len(found) - 3} more" if len(found) > 3 else ""
@@ -96,6 +101,14 @@ def strays(records: Sequence[Record]) -> list[str]:
         f"a sample lies far from those before and after it: {'; '.join(found[:3])}{more}: no "
         "motion explains that; put NaN in its place"
     ]
+
+
+def _leaps(values: np.ndarray, row: int) -> bool:
+    """Whether a sample is far from those around it, too, and not part of a motion far away."""
+    before, after = values[max(row - REACH, 0) : max(row - GUARD, 0)], values[row + GUARD + 1 :]
+    beside = np.concatenate((before, after[: REACH - GUARD]))
+    middle = np.median(beside)
+    return bool(abs(values[row] - middle) > STRAY * np.median(np.abs(beside - middle)))
 
 
 def _misfit(law: PolynomialSystem, problem: Collocation, noise: np.ndarray) -> list[str]:
