@@ -67,7 +67,7 @@ def cut_off(folder):
 
 def one_frame(folder):
     frame = next(vl.read_video(folder / "a.avi"))
-    vl.write_video(folder / "bad.avi", [frame])
+    vl.write_video(folder / "bad.avi", [frame], codec="MJPG")
 
 
 def empty(folder):

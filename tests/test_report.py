@@ -27,7 +27,7 @@ def case(tmp_path_factory):
     tracks = [camera.project(x) for camera in rig.cameras]
     paths = []
     for i, track in enumerate(tracks):
-        paths.append(folder / f"<{i}>.avi")  # a name that has to be escaped
+        paths.append(folder / f"<{i}>.mov")  # a name that has to be escaped
         scene = vl.Scene(background="plain", size=8, image_size=(96, 96))
         vl.render_video(paths[-1], track[:20], scene)
     tracks[1] = np.where(np.arange(150)[:, None] < 10, np.nan, tracks[1])
@@ -82,7 +82,7 @@ def test_the_page_tells_law_verdict_and_cameras(page, case):
     assert "No reason for doubt was found." in text
     assert "3.500 ± 0.01" in text
     assert "0.000 ± unknown" in text
-    assert "&lt;1&gt;.avi" in text
+    assert "&lt;1&gt;.mov" in text
     assert "<1>" not in text
     assert "degree 2" in text
 
@@ -141,7 +141,7 @@ def test_a_report_that_fails_leaves_what_was_there(case, tmp_path):
     folder.mkdir()
     (folder / "report.html").write_text("old")
     with pytest.raises(FileNotFoundError, match="gone"):
-        write_report(found, [*paths[:2], tmp_path / "gone.avi"], folder)
+        write_report(found, [*paths[:2], tmp_path / "gone.mov"], folder)
     assert (folder / "report.html").read_text() == "old"
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
 
