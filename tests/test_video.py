@@ -210,7 +210,7 @@ def test_render_video_writes_what_render_yields(tmp_path):
         assert np.array_equal(a, b)
 
 
-@pytest.mark.parametrize("fps", [25, 1 / 3, 66.67, 29.97])
+@pytest.mark.parametrize("fps", [25, 1 / 3, 66.67, 29.97, 0.01, 1e4])
 def test_frame_rate_is_kept(tmp_path, fps):
     path = write_video(tmp_path / "clip.mov", [np.zeros((64, 64, 3), np.uint8)] * 3, fps)
     assert video_info(path).fps == pytest.approx(fps, rel=1e-4)
@@ -290,7 +290,9 @@ def test_render_rejects(track, message):
         ("clip.txt", {}, ValueError, "path: must end in .mov or .mkv"),
         ("clip.mkv", {"codec": "XVID"}, ValueError, "codec: must be one of"),
         ("clip.mkv", {"codec": "mp4v"}, ValueError, "path: must end in .mp4"),
-        ("clip.mkv", {"fps": 0}, ValueError, "fps: must be positive, got 0"),
+        ("clip.mkv", {"fps": 0}, ValueError, r"fps: must be in \[0.01, 10000\], got 0"),
+        ("clip.mov", {"fps": 1e300}, ValueError, r"fps: must be in \[0.01, 10000\], got 1e\+300"),
+        ("clip.mov", {"fps": np.nan}, ValueError, "fps: must be a finite number, got nan"),
         ("none/clip.mkv", {}, FileNotFoundError, "path: the folder must exist"),
     ],
 )

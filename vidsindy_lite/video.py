@@ -32,7 +32,6 @@ from .checks import (
     check_integer,
     check_number,
     check_path,
-    check_positive,
 )
 
 # What is wrong with a file is said by our errors, which name it. OpenCV reads this when it opens
@@ -58,6 +57,8 @@ CODECS = {
     "mp4v": (".mp4",),
     "MJPG": (".avi", ".mkv"),
 }
+
+FRAME_RATES = 0.01, 10_000.0  # per second, that all these files can hold
 
 _SCANLINES = 16  # per row of pixels, when the target is drawn
 _NORMAL = ndtri((np.arange(2**16) + 0.5) / 2**16).astype(np.float32)  # quantiles, all as likely
@@ -586,6 +587,7 @@ def write_video(path, frames: Iterable[np.ndarray], fps=25, codec=None) -> Path:
     frames : iterable of (height, width, 3) uint8
         Blue-green-red, all of one size, of even width and height.
     fps : float
+        Frames per second, in [0.01, 10000].
     codec : {"qtrle", "FFV1", "mp4v", "MJPG"}, optional
         Lossless by default; "mp4v" and "MJPG" are lossy.
 
@@ -612,7 +614,9 @@ def write_video(path, frames: Iterable[np.ndarray], fps=25, codec=None) -> Path:
     if suffix not in CODECS[codec]:
         allowed = " or ".join(CODECS[codec])
         raise ValueError(f"path: must end in {allowed} for {codec}, got '{path}'")
-    fps = check_positive("fps", fps)
+    low, high = FRAME_RATES
+    if not low <= check_number("fps", fps) <= high:
+        raise ValueError(f"fps: must be in [{low:g}, {high:g}], got {fps}")
     if not path.parent.is_dir():
         raise FileNotFoundError(f"path: the folder must exist, got '{path.parent}'")
     partial = path.with_name(f".{path.stem}.{os.getpid()}{suffix}")
