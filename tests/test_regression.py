@@ -8,7 +8,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vidsindy_lite.polynomials import monomial_exponents, monomials
-from vidsindy_lite.regression import closest_rival, stridge, subset_search
+from vidsindy_lite.regression import (
+    _Quadratic,
+    _Tableau,
+    closest_rival,
+    stridge,
+    subset_search,
+)
 from vidsindy_lite.systems import SYSTEMS
 
 
@@ -146,6 +152,27 @@ def test_the_closest_rival_is_priced_as_it_is():
         price - objective(information, pull, charge, support), rel=1e-3, abs=1e-2
     )
     assert cost > 9
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 8))
+def test_the_update_for_a_newcomer_is_a_fit_with_it(seed, m):
+    information, pull, rng = random_problem(seed, m)
+    model = _Quadratic(information, pull, rng.standard_normal(m), np.ones(m))
+    support = rng.random(m) < 0.5
+    assume(not support.all())
+    before = _Tableau.of(model, model.fit(support))
+    number = int(rng.integers(len(before.outside)))
+    support[before.outside[number]] = True
+    updated, direct = before.joined(model, number), _Tableau.of(model, model.fit(support))
+    stays = np.isin(direct.inside, before.inside)
+    np.testing.assert_array_equal(updated.outside, direct.outside)
+    for name in ("left", "room"):
+        expected = getattr(direct, name)
+        np.testing.assert_allclose(getattr(updated, name), expected, rtol=1e-5, atol=1e-6)
+    for name in ("fitted", "spread"):
+        expected = getattr(direct, name)[stays]
+        np.testing.assert_allclose(getattr(updated, name), expected, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(updated.response, direct.response[:, stays], rtol=1e-5, atol=1e-6)
 
 
 def test_a_charge_of_minus_infinity_keeps_a_worthless_column():
