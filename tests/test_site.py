@@ -91,6 +91,7 @@ GOOD = """<!DOCTYPE html><link rel='icon' href='data:,'>
 <meta name='viewport' content='width=device-width'><body>{}</body>"""
 
 
+@pytest.mark.slow
 def test_the_reference_reads_all_annotations(tmp_path):
     modules = [path.stem for path in PACKAGE.glob("*.py") if not path.stem.startswith("__")]
     with warnings.catch_warnings():
