@@ -109,7 +109,9 @@ def test_noise_and_gaps_are_no_strays(law):
     for period in ({}, {"samples_per_period": 25}):
         t, clean = law.trajectory(1500, **period)
         noisy = [corruption.add_noise(clean, level, rng) for level in (0.05, 0.2, 0.5)]
-        hidden = [corruption.drop_blocks(x, 0.3, rng) for x in (clean, *noisy)]
+        hidden = [
+            corruption.drop_blocks(x, share, rng) for x in (clean, *noisy) for share in (0.3, 0.5)
+        ]
         uneven = [np.sort(rng.choice(1500, size, replace=False)) for size in (400, 100)]
         parts = (slice(None), slice(0, 100), slice(1400, 1500), slice(0, 400), *uneven)
         for x in (clean, *noisy, *hidden):
