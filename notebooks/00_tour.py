@@ -55,15 +55,12 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import discover_from_videos, plots, read_video, score
-from vidsindy_lite.animation import draw_tour
-from vidsindy_lite.artifacts import save_animation, save_figure, save_table
-from vidsindy_lite.experiments import film
-from vidsindy_lite.metrics import trajectory_error
-from vidsindy_lite.systems import SYSTEMS
-from vidsindy_lite.video import read_frame
+from vidsindy_lite import discover_from_videos, read_video
+from vidsindy_lite.companion.artifacts import save_animation, save_figure, save_table
+from vidsindy_lite.study import SYSTEMS, film, plots, score, trajectory_error
+from vidsindy_lite.vision import read_frame
 
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 frames = {"full": 1500, "quick": 400}[profile]
 
 # %% [markdown]
@@ -260,7 +257,7 @@ moments = np.arange(0, 300, 6)
 readers = [enumerate(read_video(path)) for path in shot.paths]
 films = [[image for i, image in video if i in moments] for video in readers]
 laws = found.equations("native").splitlines()
-pictures = draw_tour(films, moments, found.tracks, found.x, laws)
+pictures = plots.draw_tour(films, moments, found.tracks, found.x, laws)
 caption = "Three videos, the tracks in them, the path in space, and its law."
 save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "equations": laws})
 
@@ -333,6 +330,6 @@ folder.cleanup()
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

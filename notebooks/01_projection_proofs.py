@@ -38,12 +38,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from vidsindy_lite import geometry, plots
-from vidsindy_lite.artifacts import save_figure, save_table
-from vidsindy_lite.cameras import Rig
-from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.cameras import Rig, geometry
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots
 
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 frames = {"full": 1500, "quick": 300}[profile]
 e_z = np.array([0.0, 0.0, 1.0])
 
@@ -344,6 +343,6 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

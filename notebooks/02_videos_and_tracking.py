@@ -49,21 +49,27 @@ import numpy as np
 from vidsindy_lite import (
     follow,
     learn_cameras,
-    plots,
     read_video,
     reconstruct,
     render_video,
     track,
     write_video,
 )
-from vidsindy_lite.artifacts import save_figure, save_table
-from vidsindy_lite.detector import WEIGHTS
-from vidsindy_lite.experiments import SAMPLES_PER_PERIOD, film
-from vidsindy_lite.systems import SYSTEMS, runge_kutta_4
-from vidsindy_lite.video import BACKGROUNDS, SHAPES, Scene, read_frame, render, render_restless
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.dynamics import runge_kutta_4
+from vidsindy_lite.study import SAMPLES_PER_PERIOD, SYSTEMS, film, plots
+from vidsindy_lite.vision import (
+    BACKGROUNDS,
+    SHAPES,
+    WEIGHTS,
+    Scene,
+    read_frame,
+    render,
+    render_restless,
+)
 
 # %%
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 frames, long = {"full": (300, 1500), "quick": (120, 400)}[profile]
 folder = TemporaryDirectory()
 
@@ -531,6 +537,6 @@ folder.cleanup()
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

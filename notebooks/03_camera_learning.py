@@ -44,12 +44,11 @@ from time import perf_counter
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import plots
-from vidsindy_lite.artifacts import save_figure, save_table
 from vidsindy_lite.cameras import Rig, calibration_errors, learn_cameras, reconstruct, residuals
-from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots
 
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 trials = {"full": 100, "quick": 12}[profile]
 
 # %% [markdown]
@@ -391,6 +390,6 @@ assert "cameras[1] and cameras[2]" in message
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

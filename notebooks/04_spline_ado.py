@@ -49,22 +49,28 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import approx_fprime
 from tqdm import tqdm
 
-from vidsindy_lite import REFERENCE_OFFSET, SYSTEMS, discover, plots_solver, score
-from vidsindy_lite.ado import term_charges
-from vidsindy_lite.artifacts import save_figure, save_table
+from vidsindy_lite import discover
+from vidsindy_lite.companion.artifacts import save_figure, save_table
 
 # %%
-from vidsindy_lite.collocation import Collocation, Segment, State
-from vidsindy_lite.corruption import add_noise
-from vidsindy_lite.frames import FrameAlgebra
-from vidsindy_lite.limits import cramer_rao
-from vidsindy_lite.paper_ado import discover_paper
-from vidsindy_lite.polynomials import monomial_exponents, monomials
-from vidsindy_lite.regression import closest_rival, subset_search
-from vidsindy_lite.smoothing import smooth
-from vidsindy_lite.splines import clamped_knots, design_matrix
+from vidsindy_lite.dynamics import (
+    Collocation,
+    FrameAlgebra,
+    Segment,
+    State,
+    clamped_knots,
+    closest_rival,
+    cramer_rao,
+    design_matrix,
+    monomial_exponents,
+    monomials,
+    smooth,
+    subset_search,
+    term_charges,
+)
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, discover_paper, plots, score
 
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 jobs = 2 if full else 1  # two processes are not worth their start-up in the quick profile
 
@@ -98,7 +104,7 @@ basis = design_matrix(knots, fine)
 assert (np.count_nonzero(basis, axis=1) <= 4).all()
 
 # %%
-fig = plots_solver.plot_basis(fine, basis, 0.065, breakpoints)
+fig = plots.plot_basis(fine, basis, 0.065, breakpoints)
 caption = "At any time four basis functions differ from zero (colours), and all sum up to one."
 save_figure("solver_basis", fig, caption=caption, numbers={"t": fine, "basis": basis})
 
@@ -182,7 +188,7 @@ row, column = np.nonzero(A[: P.size, : P.size])
 assert np.abs(row - column).max() == 11
 
 # %%
-fig = plots_solver.plot_normal_matrix(A, P.size, native.support.sum())
+fig = plots.plot_normal_matrix(A, P.size, native.support.sum())
 caption = "The normal matrix: a band for the curve, a dense border for coefficients and offset."
 save_figure("solver_matrix", fig, caption=caption, numbers={"matrix": A != 0})
 
@@ -263,7 +269,7 @@ at = nodes[inside]
 samples = {"t": t[seen], "data": x[seen, 0]}
 curves = {"first": (window, first(window)[:, 0]), "final": (window, spline(window)[:, 0])}
 checks = {"nodes": (at, spline(at)[:, 0]), "residual": (window, unmet(window))}
-fig = plots_solver.plot_collocation(**samples, **curves, **checks)
+fig = plots.plot_collocation(**samples, **curves, **checks)
 caption = "The law pulls the curve off the noise; it holds exactly at the collocation nodes."
 save_figure("solver_curve", fig, caption=caption, numbers=samples | curves | checks)
 
@@ -345,7 +351,7 @@ assert last["ours"] < 1e-6 * last["paper's"]
 
 # %%
 terms = {"reference frame": truth.support.sum(), "own frame": native.support.sum()}
-fig = plots_solver.plot_histories(histories, terms)
+fig = plots.plot_histories(histories, terms)
 caption = "Gradient descent settles at a compromise; continuation makes the law hold exactly."
 save_figure("solver_histories", fig, caption=caption, numbers=histories)
 
@@ -437,7 +443,7 @@ panels = {
     "|c| / error": (z, bar),
     "... after the search": (z_after, bar),
 }
-fig = plots_solver.plot_ranks(panels, is_true)
+fig = plots.plot_ranks(panels, is_true)
 caption = "True and false terms mix in the order of size, also relative to their errors."
 numbers = {name: values for name, (values, _) in panels.items()} | {"true": is_true}
 save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
@@ -501,7 +507,7 @@ print(f"the subset search: exact for {len(searched)}, {', '.join(searched)}")
 assert one_for_all < len(searched)
 
 # %%
-fig = plots_solver.plot_windows(thresholds, exact)
+fig = plots.plot_windows(thresholds, exact)
 caption = "Thresholds that would leave exactly the true terms: no value serves all systems."
 save_figure("solver_windows", fig, caption=caption, numbers={"threshold": thresholds, **exact})
 
@@ -538,7 +544,7 @@ assert np.abs(best - offset[:2]).max() <= 1
 # %%
 axes = {"x_axis": x_axis, "y_axis": y_axis, "count": counts}
 path = spline(np.linspace(t[0], t[399], 1200))[:, :2]
-fig = plots_solver.plot_origin_map(**axes, data=path, best=best, truth=offset[:2])
+fig = plots.plot_origin_map(**axes, data=path, best=best, truth=offset[:2])
 caption = "Number of significant terms against the origin: fewest at (10, 10), the true one."
 save_figure("solver_origin", fig, caption=caption, numbers=axes)
 
@@ -602,7 +608,7 @@ assert np.sqrt(np.mean(ratio**2)) < 1.5
 labels = [f"{native.terms[k]} in d{'xyz'[j]}/dt" for j, k in np.argwhere(native.support.T)]
 labels += ["origin, x", "origin, y"]
 deviations, bars = (estimates - true) / limit, errors / limit
-fig = plots_solver.plot_errors_and_bound(labels, deviations, bars)
+fig = plots.plot_errors_and_bound(labels, deviations, bars)
 caption = "Estimates of repeated noise draws with 95 % intervals, in units of the Cramer-Rao bound."
 numbers = {"labels": labels, "deviations": deviations, "errors": bars, "bound": limit}
 save_figure("solver_errors", fig, caption=caption, numbers=numbers)
@@ -671,7 +677,7 @@ verdicts = {
     label[s]: {str(value): [r["verdict"] for r in grouped[s, value]] for value in values}
     for s, values in sweeps.items()
 }
-fig = plots_solver.plot_verdicts(verdicts)
+fig = plots.plot_verdicts(verdicts)
 caption = "How often the law is exact, and what the solver says about it, in three sweeps."
 save_figure("solver_failures_figure", fig, caption=caption, numbers=verdicts)
 
@@ -785,6 +791,6 @@ save_table("solver_pendulum", rows, caption=caption)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

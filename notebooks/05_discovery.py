@@ -43,16 +43,25 @@ import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Math, display
 
-from vidsindy_lite import baselines, discover, plots
-from vidsindy_lite.artifacts import save_figure, save_table
-from vidsindy_lite.experiments import FilmTask, grid, record, run_trial, select
-from vidsindy_lite.metrics import summary
-from vidsindy_lite.published import SCORES
-from vidsindy_lite.sweeps import sweep
-from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite import discover
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.study import (
+    REFERENCE_OFFSET,
+    SCORES,
+    SYSTEMS,
+    FilmTask,
+    baselines,
+    grid,
+    plots,
+    record,
+    run_trial,
+    select,
+    summary,
+    sweep,
+)
 
 # %%
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 names = tuple(SYSTEMS) if full else ("SprottF", "Lorenz")
 frames = 1500 if full else 300
@@ -400,7 +409,7 @@ for method in baselines.BASELINES:
 # <details><summary>Solution</summary>
 #
 # ```python
-# from vidsindy_lite import score
+# from vidsindy_lite.study import score
 #
 # truth = SYSTEMS["Tsucs2"].shift(REFERENCE_OFFSET)
 # wrong = truth.coefficients.copy()
@@ -418,7 +427,7 @@ for method in baselines.BASELINES:
 # <details><summary>Solution</summary>
 #
 # ```python
-# from vidsindy_lite.experiments import METHODS, Trial
+# from vidsindy_lite.study.trials import METHODS, Trial
 #
 # for method in METHODS:
 #     print(method, run_trial(Trial(names[0], "noise", 0.05, seed, method, frames=frames)).score)
@@ -435,6 +444,6 @@ for method in baselines.BASELINES:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

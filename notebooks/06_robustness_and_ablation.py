@@ -43,18 +43,27 @@ from itertools import product
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import plots_solver, plots_study
-from vidsindy_lite.ado import term_charges
-from vidsindy_lite.artifacts import save_figure, save_table
-from vidsindy_lite.experiments import METHODS, FilmTask, by_level, grid, record, run_trial, select
-from vidsindy_lite.limits import cramer_rao
-from vidsindy_lite.metrics import summary, term_errors
-from vidsindy_lite.published import ABLATION
-from vidsindy_lite.sweeps import sweep
-from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.dynamics import cramer_rao, term_charges
+from vidsindy_lite.study import (
+    ABLATION,
+    METHODS,
+    REFERENCE_OFFSET,
+    SYSTEMS,
+    FilmTask,
+    by_level,
+    grid,
+    plots,
+    record,
+    run_trial,
+    select,
+    summary,
+    sweep,
+    term_errors,
+)
 
 # %%
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 systems = tuple(SYSTEMS) if full else ("SprottF", "Lorenz")
 frames = 1500 if full else 300
@@ -150,7 +159,7 @@ def robustness(figure_id, caption, source, methods, published=None, **fields):
         for m, groups in by_method.items()
         for level, group in groups.items()
     }
-    fig = plots_study.plot_robustness(curves, published)
+    fig = plots.plot_robustness(curves, published)
     save_figure(figure_id, fig, caption=caption, numbers=numbers)
 
 
@@ -278,7 +287,7 @@ caption = f"Share of {len(trials)} trials whose terms are all right and none is 
 save_table("study_exact", rows, caption=caption)
 
 # %%
-fig = plots_study.plot_shares(shares)
+fig = plots.plot_shares(shares)
 numbers = {
     f"{c}, {name}": {f"{level:g}": value for level, value in values.items()}
     for c, by_system in shares.items()
@@ -474,7 +483,7 @@ caption = "Errors in units of their standard errors, and as what the error bars 
 save_table("study_pulls", rows, caption=caption)
 
 # %%
-fig = plots_study.plot_pull_distribution(pulled)
+fig = plots.plot_pull_distribution(pulled)
 caption = "Share of coefficients within so many standard errors; grey: the normal distribution."
 save_figure("study_pulls_figure", fig, caption=caption, numbers=pulled)
 
@@ -501,7 +510,7 @@ verdicts = {
     }
     for condition in levels
 }
-fig = plots_solver.plot_verdicts({f"{c} (%)": v for c, v in verdicts.items()})
+fig = plots.plot_verdicts({f"{c} (%)": v for c, v in verdicts.items()})
 caption = "How often the law is exact, and what the solver says of it, over all systems."
 save_figure("study_verdicts_figure", fig, caption=caption, numbers=verdicts)
 
@@ -603,8 +612,9 @@ for row in rows:
 # <details><summary>Solution</summary>
 #
 # ```python
-# from vidsindy_lite import discover, score
-# from vidsindy_lite.corruption import add_noise, drop_blocks
+# from vidsindy_lite import discover
+# from vidsindy_lite.study import score
+# from vidsindy_lite.study.corruption import add_noise, drop_blocks
 #
 # rng = np.random.default_rng(0)
 # film = films[[film.truth.name for film in films].index("SprottF")]
@@ -633,6 +643,6 @@ for row in rows:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

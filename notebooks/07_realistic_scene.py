@@ -40,14 +40,10 @@ jobs: int = 2  # trials at a time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import plots
-from vidsindy_lite.artifacts import save_figure, save_table
-from vidsindy_lite.metrics import pulls
-from vidsindy_lite.realistic import DISTURBANCES, START, SceneTask, run
-from vidsindy_lite.sweeps import sweep
-from vidsindy_lite.systems import SYSTEMS
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.study import DISTURBANCES, START, SYSTEMS, SceneTask, plots, pulls, run, sweep
 
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 frames = 400 if full else 250
 trials = range(seed, seed + (5 if full else 1))
@@ -238,7 +234,8 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # <details><summary>Solution</summary>
 #
 # ```python
-# from vidsindy_lite import Rig, discover, reconstruct, score
+# from vidsindy_lite import Rig, discover, reconstruct
+# from vidsindy_lite.study import score
 #
 # law = discover(first.t, reconstruct(tracks, Rig.around(first.x)))
 # print(first.score, score(law, first.truth), sep="\n")
@@ -254,7 +251,8 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # <details><summary>Solution</summary>
 #
 # ```python
-# from vidsindy_lite import Rig, discover, learn_cameras, reconstruct, score
+# from vidsindy_lite import Rig, discover, learn_cameras, reconstruct
+# from vidsindy_lite.study import score
 #
 # pair = Rig(Rig.around(first.x).uncalibrated(keep=0).cameras[:2])
 # path = reconstruct(tracks[:2], learn_cameras(tracks[:2], pair))
@@ -272,6 +270,6 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

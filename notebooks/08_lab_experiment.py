@@ -45,12 +45,12 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import lab, plots, plots_lab
-from vidsindy_lite.artifacts import save_figure, save_table
 from vidsindy_lite.cameras import Rig, calibration_errors, learn_cameras, reconstruct, residuals
-from vidsindy_lite.video import read_frame
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.study import lab, plots
+from vidsindy_lite.vision import read_frame
 
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 frames = 50 if full else 30  # of each path
 
@@ -187,7 +187,7 @@ assert np.isclose(measured_rms[0], rms(error), rtol=0.05)  # from pixels as from
 # %%
 by_path = length(error).reshape(3, -1), length(predicted).reshape(3, -1)
 by_distance = {"measured": np.array(measured_rms), "first order": np.array(predicted_rms)}
-fig = plots_lab.plot_orthographic_error(
+fig = plots.plot_orthographic_error(
     np.arange(frames) / lab.FPS, *by_path, np.array(ratio), by_distance
 )
 caption = "Error of orthographic cameras: along the paths, and against depth range over distance."
@@ -226,7 +226,7 @@ print(f"median {middle:.1f} mm, nine of ten between {low:.1f} and {high:.1f} mm"
 assert low < published < high
 
 # %%
-fig = plots_lab.plot_anywhere(anywhere, published)
+fig = plots.plot_anywhere(anywhere, published)
 caption = "Error at the marked point for rigs put up at random: the paper's is an ordinary one."
 save_figure("lab_anywhere", fig, caption=caption, numbers={"error": anywhere})
 
@@ -266,7 +266,7 @@ assert rms(by_pinhole - x) < 0.1
 models = {"orthographic": by_flat, "perspective": by_pinhole}
 points = {"marked point": lab.MARKED, "the paper's result for it": lab.IDENTIFIED}
 found = {name: values.reshape(paths.shape) for name, values in models.items()}
-fig = plots_lab.plot_table(truth, paths, found, points)
+fig = plots.plot_table(truth, paths, found, points)
 caption = "The paths from above: true, by orthographic and by perspective cameras; and the scene."
 save_figure("lab_table", fig, caption=caption, numbers={"truth": paths, **found})
 
@@ -330,7 +330,7 @@ save_table("lab_models", rows, caption="Three paths of the ball, by the model of
 
 # %%
 lengths = {name: length(path - x) for name, (_, path) in results.items()}
-fig = plots_lab.plot_model_errors(lengths)
+fig = plots.plot_model_errors(lengths)
 caption = "Error in space by the model of the cameras; the vertical line is one millimetre."
 save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 
@@ -439,6 +439,6 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

@@ -47,17 +47,22 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 # %%
-from vidsindy_lite import PolynomialSystem, discover_from_videos, plots_report, score
+from vidsindy_lite import PolynomialSystem, discover_from_videos
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.artifacts import save_figure, save_table
-from vidsindy_lite.cameras import Rig, learn_cameras
-from vidsindy_lite.synchrony import DISAGREEMENT, align, disagreement
-from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
-from vidsindy_lite.templates import rig_template
-from vidsindy_lite.video import Scene, read_frame, render, video_info, write_video
+from vidsindy_lite.cameras import (
+    DISAGREEMENT,
+    Rig,
+    align,
+    disagreement,
+    learn_cameras,
+    rig_template,
+)
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots, score
+from vidsindy_lite.vision import Scene, read_frame, render, video_info, write_video
 
 # %%
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
 names = ("Lorenz", "SprottE") if full else ("Lorenz",)
 frames = 1000 if full else 300
@@ -202,7 +207,7 @@ save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rat
 # %%
 result = data[shown]
 t, x, curve = (np.array(result[key], dtype=float) for key in ("t", "x", "curve"))
-fig = plots_report.plot_path(t, x, curve)
+fig = plots.plot_path(t, x, curve)
 caption = "The reconstructed path (grey) and the curve that obeys the law (blue)."
 save_figure("own_path", fig, caption=caption, numbers={"t": t, "x": x, "curve": curve})
 
@@ -222,7 +227,7 @@ lags = np.array([camera["lag"] for camera in result["cameras"]])
 instant = 10
 places = [(path, instant - round(lag)) for path, lag in zip("abc", lags, strict=True)]
 images = [read_frame(folders[shown] / f"{p}.avi", n) for p, n in places]
-fig = plots_report.plot_views(images, [f"{p}.avi, frame {n}" for p, n in places], tracks, instant)
+fig = plots.plot_views(images, [f"{p}.avi, frame {n}" for p, n in places], tracks, instant)
 caption = "One instant in the three videos, each with the whole track."
 save_figure("own_views", fig, caption=caption, numbers=dict(zip("abc", tracks, strict=True)))
 
@@ -258,7 +263,7 @@ save_table("own_cameras", rows, caption="Lags and cameras as learned; the first 
 
 # %%
 missed = [np.array(part, dtype=float) for part in result["residuals"]]
-fig = plots_report.plot_residuals(t, missed, DISAGREEMENT)
+fig = plots.plot_residuals(t, missed, DISAGREEMENT)
 caption = "Residuals of the three cameras; above the dashed line, the rig is doubted."
 save_figure("own_residuals", fig, caption=caption, numbers=dict(zip("abc", missed, strict=True)))
 
@@ -286,7 +291,7 @@ moved = [align(tracks, (0, lag - lags[1], 0)) for lag in tried]  # they are alig
 worst = np.array([max(disagreement(views, learned)) for views in moved])
 
 # %%
-fig = plots_report.plot_lags(tried, worst, DISAGREEMENT)
+fig = plots.plot_lags(tried, worst, DISAGREEMENT)
 caption = "Disagreement of the views for each lag of the second video."
 save_figure("own_lags", fig, caption=caption, numbers={"lag": tried, "pixels": worst})
 assert abs(tried[worst.argmin()] - late) < 0.11
@@ -401,6 +406,6 @@ else:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

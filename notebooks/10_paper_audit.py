@@ -45,15 +45,33 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import audit, geometry, plots_audit, splines
-from vidsindy_lite.artifacts import save_figure, save_table
-from vidsindy_lite.baselines import ensemble, stlsq
-from vidsindy_lite.cameras import Rig, calibration_errors, learn_cameras, reconstruct, residuals
-from vidsindy_lite.metrics import score
-from vidsindy_lite.published import ABLATION, DATASETS_CLAIMED, LAB, LAWS, SCORES, SYSTEMS_S1
-from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.cameras import (
+    Rig,
+    calibration_errors,
+    geometry,
+    learn_cameras,
+    reconstruct,
+    residuals,
+)
+from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.dynamics import splines
+from vidsindy_lite.study import (
+    ABLATION,
+    DATASETS_CLAIMED,
+    LAB,
+    LAWS,
+    REFERENCE_OFFSET,
+    SCORES,
+    SYSTEMS,
+    SYSTEMS_S1,
+    audit,
+    ensemble,
+    plots,
+    score,
+    stlsq,
+)
 
-plt.style.use("vidsindy_lite.vidsindy")
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
 frames = {"full": 1500, "quick": 400}[profile]
 truths = {name: system.shift(REFERENCE_OFFSET) for name, system in SYSTEMS.items()}
 true_terms = {name: int(truth.support.sum()) for name, truth in truths.items()}
@@ -163,7 +181,7 @@ paths = {
     "the text's rotation throughout: half a turn": half_turn,
 }  # fmt: skip
 paths = {label: path[:400] for label, path in paths.items()}
-fig = plots_audit.plot_paths(paths, "xyz", columns=(0, 2))
+fig = plots.plot_paths(paths, "xyz", columns=(0, 2))
 caption = "With the rotation of the text the path is lost, or turned by half a turn about z."
 save_figure("audit_rotation", fig, caption=caption, numbers=paths)
 
@@ -354,7 +372,7 @@ assert as_z["difference / rounding"] < 1
 # %%
 differences = {f"{row['system']}, {row['method']}": row["difference / rounding"] for row in rows}
 differences["WangSun, PySINDy, 82.27 as z"] = as_z["difference / rounding"]
-fig = plots_audit.plot_recomputed(differences)
+fig = plots.plot_recomputed(differences)
 caption = "Printed against recomputed l2 errors of Table 1, in units of what rounding can explain."
 save_figure("audit_l2_figure", fig, caption=caption, numbers=differences)
 
@@ -493,7 +511,7 @@ for name, law in (("NoseHoover", LAWS["PySINDy", "NoseHoover"]), ("WangSun", men
     ratios[name] = {key: audit.coefficient_ratios(fit, truths[name]) for key, fit in fits.items()}
 
 # %%
-fig = plots_audit.plot_ratios(ratios)
+fig = plots.plot_ratios(ratios)
 caption = "PySINDy's coefficients over the true ones: the printed ones are those of a wrong clock."
 save_figure("audit_factor_ten", fig, caption=caption, numbers=ratios)
 
@@ -647,7 +665,7 @@ paths = {
     "truth": native + REFERENCE_OFFSET,
     "in the coordinates that the printed law implies": fit.offset + fit.scale * native,
 }
-fig = plots_audit.plot_paths(paths, "xyz", columns=(1, 2))
+fig = plots.plot_paths(paths, "xyz", columns=(1, 2))
 caption = "NoseHoover, true and in the coordinates of the printed law: they do not coincide."
 save_figure("audit_nose_hoover_path", fig, caption=caption, numbers=paths)
 
@@ -682,7 +700,7 @@ for name, truth in truths.items():
     shares[name] = {"constants": constant, "all other terms": 1 - constant}
 
 # %%
-fig = plots_audit.plot_what_l2_sees(shares)
+fig = plots.plot_what_l2_sees(shares)
 caption = "Share of the constants in the squared norm of each ground truth of Table S2."
 save_figure("audit_norm", fig, caption=caption, numbers=shares)
 
@@ -810,6 +828,6 @@ save_table("audit", findings, caption=caption)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.repository import versions
+from vidsindy_lite.stamp import versions
 
 print(versions())

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import vidsindy_lite as vl
+from vidsindy_lite import study
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.video import render
+from vidsindy_lite.vision import render
 
 SIZE = (128, 128)
 
@@ -16,7 +17,7 @@ SIZE = (128, 128)
 def folder(tmp_path_factory):
     """Three lossy videos of 30 fps and different length; the second starts 7 frames late."""
     folder = tmp_path_factory.mktemp("own")
-    truth = vl.SYSTEMS["SprottE"].shift(vl.REFERENCE_OFFSET)
+    truth = study.SYSTEMS["SprottE"].shift(study.REFERENCE_OFFSET)
     _, x = truth.trajectory(220)
     rig = vl.Rig.around(x, SIZE)
     rows = slice(0, 220), slice(7, 215), slice(0, 210)

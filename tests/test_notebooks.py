@@ -7,9 +7,9 @@ import jupytext
 import nbformat
 import pytest
 
-from vidsindy_lite import artifacts, runner
-from vidsindy_lite.compare import differences
-from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.companion import artifacts, differences
+from vidsindy_lite.companion import run as runner
+from vidsindy_lite.stamp import PACKAGE
 
 ROOT = PACKAGE.parent
 NOTEBOOKS = runner.find_notebooks(ROOT)

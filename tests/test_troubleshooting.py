@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import trajectory
+from helpers import trajectory
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
-from vidsindy_lite.corruption import add_noise
-from vidsindy_lite.report import check_folder_is_free
-from vidsindy_lite.repository import PACKAGE
-from vidsindy_lite.video import render
+from vidsindy_lite.companion import check_folder_is_free
+from vidsindy_lite.stamp import PACKAGE
+from vidsindy_lite.study import add_noise
+from vidsindy_lite.vision import render
 
 README = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
 pytestmark = pytest.mark.usefixtures("tracked_once")

@@ -1,47 +1,59 @@
-"""Governing equations of a moving target from the videos of three cameras.
+"""Governing equations of a moving target from the videos of several cameras.
 
-The modules stand in the order of the pipeline:
-systems, cameras, perspective | video, tracking, synchrony | ado (discovery) | pipeline |
-experiments, lab | report.
+    video files --vision--> pixel tracks --cameras--> path in space --dynamics--> equations
+
+`discover_from_videos` goes all the way; each room can be used by itself. The paper's world
+(benchmark systems, trials, baselines, scores) is `vidsindy_lite.study`, what turns the notebooks
+into figures and pages is `vidsindy_lite.companion`.
 """
 
-from .ado import discover
-from .cameras import Camera, Rig, learn_cameras, reconstruct, residuals
-from .discovery import Discovery
-from .metrics import Score, score
-from .perspective import PerspectiveCamera
+from .cameras import (
+    Camera,
+    PerspectiveCamera,
+    Rig,
+    Synchrony,
+    align,
+    learn_cameras,
+    learn_lags,
+    reconstruct,
+    residuals,
+    rig_template,
+)
+from .dynamics import Discovery, PolynomialSystem, discover
 from .pipeline import VideoDiscovery, discover_from_videos
-from .polynomials import PolynomialSystem
-from .synchrony import Synchrony, align, learn_lags
-from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
-from .tracking import Track, follow, track
-from .video import Scene, read_video, render_video, write_video
+from .vision import (
+    Scene,
+    Track,
+    follow,
+    read_frame,
+    read_video,
+    render_video,
+    track,
+    write_video,
+)
 
 __all__ = [
-    "PolynomialSystem",
-    "SYSTEMS",
-    "REFERENCE_OFFSET",
-    "Benchmark",
-    "Camera",
-    "PerspectiveCamera",
-    "Rig",
-    "learn_cameras",
-    "reconstruct",
-    "residuals",
-    "Scene",
-    "render_video",
-    "write_video",
-    "read_video",
+    "discover_from_videos",
+    "VideoDiscovery",
     "track",
     "follow",
     "Track",
-    "Synchrony",
+    "read_video",
+    "read_frame",
+    "write_video",
+    "render_video",
+    "Scene",
     "align",
     "learn_lags",
+    "Synchrony",
+    "Camera",
+    "PerspectiveCamera",
+    "Rig",
+    "rig_template",
+    "learn_cameras",
+    "reconstruct",
+    "residuals",
     "discover",
     "Discovery",
-    "score",
-    "Score",
-    "discover_from_videos",
-    "VideoDiscovery",
+    "PolynomialSystem",
 ]

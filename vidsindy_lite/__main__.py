@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from .systems import SYSTEMS
+from .study import SYSTEMS
 
 DISCOVER_DESCRIPTION = """\
 Find the equations of motion of one target in your own videos, and write a report.
@@ -241,13 +241,11 @@ def _size(text: str) -> tuple[int, int]:
 def _discover(options: argparse.Namespace) -> int:
     import numpy as np
 
-    from vidsindy_lite.cameras import Rig
-    from vidsindy_lite.checks import check_positive
-    from vidsindy_lite.pipeline import discover_from_videos
-    from vidsindy_lite.report import PAGE, check_folder_is_free, write_report
-    from vidsindy_lite.synchrony import list_lags
-    from vidsindy_lite.tracking import check_detector
-    from vidsindy_lite.video import video_info
+    from .cameras import Rig, list_lags
+    from .checks import check_positive
+    from .companion import PAGE, check_folder_is_free, write_report
+    from .pipeline import discover_from_videos
+    from .vision import check_detector, video_info
 
     check_detector(options.detector)
     check_folder_is_free(options.out)
@@ -276,14 +274,14 @@ def _discover(options: argparse.Namespace) -> int:
 
 
 def _rig_template(options: argparse.Namespace) -> int:
-    from vidsindy_lite.templates import rig_template
+    from .cameras import rig_template
 
     print(rig_template(options.cameras, options.model, options.size), end="")
     return 0
 
 
 def _run(options: argparse.Namespace) -> int:
-    from vidsindy_lite import runner  # papermill takes a second to import; --help need not wait
+    from .companion import run as runner
 
     report = runner.run(
         options.notebooks,
@@ -297,9 +295,8 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _demo(options: argparse.Namespace) -> int:
-    from vidsindy_lite.experiments import film
-    from vidsindy_lite.metrics import score
-    from vidsindy_lite.pipeline import discover_from_videos
+    from .pipeline import discover_from_videos
+    from .study import film, score
 
     with tempfile.TemporaryDirectory() as folder:
         print(f"filming {options.system}: three videos of {options.frames} frames ...", flush=True)
@@ -316,7 +313,7 @@ def _demo(options: argparse.Namespace) -> int:
 
 
 def _train(options: argparse.Namespace) -> int:
-    from vidsindy_lite import training  # torch takes a second to import
+    from .vision import training
 
     output = training.WEIGHTS if options.output is None else options.output
     steps = training.STEPS if options.steps is None else options.steps
@@ -326,7 +323,7 @@ def _train(options: argparse.Namespace) -> int:
 
 
 def _site(options: argparse.Namespace) -> int:
-    from vidsindy_lite.site import build_site
+    from .companion import build_site
 
     pages = build_site(options.output)
     print(f"{len(pages)} pages: open {options.output}/index.html")
@@ -334,7 +331,7 @@ def _site(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from vidsindy_lite.compare import side_by_side
+    from .companion import side_by_side
 
     found = side_by_side(options.committed, options.regenerated, options.output)
     for name, place in found.items():

@@ -10,14 +10,24 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from .ado import discover
-from .cameras import Rig, check_learnable, learn_cameras, learn_normal, reconstruct
+from .cameras import (
+    DISAGREEMENT,
+    Rig,
+    Synchrony,
+    align,
+    check_learnable,
+    disagreement,
+    learn_cameras,
+    learn_lags,
+    learn_normal,
+    list_lags,
+    reconstruct,
+    systematic_errors,
+    trailing_errors,
+)
 from .checks import check_integer, check_path, check_times, check_vector
-from .discovery import Discovery
-from .synchrony import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
-from .tracking import Track, check_detector, follow
-from .uncertainty import systematic_errors, trailing_errors
-from .video import VideoInfo, video_info
+from .dynamics import Discovery, discover
+from .vision import Track, VideoInfo, check_detector, follow, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 

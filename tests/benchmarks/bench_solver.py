@@ -14,14 +14,15 @@ import numpy as np
 import pytest
 import torch
 
-from vidsindy_lite.ado import discover
-from vidsindy_lite.baselines import BASELINES
-from vidsindy_lite.corruption import add_noise
-from vidsindy_lite.limits import cramer_rao
-from vidsindy_lite.metrics import score
-from vidsindy_lite.paper_ado import discover_paper
-from vidsindy_lite.polynomials import PolynomialSystem
-from vidsindy_lite.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.dynamics import PolynomialSystem, cramer_rao, discover
+from vidsindy_lite.study import (
+    BASELINES,
+    REFERENCE_OFFSET,
+    SYSTEMS,
+    add_noise,
+    discover_paper,
+    score,
+)
 
 TABLE = Path("build/benchmarks/solver.csv")
 ROWS: list[dict[str, object]] = []

@@ -10,17 +10,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.detector import LearnedDetector, detections
-from vidsindy_lite.tracking import follow, track
-from vidsindy_lite.training import SEEN_BACKGROUNDS, SEEN_SHAPES
-from vidsindy_lite.video import (
+from vidsindy_lite.vision import (
     BACKGROUNDS,
+    SEEN_BACKGROUNDS,
+    SEEN_SHAPES,
     SHAPES,
+    LearnedDetector,
     Scene,
+    detections,
+    follow,
     read_video,
     render,
     render_restless,
     render_video,
+    track,
     write_video,
 )
 

@@ -1,0 +1,716 @@
+"""Cameras: the convention, files, learning, reconstruction, and what bad input is told."""
+
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+from helpers import trajectory
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidsindy_lite.cameras.calibrate import (
+    Camera,
+    Rig,
+    calibration_errors,
+    learn_cameras,
+    learn_normal,
+    reconstruct,
+    residuals,
+)
+from vidsindy_lite.cameras.geometry import plane_projection, rodrigues, rotation_to_z
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def random_rig(rng, x, cameras=3):
+    """Cameras anywhere around x, facing so differently that no axis is poorly seen."""
+    low, high = x.min(axis=0), x.max(axis=0)
+    reach = np.linalg.norm(high - low) / 2
+    while True:
+        normals = rng.normal(size=(cameras, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        if np.linalg.eigvalsh(cameras * np.eye(3) - normals.T @ normals)[0] > cameras / 3:
+            break
+    return Rig(
+        Camera(
+            position=(low + high) / 2 + reach * (rng.uniform(-2, 2) * n + 0.1 * rng.normal(size=3)),
+            normal=n,
+            scale=reach / rng.uniform(180, 230),
+            angle=rng.uniform(-np.pi, np.pi),
+        )
+        for n in normals
+    )
+
+
+def scene(seed, n=500, cameras=3):
+    rng = np.random.default_rng(seed)
+    x = trajectory(rng, n)
+    rig = random_rig(rng, x, cameras)
+    return x, rig, [camera.project(x) for camera in rig.cameras], rng
+
+
+def rmse_in_pixels(x, truth, rig):
+    pixel = np.sqrt(np.mean([camera.scale**2 for camera in rig.cameras]))
+    return np.sqrt(np.mean((x - truth) ** 2, axis=0)) / pixel
+
+
+@pytest.fixture
+def small():
+    return scene(7, n=40)
+
+
+class TestCamera:
+    def test_convention_by_hand(self):
+        # Looking down the z axis, unturned: x to the right, y up, so v falls as y grows.
+        camera = Camera(position=(1, 2, 50), normal=(0, 0, 1), scale=0.5, angle=0.0)
+        np.testing.assert_allclose(camera.project([[1, 2, -9]]), [[255.5, 255.5]])
+        np.testing.assert_allclose(camera.project([[2, 2, 0]]), [[257.5, 255.5]])
+        np.testing.assert_allclose(camera.project([[1, 3, 0]]), [[255.5, 253.5]])
+
+    def test_in_plane_angle_by_hand(self):
+        # T(pi/2) takes (0, 1) to (1, 0): a step along x is seen as a step up the image.
+        camera = Camera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=np.pi / 2)
+        np.testing.assert_allclose(camera.project([[1, 0, 0]]), [[255.5, 254.5]])
+
+    def test_image_size(self):
+        camera = Camera(
+            position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=0, image_size=(641, 481)
+        )
+        np.testing.assert_allclose(camera.project([[0, 0, 0]]), [[320, 240]])
+
+    @given(SEEDS)
+    @settings(max_examples=20)
+    def test_project_satisfies_the_camera_equation(self, seed):
+        x, rig, _, _ = scene(seed, n=5)
+        for camera in rig.cameras:
+            u, v = camera.project(x).T
+            x_c = np.array([u - 511 / 2, 511 / 2 - v])
+            c, s = np.cos(camera.angle), np.sin(camera.angle)
+            left = camera.scale * np.array([[c, s], [-s, c]]) @ x_c + camera.offset[:, None]
+            right = rotation_to_z(camera.normal)[:2] @ x.T
+            np.testing.assert_allclose(left, right, atol=1e-10 * np.abs(x).max())
+
+    def test_plane_coordinates_undo_project(self, small):
+        x, rig, tracks, _ = small
+        for camera, track in zip(rig.cameras, tracks, strict=True):
+            seen = camera.plane_coordinates(track)
+            np.testing.assert_allclose(seen, x @ camera.rows.T, atol=1e-10 * np.abs(x).max())
+
+    def test_depth_is_not_seen(self, small):
+        x, rig, tracks, _ = small
+        for camera, track in zip(rig.cameras, tracks, strict=True):
+            on_plane = plane_projection(x, camera.normal, -camera.normal @ camera.position)
+            np.testing.assert_allclose(camera.project(on_plane), track, atol=1e-9)
+            nearer = replace(camera, position=camera.position + 3 * camera.normal)
+            np.testing.assert_allclose(nearer.project(x), track, atol=1e-9)
+
+    def test_nan_rows_pass_through(self):
+        camera = Camera(position=(0, 0, 0), normal=(1, 1, 1), scale=1, angle=0)
+        pixels = camera.project([[np.nan, 0, 0], [0, 0, 0]])
+        assert np.isnan(pixels[0]).all()
+        np.testing.assert_allclose(pixels[1], 255.5)
+
+    def test_is_frozen_and_normalises(self):
+        camera = Camera(position=[1, 2, 3], normal=[0, 3, 4])
+        np.testing.assert_allclose(camera.normal, [0, 0.6, 0.8], rtol=1e-15)
+        assert not camera.is_calibrated
+        with pytest.raises(FrozenInstanceError):
+            camera.scale = 1.0
+        with pytest.raises(ValueError, match="read-only"):
+            camera.normal[0] = 1.0
+
+    def test_does_not_share_memory_with_its_arguments(self):
+        position = np.zeros(3)
+        camera = Camera(position=position, normal=[0, 0, 1])
+        position[0] = 9
+        assert camera.position[0] == 0
+
+    def test_equality(self):
+        camera = Camera(position=[1, 2, 3], normal=[0, 3, 4], scale=1, angle=0)
+        assert camera == replace(camera)
+        assert camera != replace(camera, scale=2)
+        assert camera != "camera"
+
+    def test_hash_agrees_with_equality(self):
+        camera = Camera(position=[1, 2, 0.0], normal=[0, 3, 4], scale=1, angle=0)
+        twin = Camera(position=(1, 2, -0.0), normal=(0, 3.0, 4), scale=1.0, angle=-0.0)
+        assert camera == twin
+        assert len({camera, twin, replace(camera, scale=2), replace(camera, angle=1)}) == 3
+        rig = Rig([camera, replace(camera, normal=(1, 0, 0))])
+        assert len({rig, Rig(rig.cameras), rig.uncalibrated()}) == 2
+
+    @pytest.mark.parametrize("length", [1e-200, 1e200, 5e-324])
+    def test_normals_of_any_length(self, length):
+        camera = Camera(position=[0, 0, 0], normal=[0, 0, length])
+        assert camera.normal.tolist() == [0, 0, 1]
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"position": (1, 2)}, "position: must be 3 finite numbers, got"),
+            ({"position": (1, 2, np.inf)}, "position: must be 3 finite numbers, got"),
+            ({"normal": (0, 0, 0)}, "normal: must not be the zero vector, got"),
+            ({"normal": "up"}, "normal: must be an array of real numbers, got 'up'"),
+            ({"angle": None}, "scale and angle: give both .* or neither .* got scale=1.0, angle=N"),
+            ({"scale": 0}, "scale: must be positive, got 0"),
+            ({"scale": -1}, "scale: must be positive, got -1"),
+            ({"scale": True}, "scale: must be a finite number, got True"),
+            ({"scale": np.nan}, "scale: must be a finite number, got nan"),
+            ({"angle": "left"}, "angle: must be a finite number, got 'left'"),
+            ({"image_size": (512, 0)}, r"image_size: must be two integers .*, got \(512, 0\)"),
+            ({"image_size": (512.5, 512)}, "image_size: must be two integers of at least 1, got"),
+            ({"image_size": 512}, "image_size: must be two integers of at least 1, got 512"),
+        ],
+    )
+    def test_bad_camera(self, change, message):
+        good = {"position": (0, 0, 0), "normal": (0, 0, 1), "scale": 1.0, "angle": 0.0}
+        with pytest.raises(ValueError, match=message):
+            Camera(**good | change)
+
+    def test_bad_points(self, small):
+        camera = small[1].cameras[0]
+        with pytest.raises(ValueError, match=r"x: must have shape \(n, 3\), got \(4, 2\)"):
+            camera.project(np.zeros((4, 2)))
+        with pytest.raises(ValueError, match="x: must be finite or NaN, got 1 infinite values"):
+            camera.project([[0, np.inf, 0]])
+        with pytest.raises(ValueError, match=r"pixels: must have shape \(n, 2\), got \(2,\)"):
+            camera.plane_coordinates([1, 2])
+
+    def test_uncalibrated_camera_cannot_project(self):
+        camera = Camera(position=(0, 0, 0), normal=(0, 0, 1))
+        for use in (camera.project, camera.plane_coordinates):
+            with pytest.raises(ValueError, match="scale and angle must be known, got None"):
+                use(np.zeros((1, 3)))
+
+
+class TestRig:
+    @given(SEEDS, st.integers(2, 5), st.booleans())
+    @settings(max_examples=30)
+    def test_file_round_trip_is_exact(self, tmp_path_factory, seed, cameras, calibrated):
+        _, rig, _, _ = scene(seed, n=5, cameras=cameras)
+        rig = rig if calibrated else rig.uncalibrated(keep=1)
+        path = tmp_path_factory.mktemp("rig") / "rig.toml"
+        rig.save(path)
+        text = path.read_text()
+        assert Rig.load(path) == rig
+        Rig.load(path).save(path)
+        assert path.read_text() == text
+
+    def test_reads_a_file_written_by_hand(self, tmp_path):
+        path = tmp_path / "rig.toml"
+        path.write_text(
+            "[[camera]]\nposition = [0, 0, 10]\nnormal = [0, 0, 1]\nscale = 1\nangle = 0.5\n"
+            "[[camera]]\nposition = [10, 0.0, 0]\nnormal = [2, 0, 0]\nimage_size = [640, 480]\n"
+        )
+        assert Rig.load(path) == Rig(
+            [
+                Camera(position=(0, 0, 10), normal=(0, 0, 1), scale=1.0, angle=0.5),
+                Camera(position=(10, 0, 0), normal=(1, 0, 0), image_size=(640, 480)),
+            ]
+        )
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("[[camera]", "must be a TOML file"),
+            ("", r"must hold \[\[camera\]\] tables and nothing else, got \[\]"),
+            ("[camera]\nnormal = [0, 0, 1]", r"must hold \[\[camera\]\] tables"),
+            ("unit = 'mm'\n[[camera]]", r"nothing else, got \['camera', 'unit'\]"),
+            ("camera = [1, 2]", "camera 0: must be a table"),
+            ("[[camera]]\nposition = [0, 0, 1]", "camera 0: normal: must be given, got keys posi"),
+            (
+                "[[camera]]\nmodel = 'perspective'\nnormal = [0, 0, 1]",
+                "camera 0: position: must be given for a perspective camera",
+            ),
+            (
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1]",
+                "camera 0: normal: must be 3",
+            ),
+            (
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\nzoom = 2",
+                "camera 0: zoom: must",
+            ),
+            (
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n"
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 1, 0]\nscale = -1\nangle = 0",
+                "camera 1: scale: must be positive, got -1",
+            ),
+            (
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n"
+                "[[camera]]\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n",
+                "cameras: must have at least two independent normals",
+            ),
+        ],
+    )
+    def test_bad_file_names_file_camera_and_key(self, tmp_path, text, message):
+        path = tmp_path / "broken.toml"
+        path.write_text(text)
+        with pytest.raises(ValueError, match=rf"broken\.toml: .*{message}"):
+            Rig.load(path)
+
+    def test_missing_file(self, tmp_path):
+        with pytest.raises(FileNotFoundError, match=r"nowhere\.toml"):
+            Rig.load(tmp_path / "nowhere.toml")
+
+    @pytest.mark.parametrize("second", [(0, 0, 1), (0, 0, -1), (1e-9, 0, 1)])
+    def test_parallel_normals(self, second):
+        cameras = [Camera(position=(0, 0, 0), normal=n) for n in ((0, 0, 1), second, (0, 0, 2))]
+        with pytest.raises(ValueError, match="cameras: must have at least two independent normals"):
+            Rig(cameras)
+
+    def test_needs_two_cameras(self, small):
+        with pytest.raises(ValueError, match="cameras: must be two or more, got 1"):
+            Rig(small[1].cameras[:1])
+        for none in (None, small[1].cameras[0], 3):
+            with pytest.raises(ValueError, match="cameras.*: must be"):
+                Rig(none)
+        with pytest.raises(ValueError, match=r"cameras\[0\]: must be of type Camera, got 1"):
+            Rig([1, 2])
+
+    def test_uncalibrated(self, small):
+        _, rig, _, _ = small
+        start = rig.uncalibrated(keep=2)
+        assert [camera.is_calibrated for camera in start.cameras] == [False, False, True]
+        assert start.cameras[2] == rig.cameras[2]
+        with pytest.raises(ValueError, match="keep: must be an index of 3 cameras, got 3"):
+            rig.uncalibrated(keep=3)
+        for keep in (1.5, -1, "a"):
+            with pytest.raises(ValueError, match="keep: must be an integer of at least 0, got"):
+                rig.uncalibrated(keep)
+
+    def test_files_have_names(self, small):
+        for use in (Rig.load, small[1].save):
+            with pytest.raises(ValueError, match="path: must be the name of a file, got None"):
+                use(None)
+
+    @given(SEEDS, st.sampled_from([(512, 512), (640, 480), (100, 300)]))
+    @settings(max_examples=30)
+    def test_around_fills_the_images(self, seed, image_size):
+        x = trajectory(np.random.default_rng(seed), 200)
+        rig = Rig.around(x, image_size=image_size)
+        half = (np.array(image_size) - 1) / 2
+        for camera in rig.cameras:
+            used = np.abs(camera.project(x) - half) / half
+            assert used.max() == pytest.approx(0.85, abs=1e-6)
+        normals = np.array([camera.normal for camera in rig.cameras])
+        assert np.linalg.svd(normals, compute_uv=False)[-1] > 0.3
+        up = [np.diff(c.project([[0, 0, 0], [0, 0, 1]]), axis=0)[0] for c in rig.cameras]
+        roll = [np.rad2deg(np.arctan2(-right, -down)) for right, down in up]
+        np.testing.assert_allclose(roll, [6, -9, 14], atol=1e-9)
+
+    def test_around_needs_a_scene(self):
+        with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
+            Rig.around(np.ones((5, 3)))
+        for none in (np.zeros((0, 3)), np.full((5, 3), np.nan), [[1, 2, 3]]):
+            with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
+                Rig.around(none)
+        for size in (512, "ab", (1, 512)):
+            with pytest.raises(ValueError, match="image_size: must be two integers of at least 2"):
+                Rig.around(np.eye(3), image_size=size)
+
+
+class TestLearning:
+    @pytest.mark.parametrize("method", ["joint", "paper"])
+    @given(SEEDS, st.integers(0, 2))
+    @settings(max_examples=15)
+    def test_exact_pixels_give_exact_cameras(self, method, seed, keep):
+        x, truth, tracks, _ = scene(seed)
+        learned = learn_cameras(tracks, truth.uncalibrated(keep), method)
+        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+        np.testing.assert_allclose(reconstruct(tracks, learned), x, atol=1e-9 * np.ptp(x))
+
+    @pytest.mark.slow
+    @given(SEEDS, st.integers(0, 2))
+    @settings(max_examples=25)
+    def test_integer_pixels_give_a_third_of_a_pixel(self, seed, keep):
+        x, truth, tracks, _ = scene(seed)
+        tracks = [np.round(track) for track in tracks]
+        learned = learn_cameras(tracks, truth.uncalibrated(keep))
+        assert rmse_in_pixels(reconstruct(tracks, learned), x, truth).max() <= 0.35
+
+    @given(SEEDS)
+    @settings(max_examples=4)
+    def test_gradient_descends_to_the_closed_form(self, seed):
+        _, truth, tracks, rng = scene(seed, n=100)
+        tracks = [track + rng.normal(size=track.shape) for track in tracks]
+        start = truth.uncalibrated()
+        descended, closed = (learn_cameras(tracks, start, m) for m in ("gradient", "paper"))
+        assert np.abs(calibration_errors(descended, closed)).max() < 1e-6
+
+    @pytest.mark.slow
+    @given(SEEDS, st.integers(2, 6), st.data())
+    @settings(max_examples=20)
+    def test_any_number_of_cameras_with_missing_views(self, seed, cameras, data):
+        x, truth, tracks, rng = scene(seed, n=60, cameras=cameras)
+        known = data.draw(st.integers(1, cameras))
+        start = Rig(
+            camera if i < known else replace(camera, scale=None, angle=None)
+            for i, camera in enumerate(truth.cameras)
+        )
+        seen = rng.random((60, cameras)) < 0.8
+        seen[:4] = True
+        for i, track in enumerate(tracks):
+            track[~seen[:, i]] = np.nan
+        learned = learn_cameras(tracks, start)
+        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+        found = reconstruct(tracks, learned)
+        enough = seen.sum(axis=1) >= 2
+        np.testing.assert_allclose(found[enough], x[enough], atol=1e-8 * np.ptp(x))
+        assert np.isnan(found[~enough]).all()
+
+    def test_every_frame_may_miss_a_view(self):
+        _, truth, tracks, _ = scene(1, n=90)
+        for i, track in enumerate(tracks):
+            track[i::3] = np.nan
+        learned = learn_cameras(tracks, truth.uncalibrated())
+        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+        with pytest.raises(ValueError, match="common views must give at least 4 equations"):
+            learn_cameras(tracks, truth.uncalibrated(), "paper")
+
+    @pytest.mark.slow
+    def test_joint_is_closer_and_less_biased_than_eq_4(self):
+        errors = {"joint": [], "paper": []}
+        for seed in range(30):
+            rng = np.random.default_rng(seed)
+            x = trajectory(rng, 400)
+            truth = Rig.around(x)
+            tracks = [c.project(x) + 4 * rng.normal(size=(400, 2)) for c in truth.cameras]
+            for method, found in errors.items():
+                learned = learn_cameras(tracks, truth.uncalibrated(), method)
+                found.extend(calibration_errors(learned, truth)[1:])
+        joint, paper = np.array(errors["joint"]), np.array(errors["paper"])
+        assert (np.mean(joint**2, axis=0) < np.mean(paper**2, axis=0)).all()
+        # Noise in the regressors shrinks the scale in Eq. (4), not at the least reprojection error.
+        standard_error = joint[:, 0].std() / np.sqrt(len(joint))
+        assert abs(joint[:, 0].mean()) < 3 * standard_error
+        assert paper[:, 0].mean() < -3 * standard_error
+
+    def test_known_cameras_are_kept(self, small):
+        _, truth, tracks, _ = small
+        tracks = [np.round(track) for track in tracks]
+        assert learn_cameras(tracks, truth) == truth
+        assert learn_cameras(tracks, truth.uncalibrated(1)).cameras[1] == truth.cameras[1]
+
+    def test_unit_of_length_does_not_matter(self, small):
+        _, truth, tracks, _ = small
+        tracks = [np.round(track) for track in tracks]
+        start = truth.uncalibrated()
+        small_unit = Rig(
+            replace(
+                camera,
+                position=1e6 * camera.position,
+                scale=camera.scale and 1e6 * camera.scale,
+            )
+            for camera in start.cameras
+        )
+        for one, other in zip(
+            learn_cameras(tracks, start).cameras,
+            learn_cameras(tracks, small_unit).cameras,
+            strict=True,
+        ):
+            assert other.scale == pytest.approx(1e6 * one.scale, rel=1e-7)
+            assert other.angle == pytest.approx(one.angle, abs=1e-7)
+
+
+class TestReconstruction:
+    def test_eq_6_with_equal_scales(self, small):
+        _, rig, _, rng = small
+        rig = Rig(replace(camera, scale=0.3) for camera in rig.cameras)
+        tracks = [rng.uniform(0, 511, size=(20, 2)) for _ in rig.cameras]
+        rows = np.vstack([camera.rows for camera in rig.cameras])
+        seen = [c.plane_coordinates(track) for c, track in zip(rig.cameras, tracks, strict=True)]
+        expected = np.linalg.lstsq(rows, np.hstack(seen).T)[0].T
+        np.testing.assert_allclose(reconstruct(tracks, rig), expected, atol=1e-10)
+
+    def test_no_point_is_closer_in_pixels(self, small):
+        x, rig, tracks, rng = small
+        tracks = [track + 3 * rng.normal(size=track.shape) for track in tracks]
+        best = reconstruct(tracks, rig)
+
+        def cost(points):
+            pairs = zip(rig.cameras, tracks, strict=True)
+            return sum(((c.project(points) - track) ** 2).sum(axis=1) for c, track in pairs)
+
+        for step in 0.01 * np.ptp(x) * rng.normal(size=(10, 3)):
+            assert (cost(best + step) > cost(best)).all()
+
+    def test_two_parallel_views_are_not_enough(self, small):
+        _, rig, _, rng = small
+        twin = replace(rig.cameras[0], normal=-rig.cameras[0].normal)
+        rig = Rig([rig.cameras[0], twin, rig.cameras[1]])
+        tracks = [rng.uniform(0, 511, size=(3, 2)) for _ in range(3)]
+        tracks[2][0] = np.nan
+        assert np.isnan(reconstruct(tracks, rig)).all(axis=1).tolist() == [True, False, False]
+
+    def test_residuals(self):
+        _, rig, tracks, rng = scene(3, n=4000)
+        noisy = [track + 2 * rng.normal(size=track.shape) for track in tracks]
+        noisy[1][:10] = np.nan
+        found = residuals(noisy, rig)
+        assert np.isnan(found[1][:10]).all()
+        assert np.isfinite(found[0]).all()
+        # Three of the six numbers of a frame are free; 24000 of them give the rms to 1 %.
+        rms = np.sqrt(np.nanmean(np.hstack(found) ** 2))
+        assert rms == pytest.approx(2 / np.sqrt(2), rel=0.03)
+        np.testing.assert_allclose(np.hstack(residuals(tracks, rig)), 0, atol=1e-9)
+
+    def test_uncalibrated_rig(self, small):
+        _, rig, tracks, _ = small
+        for use in (reconstruct, residuals):
+            with pytest.raises(
+                ValueError, match=r"rig: .* got cameras\[1\] without scale and angl"
+            ):
+                use(tracks, rig.uncalibrated())
+
+
+def test_calibration_errors(small):
+    _, truth, _, _ = small
+    first, *others = truth.cameras
+    off = Rig(
+        [replace(first, scale=1.01 * first.scale, angle=first.angle - 3 * np.pi + 0.1), *others]
+    )
+    expected = [[0.01, 0.1 - np.pi], [0, 0], [0, 0]]
+    np.testing.assert_allclose(calibration_errors(off, truth), expected, atol=1e-12)
+    with pytest.raises(ValueError, match="must have as many cameras as truth, got 2 and 3"):
+        calibration_errors(Rig(others), truth)
+    with pytest.raises(
+        ValueError, match=r"truth: all cameras must be calibrated, got cameras\[1\]"
+    ):
+        calibration_errors(truth, truth.uncalibrated())
+
+
+class TestOutliers:
+    @pytest.mark.parametrize("method", ["joint", "paper"])
+    @pytest.mark.parametrize("seed", range(5))
+    def test_one_outlier_does_not_bend_the_cameras(self, method, seed):
+        _, truth, tracks, rng = scene(seed)
+        turn = rng.uniform(0, 2 * np.pi)
+        tracks[rng.integers(3)][rng.integers(500)] += 200 * np.array([np.cos(turn), np.sin(turn)])
+        learned = learn_cameras(tracks, truth.uncalibrated(), method)
+        assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_noisy_tracks_with_outliers_are_as_good_as_without(self, seed):
+        _, truth, tracks, rng = scene(seed)
+        noisy = [track + rng.normal(size=track.shape) for track in tracks]
+        outliers = [track.copy() for track in noisy]
+        gaps = [track.copy() for track in noisy]
+        frames = rng.choice(500, 25, replace=False)
+        for number, frame in enumerate(frames):
+            outliers[number % 3][frame] += 200 * rng.choice([-1, 1], size=2)
+            gaps[number % 3][frame] = np.nan
+        start = truth.uncalibrated()
+        found, expected = (
+            calibration_errors(learn_cameras(seen, start), truth) for seen in (outliers, gaps)
+        )
+        # The two cameras that still see such a frame are left out as well: 1 in 20 frames.
+        np.testing.assert_allclose(found, expected, atol=2e-4)
+        assert np.abs(found).max() < 2e-3
+
+    def test_the_residuals_show_the_frame(self):
+        _, rig, tracks, _ = scene(3)
+        tracks[1][70] += 200
+        missed = [np.linalg.norm(residual, axis=1) for residual in residuals(tracks, rig)]
+        assert np.max(missed, axis=0).argmax() == 70
+        assert np.max(missed) > 50
+        np.testing.assert_allclose(np.delete(np.max(missed, axis=0), 70), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_a_wrong_normal_is_learned_back(index):
+    x, truth, tracks, _ = scene(5)
+    middle = x.mean(axis=0)
+    truth = Rig(replace(camera, position=middle) for camera in truth.cameras)
+    tracks = [camera.project(x) for camera in truth.cameras]
+    turn = rodrigues([1, 2, 3], np.deg2rad(8))
+    cameras = list(truth.cameras)
+    cameras[index] = replace(cameras[index], normal=turn @ cameras[index].normal)
+    learned = learn_normal(tracks, Rig(cameras).uncalibrated(), index)
+    np.testing.assert_allclose(
+        learned.cameras[index].normal, truth.cameras[index].normal, atol=1e-6
+    )
+    np.testing.assert_allclose(np.hstack(residuals(tracks, learned)), 0, atol=1e-4)
+
+
+class TestBadTracks:
+    def test_masked_rows_are_not_seen(self, small):
+        _, rig, tracks, _ = small
+        wild = tracks[1].copy()
+        wild[3] = 1e6
+        masked = np.ma.masked_array(wild, mask=np.zeros((40, 2), dtype=bool))
+        masked[3, 0] = np.ma.masked
+        assert np.isnan(residuals([tracks[0], masked, tracks[2]], rig)[1][3]).all()
+
+    def test_what_is_no_rig_or_no_tracks(self, small):
+        _, rig, tracks, _ = small
+        for use in (learn_cameras, reconstruct, residuals):
+            with pytest.raises(ValueError, match="rig: must be of type Rig, got 'rig.toml'"):
+                use(tracks, "rig.toml")
+            with pytest.raises(ValueError, match=r"tracks: must be a list of arrays \(n, 2\), one"):
+                use(None, rig)
+            with pytest.raises(ValueError, match=r"tracks\[0\]: must be an array of real numbers"):
+                use(["a.mkv", "b.mkv", "c.mkv"], rig)
+
+    @pytest.mark.parametrize("use", [learn_cameras, reconstruct, residuals])
+    def test_wrong_tracks(self, small, use):
+        _, rig, tracks, _ = small
+        infinite = tracks[1].copy()
+        infinite[3, 0] = np.inf
+        for bad, message in [
+            (tracks[:2], "tracks: must be one per camera, got 2 for 3 cameras"),
+            ([tracks[0], tracks[1], tracks[2][:-1]], r"same number of frames, got \[40, 40, 39\]"),
+            ([tracks[0], tracks[1].T, tracks[2]], r"tracks\[1\]: must have shape \(n, 2\), got"),
+            ([tracks[0], infinite, tracks[2]], r"tracks\[1\]: must be finite or NaN, got 1 inf"),
+            ([tracks[0], tracks[1], np.nan * tracks[2]], r"tracks\[2\]: must see the target in so"),
+        ]:
+            with pytest.raises(ValueError, match=message):
+                use(bad, rig)
+
+    def test_no_calibrated_camera(self, small):
+        _, rig, tracks, _ = small
+        rig = Rig(replace(camera, scale=None, angle=None) for camera in rig.cameras)
+        with pytest.raises(ValueError, match="at least one camera must be calibrated .* none of 3"):
+            learn_cameras(tracks, rig)
+
+    def test_unknown_method(self, small):
+        _, rig, tracks, _ = small
+        with pytest.raises(ValueError, match="method: must be one of .* got 'magic'"):
+            learn_cameras(tracks, rig, method="magic")
+
+    def test_too_few_common_frames(self, small):
+        _, rig, tracks, _ = small
+        start = rig.uncalibrated()
+        one = [track[:1] for track in tracks]
+        with pytest.raises(
+            ValueError, match=r"at least 4 equations .* of cameras\[1\] and .* got 3"
+        ):
+            learn_cameras(one, start)
+        tracks[0][20:] = np.nan
+        tracks[1][20:] = np.nan
+        tracks[2][:20] = np.nan
+        with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
+            learn_cameras(tracks, start)
+
+    @pytest.mark.parametrize("noise", [0, 0.3, 3])
+    @pytest.mark.parametrize("method", ["joint", "paper", "gradient"])
+    def test_static_target(self, small, noise, method):
+        _, rig, tracks, rng = small
+        still = [track[:1] + noise * rng.normal(size=track.shape) for track in tracks]
+        with pytest.raises(
+            ValueError, match=r"motion must determine .* cameras\[1\] and cameras\[2"
+        ):
+            learn_cameras(still, rig.uncalibrated(), method)
+
+    def test_motion_that_one_camera_does_not_see(self, small):
+        # Motion along the line of sight of camera 2 leaves it one equation short.
+        x, rig, _, _ = small
+        line = x[:1] + np.linspace(-1, 1, 40)[:, None] * rig.cameras[2].normal
+        start = Rig([*rig.cameras[:2], replace(rig.cameras[2], scale=None, angle=None)])
+        tracks = [camera.project(line) for camera in rig.cameras]
+        centre = replace(start.cameras[2], position=x[0])
+        tracks[2][:] = 255.5
+        with pytest.raises(ValueError, match=r"scale and angle of cameras\[2\], got"):
+            learn_cameras(tracks, Rig([*start.cameras[:2], centre]))
+
+    def test_eq_4_needs_independent_unknown_cameras(self, small):
+        _, rig, tracks, _ = small
+        twin = replace(rig.cameras[1], normal=-rig.cameras[1].normal)
+        rig = Rig([rig.cameras[0], rig.cameras[1], twin])
+        with pytest.raises(ValueError, match="'paper' needs two independent normals among the unc"):
+            learn_cameras(tracks, rig.uncalibrated(), "paper")
+
+    def test_joint_learns_parallel_unknown_cameras(self, small):
+        x, rig, _, _ = small
+        rig = Rig([rig.cameras[0], rig.cameras[1], replace(rig.cameras[1], angle=0.5)])
+        tracks = [camera.project(x) for camera in rig.cameras]
+        learned = learn_cameras(tracks, rig.uncalibrated())
+        assert np.abs(calibration_errors(learned, rig)).max() < 1e-9
+
+
+class TestPosition:
+    """Cameras whose position is not trusted: two more unknowns each."""
+
+    @staticmethod
+    def without(rig, *loose):
+        return Rig(
+            replace(camera, position=None) if i in loose else camera
+            for i, camera in enumerate(rig.cameras)
+        )
+
+    @given(SEEDS, st.sampled_from([(0, (2,)), (0, (1,)), (2, (2,)), (1, (0,))]))
+    @settings(max_examples=10)
+    def test_exact_tracks_give_the_exact_path(self, seed, which):
+        keep, loose = which
+        x, rig, tracks, _ = scene(seed, n=100)
+        learned = learn_cameras(tracks, self.without(rig.uncalibrated(keep), *loose))
+        for camera, true in zip(learned.cameras, rig.cameras, strict=True):
+            np.testing.assert_allclose(camera.offset, true.offset, atol=1e-6 * np.abs(x).max())
+        assert np.abs(calibration_errors(learned, rig)).max() < 1e-7
+        assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 1e-5
+
+    def test_a_calibrated_rig_may_miss_one(self):
+        x, rig, tracks, _ = scene(3)
+        learned = learn_cameras(tracks, self.without(rig, 1))
+        np.testing.assert_allclose(learned.cameras[1].offset, rig.cameras[1].offset, rtol=1e-7)
+        assert learned.cameras[0] == rig.cameras[0]
+
+    def test_two_of_four(self):
+        x, rig, tracks, rng = scene(5, cameras=4)
+        tracks = [track + 0.1 * rng.normal(size=track.shape) for track in tracks]
+        learned = learn_cameras(tracks, self.without(rig.uncalibrated(), 1, 3))
+        assert rmse_in_pixels(reconstruct(tracks, learned), x, rig).max() < 0.3
+
+    def test_it_is_the_position_that_was_wrong(self):
+        _, rig, tracks, _ = scene(6)
+        first, second, third = rig.uncalibrated().cameras
+        moved = replace(third, position=third.position + 20 * rig.cameras[2].scale * third.rows[0])
+        off = np.hstack(residuals(tracks, learn_cameras(tracks, Rig([first, second, moved]))))
+        free = self.without(Rig([first, second, moved]), 2)
+        assert np.abs(off).max() > 1
+        assert np.abs(np.hstack(residuals(tracks, learn_cameras(tracks, free)))).max() < 1e-6
+
+    def test_a_wrong_normal_is_found_beside_it(self):
+        _, rig, tracks, _ = scene(8, cameras=4)
+        start = self.without(rig.uncalibrated(), 3)
+        true = start.cameras[1].normal
+        wrong = replace(start.cameras[1], normal=rodrigues([0, 0, 1], 0.1) @ true)
+        first, _, third, fourth = start.cameras
+        found = learn_normal(tracks, Rig([first, wrong, third, fourth]), 1)
+        np.testing.assert_allclose(found.cameras[1].normal, true, atol=1e-4)
+
+    def test_file(self, small, tmp_path):
+        rig = self.without(small[1], 1)
+        rig.save(tmp_path / "rig.toml")
+        assert (tmp_path / "rig.toml").read_text().count("position") == 2
+        assert Rig.load(tmp_path / "rig.toml") == rig
+        assert len({*rig.cameras, *Rig.load(tmp_path / "rig.toml").cameras}) == 3
+
+    def test_what_cannot_be_learned_is_said(self, small):
+        x, rig, tracks, _ = small
+        with pytest.raises(ValueError, match=r"rig: the positions of two cameras .* got 1"):
+            learn_cameras(tracks, self.without(rig, 1, 2))
+        with pytest.raises(ValueError, match=r"'joint' .* position of cameras\[2\], got 'paper'"):
+            learn_cameras(tracks, self.without(rig.uncalibrated(), 2), method="paper")
+        still = [np.repeat(track[:1], 40, axis=0) for track in tracks]
+        message = r"must determine scale, angle and position of .*cameras\[2\]"
+        with pytest.raises(ValueError, match=message):
+            learn_cameras(still, self.without(rig.uncalibrated(), 2))
+        loose = self.without(rig, 1)
+        with pytest.raises(ValueError, match=r"got cameras\[1\] without; use learn_cameras"):
+            reconstruct(tracks, loose)
+        with pytest.raises(ValueError, match="camera: position must be known, got None"):
+            loose.cameras[1].project(x)
+
+
+def test_two_cameras_do_not_see_what_three_do():
+    x = trajectory(np.random.default_rng(6), 200)
+    first, second, third = Rig.around(x).cameras
+    tracks = [camera.project(x) for camera in (first, second, third)]
+    found = learn_cameras(tracks[:2], Rig([first, second]).uncalibrated())
+    np.testing.assert_allclose(reconstruct(tracks[:2], found), x, atol=1e-8 * np.ptp(x))
+    turn = rodrigues(np.cross(first.normal, second.normal), np.deg2rad(5))
+    wrong = replace(second, normal=turn @ second.normal)
+    pair = learn_cameras(tracks[:2], Rig([first, wrong]).uncalibrated())
+    assert np.abs(np.hstack(residuals(tracks[:2], pair))).max() < 1e-6
+    assert np.abs(reconstruct(tracks[:2], pair) - x).max() > 0.02 * np.ptp(x)
+    assert np.abs(np.hstack(residuals(tracks, Rig([*pair.cameras, third])))).max() > 1

@@ -1,0 +1,307 @@
+"""Lags of videos: exact, to a fraction of a frame, and known to be unknown."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers import trajectory
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+
+import vidsindy_lite as vl
+from vidsindy_lite.cameras import synchronise as synchrony
+from vidsindy_lite.cameras.synchronise import (
+    DISAGREEMENT,
+    align,
+    disagreement,
+    learn_lags,
+    list_lags,
+)
+
+NOISE = 0.05  # pixels
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """A motion as a function of the frame number, from -60 to 340, and a rig around it."""
+    x = trajectory(np.random.default_rng(4), 400)
+    return CubicSpline(np.arange(400) - 60, x), vl.Rig.around(x)
+
+
+def filmed(motion, frames, lags, rates=(1, 1, 1), noise=NOISE):
+    path, rig = motion
+    rng = np.random.default_rng(0)
+    tracks = []
+    for camera, n, lag, rate in zip(rig.cameras, frames, lags, rates, strict=True):
+        pixels = camera.project(path(lag + np.arange(n) / rate))
+        tracks.append(pixels + noise * rng.normal(size=pixels.shape))
+    return tracks
+
+
+# ---------------------------------------------------------------------------------------- the clock
+
+
+def test_whole_lags_move_tracks_as_they_are(motion):
+    tracks = filmed(motion, (100, 90, 120), (0, 0, 0))
+    first, second, third = align(tracks, (0, 7, -12))
+    np.testing.assert_array_equal(first, tracks[0])
+    np.testing.assert_array_equal(second[7:97], tracks[1])
+    assert np.isnan(second[:7]).all()
+    assert np.isnan(second[97:]).all()
+    np.testing.assert_array_equal(third, tracks[2][12:112])
+
+
+def test_only_differences_of_lags_count(motion):
+    tracks = filmed(motion, (40, 40, 40), (0, 0, 0))
+    for ours, theirs in zip(align(tracks, (3, 5, 0)), align(tracks, (0, 2, -3)), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9), st.floats(1e-6, 1e6), st.floats(1e-6, 1e6))
+def test_far_lags_and_fast_rates_are_no_trouble(first, second, slow, fast):
+    with warnings.catch_warnings(action="error"):
+        ours, theirs = align([np.ones((9, 2)), np.ones((5, 2))], (first, second), (slow, fast))
+    assert (ours == 1).all()
+    if second - first > 9:
+        assert np.isnan(theirs).all()
+
+
+@given(st.floats(-5, 5), st.floats(0.4, 2.5))
+@settings(max_examples=30)
+def test_cubic_motions_are_interpolated_exactly(lag, rate):
+    def pixels(instant):
+        return np.column_stack((100 + instant - 0.01 * instant**3, 50 - 0.1 * instant**2))
+
+    tracks = [pixels(np.arange(20)), pixels(lag + np.arange(60) / rate)]
+    ours, theirs = align(tracks, (0, lag), (1, rate))
+    shown = np.isfinite(theirs).all(axis=1)
+    np.testing.assert_allclose(theirs[shown], ours[shown], rtol=0, atol=1e-8)
+    instants = np.arange(20)
+    covered = (instants >= lag + 1 / rate) & (instants <= lag + 58 / rate)
+    assert shown[covered].all()
+
+
+def test_nothing_is_made_up_in_gaps(motion):
+    tracks = filmed(motion, (50, 50, 50), (0, 0, 0))
+    tracks[1][20:25] = np.nan
+    _, second, _ = align(tracks, (0, 0.5, 0))
+    hidden = np.isnan(second).any(axis=1)
+    assert np.flatnonzero(hidden).tolist() == [0, *range(20, 26)]
+
+
+# ----------------------------------------------------------------------------------------- learning
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("keep", [0, 2])
+def test_fractional_lags_and_different_lengths(motion, keep):
+    lags = (0, 7.4, -12.7)
+    tracks = filmed(motion, (250, 230, 240), lags)
+    found = learn_lags(tracks, motion[1].uncalibrated(keep))
+    assert found.agree
+    assert found.doubts == ()
+    pulls = (found.lags - lags)[1:] / found.errors[1:]
+    assert np.abs(pulls).max() < 4
+    assert found.errors.max() < 0.01
+    assert found.errors[0] == 0
+
+
+@pytest.mark.parametrize(
+    "lags", [(0, 0, 0), (0, 7, 0), pytest.param((0, -20, 35), marks=pytest.mark.slow)]
+)
+def test_whole_lags_come_out_whole(motion, lags):
+    found = learn_lags(filmed(motion, (250, 240, 230), lags), motion[1].uncalibrated())
+    assert found.lags.tolist() == list(lags)
+    assert found.missed < 5 * NOISE
+
+
+def test_a_small_fraction_is_not_rounded_away(motion):
+    found = learn_lags(filmed(motion, (250,) * 3, (0, 0.1, 0)), motion[1].uncalibrated())
+    np.testing.assert_allclose(found.lags, (0, 0.1, 0), atol=0.01)
+
+
+@pytest.mark.slow
+def test_different_frame_rates(motion):
+    lags, rates = (0, 10.3, -20), (1, 1.2, 0.5)
+    tracks = filmed(motion, (250, 250, 120), lags, rates)
+    found = learn_lags(tracks, motion[1].uncalibrated(), rates)
+    np.testing.assert_allclose(found.lags, lags, atol=0.02)
+    np.testing.assert_allclose(found.rates, rates)
+    assert found.frame(1, 100) == round((100 - 10.3) * 1.2)
+
+
+def test_calibrated_rig_and_outliers(motion):
+    tracks = filmed(motion, (250, 250, 250), (0, 7, -4))
+    for i, track in enumerate(tracks):
+        track[20 + i :: 50] += 60  # jumps of the tracker, in up to six frames of a hundred
+    found = learn_lags(tracks, motion[1])
+    np.testing.assert_allclose(found.lags, (0, 7, -4), atol=0.02)
+
+
+@pytest.mark.slow
+def test_a_camera_without_a_position(motion):
+    first, second, third = motion[1].uncalibrated().cameras
+    rig = vl.Rig([first, replace(second, position=None), third])
+    found = learn_lags(filmed(motion, (250, 250, 250), (0, 7, -4)), rig)
+    assert found.lags.tolist() == [0, 7, -4]
+
+
+@pytest.mark.slow
+def test_perspective_cameras():
+    x = trajectory(np.random.default_rng(5), 300)
+    middle, reach = x.mean(axis=0), np.linalg.norm(np.ptp(x, axis=0))
+    cameras = [
+        vl.PerspectiveCamera(
+            position=middle + 3 * reach * camera.normal,
+            normal=camera.normal,
+            scale=camera.scale / (3 * reach),
+            angle=camera.angle,
+        )
+        for camera in vl.Rig.around(x).cameras
+    ]
+    tracks = [camera.project(x) for camera in cameras]
+    tracks[1] = tracks[1][9:]
+    found = learn_lags(tracks, vl.Rig(cameras).uncalibrated())
+    np.testing.assert_allclose(found.lags, (0, 9, 0), atol=1e-6)
+
+
+# ------------------------------------------------------------------------ what cannot be told apart
+
+
+def periodic(k):
+    phase = 2 * np.pi * np.asarray(k) / 60.3
+    return np.column_stack(
+        (10 + 5 * np.cos(phase), 6 * np.sin(phase), 3 * np.cos(phase + 1) + 2 * np.sin(2 * phase))
+    )
+
+
+@pytest.mark.slow
+def test_a_motion_that_repeats_itself_leaves_several_lags():
+    rig = vl.Rig.around(periodic(np.arange(61)))
+    tracks = filmed((periodic, rig), (180, 180, 180), (0, 20, 5))
+    found = learn_lags(tracks, rig.uncalibrated())
+    assert found.agree
+    assert found.lags.tolist() == [0, 20, 5]  # the smallest
+    assert "the lags of the videos cannot be told: (" in found.doubts[0]
+    assert "because the motion repeats itself" in found.doubts[0]
+
+
+def test_a_target_that_hardly_moves_tells_no_lag():
+    rig = vl.Rig.around(periodic(np.arange(61)))
+
+    def slow(k):
+        return rig.cameras[0].scale * np.outer(k, [0.01, 0.02, 0.01])
+
+    found = learn_lags(filmed((slow, rig), (150,) * 3, (0, 0, 0), noise=0.4), rig)
+    assert any("the target moves too little or too slowly" in doubt for doubt in found.doubts)
+
+
+def test_a_wrong_rig_is_not_explained_by_lags(motion):
+    first, second, third = motion[1].uncalibrated().cameras
+    turned = replace(second, normal=second.normal + 0.3 * second.rows[0])
+    tracks = filmed(motion, (250,) * 3, (0, 0, 0))
+    found = learn_lags(tracks, vl.Rig([first, turned, third]))
+    assert not found.agree
+    assert found.missed > DISAGREEMENT
+    assert found.lags.tolist() == [0, 0, 0]
+    assert np.isinf(found.errors).all()
+
+
+def test_no_lags_are_tried_twice(motion, monkeypatch):
+    first, second, third = motion[1].uncalibrated().cameras
+    turned = replace(second, normal=second.normal + 0.3 * second.rows[0])
+    tried = []
+
+    def watched(tracks, rig):
+        tried.append(np.hstack(tracks).tobytes())
+        return vl.learn_cameras(tracks, rig)
+
+    monkeypatch.setattr(synchrony, "learn_cameras", watched)
+    learn_lags(filmed(motion, (100,) * 3, (0, 0, 0)), vl.Rig([first, turned, third]))
+    assert len(tried) > 10
+    assert len(set(tried)) == len(tried)
+
+
+@pytest.mark.slow
+def test_lags_that_are_given_are_the_start(motion):
+    tracks = filmed(motion, (250,) * 3, (0, 7, 0))
+    rig = motion[1].uncalibrated()
+    assert learn_lags(tracks, rig, start=(1, 8, 1)).lags.tolist() == [0, 7, 0]
+    assert learn_lags(tracks, rig, start=(0, 60, 0)).lags.tolist() == [0, 7, 0]
+
+
+def test_outliers_do_not_count_as_disagreement(motion):
+    tracks = filmed(motion, (250,) * 3, (0, 0, 0))
+    quiet = disagreement(tracks, motion[1])
+    tracks[0][::20] += 50
+    assert max(disagreement(tracks, motion[1])) < 1.5 * max(quiet)
+
+
+def test_lags_as_text():
+    assert list_lags(np.array([0.0, 7.0, -12.504, -1e-9])) == "0, 7, -12.5, 0"
+
+
+# ---------------------------------------------------------------------------------------- bad input
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"rates": (1, 1)}, "rates: must be 3 finite numbers"),
+        ({"rates": (1, 0, 1)}, "rates: must be positive, got 0"),
+        ({"rates": (1, 1e300, 1)}, r"rates: must be between 1e-06 and 1e\+06, got 1e\+300"),
+        ({"rates": (1, 1, 1e-310)}, r"rates: must be between 1e-06 and 1e\+06, got 1e-310"),
+        ({"start": (0, -1e300, 0)}, r"start: must be at most 1e\+09 frames, got 1e\+300"),
+        ({"start": (0, np.nan, 0)}, "start: must be 3 finite numbers"),
+    ],
+)
+def test_bad_input_is_named(motion, arguments, message):
+    tracks = filmed(motion, (30,) * 3, (0, 0, 0))
+    with pytest.raises(ValueError, match=message):
+        learn_lags(tracks, motion[1], **arguments)
+
+
+def test_one_track_per_camera_and_lag(motion):
+    tracks = filmed(motion, (30,) * 3, (0, 0, 0))
+    with pytest.raises(ValueError, match="tracks: must be one per camera, got 2 for 3 cameras"):
+        learn_lags(tracks[:2], motion[1])
+    with pytest.raises(ValueError, match="lags: must be 3 finite numbers"):
+        align(tracks, (0, 1))
+    with pytest.raises(ValueError, match=r"lags: must be at most 1e\+09 frames, got 1e\+300"):
+        align(tracks, (0, 1e300, 0))
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "message"),
+    [
+        (np.zeros(30), r"tracks\[1\]: must have shape \(n, 2\), got \(30,\)"),
+        (np.zeros((30, 3)), r"tracks\[1\]: must have shape \(n, 2\), got \(30, 3\)"),
+        (np.full((30, 2), np.inf), r"tracks\[1\]: must be finite or NaN, got 60 infinite values"),
+        (np.full((30, 2), 1e300), r"tracks\[1\]: must be pixels of at most 1e\+100, got 1e\+300"),
+        ("abc", r"tracks\[1\]: must be an array of real numbers, got 'abc'"),
+    ],
+)
+def test_tracks_of_a_wrong_shape_are_named(motion, spoilt, message):
+    tracks = filmed(motion, (30,) * 3, (0, 0, 0))
+    tracks[1] = spoilt
+    for use in (lambda: learn_lags(tracks, motion[1]), lambda: align(tracks, (0, 0, 0))):
+        with pytest.raises(ValueError, match=message):
+            use()
+
+
+@pytest.mark.parametrize("wrong", [None, "a.mkv", {}, [], np.array(3.0)])
+def test_what_are_no_tracks(motion, wrong):
+    for use in (lambda: learn_lags(wrong, motion[1]), lambda: align(wrong, (0, 0, 0))):
+        message = r"tracks: must be a list of arrays \(n, 2\), one per camera, got "
+        with pytest.raises(ValueError, match=message):
+            use()
+
+
+@pytest.mark.parametrize("blind", [0, 2])
+def test_a_camera_that_never_sees_the_target(motion, blind):
+    tracks = filmed(motion, (30,) * 3, (0, 0, 0))
+    tracks[blind][::2, 0] = tracks[blind][1::2, 1] = np.nan  # half a pixel tells nothing
+    with pytest.raises(ValueError, match=rf"tracks\[{blind}\]: must show the target in some frame"):
+        learn_lags(tracks, motion[1])

@@ -1,0 +1,207 @@
+"""Errors that all samples share: told by the rig, counted in by the law."""
+
+import numpy as np
+import pytest
+from helpers import trajectory
+
+import vidsindy_lite as vl
+from vidsindy_lite import study
+from vidsindy_lite.cameras.calibrate import camera_parameters
+from vidsindy_lite.cameras.synchronise import Synchrony
+from vidsindy_lite.cameras.uncertainty import (
+    long_run_covariance,
+    systematic_errors,
+    trailing_errors,
+)
+
+NOISE = 0.05  # pixels
+
+
+def dependent(rng, n, memory):
+    """A series of mean 0 and variance 1 in which each value keeps a share of the one before."""
+    series = rng.normal(size=(n, 2))
+    for k in range(1, n):
+        series[k] = memory * series[k - 1] + np.sqrt(1 - memory**2) * series[k]
+    return series
+
+
+def learned_rig(rng, memory, frames=250):
+    """A random rig learned from noisy tracks: errors of its parameters, and the path's modes."""
+    x = trajectory(rng, frames)
+    truth = vl.Rig.around(x)
+    rig = truth.uncalibrated()
+    tracks = [c.project(x) + NOISE * dependent(rng, frames, memory) for c in truth.cameras]
+    learned = vl.learn_cameras(tracks, rig)
+    still = Synchrony(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
+    modes = systematic_errors(tracks, rig, learned, still)
+    return camera_parameters(rig, learned) - camera_parameters(rig, truth), modes, x, learned
+
+
+@pytest.mark.parametrize("memory", [0.0, pytest.param(0.6, marks=pytest.mark.slow)])
+def test_errors_of_cameras_are_as_large_as_stated(memory):
+    pulls = []
+    for seed in np.random.SeedSequence(5).spawn(15):
+        errors, modes, x, learned = learned_rig(np.random.default_rng(seed), memory)
+        # What the cameras' errors do to the path, in units of what they may do.
+        turned = vl.reconstruct([c.project(x) for c in vl.Rig.around(x).cameras], learned) - x
+        sizes, *_ = np.linalg.lstsq(modes.reshape(len(modes), -1).T, turned.ravel())
+        assert np.abs(turned - np.tensordot(sizes, modes, 1)).max() < 0.02 * np.abs(turned).max()
+        pulls.append(sizes)
+    spread = np.sqrt(np.mean(np.square(pulls)))
+    assert 0.8 < spread < 1.3  # with independent errors taken for granted: 2 at the second
+    assert np.abs(pulls).max() < 5
+
+
+def test_known_cameras_share_no_errors():
+    x = trajectory(np.random.default_rng(1), 50)
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) for camera in rig.cameras]
+    still = Synchrony(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
+    assert systematic_errors(tracks, rig, rig, still).shape == (0, 50, 3)
+
+
+def test_an_uncertain_lag_moves_the_path_along_its_motion():
+    rng = np.random.default_rng(2)
+    x = trajectory(rng, 200)
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) + NOISE * rng.normal(size=(200, 2)) for camera in rig.cameras]
+    lags = Synchrony(np.zeros(3), np.ones(3), np.array([0, 0.01, np.inf]), 0.0)
+    modes = systematic_errors(tracks, rig, rig, lags)
+    assert modes.shape == (1, 200, 3)
+    speed, shift = (np.linalg.norm(part, axis=1) for part in (np.gradient(x, axis=0), modes[0]))
+    assert np.corrcoef(speed[2:-2], shift[2:-2])[0, 1] > 0.8
+
+
+def trailing(rig, x, trail, noise=NOISE, seed=0):
+    """Tracks that stay behind the motion by so many pixels."""
+    rng = np.random.default_rng(seed)
+    clean = [camera.project(x) for camera in rig.cameras]
+    steps = [np.gradient(track, axis=0) for track in clean]
+    return [
+        track - trail * step / np.linalg.norm(step, axis=1, keepdims=True)
+        + noise * rng.normal(size=track.shape)
+        for track, step in zip(clean, steps, strict=True)
+    ]  # fmt: skip
+
+
+def test_trails_are_half_the_noise_of_the_tracks():
+    x = trajectory(np.random.default_rng(3), 400)
+    rig = vl.Rig.around(x)
+    modes = trailing_errors(trailing(rig, x, 0), rig)
+    assert modes.shape == (3, 400, 3)
+    behind = vl.reconstruct(trailing(rig, x, NOISE / 2, noise=0), rig) - x
+    apart = modes.sum(axis=0) - behind
+    assert np.sqrt(np.mean(apart**2)) < 0.2 * np.sqrt(np.mean(behind**2))
+    np.testing.assert_allclose(trailing_errors(trailing(rig, x, 0, noise=0), rig), 0, atol=1e-9)
+
+
+def test_no_trail_where_nothing_moves_or_is_seen():
+    x = trajectory(np.random.default_rng(4), 100)
+    x[40:60] = x[40]
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) for camera in rig.cameras]
+    for track in tracks:
+        track[80:] = np.nan
+    tracks[0][:20] += NOISE * np.random.default_rng(0).normal(size=(20, 2))
+    modes = trailing_errors(tracks, rig)
+    assert np.isfinite(modes).all()
+    np.testing.assert_allclose(modes[:, 41:59], 0, atol=1e-12)
+    np.testing.assert_array_equal(modes[:, 80:], 0)
+
+
+def test_long_run_covariance_of_an_autoregressive_series():
+    series = dependent(np.random.default_rng(0), 20000, 0.6)
+    np.testing.assert_allclose(np.diag(long_run_covariance(series)), 4, rtol=0.15)  # 1.6 / 0.4
+    np.testing.assert_allclose(np.diag(long_run_covariance(series[::40])), 1, rtol=0.3)
+
+
+# ------------------------------------------------------------------------------------ in the solver
+
+
+def distorted(name, seed, size):
+    """A clean trajectory seen through a slightly wrong linear map, and what the map may be."""
+    rng = np.random.default_rng(seed)
+    truth = study.SYSTEMS[name].shift((10, 10, 0))
+    t, x = truth.trajectory(300)
+    modes = size * np.einsum("kij,nj->kni", rng.normal(size=(4, 3, 3)), x - x.mean(axis=0))
+    noise = 1e-5 * x.std(axis=0) * rng.normal(size=x.shape)
+    return truth, t, x + np.tensordot(rng.normal(size=4), modes, 1) + noise, modes
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"), [("SprottE", 0), pytest.param("WangSun", 4, marks=pytest.mark.slow)]
+)
+def test_a_slightly_wrong_map_makes_false_terms_unless_it_is_told(name, seed):
+    truth, t, x, modes = distorted(name, seed, 1e-4)
+    blind = study.score(vl.discover(t, x), truth)
+    told = vl.discover(t, x, systematic=modes)
+    assert blind.false_positives > 0
+    assert study.score(told, truth).exact
+    assert study.score(told, truth).l2 < 0.1 * blind.l2
+    inside = truth.support
+    pulls = (told.coefficients - truth.coefficients)[inside] / told.standard_errors[inside]
+    assert np.sqrt(np.mean(pulls**2)) < 2.5
+    assert told.status == "ok"
+
+
+@pytest.mark.slow
+def test_trailing_tracks_make_false_terms_unless_it_is_told():
+    truth = study.SYSTEMS["SprottF"].shift(study.REFERENCE_OFFSET)
+    t, x = truth.trajectory(600)
+    rig = vl.Rig.around(x)
+    tracks = trailing(rig, x, 0.5 * NOISE)
+    seen = vl.reconstruct(tracks, rig)
+    blind = vl.discover(t, seen)
+    told = vl.discover(t, seen, systematic=trailing_errors(tracks, rig))
+    assert study.score(blind, truth).false_positives > 0
+    assert study.score(told, truth).exact
+    assert told.status == "ok"
+
+
+def oscillation():
+    """dx/dt = -y, dy/dt = x, with noise of 1e-3."""
+    t = np.linspace(0, 20, 200)
+    x = np.column_stack((np.cos(t), np.sin(t)))
+    return t, x, x + 1e-3 * np.random.default_rng(0).normal(size=x.shape)
+
+
+def test_no_systematic_errors_change_nothing():
+    t, x, noisy = oscillation()
+    plain, none = (vl.discover(t, noisy, 2, systematic=e) for e in (None, x[None][:0]))
+    np.testing.assert_array_equal(plain.coefficients, none.coefficients)
+    np.testing.assert_array_equal(plain.covariance, none.covariance)
+
+
+def test_error_bars_grow_with_systematic_errors():
+    # A wrong scale of x alone changes both coefficients in proportion.
+    t, x, noisy = oscillation()
+    scale = 1e-3 * x * [1, 0]
+    without, told = (vl.discover(t, noisy, 1, systematic=e) for e in (None, scale[None]))
+    np.testing.assert_allclose(told.standard_errors.max(axis=0), 1e-3, rtol=0.1)
+    assert without.standard_errors.max() < 2e-4
+
+
+@pytest.mark.slow
+def test_missing_rows_and_several_trajectories():
+    truth, t, x, modes = distorted("SprottE", 0, 1e-4)
+    x[100:104] = np.nan
+    modes[:, 100:104] = np.nan
+    whole = vl.discover(t, x, systematic=modes)
+    halves = [(t[:150], x[:150]), (t[150:], x[150:])]
+    parts = vl.discover(halves, systematic=[modes[:, :150], modes[:, 150:]])
+    assert study.score(whole, truth).exact
+    assert study.score(parts, truth).exact
+
+
+@pytest.mark.parametrize(
+    ("systematic", "message"),
+    [
+        (np.zeros((2, 9, 2)), r"systematic: must have shape \(k, 10, 2\), got \(2, 9, 2\)"),
+        (np.zeros((10, 2)), "systematic: must be one array per trajectory"),
+        (np.full((1, 10, 2), np.nan), "systematic: must be finite where x is"),
+    ],
+)
+def test_malformed_systematic_errors_are_named(systematic, message):
+    t = np.arange(10.0)
+    with pytest.raises(ValueError, match=message):
+        vl.discover(t, np.column_stack((np.sin(t), np.cos(t))), 1, systematic=systematic)

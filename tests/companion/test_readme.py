@@ -1,0 +1,141 @@
+"""The README's code runs, its generated parts are current, its links lead somewhere."""
+
+import json
+import re
+import shutil
+
+import pytest
+
+from vidsindy_lite.cameras import Rig
+from vidsindy_lite.companion.readme import HEADLINES, PARTS, fill
+from vidsindy_lite.companion.site import heading_anchor
+from vidsindy_lite.stamp import PACKAGE
+
+ROOT = PACKAGE.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("tracked_once")
+def test_the_code_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    smallest, own_videos, test_videos = blocks("python")
+    names = {}
+    for code in (smallest, test_videos, own_videos):  # which writes the files that the last reads
+        exec(code, names)
+    assert "all true terms found, 0 false" in capsys.readouterr().out
+
+
+def test_the_rig_file_is_one(tmp_path):
+    text = "\n".join(blocks("toml"))  # the second one adds a camera
+    (tmp_path / "rig.toml").write_text(text)
+    rig = Rig.load(tmp_path / "rig.toml")
+    assert [camera.is_calibrated for camera in rig.cameras] == [True, False, False, True]
+
+
+def test_a_line_that_does_not_run_is_seen():
+    code = blocks("python")[0].replace("vl.discover(", "vl.find(")
+    with pytest.raises(AttributeError, match="find"):
+        exec(code, {})
+
+
+# ---------------------------------------------------------------------------------- generated parts
+
+
+def test_generated_parts_are_those_of_the_figures():
+    assert re.findall(r"^<!-- (\w+) -->$", README.replace("<!-- end -->", ""), re.MULTILINE)
+    assert fill(README, ROOT) == README
+
+
+def test_every_part_is_shown():
+    assert all(f"\n<!-- {name} -->\n" in README for name in PARTS)
+
+
+@pytest.mark.parametrize(("old", "new"), [("35 of 35", "34 of 35"), ("| 0.77 |", "| 0.07 |")])
+def test_an_edited_result_is_seen(old, new):
+    assert old in README
+    assert fill(README.replace(old, new, 1), ROOT) != README.replace(old, new, 1)
+
+
+def test_every_notebook_has_one_headline():
+    sources = {path.stem: path.read_text("utf-8") for path in (ROOT / "notebooks").glob("*.py")}
+    saved = [[name for name in HEADLINES if f'"{name}"' in text] for text in sources.values()]
+    assert [len(names) for names in saved] == [1] * len(sources)
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "headline"),
+    [
+        (
+            "tour_score",
+            [{"true terms": 12, "missing": 1, "false": 2, "l2": 3.2e-4, "worst coefficient": 0.1}],
+            "11 of 12 terms, 2 false, l2 3e-04",
+        ),
+        (
+            "projection_shift",
+            [{"rotation": r, "shift of the image": s} for r, s in (("R", 2e-15), ("text", 31.4))],
+            "the plane's D moves the image by 2e-15; with the text's rotation by 31",
+        ),
+    ],
+)
+def test_a_headline_says_what_its_table_holds(tmp_path, name, rows, headline):
+    figures = tmp_path / "figures"
+    figures.mkdir()
+    (tmp_path / "notebooks").mkdir()
+    (tmp_path / "notebooks" / "00_one.py").write_text("# # One\n")
+    record = {"id": name, "kind": "table", "caption": "A table.", "notebook": "00_one"}
+    (figures / f"{name}.json").write_text(json.dumps({**record, "rows": rows}))
+    assert f"| One | {headline} |" in PARTS["notebooks"](tmp_path)
+
+
+def test_another_result_is_seen(tmp_path):
+    shutil.copytree(ROOT / "figures", tmp_path / "figures")
+    shutil.copytree(ROOT / "notebooks", tmp_path / "notebooks")
+    assert fill(README, tmp_path) == README
+    table = tmp_path / "figures" / "table_1.json"
+    table.write_text(table.read_text().replace('"paper: l2 (e-2)": 1.5', '"paper: l2 (e-2)": 1.6'))
+    assert fill(README, tmp_path) != README
+
+
+def test_an_unknown_part_is_named():
+    with pytest.raises(ValueError, match="text: a part must be one of .*, got 'table_9'"):
+        fill("<!-- table_9 -->\n<!-- end -->", ROOT)
+
+
+# -------------------------------------------------------------------------------------------- links
+
+
+def dead_links(page):
+    """Relative links of a Markdown page that lead to no file, or to no heading of a page."""
+    text = re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
+    text = text.replace("# # ", "# ")  # the .py half of a notebook
+    dead = []
+    for url in re.findall(r"\]\(([^)\s]+)\)", text):
+        path, _, anchor = url.partition("#")
+        target = page.parent / path if path else page
+        if ":" not in url and not target.exists():
+            dead.append(url)
+        elif ":" not in url and anchor and target.suffix == ".md":
+            headings = re.findall(r"^#+ (.*)", target.read_text("utf-8"), re.MULTILINE)
+            if anchor not in map(heading_anchor, headings):
+                dead.append(url)
+    return dead
+
+
+@pytest.mark.parametrize(
+    "page",
+    [ROOT / "README.md", ROOT / "figures" / "README.md", *(ROOT / "notebooks").glob("*.py")],
+    ids=lambda page: f"{page.parent.name}/{page.name}",
+)
+def test_links_lead_somewhere(page):
+    assert dead_links(page) == []
+
+
+def test_a_dead_link_is_seen(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# One\n[a](page.md#one) [b](page.md#two) [c](none.md) [d](https://x.org)")
+    assert dead_links(page) == ["page.md#two", "none.md"]

@@ -1,0 +1,185 @@
+"""The report: complete, readable without network, and whole or not there."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import fields, replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import vidsindy_lite as vl
+from vidsindy_lite import study
+from vidsindy_lite.cameras import Synchrony
+from vidsindy_lite.companion.report import FILES, check_folder_is_free, summary, write_report
+from vidsindy_lite.dynamics import Discovery
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    """A law, found from a true path with gaps, and videos that show it."""
+    folder = tmp_path_factory.mktemp("videos")
+    truth = study.SYSTEMS["SprottE"].shift(study.REFERENCE_OFFSET)
+    t, x = truth.trajectory(150)
+    rig = vl.Rig.around(x, image_size=(96, 96))
+    tracks = [camera.project(x) for camera in rig.cameras]
+    paths = []
+    for i, track in enumerate(tracks):
+        paths.append(folder / f"<{i}>.mov")  # a name that has to be escaped
+        scene = vl.Scene(background="plain", size=8, image_size=(96, 96))
+        vl.render_video(paths[-1], track[:20], scene)
+    tracks[1] = np.where(np.arange(150)[:, None] < 10, np.nan, tracks[1])
+    tracks[2] = np.where(np.arange(150)[:, None] < 5, np.nan, tracks[2])
+    x[:5] = np.nan
+    law = vl.discover(t, x, degree=2)
+    parts = {field.name: getattr(law, field.name) for field in fields(Discovery)}
+    lags = Synchrony(np.array([0, 3.5, 0]), np.ones(3), np.array([0, 0.01, np.inf]), 0.1)
+    return vl.VideoDiscovery(**parts, tracks=tuple(tracks), rig=rig, lags=lags, t=t, x=x), paths
+
+
+@pytest.fixture(scope="module")
+def page(case, tmp_path_factory):
+    found, paths = case
+    folder = tmp_path_factory.mktemp("out") / "report"
+    return write_report(found, paths, folder, {"degree": 2})
+
+
+class Parser(HTMLParser):
+    """Collects addresses, and checks that what is opened is closed."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.addresses, self.images = [], [], 0
+
+    def handle_starttag(self, tag, attributes):
+        self.addresses += [value for key, value in attributes if key in ("src", "href")]
+        self.images += tag == "img"
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_the_page_needs_nothing_else(page):
+    parser = Parser()
+    text = page.read_text(encoding="utf-8")
+    parser.feed(text)
+    assert parser.open == []
+    assert parser.images == 4
+    assert all(address.startswith("data:image/png;base64,") for address in parser.addresses)
+    assert not re.search(r"https?:|@import|<script|<link", text)
+    assert len(text) < 3_000_000
+
+
+def test_the_page_tells_law_verdict_and_cameras(page, case):
+    found, _ = case
+    text = page.read_text(encoding="utf-8")
+    for frame in ("data", "native"):
+        assert found.equations(frame) in text
+    assert "No reason for doubt was found." in text
+    assert "3.500 ± 0.01" in text
+    assert "0.000 ± unknown" in text
+    assert "&lt;1&gt;.mov" in text
+    assert "<1>" not in text
+    assert "degree 2" in text
+
+
+def test_doubts_are_told_in_words(case):
+    found, paths = case
+    from vidsindy_lite.companion.report import _page
+
+    doubted = replace(found, warnings=("the rig is < wrong",))
+    text = _page(doubted, paths, summary(doubted, paths))
+    assert "Suspect: do not trust this law as it is." in text
+    assert "the rig is &lt; wrong" in text
+    assert "No reason for doubt" not in text
+
+
+def test_the_data_are_those_of_the_law(page, case):
+    found, _ = case
+
+    def refuse(constant):
+        raise AssertionError(f"{constant} is not JSON")
+
+    data = json.loads((page.parent / "result.json").read_text("utf-8"), parse_constant=refuse)
+    assert data["status"] == found.status
+    assert data["law"]["native"]["equations"] == found.equations("native")
+    term = data["law"]["data"]["terms"][0]
+    row, column = found.terms.index(term["term"]), "xyz".index(term["equation"][1])
+    assert term["coefficient"] == found.coefficients[row, column]
+    assert term["standard_error"] == found.standard_errors[row, column]
+    assert len(data["law"]["data"]["terms"]) == found.system.support.sum()
+    x = np.array(data["x"], dtype=float)
+    np.testing.assert_array_equal(x, found.x)
+    assert data["x"][0] == [None] * 3
+    assert data["cameras"][1]["lag"] == 3.5
+    assert data["cameras"][2]["lag_error"] is None
+    assert data["cameras"][1]["share_of_frames_seen"] == pytest.approx(140 / 150)
+
+
+def test_the_learned_rig_is_there(page, case):
+    assert vl.Rig.load(page.parent / "rig.toml") == case[0].rig
+    assert {path.name for path in page.parent.iterdir()} == set(FILES)
+
+
+def test_an_earlier_report_is_replaced(case, page, tmp_path):
+    folder = tmp_path / "report"
+    folder.mkdir()
+    (folder / "report.html").write_text("old")
+    write_report(*case, folder)
+    assert {path.name for path in folder.iterdir()} == set(FILES)
+    assert "old" not in (folder / "report.html").read_text(encoding="utf-8")[:10]
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_a_report_that_fails_leaves_what_was_there(case, tmp_path):
+    found, paths = case
+    folder = tmp_path / "report"
+    folder.mkdir()
+    (folder / "report.html").write_text("old")
+    with pytest.raises(FileNotFoundError, match="gone"):
+        write_report(found, [*paths[:2], tmp_path / "gone.mov"], folder)
+    assert (folder / "report.html").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_other_peoples_files_are_not_overwritten(tmp_path):
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(ValueError, match="out: must be a new folder .* with thesis.tex"):
+        check_folder_is_free(tmp_path)
+    with pytest.raises(ValueError, match="out: must be a folder, got the file"):
+        check_folder_is_free(tmp_path / "thesis.tex")
+    with pytest.raises(ValueError, match="out: the folder around it must exist"):
+        check_folder_is_free(tmp_path / "a" / "b")
+
+
+IN_A_NOTEBOOK = """
+from types import SimpleNamespace
+import matplotlib
+import numpy as np
+from IPython.core.interactiveshell import InteractiveShell
+InteractiveShell.instance()
+from vidsindy_lite.companion import report
+t = np.linspace(0, 1, 20)
+x = np.column_stack((t, t**2, t**3))
+figures = report._figures(SimpleNamespace(t=t, x=x, curve=lambda t: x), [])
+assert "<img" in next(figures)
+figures.close()
+print("interactive:", matplotlib.is_interactive())
+"""
+
+
+def test_a_notebook_still_shows_its_figures_after_a_report():
+    environment = os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"}
+    command = [sys.executable, "-c", IN_A_NOTEBOOK]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert "interactive: True" in done.stdout
+
+
+def test_one_video_per_camera(case, tmp_path):
+    with pytest.raises(ValueError, match="paths: must be 3 videos, got 2"):
+        write_report(case[0], case[1][:2], tmp_path / "report")

@@ -1,0 +1,123 @@
+"""Banded Gauss-Newton against dense algebra, on problems small enough for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import approx_fprime
+
+from vidsindy_lite.dynamics.collocation import Collocation, Segment, State
+from vidsindy_lite.dynamics.polynomials import monomial_exponents
+
+
+@pytest.fixture
+def problem():
+    """Two segments of a plane curve, a cubic law with a moving offset, uneven weights."""
+    rng = np.random.default_rng(0)
+    segments = []
+    for record, (low, high) in enumerate([(0.0, 2.0), (3.0, 3.6)]):
+        t = np.sort(rng.uniform(low, high, 9))
+        segments.append(Segment.even(t, rng.normal(size=(9, 2)), 0.5, record))
+    return Collocation(segments, monomial_exponents(2, 2), np.array([4.0, 1.0]), np.array([3.0, 7]))
+
+
+@pytest.fixture
+def state(problem):
+    rng = np.random.default_rng(1)
+    active = rng.random((6, 2)) < 0.6
+    return State(
+        rng.normal(size=(problem.r, 2)), rng.normal(size=(6, 2)) * active, active,
+        rng.normal(size=2), np.array([True, False]),
+    )  # fmt: skip
+
+
+def residuals(problem, state):
+    data = (problem.curve(state.control_points) - problem.x) * np.sqrt(problem.data_weights)
+    weights = np.sqrt(problem.node_weights[:, None] * problem.physics_weights)
+    return np.concatenate([data.ravel(), (weights * problem.physics_residual(state)).ravel()])
+
+
+def dense_jacobian(problem, state, columns):
+    """By differences: first the control points, then the named columns."""
+    size = state.control_points.size
+
+    def at(p):
+        flat = state.flat()
+        flat[columns] += p[size:]
+        moved = replace(
+            state,
+            control_points=state.control_points + p[:size].reshape(-1, 2),
+            coefficients=flat[:12].reshape(2, 6).T,
+            active=np.ones((6, 2), dtype=bool),
+            offset=flat[12:],
+        )
+        return residuals(problem, moved)
+
+    return approx_fprime(np.zeros(size + len(columns)), at, 1e-7)
+
+
+def test_one_equation_per_control_point_but_for_the_initial_condition(problem):
+    assert problem.nodes.shape[0] == problem.r - len(problem.segments)
+
+
+def test_objective_is_the_sum_of_squares(problem, state):
+    assert problem.objective(state) == pytest.approx((residuals(problem, state) ** 2).sum())
+
+
+def test_schur_complement_and_gradient_agree_with_dense_algebra(problem, state):
+    columns = np.arange(14)  # all terms, active or not, and both axes of the offset
+    model = problem.linearise(state, columns)
+    jacobian = dense_jacobian(problem, state, columns)
+    curve, law = np.split(jacobian, [state.control_points.size], axis=1)
+    projector = np.eye(len(curve)) - curve @ np.linalg.pinv(curve)
+    residual = residuals(problem, state)
+    np.testing.assert_allclose(model.information, law.T @ projector @ law, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(model.gradient, -law.T @ projector @ residual, rtol=1e-4, atol=1e-4)
+    step = -np.linalg.pinv(curve) @ residual
+    np.testing.assert_allclose(model.curve_step.ravel(), step, rtol=1e-4, atol=1e-5)
+    left = ((residual + curve @ step) ** 2).sum()
+    assert model.fall == pytest.approx((residual**2).sum() - left, rel=1e-6)
+
+
+def test_solve_reaches_a_stationary_point(problem, state):
+    solved = problem.solve(state, tolerance=1e-9, max_steps=200)
+    assert problem.objective(solved) < problem.objective(state)
+    columns = np.flatnonzero(solved.free())
+    slope = dense_jacobian(problem, solved, columns).T @ residuals(problem, solved)
+    scale = np.abs(dense_jacobian(problem, solved, columns)).sum(axis=0).max()
+    assert np.abs(slope).max() < 1e-3 * scale
+
+
+def test_what_is_not_free_does_not_move(problem, state):
+    solved = problem.solve(state)
+    assert (solved.coefficients[~state.active] == 0).all()
+    assert solved.offset[1] == state.offset[1]
+    assert solved.offset[0] != state.offset[0]
+
+
+def test_refined_segment_halves_every_span():
+    segment = Segment.even(np.linspace(0, 1, 5), np.zeros((5, 1)), 0.3, 0)
+    assert len(segment.breakpoints) == 5
+    assert len(segment.refined().breakpoints) == 9
+    assert set(segment.breakpoints) <= set(segment.refined().breakpoints)
+
+
+def test_other_weights_leave_a_problem_as_it_is(problem, state):
+    before = problem.objective(state)
+    other = problem.weighted(np.array([1.0, 9.0]), np.array([5.0, 2.0]))
+    fresh = Collocation(problem.segments, problem.exponents, [1.0, 9.0], [5.0, 2.0])
+    assert other.objective(state) == fresh.objective(state) != before
+    assert problem.objective(state) == before
+
+
+def test_a_fit_stops_when_nothing_more_is_promised(problem, state):
+    solved = problem.solve(state, tolerance=1e-9, max_steps=200)
+    model = problem.linearise(solved, np.flatnonzero(solved.free()))
+    _, promise = model.newton()
+    assert 0 <= promise < 1e-6 * problem.objective(solved)
+    linearised = []
+    problem.linearise = lambda *args: (
+        linearised.append(1) or type(problem).linearise(problem, *args)
+    )
+    problem.solve(solved, tolerance=1e-3)
+    assert len(linearised) == 1

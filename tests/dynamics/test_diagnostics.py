@@ -1,0 +1,118 @@
+"""The doubts, on fits whose support is set by hand."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.dynamics.collocation import Collocation, Segment, State
+from vidsindy_lite.dynamics.diagnostics import doubts, frame_doubts, strays
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.solver import term_charges
+from vidsindy_lite.dynamics.splines import DEGREE
+from vidsindy_lite.dynamics.trajectories import check_records
+from vidsindy_lite.study import SYSTEMS, corruption
+
+NOISE = 0.03
+
+
+@pytest.fixture(scope="module")
+def duffing():
+    """A hardening spring, measured with noise, and the control points of a first curve."""
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5}}, degree=3)
+    t = np.linspace(0, 30, 600)
+    x = law.simulate(t, (1.5, 0))
+    x += NOISE * np.random.default_rng(0).normal(size=x.shape)
+    return law, t, x
+
+
+def fitted(duffing, dropped=None):
+    law, t, x = duffing
+    segment = Segment.even(t, x, 1 / 8, 0)
+    weights = np.full(2, NOISE**-2)
+    problem = Collocation([segment], law.exponents, weights, np.full(2, 1e6))
+    nodes = np.linspace(t[0], t[-1], len(segment.breakpoints) + DEGREE - 1)
+    curve = np.stack([np.interp(nodes, t, column) for column in x.T], axis=1)
+    active = law.support.copy()
+    if dropped:
+        active[law.terms.index(dropped), 1] = False
+    origin, still = np.zeros(2), np.zeros(2, dtype=bool)
+    state = State(curve, np.where(active, law.coefficients, 0.0), active, origin, still)
+    state = problem.solve(state, tolerance=1e-4, max_steps=100)
+    found = PolynomialSystem(law.names, law.exponents, state.coefficients)
+    return doubts(
+        found, state, problem, term_charges(law.exponents), [(t, x)], np.full(2, NOISE)
+    )
+
+
+def test_the_true_law_is_not_doubted(duffing):
+    assert fitted(duffing) == []
+
+
+def test_a_missing_term_is_noticed(duffing):
+    assert any("the terms left out explain more than chance" in d for d in fitted(duffing, "x^3"))
+
+
+def test_a_narrow_decision_in_the_frame_of_the_data_is_told(duffing):
+    law = duffing[0]
+    margins = np.full(law.coefficients.size, 100.0)
+    assert frame_doubts(law, margins) == []
+    margins[[law.terms.index("1"), len(law.terms) + law.terms.index("x^3")]] = 3.0, 1.5
+    (doubt,) = frame_doubts(law, margins)
+    assert "with 1 in dx/dt, without x^3 in dy/dt (criterion +1.5)" in doubt
+
+
+def test_a_coordinate_that_lost_its_law_is_told(duffing):
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
+    (doubt,) = frame_doubts(law, np.full(law.coefficients.size, 100.0))
+    assert "no term was found for dy/dt" in doubt
+
+
+@pytest.mark.parametrize("size", [1e3, -1e6])
+def test_a_single_sample_far_off_is_named(duffing, size):
+    _, t, x = duffing
+    x = x.copy()
+    x[200:220] = np.nan
+    x[300, 1] = size
+    (doubt,) = strays(check_records(t, x))
+    assert f"a sample lies far from those before and after it: t = {t[300]:g}, x = (" in doubt
+    assert f", {size:g})" in doubt
+    x[[310, 320, 330, 340], 0] = size
+    (doubt,) = strays(check_records(t, x))
+    assert "and 2 more" in doubt
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("rows", [[0], [599], [0, 1, 2], [597, 598, 599], [300, 301], [7, 8, 9]])
+def test_outliers_at_the_ends_and_in_a_row_are_named(duffing, rows, sign):
+    _, t, x = duffing
+    x = x.copy()
+    x[rows, 1] = 1e3 * sign ** np.arange(len(rows))
+    (doubt,) = strays(check_records(t, x))
+    places = doubt.split("after it: ")[1].split(": no motion")[0].split("; ")
+    assert [float(place.split(",")[0].removeprefix("t = ")) for place in places] == pytest.approx(
+        t[rows], rel=1e-4
+    )
+
+
+@pytest.mark.parametrize("rate", [0.03, 0.3])
+def test_a_motion_that_comes_to_rest_is_no_stray(rate):
+    k = np.arange(3000)
+    x = np.exp(-rate * k)[:, None] * np.column_stack((np.cos(0.2 * k), np.sin(0.2 * k)))
+    for states in (x, x[::-1], np.exp(-rate * k)[:, None]):
+        assert strays(check_records(k, states)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", SYSTEMS.values(), ids=SYSTEMS)
+def test_noise_and_gaps_are_no_strays(law):
+    rng = np.random.default_rng(0)
+    for period in ({}, {"samples_per_period": 25}):
+        t, clean = law.trajectory(1500, **period)
+        noisy = [corruption.add_noise(clean, level, rng) for level in (0.05, 0.2, 0.5)]
+        hidden = [
+            corruption.drop_blocks(x, share, rng) for x in (clean, *noisy) for share in (0.3, 0.5)
+        ]
+        uneven = [np.sort(rng.choice(1500, size, replace=False)) for size in (400, 100)]
+        parts = (slice(None), slice(0, 100), slice(1400, 1500), slice(0, 400), *uneven)
+        for x in (clean, *noisy, *hidden):
+            for part in parts:
+                assert strays(check_records(t[part], x[part])) == []

@@ -1,0 +1,71 @@
+"""Exact changes of frame, and the search for the sparsest one."""
+
+import numpy as np
+import pytest
+from scipy.optimize import check_grad
+
+from vidsindy_lite.dynamics.origin import FrameAlgebra, sparse_origins
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem, closure_mask, monomial_exponents
+from vidsindy_lite.study import SYSTEMS
+
+
+def algebra(law, relative_error):
+    size = law.coefficients.size
+    return FrameAlgebra(law.exponents, law.coefficients, np.eye(size) / relative_error**2)
+
+
+def test_coefficients_in_another_frame_are_those_of_the_shift():
+    law = SYSTEMS["WangSun"]
+    origin = np.array([1.0, -2.0, 0.5])
+    coefficients, _ = algebra(law, 0.1).at(origin)
+    np.testing.assert_allclose(coefficients, law.shift(-origin).coefficients, atol=1e-12)
+
+
+def test_information_in_another_frame_keeps_the_quadratic_form():
+    rng = np.random.default_rng(0)
+    exponents = monomial_exponents(2, 2)
+    factor = rng.normal(size=(12, 12))
+    frames = FrameAlgebra(exponents, rng.normal(size=(6, 2)), factor.T @ factor)
+    delta = rng.normal(size=(6, 2))
+    moved = FrameAlgebra(exponents, frames.coefficients + delta, frames.information)
+    origin = np.array([0.3, -1.2])
+    difference = (moved.at(origin)[0] - frames.at(origin)[0]).T.ravel()
+    expected = delta.T.ravel() @ frames.information @ delta.T.ravel()
+    assert difference @ frames.at(origin)[1] @ difference == pytest.approx(expected)
+
+
+def test_gradient_of_the_smooth_count():
+    law = SYSTEMS["Lorenz"].shift((0.3, -0.4, 0.8))
+    frames = algebra(law, 0.3)
+    active = np.ones(law.coefficients.shape, dtype=bool)
+    for point in np.random.default_rng(0).normal(size=(5, 3)):
+        error = check_grad(
+            lambda o: frames.smooth_count(o, active, 9.0)[0],
+            lambda o: frames.smooth_count(o, active, 9.0)[1],
+            point,
+        )
+        assert error < 1e-4
+
+
+@pytest.mark.parametrize("name", ["SprottE", "SprottF", "NoseHoover", "WangSun"])
+@pytest.mark.parametrize("relative_error", [1e-6, 1e-2])
+def test_the_native_frame_is_found(name, relative_error):
+    offset = np.array([1.3, -0.7, 0.0])
+    law = SYSTEMS[name].shift(offset)
+    active = closure_mask(law.exponents, law.support)
+    box = (np.full(3, -3.0), np.full(3, 3.0))
+    rng = np.random.default_rng(0)
+    frames = algebra(law, relative_error)
+    origins = sparse_origins(frames, active, np.zeros(3), box, 12.0, keep=4, rng=rng)
+    counts = [frames.smooth_count(origin, active, 12.0)[0] for origin in origins]
+    assert counts[0] == min(counts)
+    assert counts[0] <= SYSTEMS[name].support.sum() + 1e-6
+
+
+def test_a_linear_law_has_its_fixed_point_as_origin():
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1, "y": -0.2}}).shift((2.0, 1.0))
+    box = (np.full(2, -3.0), np.full(2, 3.0))
+    origins = sparse_origins(
+        algebra(law, 1e-3), law.support, np.zeros(2), box, 12.0, 4, np.random.default_rng(0)
+    )
+    assert min(np.abs(o - (2.0, 1.0)).max() for o in origins) < 0.01

@@ -1,0 +1,226 @@
+"""Polynomial systems: terms, values, derivatives, exact shifts, simulation, text."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vidsindy_lite.dynamics.polynomials import (
+    PolynomialSystem,
+    closure,
+    closure_mask,
+    divides,
+    monomial_exponents,
+    monomials,
+    shift_generators,
+    shift_matrix,
+    variable_names,
+)
+
+LORENZ = {
+    "x": {"x": -10, "y": 10},
+    "y": {"x": 28, "xz": -1, "y": -1},
+    "z": {"xy": 1, "z": -8 / 3},
+}
+
+
+@st.composite
+def systems(draw):
+    d, degree = draw(st.integers(1, 4)), draw(st.integers(0, 3))
+    exponents = monomial_exponents(d, degree)
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    sparse = rng.normal(size=exponents.shape) * (rng.random(exponents.shape) < 0.4)
+    return PolynomialSystem(variable_names(d), exponents, sparse)
+
+
+def test_exponents_are_graded_and_complete():
+    assert monomial_exponents(2, 2).tolist() == [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]]
+    assert len(monomial_exponents(3, 3)) == 20
+    assert len(np.unique(monomial_exponents(4, 3), axis=0)) == 35
+
+
+def test_terms_are_read_in_any_usual_spelling():
+    spellings = ["x^2 y", "x*x*y", "yx**2", " x ^2*y "]
+    laws = [PolynomialSystem.from_terms({"x": {s: 2.0}, "y": {}}, degree=3) for s in spellings]
+    for law in laws:
+        assert law.coefficients[law.terms.index("x^2y"), 0] == 2.0
+        assert law.support.sum() == 1
+
+
+def test_long_names_are_kept_apart():
+    law = PolynomialSystem.from_terms({"x1": {"x1 x10": 1}, "x10": {"x10^2": -3}})
+    assert law.terms[-3:] == ("x1^2", "x1 x10", "x10^2")
+    assert "x_{10}" in law.latex()
+
+
+@pytest.mark.parametrize(
+    ("equations", "message"),
+    [
+        ({"x": {"q": 1}}, "term: must be a product"),
+        ({"x": {"x^": 1}}, "term: must be a product"),
+        ({"x": {"x^4": 1}}, "degree: must be at least"),
+        ({"x": {"": 1}}, "term: must be '1' or a product"),
+        ({"x": {2: 1}}, "term: must be '1' or a product .* got 2"),
+        ({"x": {"x": "a"}}, "coefficient of x: must be a finite number, got 'a'"),
+        ({"x": 3}, "equations: must give each variable its terms, .* got {'x': 3}"),
+        (None, "equations: must give each variable its terms, .* got None"),
+        ({}, "equations: must give each variable its terms, .* got {}"),
+    ],
+)
+def test_bad_terms_are_refused(equations, message):
+    with pytest.raises(ValueError, match=message):
+        PolynomialSystem.from_terms(equations, degree=3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((("x",), [[0], [1]], [[np.nan], [1]]), "coefficients: must be finite"),
+        ((("x",), [[1], [1]], [[1], [1]]), "exponents: every monomial may appear once"),
+        ((("x", "y"), [[1]], [[1]]), r"exponents: must have shape \(l, 2\), got shape \(1, 1\)"),
+        ((("x",), [[-1]], [[1]]), "exponents: must be non-negative integers, got -1"),
+        ((("x",), [[1.9]], [[1]]), "exponents: must be non-negative integers, got 1.9"),
+        ((("x",), [[np.nan]], [[1]]), "exponents: must be non-negative integers, got nan"),
+        ((("x",), [[1]], [[1j]]), "coefficients: must be an array of real numbers"),
+        ((("x", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct"),
+        ((("", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
+        ((("1", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
+        ((None, [[1]], [[1]]), "names: must be distinct names such as x or x1"),
+        ((("x",), [[1]], [[1, 2]]), "coefficients: must have shape"),
+    ],
+)
+def test_bad_systems_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        PolynomialSystem(*arguments)
+
+
+def test_value_is_the_formula():
+    law = PolynomialSystem.from_terms(LORENZ)
+    x, y, z = point = np.array([1.5, -2.0, 3.0])
+    np.testing.assert_allclose(law(point), [10 * (y - x), x * (28 - z) - y, x * y - 8 / 3 * z])
+    assert law(np.stack([point, point])).shape == (2, 3)
+
+
+@given(systems(), st.integers(0, 1000))
+def test_gradient_agrees_with_differences(law, seed):
+    x = np.random.default_rng(seed).normal(size=law.d)
+    step = 1e-6
+    numeric = np.stack(
+        [(law(x + step * e) - law(x - step * e)) / (2 * step) for e in np.eye(law.d)], axis=-1
+    )
+    np.testing.assert_allclose(law.gradient(x), numeric, atol=1e-6 * (1 + np.abs(numeric).max()))
+
+
+@given(systems(), st.integers(0, 1000))
+def test_shift_moves_the_argument_and_comes_back(law, seed):
+    rng = np.random.default_rng(seed)
+    x, offset = rng.normal(size=(5, law.d)), rng.normal(size=law.d)
+    shifted = law.shift(offset)
+    np.testing.assert_allclose(shifted(x + offset), law(x), atol=1e-10)
+    np.testing.assert_allclose(shifted.shift(-offset)(x), law(x), atol=1e-9)
+
+
+def test_shift_agrees_with_simulation():
+    law, offset = PolynomialSystem.from_terms(LORENZ), np.array([10.0, 10.0, 0.0])
+    t, x0 = np.linspace(0, 1, 50), np.array([-8.0, 7.0, 27.0])
+    moved = law.shift(offset).simulate(t, x0 + offset)
+    np.testing.assert_allclose(moved, law.simulate(t, x0) + offset, atol=1e-7)
+
+
+def test_shift_leaves_no_remainder_where_terms_cancel():
+    law = PolynomialSystem.from_terms({"x": {"x": -10, "y": 10}, "y": {"y": -0.1}})
+    shifted = law.shift((0.3, 0.3))
+    assert shifted.coefficients[shifted.terms.index("1"), 0] == 0
+
+
+def test_shift_matrix_of_a_line():
+    exponents = monomial_exponents(1, 2)
+    np.testing.assert_allclose(shift_matrix(exponents, [2.0]), [[1, -2, 4], [0, 1, -4], [0, 0, 1]])
+
+
+def test_generators_differentiate_monomials_and_shifts():
+    exponents = monomial_exponents(2, 3)
+    x, axis, step = np.array([[0.3, -1.2]]), np.array([0.0, 1e-6]), 1e-6
+    generator = shift_generators(exponents)[1]
+    slope = (monomials(x + axis, exponents) - monomials(x - axis, exponents)) / (2 * step)
+    np.testing.assert_allclose(monomials(x, exponents) @ generator, slope, atol=1e-8)
+    rate = (shift_matrix(exponents, axis) - shift_matrix(exponents, -axis)) / (2 * step)
+    np.testing.assert_allclose(rate, -generator, atol=1e-8)
+
+
+def test_divides():
+    assert divides(np.array([[0, 0], [1, 0], [1, 1]])).tolist() == [
+        [True, True, True], [False, True, True], [False, False, True],
+    ]  # fmt: skip
+
+
+def test_closure_holds_all_divisors():
+    assert closure(np.array([[2, 0], [0, 1]])).tolist() == [[0, 0], [1, 0], [0, 1], [2, 0]]
+    exponents = monomial_exponents(2, 2)
+    support = np.zeros((6, 2), dtype=bool)
+    support[4, 1] = True  # xy in the second equation
+    widened = closure_mask(exponents, support)
+    assert widened[:, 1].tolist() == [True, True, True, False, True, False]
+    assert not widened[:, 0].any()
+
+
+def test_simulation_of_a_decay_is_the_exponential():
+    law = PolynomialSystem.from_terms({"x": {"x": -2}})
+    t = np.linspace(0, 3, 20)
+    np.testing.assert_allclose(law.simulate(t, [1.5])[:, 0], 1.5 * np.exp(-2 * t), rtol=1e-9)
+
+
+def test_simulation_says_nan_after_a_blow_up():
+    law = PolynomialSystem.from_terms({"x": {"x^2": 1}})
+    x = law.simulate(np.linspace(0, 2, 21), [1.0])  # infinite at t = 1
+    assert np.isfinite(x[:9]).all()
+    assert np.isnan(x[11:]).all()
+
+
+@pytest.mark.parametrize(
+    ("t", "x0", "message"),
+    [
+        ([0, 0], [1], "t: must increase"),
+        ([], [1], "t: must hold at least one time"),
+        (3, [1], "t: must hold at least one time"),
+        ([0, np.inf], [1], "t: must be finite, got inf"),
+        ([0, np.nan, 1], [1], "t: must be finite, got nan"),
+        ([0, 1], [1, 2], "x0: must be 1 finite numbers"),
+        ([0, 1], [np.nan], "x0: must be 1 finite numbers"),
+    ],
+)
+def test_bad_simulations_are_refused(t, x0, message):
+    with pytest.raises(ValueError, match=message):
+        PolynomialSystem.from_terms({"x": {"x": 1}}).simulate(t, x0)
+
+
+def test_text_and_latex():
+    law = PolynomialSystem.from_terms({"x": {"1": -0.5, "x": 1, "x^2y": -2.25}, "y": {}})
+    assert law.text() == "dx/dt = x - 2.25 x^2y - 0.5\ndy/dt = 0"
+    assert r"\dot{x} &= x - 2.25\,x^{2} y - 0.5" in law.latex()
+
+
+def test_wrong_shapes_are_named():
+    law = PolynomialSystem.from_terms(LORENZ)
+    with pytest.raises(ValueError, match=r"x: must have shape \(n, 3\), got \(4, 2\)"):
+        law.library(np.zeros((4, 2)))
+    for offset in ([1, 2], "abc", None):
+        with pytest.raises(ValueError, match="offset: must be"):
+            law.shift(offset)
+    for use in (law, law.gradient, law.library):
+        with pytest.raises(ValueError, match="x: must be an array of real numbers, got 'abc'"):
+            use("abc")
+
+
+@pytest.mark.parametrize("degree", [-1, 2.5, 2.0, True, "3", None])
+def test_degrees_are_whole_numbers(degree):
+    with pytest.raises(ValueError, match="degree: must be an integer of at least 0, got"):
+        monomial_exponents(2, degree)
+    if degree is not None:
+        with pytest.raises(ValueError, match="degree: must be"):
+            PolynomialSystem.from_terms({"x": {"1": 1}}, degree=degree)
+
+
+def test_library_of_monomials():
+    x = np.array([[2.0, 3.0]])
+    assert monomials(x, monomial_exponents(2, 2)).tolist() == [[1, 2, 3, 4, 6, 9]]

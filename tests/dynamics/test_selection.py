@@ -1,0 +1,204 @@
+"""Sparse regression against brute force over all supports, and the paper's STRidge."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from vidsindy_lite.dynamics.selection import (
+    _Quadratic,
+    _Tableau,
+    closest_rival,
+    subset_search,
+)
+
+
+def objective(information, pull, charge, support):
+    """Lowest value on a support, from the definition."""
+    inside = np.flatnonzero(support)
+    solution = np.linalg.solve(information[np.ix_(inside, inside)], pull[inside])
+    return charge[inside].sum() - pull[inside] @ solution
+
+
+def brute_force(information, pull, charge):
+    supports = [np.array(s, dtype=bool) for s in product([False, True], repeat=len(pull))]
+    values = [objective(information, pull, charge, s) for s in supports]
+    best = int(np.argmin(values))
+    return supports[best], values[best]
+
+
+def random_problem(seed, m, rows=40):
+    rng = np.random.default_rng(seed)
+    matrix = rng.standard_normal((rows, m)) @ rng.standard_normal((m, m))
+    truth = np.where(rng.random(m) < 0.5, rng.standard_normal(m), 0.0)
+    target = matrix @ truth + 0.1 * rng.standard_normal(rows)
+    return matrix.T @ matrix, matrix.T @ target, rng
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.floats(0.01, 100), st.booleans())
+def test_without_correlation_the_search_finds_the_global_minimum(seed, m, price, full):
+    rng = np.random.default_rng(seed)
+    information = np.diag(10.0 ** rng.uniform(-3, 3, m))
+    pull = rng.standard_normal(m) * np.sqrt(np.diag(information))
+    charge = price * rng.uniform(0.1, 1, m)
+    support, solution, value = subset_search(information, pull, 0 * pull, charge, np.full(m, full))
+    expected, lowest = brute_force(information, pull, charge)
+    # Every term decides for itself: no local minimum. Ties are a matter of rounding.
+    worth = pull**2 / np.diag(information)
+    assume((np.abs(worth - charge) > 1e-6).all())
+    assert (support == expected).all()
+    assert value == pytest.approx(lowest, abs=1e-8)
+    np.testing.assert_allclose(solution, np.where(expected, pull / np.diag(information), 0.0))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 3), st.floats(0.01, 10))
+def test_with_three_columns_the_search_from_everything_is_rarely_off(seed, m, price):
+    information, pull, _ = random_problem(seed, m)
+    charge = np.full(m, price)
+    _, _, value = subset_search(information, pull, 0 * pull, charge, np.ones(m, dtype=bool))
+    _, lowest = brute_force(information, pull, charge)
+    others = [
+        subset_search(information, pull, 0 * pull, charge, np.array(s, dtype=bool))[2]
+        for s in product([False, True], repeat=m)
+    ]
+    # One of the starts is the minimum itself, where the search has to stay.
+    assert min(others) == pytest.approx(lowest, rel=1e-8, abs=1e-8)
+    assert value >= lowest - 1e-8 * (1 + abs(lowest))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.floats(0.01, 10))
+def test_no_single_move_improves_the_result(seed, m, price):
+    information, pull, rng = random_problem(seed, m)
+    charge = price * rng.uniform(0.5, 1.5, m)
+    start = rng.random(m) < 0.5
+    support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
+    tolerance = 1e-6 * (1 + abs(value))
+    assert (np.flatnonzero(solution) == np.flatnonzero(support)).all()
+    assert value == pytest.approx(objective(information, pull, charge, support), abs=tolerance)
+    assert value <= objective(information, pull, charge, start) + tolerance
+    for i in range(m):
+        flipped = support.copy()
+        flipped[i] = not flipped[i]
+        assert value <= objective(information, pull, charge, flipped) + tolerance
+        for k in np.flatnonzero(support != support[i]):
+            swapped = support.copy()
+            swapped[[i, k]] = swapped[[k, i]]
+            assert value <= objective(information, pull, charge, swapped) + tolerance
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_with_clear_data_the_true_support_is_found_from_everything_and_from_nothing(seed):
+    rng = np.random.default_rng(seed)
+    matrix = rng.standard_normal((200, 10))
+    truth = np.zeros(10)
+    truth[rng.choice(10, 3, replace=False)] = rng.choice([-1, 1], 3) * [1.0, 10.0, 100.0]
+    target = matrix @ truth + 0.01 * rng.standard_normal(200)
+    information, pull = matrix.T @ matrix, matrix.T @ target
+    charge = np.full(10, 0.01)
+    for start in (np.ones(10, dtype=bool), np.zeros(10, dtype=bool)):
+        support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
+        assert (support == (truth != 0)).all()
+        assert value == pytest.approx(brute_force(information, pull, charge)[1])
+        np.testing.assert_allclose(solution[support], truth[support], atol=0.01)
+
+
+def test_a_swap_leaves_a_support_that_drops_and_adds_cannot():
+    # Column 2 alone explains the target; columns 0 and 2 are nearly the same.
+    rng = np.random.default_rng(0)
+    matrix = rng.standard_normal((100, 3))
+    matrix[:, 0] = matrix[:, 2] + 0.05 * rng.standard_normal(100)
+    pull, information = matrix.T @ matrix[:, 2], matrix.T @ matrix
+    start = np.array([True, False, False])
+    charge = np.full(3, 1.0)
+    wrong = objective(information, pull, charge, start)
+    assert objective(information, pull, charge, [False, False, False]) > wrong
+    assert objective(information, pull, charge, [True, False, True]) > wrong
+    support, solution, _ = subset_search(information, pull, 0 * pull, charge, start)
+    assert list(support) == [False, False, True]
+    np.testing.assert_allclose(solution, [0, 0, 1], atol=1e-6)
+
+
+def circle(radius=1.0):
+    """Information and pull of 1, x, x^2, y^2, y for y - 10, on a circle around (10, 10)."""
+    angle = np.linspace(0, 6, 200)
+    x, y = 10 + radius * np.cos(angle), 10 + radius * np.sin(angle)
+    columns = np.stack([np.ones_like(x), x, x**2, y**2, y], axis=1)
+    weight = 1e8  # chi-square units: noise of 1e-4
+    return weight * columns.T @ columns, weight * columns.T @ (y - 10)
+
+
+def test_a_conserved_quantity_does_not_trap_the_search():
+    information, pull = circle()
+    start = np.array([True, True, True, True, False])
+    support, solution, _ = subset_search(information, pull, 0 * pull, np.full(5, 10.0), start)
+    assert support.tolist() == [True, False, False, False, True]
+    np.testing.assert_allclose(solution[[0, 4]], [-10, 1], rtol=1e-4)
+
+
+def test_the_closest_rival_is_priced_as_it_is():
+    information, pull = circle()
+    support = np.array([True, False, False, False, True])
+    charge = np.full(5, 10.0)
+    cost, dropped, added = closest_rival(information, pull, 0 * pull, charge, support)
+    changed = support.copy()
+    changed[dropped], changed[added] = False, True
+    price = objective(information, pull, charge, changed)
+    assert cost == pytest.approx(
+        price - objective(information, pull, charge, support), rel=1e-3, abs=1e-2
+    )
+    assert cost > 9
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 8))
+def test_the_update_for_a_newcomer_is_a_fit_with_it(seed, m):
+    information, pull, rng = random_problem(seed, m)
+    model = _Quadratic(information, pull, rng.standard_normal(m), np.ones(m))
+    support = rng.random(m) < 0.5
+    assume(not support.all())
+    before = _Tableau.of(model, model.fit(support))
+    number = int(rng.integers(len(before.outside)))
+    support[before.outside[number]] = True
+    updated, direct = before.joined(model, number), _Tableau.of(model, model.fit(support))
+    stays = np.isin(direct.inside, before.inside)
+    np.testing.assert_array_equal(updated.outside, direct.outside)
+    for name in ("left", "room"):
+        expected = getattr(direct, name)
+        np.testing.assert_allclose(getattr(updated, name), expected, rtol=1e-5, atol=1e-6)
+    for name in ("fitted", "spread"):
+        expected = getattr(direct, name)[stays]
+        np.testing.assert_allclose(getattr(updated, name), expected, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(updated.response, direct.response[:, stays], rtol=1e-5, atol=1e-6)
+
+
+def test_a_charge_of_minus_infinity_keeps_a_worthless_column():
+    information, pull = np.eye(3), np.array([5.0, 0.0, 0.1])
+    charge = np.array([1.0, -np.inf, 1.0])
+    support, solution, value = subset_search(
+        information, pull, 0 * pull, charge, np.ones(3, dtype=bool)
+    )
+    assert list(support) == [True, True, False]
+    np.testing.assert_allclose(solution, [5, 0, 0])
+    assert value == pytest.approx(1 - 25)
+
+
+def test_the_start_is_left_as_it_is():
+    start = np.ones(3, dtype=bool)
+    subset_search(np.eye(3), np.zeros(3), np.zeros(3), np.ones(3), start)
+    assert start.all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_scaling_a_column_scales_its_coefficient_and_changes_nothing_else(seed):
+    information, pull, rng = random_problem(seed, 5)
+    scale = 10.0 ** rng.uniform(-3, 3, 5)
+    charge, start = np.ones(5), np.ones(5, dtype=bool)
+    support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
+    scaled = subset_search(
+        information * scale[:, None] * scale, pull * scale, 0 * pull, charge, start
+    )
+    assert (scaled[0] == support).all()
+    np.testing.assert_allclose(scaled[1] * scale, solution, rtol=1e-5, atol=1e-8)
+    assert scaled[2] == pytest.approx(value, rel=1e-6)
+

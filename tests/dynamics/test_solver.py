@@ -1,0 +1,283 @@
+"""Discovery: exact recovery, its uncertainty, its doubts, bad input."""
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem, monomial_exponents
+from vidsindy_lite.dynamics.solver import discover, term_charges
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
+
+
+def measured(name, noise, n=600, seed=11):
+    truth = SYSTEMS[name].shift(REFERENCE_OFFSET)
+    t, x = truth.trajectory(n)
+    return truth, t, add_noise(x, noise, np.random.default_rng(seed))
+
+
+@pytest.fixture(scope="module")
+def lorenz():
+    """What is found in noisy samples of Lorenz: the truth, the samples, the discovery."""
+    truth, t, x = measured("Lorenz", 0.05)
+    return truth, t, x, discover(t, x)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_clean_systems_are_recovered_exactly(name):
+    truth, t, x = measured(name, 0.0)
+    found = discover(t, x)
+    result = score(found, truth)
+    assert result.exact
+    assert result.l2 < 1e-5
+    assert score(found.native, SYSTEMS[name]).exact
+    np.testing.assert_allclose(found.offset, REFERENCE_OFFSET, atol=1e-4)
+    assert found.status == "ok"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["SprottE", "NoseHoover", "WangSun"])
+def test_noisy_systems_are_recovered(name):
+    truth, t, x = measured(name, 0.1, n=1000)
+    found = discover(t, x)
+    assert score(found, truth).exact
+    np.testing.assert_allclose(
+        found.noise, 0.1 * np.std(truth.trajectory(1000)[1], axis=0), rtol=0.1
+    )
+
+
+def test_law_in_the_data_frame_is_the_native_law_shifted():
+    _, t, x = measured("SprottF", 0.05)
+    found = discover(t, x)
+    shifted = found.native.shift(found.offset)
+    ours = dict(zip(shifted.terms, shifted.coefficients, strict=True))
+    for term, row, error in zip(
+        found.terms, found.coefficients, found.standard_errors, strict=True
+    ):
+        assert (np.abs(ours.get(term, 0.0) - row) <= 4 * error + 1e-6).all()
+
+
+PLANAR = {
+    "oscillator": ({"x": {"y": 1}, "y": {"x": -1, "y": 0.5, "x^2y": -0.5}}, (0.5, 0), 25),
+    "prey": ({"x": {"x": 1, "xy": -0.5}, "y": {"y": -0.8, "xy": 0.4}}, (1, 1), 30),
+    "growth": ({"x": {"x": 1, "x^2": -0.5}}, (0.05,), 8),
+}
+
+
+@pytest.mark.parametrize("name", PLANAR)
+def test_other_dimensions_and_uneven_times(name):
+    equations, x0, duration = PLANAR[name]
+    truth = PolynomialSystem.from_terms(equations, degree=3)
+    rng = np.random.default_rng(2)
+    t = np.sort(rng.uniform(0, duration, 400))
+    found = discover(t, add_noise(truth.simulate(t, x0), 0.02, rng))
+    assert score(found, truth).exact
+
+
+TIED = {  # what is conserved ties the candidates together along the record
+    "oscillator": ({"x": {"y": 1}, "y": {"x": -1}}, (10, 10), (11, 10), 20, 3),
+    "rigid body": (
+        {"x": {"yz": 1}, "y": {"xz": -2}, "z": {"xy": 0.6}},
+        (10, 10, 0),
+        (11, 10.5, 0.8),
+        20,
+        3,
+    ),
+    "springs": (
+        {"x": {"y": 1}, "y": {"x": -2, "z": 1}, "z": {"w": 1}, "w": {"x": 1, "z": -3}},
+        (0, 0, 0, 0),
+        (1, 0, 0.5, 0),
+        30,
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TIED)
+@pytest.mark.parametrize("noise", [0.0, pytest.param(0.01, marks=pytest.mark.slow)])
+def test_conserved_quantities_do_not_hide_the_law(name, noise):
+    terms, offset, x0, duration, degree = TIED[name]
+    truth = PolynomialSystem.from_terms(terms).shift(offset)
+    t = np.linspace(0, duration, 600)
+    x = add_noise(truth.simulate(t, x0), noise, np.random.default_rng(1))
+    assert score(discover(t, x, degree=degree), truth).exact
+
+
+def test_four_dimensions():
+    truth = PolynomialSystem.from_terms(
+        {
+            "x": {"y": 1},
+            "y": {"x": -1, "z": 0.3},
+            "z": {"w": 1},
+            "w": {"z": -2, "x": 0.3, "z^2": -0.4},
+        }
+    )
+    t = np.linspace(0, 40, 800)
+    x = truth.simulate(t, (1, 0, 0.5, 0))
+    found = discover(t, add_noise(x, 0.01, np.random.default_rng(0)), degree=2)
+    assert score(found, truth).exact
+
+
+@pytest.mark.slow
+def test_gaps_are_bridged():
+    truth, t, x = measured("Lorenz", 0.01, n=1000)
+    found = discover(t, drop_fibers(x, 0.2, np.random.default_rng(4)))
+    assert score(found, truth).exact
+    assert len(found.curves) == 1
+
+
+@pytest.mark.slow
+def test_missing_single_rows_are_no_gaps():
+    truth, t, x = measured("WangSun", 0.02)
+    x[np.random.default_rng(0).random(len(t)) < 0.3] = np.nan
+    found = discover(t, x)
+    assert score(found, truth).exact
+
+
+@pytest.mark.slow
+def test_several_trajectories_share_one_law():
+    truth = SYSTEMS["Lorenz"]
+    rng = np.random.default_rng(3)
+    t = np.arange(250) * 0.015
+    runs = [truth.simulate(t, x0) for x0 in ((-8, 7, 27), (5, 5, 25), (1, -6, 20))]
+    found = discover([(t, add_noise(x, 0.02, rng)) for x in runs])
+    assert score(found, truth).exact
+    assert len(found.curves) == 3
+
+
+@pytest.mark.slow
+def test_units_do_not_matter():
+    truth, t, x = measured("SprottE", 0.05)
+    found = discover(t, x)
+    scaled = discover(3600 * t, 1e-3 * x)
+    assert (scaled.coefficients != 0).tolist() == (found.coefficients != 0).tolist()
+    factor = 1e-3 / 1e-3 ** found.system.exponents.sum(axis=1)[:, None] / 3600
+    np.testing.assert_allclose(scaled.coefficients, found.coefficients * factor, rtol=1e-6)
+    np.testing.assert_allclose(scaled.standard_errors, found.standard_errors * factor, rtol=1e-4)
+
+
+def test_curve_follows_the_truth_better_than_the_data(lorenz):
+    truth, t, x, found = lorenz
+    clean = truth.trajectory(600)[1]
+    fitted = found.curve(t)
+    assert np.sqrt(np.mean((fitted - clean) ** 2)) < 0.3 * np.sqrt(np.mean((x - clean) ** 2))
+    assert np.isnan(found.curve(np.array([t[-1] + 1]))).all()
+
+
+@pytest.mark.slow
+def test_standard_errors_are_calibrated():
+    truth = PolynomialSystem.from_terms(PLANAR["oscillator"][0], degree=3)
+    t = np.linspace(0, 25, 300)
+    x = truth.simulate(t, (0.5, 0))
+    scores = []
+    for seed in range(25):
+        found = discover(t, add_noise(x, 0.05, np.random.default_rng(seed)))
+        error = found.coefficients - truth.coefficients
+        if score(found, truth).exact:  # a false term every hundred draws is within the design
+            scores.append(
+                (error / np.where(truth.support, found.standard_errors, 1))[truth.support]
+            )
+    assert len(scores) >= 23
+    assert kstest(np.concatenate(scores), "norm").pvalue > 1e-3
+
+
+def test_same_seed_same_result():
+    _, t, x = measured("NoseHoover", 0.1, n=400)
+    first, second = discover(t, x, seed=5), discover(t, x, seed=5)
+    assert (first.coefficients == second.coefficients).all()
+    assert (first.covariance == second.covariance).all()
+
+
+def test_history_tells_the_fit(lorenz):
+    history = lorenz[-1].history
+    assert history[0].terms == 30
+    assert history[-1].terms == 7
+    assert history[-1].physics_loss < 1e-4 * history[0].physics_loss
+    assert all(a.seconds <= b.seconds for a, b in zip(history, history[1:], strict=False))
+
+
+# -- doubts --------------------------------------------------------------------------------------
+
+
+def test_a_law_outside_the_library_is_doubted():
+    t = np.linspace(0, 40, 800)
+    from scipy.integrate import solve_ivp
+
+    pendulum = solve_ivp(
+        lambda _, x: [x[1], -np.sin(3 * x[0])], (0, 40), [0.9, 0], t_eval=t, rtol=1e-9
+    )
+    x = add_noise(pendulum.y.T, 0.005, np.random.default_rng(0))
+    found = discover(t, x, degree=1)
+    assert found.status == "suspect"
+    assert any("outside the library" in warning for warning in found.warnings)
+
+
+def test_a_short_record_is_doubted():
+    t = np.linspace(0, 2, 200)
+    x = np.stack([np.sin(t), np.cos(t)], axis=1)
+    found = discover(t, add_noise(x, 0.05, np.random.default_rng(0)))
+    assert any("turns of the motion" in warning for warning in found.warnings)
+
+
+def test_on_a_line_a_record_needs_no_turns():
+    terms, x0, duration = PLANAR["growth"]
+    t = np.linspace(0, duration, 300)
+    law = PolynomialSystem.from_terms(terms)
+    assert discover(t, law.simulate(t, x0)).status == "ok"
+
+
+def test_a_coarse_record_is_doubted():
+    t = 1.3 * np.arange(200)
+    x = np.stack([np.sin(t), np.cos(t)], axis=1)
+    found = discover(t, add_noise(x, 0.02, np.random.default_rng(0)), degree=1)
+    assert any("sample faster" in warning for warning in found.warnings)
+
+
+def test_pure_noise_gives_no_law_without_doubt():
+    x = np.random.default_rng(0).normal(size=(400, 2))
+    found = discover(np.arange(400.0), x)
+    assert found.status == "suspect"
+
+
+# -- input ---------------------------------------------------------------------------------------
+
+
+def test_fewer_samples_than_unknowns_are_refused():
+    _, t, x = measured("Lorenz", 0.0, n=20)
+    with pytest.raises(ValueError, match="x: must hold at least as many samples as unknowns"):
+        discover(t, x)
+
+
+def test_a_coordinate_that_stands_still_is_refused():
+    t = np.linspace(0, 10, 200)
+    with pytest.raises(ValueError, match="x: every coordinate must move, got a constant column 1"):
+        discover(t, np.stack([np.sin(t), np.ones_like(t)], axis=1))
+
+
+def test_trajectories_of_different_dimension_are_refused():
+    t = np.linspace(0, 10, 100)
+    with pytest.raises(ValueError, match="t: a list of trajectories must hold"):
+        discover([(t, np.sin(t)[:, None]), (t, np.sin(t)[:, None] + np.eye(2)[0])])
+    with pytest.raises(ValueError, match="t: a list of trajectories must hold"):
+        discover([])
+
+
+def test_a_single_trajectory_needs_both_arrays():
+    t = np.linspace(0, 10, 100)
+    for nonsense in (t, None, [t, t, t]):
+        with pytest.raises(ValueError, match="x: must be given, unless t is a list of pairs"):
+            discover(nonsense)
+
+
+@pytest.mark.parametrize("degree", [-1, 2.5, 0, "3"])
+def test_bad_degrees_are_refused(degree):
+    _, t, x = measured("Lorenz", 0.0)
+    with pytest.raises(ValueError, match="degree: must be"):
+        discover(t, x, degree=degree)
+
+
+def test_charges_rise_with_the_number_of_rivals():
+    charges = term_charges(monomial_exponents(3, 3))
+    by_degree = [np.unique(charges[monomial_exponents(3, 3).sum(axis=1) == k]) for k in range(4)]
+    assert all(len(values) == 1 for values in by_degree)
+    assert np.diff(np.concatenate(by_degree)).min() > 0

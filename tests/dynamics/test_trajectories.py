@@ -1,0 +1,74 @@
+"""Checked input and its cut at gaps."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.dynamics.trajectories import check_record, check_records, cut, typical_step
+
+T, X = np.arange(5.0), np.ones((5, 2))
+
+
+def with_value(row, value):
+    x = X.copy()
+    x[row, 1] = value
+    return x
+
+
+@pytest.mark.parametrize(
+    ("t", "x", "message"),
+    [
+        ("soon", X, "t: must be an array of real numbers, got 'soon'"),
+        (T, [[1], [2, 3]], "x: must be an array of real numbers"),
+        (T, X + 0j, "x: must be an array of real numbers"),
+        (T, np.ones(5), r"x: must have shape \(n, d\)"),
+        (T, np.ones((5, 0)), r"x: must have shape \(n, d\)"),
+        (T[:4], X, r"t: must have shape \(5,\) as x has 5 rows, got \(4,\)"),
+        (np.array([0, 1, np.nan, 3, 4]), X, "t: must be finite, got nan"),
+        (np.array([0, 1, 1, 3, 4]), X, r"t: must increase, got t\[1\] = 1 before t\[2\] = 1"),
+        (T[::-1], X, "t: must increase"),
+        (T, with_value(3, np.inf), "x: must not be infinite .* got infinity in row 3"),
+        (T, np.full((5, 2), np.nan), "x: must hold at least one row without NaN, got 5"),
+        (np.empty(0), np.empty((0, 2)), "t: must hold at least one time"),
+    ],
+)
+def test_bad_input_is_named(t, x, message):
+    with pytest.raises(ValueError, match=message):
+        check_record(t, x)
+
+
+def test_missing_rows_are_left_out():
+    t, x = check_record(T, with_value(2, np.nan))
+    assert t.tolist() == [0, 1, 3, 4]
+    assert x.shape == (4, 2)
+
+
+def test_masked_rows_are_missing():
+    mask = np.zeros(X.shape, dtype=bool)
+    mask[2, 1] = True
+    t, x = check_record(T, np.ma.masked_array(with_value(2, 1e9), mask))
+    assert t.tolist() == [0, 1, 3, 4]
+    assert x.max() == 1
+
+
+def test_one_or_several_records():
+    assert [len(t) for t, _ in check_records(T, X)] == [5]
+    assert [len(t) for t, _ in check_records([(T, X), [T[:3], X[:3]]])] == [5, 3]
+
+
+@pytest.mark.parametrize("t", [[1, 2], T, (T, X), [(T, X, X)], {"t": X}, None, [T, X]])
+def test_what_is_no_list_of_records(t):
+    with pytest.raises(ValueError, match=r"x: must be given, unless t is a list of pairs \(t, x\)"):
+        check_records(t)
+
+
+@pytest.mark.parametrize("pairs", [[], [(T, X), (T, X[:, :1])]])
+def test_records_of_one_system(pairs):
+    with pytest.raises(ValueError, match="t: a list of trajectories must hold at least one, all"):
+        check_records(pairs)
+
+
+def test_cut_at_long_steps_and_nowhere_else():
+    t = np.array([0.0, 1, 2, 5, 6, 9])
+    pieces = cut((t, t[:, None]), longest_step=2.0)
+    assert [piece[0].tolist() for piece in pieces] == [[0, 1, 2], [5, 6], [9]]
+    assert typical_step(pieces) == 1.0

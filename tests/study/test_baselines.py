@@ -1,0 +1,190 @@
+"""Each baseline is what pysindy does when it is called by hand, with the threshold it chose."""
+
+import numpy as np
+import pysindy
+import pytest
+
+from vidsindy_lite.dynamics import smooth
+from vidsindy_lite.study import baselines
+from vidsindy_lite.study.baselines import BASELINES, RIDGE, THRESHOLDS, WEAK_WIDTH, WEAK_WINDOWS
+from vidsindy_lite.study.corruption import add_noise, drop_blocks, drop_fibers
+from vidsindy_lite.study.metrics import score
+from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
+
+pytestmark = pytest.mark.slow  # fits ensembles
+
+TRUTH = SYSTEMS["Lorenz"]
+T, X = TRUTH.trajectory(600)
+
+
+@pytest.fixture
+def short_grid(monkeypatch):
+    """Few thresholds, where the choice is not what is tested: a fifth of the time."""
+    monkeypatch.setattr(baselines, "THRESHOLDS", (0.1, 0.3))
+
+
+def by_hand(name, threshold):
+    """A direct call of pysindy on clean Lorenz: its model, fitted."""
+    library = pysindy.PolynomialLibrary(degree=3)
+    optimizer = pysindy.STLSQ(threshold=threshold, alpha=RIDGE)
+    if name == "PySINDy":
+        return pysindy.SINDy(feature_library=library, optimizer=optimizer).fit(X, t=T)
+    if name == "Model-A":
+        spline = smooth([(T, X)], np.random.default_rng(0)).splines[0]
+        model = pysindy.SINDy(feature_library=library, optimizer=optimizer)
+        return model.fit(spline(T), t=T, x_dot=spline(T, 1))
+    np.random.seed(0)  # noqa: NPY002
+    if name == "E-SINDy":
+        # The seed is set once, before the fits that choose the threshold: run through them.
+        for h in (*THRESHOLDS, None):
+            chosen = threshold if h is None else h
+            bagging = pysindy.EnsembleOptimizer(
+                pysindy.STLSQ(threshold=chosen, alpha=RIDGE), bagging=True, n_models=20
+            )
+            model = pysindy.SINDy(feature_library=library, optimizer=bagging)
+            model.fit(X[:480] if h is not None else X, t=T[:480] if h is not None else T)
+        return model
+    weak = pysindy.WeakPDELibrary(
+        function_library=library, spatiotemporal_grid=T, K=WEAK_WINDOWS,
+        H_xt=WEAK_WIDTH / 2 * (T[-1] - T[0]),
+    )  # fmt: skip
+    return pysindy.SINDy(feature_library=weak, optimizer=optimizer).fit(X, t=T)
+
+
+@pytest.mark.parametrize("name", BASELINES)
+@pytest.mark.filterwarnings("ignore:.*axes labeled", "ignore:Sparsity parameter is too big")
+def test_clean_lorenz_agrees_with_a_direct_call(name, monkeypatch):
+    chosen = []
+    least_squares = baselines._least_squares
+    monkeypatch.setattr(
+        baselines, "_least_squares", lambda h, *r: (chosen.append(h), least_squares(h, *r))[1]
+    )
+    found = BASELINES[name](T, X)
+    assert chosen[:-1] == list(THRESHOLDS)
+    model = by_hand(name, chosen[-1])
+    names = model.feature_library.get_feature_names(["x", "y", "z"])
+    names = [term.replace(" ", "").replace("^", "") for term in names]
+    ours = [term.replace("^", "") for term in found.terms]
+    assert sorted(names) == sorted(ours)
+    expected = model.coefficients().T[[names.index(term) for term in ours]]
+    np.testing.assert_allclose(found.coefficients, expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["PySINDy", "E-SINDy", "Model-A"])
+def test_clean_lorenz_is_found_in_its_own_frame(name):
+    result = score(BASELINES[name](T, X), TRUTH)
+    assert result.exact
+    # Central differences at 100 samples a period are good for a percent or so, the spline for more.
+    assert result.l2 < (1e-3 if name == "Model-A" else 2e-2)
+
+
+def test_the_weak_form_needs_no_derivative():
+    result = score(baselines.weak(T, X), TRUTH)
+    assert result.exact
+    assert result.l2 < 1e-5
+
+
+@pytest.mark.parametrize("name", BASELINES)
+def test_the_time_step_is_taken_from_the_times(name, short_grid):
+    fast, slow = BASELINES[name](T / 2, X), BASELINES[name](T, X)
+    # Equal but for the terms that fall to an absolute threshold in one and not in the other.
+    size = np.linalg.norm(slow.coefficients)
+    assert np.linalg.norm(fast.coefficients - 2 * slow.coefficients) < 0.02 * size
+
+
+@pytest.mark.parametrize("name", BASELINES)
+@pytest.mark.parametrize("drop", [drop_blocks, drop_fibers])
+def test_missing_rows_never_reach_pysindy(name, drop, monkeypatch, short_grid):
+    seen = []
+
+    def watched(cls, method):
+        original = getattr(cls, method)
+
+        def call(self, *arrays, **options):
+            for array in arrays:
+                parts = array if isinstance(array, list) else [array]
+                seen.extend(bool(np.isfinite(np.asarray(part)).all()) for part in parts)
+            return original(self, *arrays, **options)
+
+        monkeypatch.setattr(cls, method, call)
+
+    watched(pysindy.PolynomialLibrary, "fit")
+    watched(pysindy.PolynomialLibrary, "transform")
+    watched(pysindy.WeakPDELibrary, "fit")
+    watched(pysindy.FiniteDifference, "__call__")
+    watched(pysindy.STLSQ, "fit")
+    x = drop(X, 0.2, np.random.default_rng(0))
+    x[::97, 1] = np.nan  # one coordinate alone is enough to lose a row
+    found = BASELINES[name](T, x)
+    assert len(seen) >= 10
+    assert all(seen)
+    assert found.support.any()
+
+
+def test_no_difference_is_taken_across_a_gap():
+    # Two stretches of a straight line with a jump between them: one slope, if they are kept apart.
+    t = np.arange(200) * 0.1
+    x = np.stack([t, np.sin(t)], axis=1)
+    x[150:] += [50, 0]
+    x[140:150] = np.nan
+    found = baselines.stlsq(t, x, degree=1)
+    assert found.coefficients[found.terms.index("1"), 0] == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["E-SINDy", "WeakSINDy"])
+def test_seeds_are_local_and_repeatable(name, short_grid):
+    t, x = T[:300], add_noise(X[:300], 0.05, np.random.default_rng(0))
+    np.random.seed(5)  # noqa: NPY002
+    expected = np.random.random(3)  # noqa: NPY002
+    np.random.seed(5)  # noqa: NPY002
+    first, again, other = (BASELINES[name](t, x, seed=seed).coefficients for seed in (1, 1, 2))
+    np.testing.assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("name", ["E-SINDy", "WeakSINDy", "Model-A"])
+def test_bad_seeds_are_named(name):
+    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got -1"):
+        BASELINES[name](T, X, seed=-1)
+
+
+def test_the_global_seed_comes_back_after_an_error():
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    with pytest.raises(ValueError, match="x: must hold"):
+        baselines.ensemble(T[:20], np.full((20, 3), np.nan), seed=1)
+    with pytest.raises(ValueError, match="x: must hold 5 samples in a row"):
+        baselines.ensemble(T[:6], X[:6], seed=1)
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+
+
+@pytest.mark.parametrize("name", BASELINES)
+def test_degree_and_dimension_are_free(name, short_grid):
+    t = np.linspace(0, 20, 400)
+    x = np.stack([np.cos(t), -np.sin(t)], axis=1)
+    found = BASELINES[name](t, x, degree=1)
+    assert found.names == ("x", "y")
+    assert found.terms == ("1", "x", "y")
+    np.testing.assert_allclose(found.coefficients, [[0, 0], [0, -1], [1, 0]], atol=0.01)
+
+
+def test_the_ridge_penalty_of_pysindy_spoils_a_shifted_library():
+    truth = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET)
+    t, x = truth.trajectory(1500)
+    assert score(baselines.stlsq(t, x), truth).exact
+    assert score(baselines.stlsq(t, x, ridge=0.05), truth).false_positives > 0
+
+
+@pytest.mark.parametrize("name", BASELINES)
+def test_bad_input(name, short_grid):
+    method = BASELINES[name]
+    with pytest.raises(ValueError, match="t: must increase"):
+        method(T[::-1], X)
+    with pytest.raises(ValueError, match="x: must not be infinite"):
+        method(T, np.where(X > 10, np.inf, X))
+    with pytest.raises(ValueError, match=r"x: must have shape \(n, d\)"):
+        method(T, X[:, 0])
+    with pytest.raises(ValueError, match="x: must hold 5 samples in a row"):
+        method(T[:4], X[:4])
+    with pytest.raises(ValueError, match="degree"):
+        method(T, X, degree=-1)

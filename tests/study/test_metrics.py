@@ -1,0 +1,164 @@
+"""Scores against hand-counted cases and by their properties."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vidsindy_lite.dynamics import PolynomialSystem
+from vidsindy_lite.study.metrics import pulls, score, summary, term_errors, trajectory_error
+from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
+
+TRUTH = PolynomialSystem.from_terms({"x": {"x": 3}, "y": {"xy": -4, "1": 1}})
+
+
+def test_counts_and_errors_of_a_case_done_by_hand():
+    found = PolynomialSystem.from_terms({"x": {"x": 3.3, "y": 2}, "y": {"xy": -4}}, degree=3)
+    result = score(found, TRUTH)
+    assert (result.terms_found, result.exact) == (False, False)
+    assert (result.false_positives, result.missing) == (1, 1)
+    assert result.precision == pytest.approx(2 / 3)
+    assert result.recall == pytest.approx(2 / 3)
+    assert result.l2 == pytest.approx(np.sqrt((0.3**2 + 2**2 + 1) / 26))
+    errors = {
+        (term, j): result.coefficient_errors[row, j]
+        for row, term in enumerate(TRUTH.terms)
+        for j in range(2)
+        if not np.isnan(result.coefficient_errors[row, j])
+    }
+    assert errors == pytest.approx({("x", 0): 0.1, ("xy", 1): 0.0, ("1", 1): 1.0})
+    assert result.max_coefficient_error == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("offset", [(0, 0, 0), REFERENCE_OFFSET])
+def test_the_truth_scores_perfectly(name, offset):
+    truth = SYSTEMS[name].shift(offset)
+    result = score(truth, truth)
+    assert result.exact
+    assert (result.precision, result.recall, result.l2) == (1, 1, 0)
+    assert result.max_coefficient_error == 0
+    assert (~np.isnan(result.coefficient_errors) == truth.support).all()
+
+
+@given(st.permutations(range(10)), st.integers(0, 2**32 - 1))
+def test_order_and_size_of_the_library_do_not_matter(order, seed):
+    rng = np.random.default_rng(seed)
+    full = PolynomialSystem.from_terms({"x": {"1": 1}, "y": {"1": 1}}, degree=3)
+    values = np.where(rng.random((10, 2)) < 0.5, rng.standard_normal((10, 2)), 0.0)
+    found = PolynomialSystem(full.names, full.exponents, values)
+    shuffled = PolynomialSystem(full.names, full.exponents[order], values[order])
+    used = values.any(axis=1)
+    small = PolynomialSystem(full.names, full.exponents[used], values[used])
+    expected = score(found, TRUTH)
+    for other in (shuffled, small):
+        result = score(other, TRUTH)
+        assert result.l2 == pytest.approx(expected.l2)
+        assert result.false_positives == expected.false_positives
+        assert result.missing == expected.missing
+        np.testing.assert_allclose(result.coefficient_errors, expected.coefficient_errors)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_precision_and_recall_are_the_papers_formulas(seed):
+    rng = np.random.default_rng(seed)
+    shape = TRUTH.coefficients.shape
+    values = np.where(rng.random(shape) < 0.5, rng.standard_normal(shape), 0.0)
+    found = PolynomialSystem(TRUTH.names, TRUTH.exponents, values)
+    result = score(found, TRUTH)
+    product = np.count_nonzero(values * TRUTH.coefficients)
+    assert result.recall == product / np.count_nonzero(TRUTH.coefficients)
+    if values.any():
+        assert result.precision == product / np.count_nonzero(values)
+    assert result.missing == 3 - product
+    assert result.exact == (found.support == TRUTH.support).all()
+
+
+def test_a_discovery_is_scored_by_its_system():
+    assert score(SimpleNamespace(system=TRUTH), TRUTH).exact
+
+
+def test_nothing_found():
+    nothing = PolynomialSystem(TRUTH.names, TRUTH.exponents, 0 * TRUTH.coefficients)
+    result = score(nothing, TRUTH)
+    assert (result.precision, result.recall, result.missing) == (0, 0, 3)
+    assert result.l2 == pytest.approx(1)
+    assert np.nanmin(result.coefficient_errors) == 1
+
+
+def test_score_rejects_what_cannot_be_compared():
+    one = PolynomialSystem.from_terms({"x": {"x": 1}})
+    with pytest.raises(ValueError, match="found: must have the dimension of truth, 2, got 1"):
+        score(one, TRUTH)
+    with pytest.raises(ValueError, match="truth: must have at least one term"):
+        score(TRUTH, PolynomialSystem(TRUTH.names, TRUTH.exponents, 0 * TRUTH.coefficients))
+
+
+def test_trajectory_error_of_a_known_displacement():
+    t = np.linspace(0, 2 * np.pi, 1000, endpoint=False)
+    truth = np.stack([5 * np.sin(t), np.cos(t), 0 * t], axis=1)
+    x = truth + [0.5, -0.1, 0.2]
+    x[100:200] = np.nan
+    x[300, 1] = np.nan
+    error = trajectory_error(x, truth)
+    np.testing.assert_allclose(error.rmse, [0.5, 0.1, 0.2])
+    np.testing.assert_allclose(error.relative, [0.1 * np.sqrt(2), 0.1 * np.sqrt(2), np.nan])
+
+
+def test_trajectory_error_rejects_bad_input():
+    truth = np.zeros((4, 2))
+    with pytest.raises(ValueError, match=r"x: must have the shape of truth, .* got \(3, 2\)"):
+        trajectory_error(np.zeros((3, 2)), truth)
+    with pytest.raises(ValueError, match="x: must hold at least one row without NaN"):
+        trajectory_error(np.full((4, 2), np.nan), truth)
+    with pytest.raises(ValueError, match="truth: must be finite"):
+        trajectory_error(truth, np.full((4, 2), np.nan))
+
+
+def test_text_of_a_score():
+    truth = PolynomialSystem.from_terms({"x": {"x": -1.0, "1": 2.0}})
+    found = PolynomialSystem.from_terms({"x": {"x": -1.1, "x^2": 0.5}})
+    text = str(score(found, truth))
+    assert text.startswith("1 terms missing, 1 false; relative l2 ")
+    assert text.endswith("precision 50%, recall 50%")
+
+
+def test_what_is_no_law_is_refused():
+    with pytest.raises(ValueError, match=r"found: must be a PolynomialSystem \(.*\), got 1"):
+        score(1, SYSTEMS["Lorenz"])
+
+
+def test_swapped_arguments_are_told():
+    with pytest.raises(ValueError, match="truth: must be a Poly.*what was found comes first, the"):
+        score(TRUTH, SimpleNamespace(system=TRUTH))
+
+
+def test_summary_is_means_in_the_papers_units():
+    right = score(TRUTH, TRUTH)
+    wrong = score(PolynomialSystem.from_terms({"x": {"x": 3, "y": 2}, "y": {"xy": -4}}), TRUTH)
+    row = summary([right, wrong])
+    l2 = 100 * np.sqrt(5 / 26)
+    assert row == {
+        "terms found": "1 of 2",
+        "false positives": 0.5,
+        "l2 (e-2)": pytest.approx(l2 / 2),
+        "spread of l2 (e-2)": pytest.approx(l2 / 2),
+        "precision (%)": pytest.approx(100 * (1 + 2 / 3) / 2),
+        "recall (%)": pytest.approx(100 * (1 + 2 / 3) / 2),
+    }
+
+
+def test_terms_that_are_missing_or_false_by_name():
+    found = PolynomialSystem.from_terms({"x": {"x": 3.3, "y": 2}, "y": {"xy": -4}}, degree=3)
+    assert term_errors(found, TRUTH) == (["1 in dy/dt"], ["y in dx/dt"])
+    assert term_errors(TRUTH, found) == (["y in dx/dt"], ["1 in dy/dt"])
+    assert term_errors(TRUTH, TRUTH) == ([], [])
+
+
+def test_pulls_of_the_true_terms_that_were_found():
+    law = PolynomialSystem.from_terms({"x": {"x": 3.3, "y": 2}, "y": {"xy": -4.2}}, degree=3)
+    errors = np.where(law.support, 0.1, 0.0)
+    found = SimpleNamespace(system=law, coefficients=law.coefficients, standard_errors=errors)
+    np.testing.assert_allclose(np.sort(pulls(found, TRUTH)), [-2, 3])

@@ -1,0 +1,379 @@
+"""Sweeps in small clones of the repository: killed, edited, damaged, on a cluster."""
+
+import json
+import math
+import os
+import pickle
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.__main__ import main
+from vidsindy_lite import stamp as repository
+from vidsindy_lite.study.sweeps import remember, sweep
+from vidsindy_lite.vision import Scene, video_info
+
+pytestmark = pytest.mark.slow  # starts processes
+
+# A module of the package, with a function that takes notes of its calls.
+TOY = '''\
+import os
+import time
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from threadpoolctl import threadpool_info
+
+
+@dataclass(frozen=True)
+class Task:
+    number: int
+    pause: float = 0.0
+
+
+def square(task):
+    """A result with random numbers, from the task alone."""
+    with open(os.environ["CALLS"], "a") as calls:
+        calls.write(f"{task.number}\\n")
+    time.sleep(task.pause)
+    if task.number < 0:
+        raise ArithmeticError("below zero")
+    return task.number**2, np.random.default_rng(task.number).normal(size=3).tolist()
+
+
+def end(task):
+    """End this very process, as a crash or the system does for want of memory."""
+    if task.number == 0:
+        os._exit(1)
+
+
+def threads(task):
+    """Threads of BLAS (OpenMP) and OpenCV in the process of this task."""
+    return [cv2.getNumThreads(), *(pool["num_threads"] for pool in threadpool_info())]
+'''
+SWEEP = """\
+import json
+import sys
+
+from vidsindy_lite import toy
+from vidsindy_lite.study.sweeps import sweep
+
+if __name__ == "__main__":
+    function, tasks = getattr(toy, sys.argv[1]), json.loads(sys.argv[2])
+    print(json.dumps(sweep(function, [toy.Task(*task) for task in tasks], desc="toy")))
+"""
+
+
+class Clone:
+    """A repository whose package holds the sweeps and the module above."""
+
+    def __init__(self, root):
+        self.root, self.calls = root, root / "calls.txt"
+        self.package = root / "vidsindy_lite"
+        self.package.mkdir()
+        (root / "notebooks").mkdir()
+        (root / "requirements.txt").write_text("numpy==2.4.6\n")
+        (root / "sweep.py").write_text(SWEEP)
+        (self.package / "__init__.py").touch()
+        (self.package / "toy.py").write_text(TOY)
+        for module in ("repository.py", "sweeps.py"):
+            (self.package / module).write_bytes((repository.PACKAGE / module).read_bytes())
+
+    def start(self, tasks, function="square", **environment):
+        """A process that sweeps over tasks, each a list of a number and a pause in seconds."""
+        self.calls.write_text("")
+        here = {"PYTHONPATH": str(self.root), "CALLS": str(self.calls)}
+        return subprocess.Popen(
+            [sys.executable, str(self.root / "sweep.py"), function, json.dumps(tasks)],
+            env=os.environ | here | environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def sweep(self, tasks, function="square", **environment):
+        """Results of a sweep to its end."""
+        process = self.start(tasks, function, **environment)
+        output, errors = process.communicate(timeout=120)
+        assert process.returncode == 0, errors
+        return json.loads(output)
+
+    def fail(self, tasks, function="square", **environment):
+        """The last line of the error of a sweep that fails."""
+        process = self.start(tasks, function, **environment)
+        _, errors = process.communicate(timeout=120)
+        assert process.returncode == 1
+        return errors.strip().splitlines()[-1]
+
+    def called(self):
+        """Numbers of the tasks that were computed since the last start."""
+        return sorted(int(line) for line in self.calls.read_text().split())
+
+    def stored(self):
+        """Files of results, by the number of the task."""
+        files = list((self.root / "build" / "cache").glob("*/toy.square/*.pkl"))
+        return {math.isqrt(pickle.loads(file.read_bytes())[0]): file for file in files}
+
+
+@pytest.fixture
+def clone(tmp_path, monkeypatch):
+    for name in ("VIDSINDY_CACHE", "VIDSINDY_DASK"):
+        monkeypatch.delenv(name, raising=False)
+    root = tmp_path / "clone"
+    root.mkdir()
+    return Clone(root)
+
+
+def wait_for(condition):
+    """Poll until a condition holds; fail after a minute."""
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+# ------------------------------------------------------------------------------------- what is kept
+
+
+def test_results_are_in_the_order_of_the_tasks_and_read_back(clone):
+    slow_first = [[3, 1.0], [1, 0.0], [2, 0.0]]
+    first = clone.sweep(slow_first)
+    assert [number for number, _ in first] == [9, 1, 4]
+    assert clone.called() == [1, 2, 3]
+    assert set(clone.stored()) == {1, 2, 3}
+    assert clone.sweep(slow_first[::-1]) == first[::-1]
+    assert clone.called() == []
+    assert [number for number, _ in clone.sweep([*slow_first, [5, 0.0]])] == [9, 1, 4, 25]
+    assert clone.called() == [5]
+
+
+def test_killed_half_way_it_goes_on_with_the_rest(clone, tmp_path):
+    tasks = [[number, 0.3] for number in range(10)]
+    process = clone.start(tasks)
+    wait_for(lambda: len(clone.stored()) >= 3)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    done = set(clone.stored())
+    assert 3 <= len(done) < 10
+    resumed = clone.sweep(tasks)
+    assert set(clone.called()) == set(range(10)) - done
+    assert resumed == clone.sweep(tasks, VIDSINDY_CACHE=str(tmp_path / "uninterrupted"))
+    assert clone.called() == list(range(10))
+
+
+def test_sweeps_that_run_at_once_share_their_tasks(clone):
+    tasks = [[number, 0.5] for number in range(6)]
+    together = [clone.start(tasks) for _ in range(2)]
+    first, second = (process.communicate(timeout=120)[0] for process in together)
+    assert json.loads(first) == json.loads(second)
+    assert clone.called() == list(range(6))
+
+
+def test_progress_starts_at_what_is_stored(clone):
+    clone.sweep([[1, 0.0]])
+    process = clone.start([[1, 0.0], [2, 1.0]])
+    _, errors = process.communicate(timeout=120)
+    percent = re.findall(r"toy: +(\d+)%", errors)
+    assert (percent[0], percent[-1]) == ("50", "100")
+
+
+def test_a_process_has_one_thread(clone):
+    pools = clone.sweep([[1], [2]], "threads", OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2")
+    assert all(len(pool) > 1 for pool in pools)
+    assert {count for pool in pools for count in pool} == {1}
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "computed"),
+    [
+        ("vidsindy_lite/toy.py", "task.number**2", "task.number * task.number", [1, 2]),
+        ("vidsindy_lite/sweeps.py", "if jobs < 1", "if jobs <= 0", [1, 2]),
+        ("requirements.txt", "2.4.6", "2.4.7", [1, 2]),
+        ("vidsindy_lite/toy.py", "A result with", "Numbers with", []),
+    ],
+)
+def test_other_code_finds_no_results(clone, file, old, new, computed):
+    tasks = [[1, 0.0], [2, 0.0]]
+    results = clone.sweep(tasks)
+    path = clone.root / file
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    assert clone.sweep(tasks) == results
+    assert clone.called() == computed
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: b"",
+        lambda content: content[:-1],
+        lambda content: content[: len(content) // 2],
+        lambda content: bytes([content[0] ^ 1]) + content[1:],
+        lambda content: content[:40] + bytes([content[40] ^ 1]) + content[41:],
+    ],
+)
+def test_damaged_file_is_computed_again(clone, damage):
+    tasks = [[1, 0.0], [2, 0.0]]
+    results = clone.sweep(tasks)
+    file = clone.stored()[2]
+    whole = file.read_bytes()
+    file.write_bytes(damage(whole))
+    assert clone.sweep(tasks) == results
+    assert clone.called() == [2]
+    assert file.read_bytes() == whole
+
+
+def test_error_names_the_task_and_what_was_finished_stays(clone):
+    error = clone.fail([[1, 0.0], [2, 0.0], [-3, 1.0], [4, 60.0], [5, 60.0]])
+    assert error.endswith(
+        "TaskError: square(Task(number=-3, pause=1.0)) raised ArithmeticError: below zero"
+    )
+    assert set(clone.stored()) == {1, 2}
+
+
+def test_named_folder(clone, tmp_path):
+    clone.sweep([[1, 0.0]], VIDSINDY_CACHE=str(tmp_path / "named"))
+    assert len(list((tmp_path / "named").glob("*/toy.square/*.pkl"))) == 1
+    assert not (clone.root / "build").exists()
+
+
+def test_outside_a_clone_nothing_is_stored(clone):
+    (clone.root / "notebooks").rmdir()
+    results = clone.sweep([[1, 0.0]])
+    assert clone.sweep([[1, 0.0]]) == results
+    assert clone.called() == [1]
+    assert not (clone.root / "build").exists()
+
+
+# --------------------------------------------------------------------------------------- a cluster
+
+CLUSTER = """\
+import sys
+import time
+
+from distributed import LocalCluster
+
+if __name__ == "__main__":
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+    ) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def cluster(clone):
+    """Address of a Dask scheduler with two worker processes that have the clone's package."""
+    (clone.root / "cluster.py").write_text(CLUSTER)
+    process = subprocess.Popen(
+        [sys.executable, str(clone.root / "cluster.py")],
+        env=os.environ | {"PYTHONPATH": str(clone.root), "CALLS": str(clone.calls)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    yield process.stdout.readline().strip()
+    process.communicate(timeout=60)
+
+
+def test_cluster_gives_the_results_of_this_machine(clone, cluster, tmp_path):
+    tasks = [[3, 0.5], [1, 0.0], [2, 0.0], [4, 0.0]]
+    here = clone.sweep(tasks, VIDSINDY_CACHE=str(tmp_path / "here"))
+    assert clone.sweep(tasks, VIDSINDY_DASK=cluster) == here
+    assert clone.called() == [1, 2, 3, 4]
+    assert set(clone.stored()) == {1, 2, 3, 4}
+    error = clone.fail([[5, 0.0], [-3, 1.0]], VIDSINDY_DASK=cluster)
+    assert error.endswith("square(Task(number=-3, pause=1.0)) raised ArithmeticError: below zero")
+    assert 5 in clone.stored()
+
+
+def test_cluster_names_the_task_that_ends_its_worker(clone, cluster):
+    error = clone.fail([[1], [0]], "end", VIDSINDY_DASK=cluster)
+    assert "KilledWorker: Attempted to run task 'end(Task(number=0, pause=0.0)) " in error
+
+
+def test_cluster_with_other_code_is_refused(clone, cluster):
+    elsewhere = clone.root / "elsewhere"
+    elsewhere.mkdir()
+    other = Clone(elsewhere)
+    (other.package / "toy.py").write_text(TOY.replace("**2", "**3"))
+    error = other.fail([[1, 0.0]], VIDSINDY_DASK=cluster)
+    assert "all workers must have this very code of vidsindy_lite, got other code on tcp" in error
+    assert other.called() == []
+
+
+def test_run_hands_the_cluster_to_the_notebooks(tiny, monkeypatch, capsys):
+    monkeypatch.chdir(tiny.root)
+    tiny.write("01_first", "import os\nassert os.environ['VIDSINDY_DASK'] == 'tcp://10.0.0.1:8786'")
+    assert main(["run", "--dask", "tcp://10.0.0.1:8786"]) == 0
+    assert "VIDSINDY_DASK" not in os.environ
+
+
+# ---------------------------------------------------------------------------------------- bad input
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("VIDSINDY_CACHE", str(tmp_path))
+    return tmp_path
+
+
+def test_without_distributed_the_error_names_the_extra(cache, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)  # as if it were not installed
+    with pytest.raises(ImportError, match=r'pip install "vidsindy_lite\[cluster\]"'):
+        sweep(video_info, [Scene()], dask="tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("function", [lambda task: task, Scene.random, wait_for, len])
+def test_function_must_be_of_the_package(cache, function):
+    with pytest.raises(ValueError, match="function: must be a top-level function of vidsindy_lite"):
+        sweep(function, [Scene()])
+
+
+@dataclass
+class Changeable:
+    number: int = 1
+
+
+@dataclass(frozen=True)
+class Holder:
+    values: object
+
+
+@pytest.mark.parametrize("task", [1, "text", Scene, Changeable(), Holder(np.ones(3)), Holder([1])])
+def test_task_must_be_a_frozen_dataclass_without_arrays(cache, task):
+    with pytest.raises(ValueError, match="tasks: each must be a frozen dataclass .* got "):
+        sweep(video_info, [Scene(), task])
+
+
+def test_jobs_must_be_positive(cache):
+    with pytest.raises(ValueError, match="jobs: must be at least 1, got 0"):
+        sweep(video_info, [Scene()], jobs=0)
+
+
+def test_no_tasks_no_results(cache):
+    assert sweep(video_info, []) == []
+
+
+def test_one_task_is_remembered_by_whoever_asks_next(cache):
+    calls = []
+
+    def double(task):
+        calls.append(task)
+        return 2 * task.values
+
+    double.__module__, double.__qualname__ = "vidsindy_lite.toy", "double"
+    assert remember(double, Holder(3)) == 6
+    assert remember(double, Holder(3)) == 6
+    assert sweep(double, [Holder(3), Holder(4)], jobs=1) == [6, 8]
+    assert remember(double, Holder(4)) == 8
+    assert calls == [Holder(3), Holder(4)]

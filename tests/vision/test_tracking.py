@@ -1,0 +1,430 @@
+"""The tracker against the exact positions of rendered targets, and what it must not invent."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tiny_onnx import write_red_detector
+
+from vidsindy_lite.cameras import Rig
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.vision.background import _shape
+from vidsindy_lite.vision.detector import LEAST, Detection
+from vidsindy_lite.vision.tracking import check_detector, follow, link, track
+from vidsindy_lite.vision.video import (
+    BACKGROUNDS,
+    COLOURS,
+    SHAPES,
+    Scene,
+    _coverage,
+    render,
+    render_restless,
+    render_video,
+    write_video,
+)
+
+pytestmark = pytest.mark.slow  # renders and tracks videos
+
+SIZE = (256, 192)
+
+
+def winding_path(n=150, size=SIZE, margin=28):
+    """A smooth path over the whole image, 4 to 9 pixels a frame."""
+    t = np.linspace(0, 1, n)
+    middle = (np.array(size) - 1) / 2
+    return middle + (middle - margin) * np.column_stack([
+        np.sin(2 * np.pi * 2 * t * n / 150), np.sin(2 * np.pi * 3 * t * n / 150 + 0.7)
+    ])
+
+
+def errors(path, truth):
+    return np.linalg.norm(track(path) - truth, axis=1)
+
+
+def distance_to_rectangle(points, rectangle):
+    left, top, width, height = rectangle
+    low = np.array([left, top]) - 0.5
+    return np.linalg.norm(points - np.clip(points, low, low + [width, height]), axis=1)
+
+
+@pytest.mark.parametrize("background", ["plain", "sky", "hills", "sea", "wood", "bricks"])
+def test_clean_textured_video(tmp_path, background):
+    truth = winding_path()
+    scene = Scene(background, size=18, image_size=SIZE)
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=1), truth)
+    assert np.isfinite(error).all()
+    assert np.sqrt(np.mean(error**2)) < 0.02
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_scenes(tmp_path, seed):
+    truth = winding_path(margin=45)  # holds the largest outline, a triangle of area pi 24^2
+    scene = Scene.random(seed, image_size=SIZE, size_variation=0.2)
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=seed), truth)
+    assert np.isfinite(error).mean() >= 0.99
+    assert np.nanmedian(error) < 0.05
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_image_noise(tmp_path, seed):
+    truth = winding_path(100)
+    scene = Scene.random(
+        seed, size=18, noise_variance=0.01, size_variation=0.2, image_size=SIZE
+    )
+    path = render_video(tmp_path / "clip.mkv", truth, scene, seed=seed)
+    difference = track(path) - truth
+    assert np.isfinite(difference[:, 0]).mean() >= 0.97
+    assert np.sqrt(np.nanmean(difference**2)) < 0.15
+    assert np.abs(np.nanmean(difference, axis=0)).max() < 0.04
+
+
+@pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mp4v"), ("a.avi", "MJPG")])
+def test_lossy_codecs(tmp_path, name, codec):
+    truth = winding_path()
+    frames = render(truth, Scene("hills", size=20, image_size=SIZE), 0)
+    error = errors(write_video(tmp_path / name, frames, codec=codec), truth)
+    assert np.isfinite(error).mean() >= 0.99
+    assert np.nanmedian(error) < 0.15
+
+
+def test_grey_video(tmp_path):
+    truth = winding_path()
+    grey = (
+        cv2.cvtColor(cv2.cvtColor(f, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+        for f in render(truth, Scene("sky", size=16, colour="black", image_size=SIZE), 2)
+    )
+    error = errors(write_video(tmp_path / "grey.mkv", grey), truth)
+    assert np.isfinite(error).all()
+    assert error.max() < 0.1
+
+
+@pytest.mark.parametrize("variance", [0, 0.005])
+@pytest.mark.parametrize("post", [(100, 20, 44, 172), (120, 20, 12, 172)])
+def test_a_hidden_target_is_not_seen_and_a_partly_hidden_one_not_trusted(tmp_path, post, variance):
+    truth = winding_path(200)
+    scene = Scene(
+        "bricks", size=22, size_variation=0.1, noise_variance=variance, occluders=(post,),
+        image_size=SIZE,
+    )
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=4), truth)
+    distance = distance_to_rectangle(truth, post)
+    assert np.isnan(error[distance < 8]).all()
+    assert np.isfinite(error[distance > 14]).mean() > 0.97
+    assert np.nanmax(error) < 0.5
+
+
+def shape_of(polygon, hidden=0):
+    """The shape numbers of a polygon (m, 2) of which the last `hidden` pixels to the right lack."""
+    alpha, corner = _coverage(polygon)
+    u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
+    alpha[:, u + corner[0] > polygon[:, 0].max() - hidden] = 0
+    centre = [alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v] / alpha.sum()
+    return _shape(alpha, u - centre[0], v - centre[1])
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    seed=st.integers(0, 1000),
+    form=st.sampled_from(SHAPES),
+    angle=st.floats(0, 2 * np.pi),
+    scale=st.floats(0.5, 2),
+)
+def test_whole_views_are_alike(seed, form, angle, scale):
+    outline = Scene(shape=form, size=24, shape_seed=seed).outline()
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    view = [0.3, 0.4] + scale * outline @ turn
+    assert np.linalg.norm(shape_of(view) - shape_of(outline)) < 0.6 / (18 * min(scale, 1))
+
+
+@settings(deadline=None, max_examples=50)
+@given(size=st.floats(8, 40), share=st.floats(0.1, 0.8))
+def test_a_part_of_a_disc_is_no_disc(size, share):
+    disc = Scene(size=size).outline()
+    assert np.linalg.norm(shape_of(disc, share * size) - shape_of(disc)) > 0.04
+
+
+@pytest.mark.parametrize("form", SHAPES)
+def test_a_target_that_lingers_half_hidden_is_not_trusted(tmp_path, form):
+    # It spends most of the clip across the edge of a post, and never vanishes behind it.
+    truth = winding_path(200)
+    k = np.arange(130)
+    truth[35:165] = np.column_stack([108 + 3 * np.sin(k / 9), 96 + 60 * np.sin(k / 20)])
+    post = (112, 0, 40, SIZE[1])
+    scene = Scene(
+        "bricks", shape=form, size=22, turns=3, shape_seed=5, occluders=(post,), image_size=SIZE
+    )
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=1), truth)
+    distance = distance_to_rectangle(truth, post)
+    assert np.isnan(error[distance < 8]).all()
+    assert np.isfinite(error[distance > 16]).mean() > 0.97
+    assert np.nanmax(error) < 0.3
+
+
+@pytest.mark.parametrize("frames", [200, 400])
+def test_a_chaotic_orbit_that_turns_at_the_edge_of_a_post(tmp_path, frames):
+    _, x = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET).trajectory(frames, 100)
+    truth = Rig.around(x).cameras[0].project(x)
+    post = (230, 0, 50, 512)
+    scene = Scene("hills", size=18, occluders=(post,))
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=1), truth)
+    assert np.isfinite(error[distance_to_rectangle(truth, post) > 10]).mean() > 0.97
+    assert np.nanmax(error) < 0.3
+
+
+def test_an_occluder_of_the_colour_of_the_target(tmp_path):
+    truth = winding_path(200)
+    post = (100, 0, 30, SIZE[1])
+
+    def frames():
+        for frame in render(truth, Scene("sky", size=22, image_size=SIZE), 3):
+            frame[:, post[0]:post[0] + post[2]] = COLOURS["red"]
+            yield frame
+
+    error = errors(write_video(tmp_path / "clip.mkv", frames()), truth)
+    assert np.isfinite(error[distance_to_rectangle(truth, post) > 16]).mean() > 0.97
+    assert np.nanmax(error) < 0.3
+
+
+def test_a_target_across_the_border_is_not_trusted(tmp_path):
+    truth = winding_path(150, margin=0)
+    scene = Scene("wood", size=20, image_size=SIZE)
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene), truth)
+    depth = np.minimum(truth, np.array(SIZE) - 1 - truth).min(axis=1)
+    assert np.isnan(error[depth < 9.5]).all()
+    assert np.isfinite(error[depth > 12]).all()
+    assert np.nanmax(error) < 0.1
+
+
+def test_frames_without_target_are_nan_and_it_is_found_again(tmp_path):
+    truth = winding_path()
+    drawn = truth.copy()
+    drawn[40:60] = np.nan
+    path = render_video(tmp_path / "clip.mkv", drawn, Scene("sea", size=14, image_size=SIZE))
+    found = track(path)
+    assert np.array_equal(np.isnan(found[:, 0]), np.isnan(drawn[:, 0]))
+    assert np.nanmax(np.abs(found - drawn)) < 0.05
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_a_target_that_stays_for_long_leaves_no_ghost(tmp_path, share):
+    n, stay = 150, int(150 * share)
+    truth = np.tile([60.0, 60.0], (n, 1))
+    truth[stay:] += np.linspace(0, 1, n - stay)[:, None] * [150, 80]
+    error = errors(
+        render_video(tmp_path / "clip.mkv", truth, Scene("bricks", size=24, image_size=SIZE)), truth
+    )
+    assert np.isfinite(error).mean() > 0.97
+    assert np.nanmax(error) < 0.3
+
+
+def circle(radius, n=150):
+    angle = np.linspace(0, 20, n)
+    return [120, 90] + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+@pytest.mark.parametrize("variance", [0, 0.005])
+@pytest.mark.parametrize("radius", [0, 2, 5])
+@pytest.mark.parametrize("form", ["disc", "polygon"])
+def test_a_target_that_never_leaves_its_place_is_background(tmp_path, form, radius, variance):
+    truth = circle(radius, 100)
+    scene = Scene("sea", form, size=18, turns=2, noise_variance=variance, image_size=SIZE)
+    assert np.isnan(track(render_video(tmp_path / "clip.mkv", truth, scene, seed=2))).all()
+
+
+def test_a_target_that_leaves_its_place_by_its_own_width_is_tracked(tmp_path):
+    truth = circle(10)
+    scene = Scene("sea", size=18, image_size=SIZE)
+    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=2), truth)
+    assert np.isfinite(error).mean() > 0.97
+    assert np.nanmax(error) < 0.1
+
+
+@pytest.mark.parametrize("variance", [0, 0.01])
+def test_nothing_is_invented_in_an_empty_scene(tmp_path, variance):
+    scene = Scene("hills", noise_variance=variance, image_size=SIZE)
+    path = render_video(tmp_path / "clip.mkv", np.full((40, 2), np.nan), scene)
+    found = track(path)
+    assert found.shape == (40, 2)
+    assert np.isnan(found).all()
+
+
+def test_a_single_frame_shows_no_motion(tmp_path):
+    path = render_video(tmp_path / "clip.mkv", [[80.0, 80.0]], Scene(image_size=SIZE))
+    assert np.isnan(track(path)).all()
+
+
+def test_a_long_clip_is_sampled_by_jumps(tmp_path):
+    size = (96, 80)
+    truth = winding_path(600, size, margin=14)
+    path = render_video(tmp_path / "clip.mkv", truth, Scene("sea", size=10, image_size=size))
+    error = errors(path, truth)
+    assert np.isfinite(error).mean() >= 0.99
+    assert np.nanmax(error) < 0.1
+
+
+def test_bad_files(tmp_path):
+    with pytest.raises(FileNotFoundError, match="path: no such video file"):
+        track(tmp_path / "missing.mkv")
+    empty = tmp_path / "empty.mkv"
+    empty.touch()
+    with pytest.raises(ValueError, match="got the empty file"):
+        track(empty)
+
+
+# ------------------------------------------------------------------- restless scenes and detectors
+
+
+def shaking(n, seed=0):
+    return np.random.default_rng(seed).normal(0, 3, (n, 2)).round().astype(int)
+
+
+def drifting(n):
+    return np.column_stack([2 * np.arange(n), np.zeros(n, int)])
+
+
+@pytest.mark.filterwarnings("ignore:.*the camera moves")
+@pytest.mark.parametrize(
+    ("background", "motion", "light"),
+    [("bricks", shaking, 0.0), ("sea", drifting, 0.1), ("bricks", drifting, 0.0)],
+)
+def test_auto_takes_the_learned_detector_where_the_background_moves(
+    tmp_path, background, motion, light
+):
+    truth = winding_path(60)
+    scene = Scene(background, shape="irregular", size=20, image_size=SIZE)
+    light = 1 + light * np.sin(np.arange(60) / 3)
+    path = write_video(tmp_path / "clip.mkv", render_restless(truth, scene, motion(60), light))
+    found = follow(path)
+    assert found.detector == "learned"
+    assert any("the background is not at rest" in w for w in found.warnings)
+    error = np.linalg.norm(found.pixels - truth, axis=1)
+    assert np.isfinite(error).mean() >= 0.97
+    assert np.sqrt(np.nanmean(error**2)) < 1
+    with pytest.warns(UserWarning, match=r"clip\.mkv: the background is not at rest"):
+        classical = np.linalg.norm(track(path, "background") - truth, axis=1)
+    assert np.mean(classical < 1) < np.mean(error < 1) - 0.1
+
+
+def test_auto_keeps_the_background_model_where_it_copes(tmp_path):
+    truth = winding_path(60)
+    scene = Scene("sea", size=20, image_size=SIZE)
+    path = write_video(tmp_path / "clip.mkv", render_restless(truth, scene, drifting(60)))
+    found = follow(path)
+    assert any("the background is not at rest" in w for w in found.warnings)
+    assert found.detector == "background"
+    assert np.linalg.norm(found.pixels - truth, axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize("background", BACKGROUNDS)
+def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
+    scene = Scene(background, size=30, noise_variance=0.01, image_size=SIZE)
+    path = render_video(tmp_path / "clip.mkv", winding_path(40), scene)
+    found = follow(path)
+    assert found.detector == "background"
+    assert found.warnings == ()
+    np.testing.assert_array_equal(found.pixels, follow(path, "background").pixels)
+
+
+def test_a_camera_that_trembles_is_told(tmp_path):
+    scene = Scene("sky", size=20, image_size=SIZE)
+    tremble = np.random.default_rng(1).integers(-1, 2, (60, 2))
+    frames = render_restless(winding_path(60), scene, tremble)
+    path = write_video(tmp_path / "clip.mkv", frames)
+    with pytest.warns(UserWarning, match=r"clip\.mkv: the camera moves, typically by [\d.]+ px"):
+        track(path)
+
+
+def test_the_learned_detector_invents_nothing_behind_a_post(tmp_path):
+    truth = winding_path(150)
+    post = (100, 0, 44, SIZE[1])
+    scene = Scene("bricks", "irregular", size=22, occluders=(post,), image_size=SIZE)
+    found = follow(render_video(tmp_path / "clip.mkv", truth, scene, seed=4), "learned")
+    inside = np.abs(truth[:, 0] - (post[0] + (post[2] - 1) / 2)) < post[2] / 2 - 13
+    assert inside.sum() > 5
+    assert np.isnan(found.pixels[inside]).all()
+    assert (found.confidence[inside] == 0).all()
+    clear = distance_to_rectangle(truth, post) > 16
+    again = np.flatnonzero(np.diff(clear.astype(int)) == 1)[:, None] + np.arange(1, 6)
+    assert np.isfinite(found.pixels[again[again[:, -1] < 150], 0]).any(axis=1).all()
+    assert np.isfinite(found.pixels[clear, 0]).mean() > 0.97
+    assert (found.confidence[clear] >= LEAST).mean() > 0.97
+
+
+def test_a_noisy_video_and_the_learned_detector(tmp_path):
+    truth = winding_path(60)
+    scene = Scene("sea", "irregular", size=22, noise_variance=0.01, image_size=SIZE)
+    difference = track(render_video(tmp_path / "clip.mkv", truth, scene), "learned") - truth
+    assert np.isfinite(difference).mean() >= 0.97
+    assert np.sqrt(np.nanmean(difference**2)) < 0.7
+
+
+def test_any_onnx_model_tracks(tmp_path):
+    truth = winding_path(40)
+    scene = Scene("sea", size=32, image_size=SIZE)
+    path = render_video(tmp_path / "clip.mkv", truth, scene)
+    model = write_red_detector(tmp_path / "red.onnx", (256, 256))
+    found = follow(path, model)
+    assert found.detector == str(model)
+    assert np.isfinite(found.pixels).mean() > 0.9
+    assert np.nanmedian(np.linalg.norm(found.pixels - truth, axis=1)) < 3  # its anchors: 8 px apart
+
+
+def test_confidence_is_that_the_target_is_seen_whole(tmp_path):
+    truth = winding_path()
+    truth[40:50] = np.nan
+    path = render_video(tmp_path / "clip.mkv", truth, Scene("sea", size=20, image_size=SIZE))
+    found = follow(path)
+    assert (found.confidence[40:50] == 0).all()
+    assert (np.delete(found.confidence, np.s_[40:50]) > np.exp(-1)).all()
+    assert found.confidence.max() <= 1
+
+
+@pytest.mark.parametrize("detector", ["yolo", "model.pt", 3, None, np.zeros(2)])
+def test_unknown_detectors(tmp_path, detector):
+    with pytest.raises(ValueError, match="detector: must be one of auto, background, learned, or"):
+        track(tmp_path / "clip.mkv", detector)
+
+
+def test_a_missing_detector_is_told_at_once(tmp_path):
+    for name in ("none.onnx", tmp_path / "none.onnx", tmp_path / "NONE.ONNX"):
+        with pytest.raises(FileNotFoundError, match=rf"detector: no such file, got '{name}'"):
+            check_detector(name)
+    assert check_detector(write_red_detector(tmp_path / "red.onnx", (256, 256))) is None
+
+
+# ---------------------------------------------------------------------------------- one motion
+
+
+def seen(u, confidence=0.9):
+    return Detection(np.array([u, 50.0]), np.array([20.0, 20.0]), confidence)
+
+
+def places(chain):
+    return [None if d is None else float(d.centre[0]) for d in chain]
+
+
+def test_a_chain_leaves_out_what_does_not_belong():
+    motion = [seen(100 + 5 * i) for i in range(20)]
+    sightings = [[d] for d in motion]
+    sightings[5].insert(0, seen(400, 0.99))  # surer than the target, once
+    sightings[9] = [seen(400, 0.99)]  # instead of it
+    sightings[14] = []
+    expected = places(motion)
+    expected[9] = expected[14] = None
+    assert places(link(sightings)) == expected
+
+
+def test_a_chain_takes_the_target_up_again():
+    motion = [[seen(100 + 5.0 * i)] for i in range(20)] + [[]] * 40
+    motion += [[seen(700 - 5.0 * i)] for i in range(20)]
+    assert places(link(motion)) == [places(m)[0] if m else None for m in motion]
+    assert link([]) == []
+    assert link([[], []]) == [None, None]
+
+
+def test_a_single_sighting_in_a_long_gap_is_not_believed():
+    motion = [[seen(100 + 5.0 * i)] for i in range(20)] + [[] for _ in range(30)]
+    motion += [[seen(200 + 5.0 * i)] for i in range(20)]
+    motion[35] = [seen(300)]
+    assert link(motion)[35] is None

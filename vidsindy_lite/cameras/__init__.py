@@ -1,0 +1,40 @@
+"""Pixels and space: camera models, calibration, triangulation, synchronisation."""
+
+from .calibrate import (
+    Camera,
+    Rig,
+    calibration_errors,
+    check_learnable,
+    learn_cameras,
+    learn_normal,
+    reconstruct,
+    residuals,
+)
+from .geometry import rodrigues, rotation_to_z
+from .perspective import PerspectiveCamera
+from .synchronise import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
+from .template import rig_template
+from .uncertainty import systematic_errors, trailing_errors
+
+__all__ = [
+    "Camera",
+    "DISAGREEMENT",
+    "PerspectiveCamera",
+    "Rig",
+    "Synchrony",
+    "align",
+    "calibration_errors",
+    "check_learnable",
+    "disagreement",
+    "learn_cameras",
+    "learn_lags",
+    "learn_normal",
+    "list_lags",
+    "reconstruct",
+    "residuals",
+    "rig_template",
+    "rodrigues",
+    "rotation_to_z",
+    "systematic_errors",
+    "trailing_errors",
+]

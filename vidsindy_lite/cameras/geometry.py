@@ -1,0 +1,208 @@
+"""Rotations and planes: how a view plane of known normal sees 3D space.
+
+A view plane with unit normal n is rotated flat: R is the rotation that takes **n to e_z** (not e_z
+to n), and the first two rows R^- give the in-plane coordinates R^- x of a point x. Because the
+third row of R is n itself, moving the plane along its normal changes R^- x not at all; moving it
+sideways changes its origin by the in-plane offset R^- position.
+
+Paper: Eq. (1)-(2), Appendices "Detail of Projection", "Plane Projection Proof" and "Compute offset
+distance of a camera plane".
+"""
+
+import numpy as np
+
+from ..checks import check_array, check_number, check_vector
+
+
+def rodrigues(axis, angle):
+    """Rotation by an angle about an axis, by Rodrigues' formula.
+
+    Paper: Eq. (1)-(2), R = I + sin(angle) U + (1 - cos(angle)) U^2, where U w = u x w.
+
+    Parameters
+    ----------
+    axis : array_like, shape (3,)
+        Rotation axis u; need not have unit length, must not be zero.
+    angle : float
+        Rotation angle in radians, right-handed about the axis.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+
+    Raises
+    ------
+    ValueError
+        If the axis is not a finite non-zero vector of shape (3,), or the angle is not finite.
+    """
+    x, y, z = unit_vector("axis", axis)
+    angle = check_number("angle", angle)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # 1 - cos(a) = 2 sin(a/2)^2 keeps its digits at small angles.
+    return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
+
+
+def rotation_to_z(normal):
+    """The shortest rotation R that takes a plane's normal to e_z: R n = e_z.
+
+    Paper: Eq. (1)-(2) with axis n x e_z and the angle between n and e_z. The axis is 0/0 for a
+    normal along z: +e_z gives the identity (the limit), and -e_z, where every horizontal axis is
+    equally short and no limit exists, gives the rotation by pi about the x axis.
+
+    Parameters
+    ----------
+    normal : array_like, shape (3,)
+        Normal of the plane, of any length but zero.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rows: the plane's X' axis, its Y' axis, and the unit normal.
+
+    Raises
+    ------
+    ValueError
+        If the normal is not a finite non-zero vector of shape (3,).
+    """
+    a, b, c = unit_vector("normal", normal)
+    horizontal = np.hypot(a, b)
+    axis = (b, -a, 0.0) if horizontal > 0 else (1.0, 0.0, 0.0)
+    # arctan2 is accurate at every angle; arccos(c) loses half its digits near 0 and pi.
+    return rodrigues(axis, np.arctan2(horizontal, c))
+
+
+def plane_projection(x, normal, d):
+    """Foot of the perpendicular from points to the plane normal . x + d = 0.
+
+    Paper: Eq. (S3), x_p = x - n (n . x + D) / (n . n) with n = (A, B, C).
+
+    Parameters
+    ----------
+    x : array_like, shape (..., 3)
+        Points; NaN rows pass through.
+    normal : array_like, shape (3,)
+        (A, B, C), of any length but zero.
+    d : float
+        D, in the units of normal . x.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+
+    Raises
+    ------
+    ValueError
+        If `x` does not end in an axis of length 3, or the normal is not a finite non-zero vector.
+    """
+    x = _points("x", x)
+    unit = unit_vector("normal", normal)
+    return x - signed_distance(x, normal, d)[..., None] * unit
+
+
+def signed_distance(x, normal, d):
+    """Signed distance of points to the plane normal . x + d = 0, positive on the normal's side.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., 3)
+        Points; NaN rows pass through.
+    normal : array_like, shape (3,)
+        Normal of the plane, of any length but zero.
+    d : float
+        Constant of the plane's equation, in the units of normal . x.
+
+    Returns
+    -------
+    ndarray, shape (...)
+
+    Raises
+    ------
+    ValueError
+        If `x` does not end in an axis of length 3, or the normal is not a finite non-zero vector.
+    """
+    x = _points("x", x)
+    unit = unit_vector("normal", normal)
+    return x @ unit + float(d) / np.linalg.norm(normal)
+
+
+def plane_through(p1, p2, p3):
+    """Plane through three points, as the normal and constant of normal . x + d = 0.
+
+    Paper: Appendix "Compute offset distance of a camera plane", n = p1p2 x p1p3.
+
+    Parameters
+    ----------
+    p1, p2, p3 : array_like, shape (3,)
+        Points; counter-clockwise as seen from the side to which the normal points.
+
+    Returns
+    -------
+    normal : ndarray, shape (3,)
+        Unit normal.
+    d : float
+
+    Raises
+    ------
+    ValueError
+        If the points lie on one line, or are not finite vectors of shape (3,).
+    """
+    p1, p2, p3 = (check_vector(f"p{i}", p, 3) for i, p in enumerate((p1, p2, p3), start=1))
+    normal = np.cross(p2 - p1, p3 - p1)
+    reach = np.linalg.norm(p2 - p1) * np.linalg.norm(p3 - p1)
+    if np.linalg.norm(normal) <= 1e-12 * reach:
+        raise ValueError(f"p1, p2, p3: must not lie on one line, got {p1}, {p2}, {p3}")
+    normal = unit_vector("normal", normal)
+    return normal, -float(normal @ p1)
+
+
+def in_plane_offset(position, normal):
+    """Offset Delta_c = R^- position of a view plane whose origin is at `position`.
+
+    Its two components are the *signed* distances of the position to the planes Y'OZ' and X'OZ'
+    through the reference origin (the paper's text names the image plane X'OY' itself, and
+    distances without a sign).
+
+    Paper: Appendix "Compute offset distance of a camera plane".
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Origin of the view plane in the reference frame, scene units.
+    normal : array_like, shape (3,)
+        Normal of the plane, of any length but zero.
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        Scene units.
+
+    Raises
+    ------
+    ValueError
+        If position or normal is not a vector of shape (3,), or the normal is zero.
+    """
+    position = check_vector("position", position, 3)
+    return rotation_to_z(normal)[:2] @ position
+
+
+def _points(name, x):
+    x = check_array(name, x)
+    if x.ndim == 0 or x.shape[-1] != 3:
+        raise ValueError(f"{name}: must have shape (..., 3), got {x.shape}")
+    return x
+
+
+def unit_vector(name, value):
+    """A finite vector of shape (3,), of any length but zero, at unit length.
+
+    Raises
+    ------
+    ValueError
+        If the vector is zero, not finite or of another shape.
+    """
+    value = check_vector(name, value, 3)
+    largest = np.abs(value).max()
+    if largest == 0:
+        raise ValueError(f"{name}: must not be the zero vector, got {value.tolist()}")
+    value = value / largest  # so that squares neither overflow nor underflow
+    return value / np.linalg.norm(value)

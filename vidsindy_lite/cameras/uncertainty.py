@@ -1,0 +1,139 @@
+"""How far the learned cameras and lags may be wrong, and the errors that this puts into the path.
+
+A wrong angle of 1e-4 turns the whole path by about as much: an error far below the noise of a
+frame, but shared by all frames, so that it does not average out. A law fitted to such a path has
+small terms that the true one has not. `discover` takes such errors into account if it is told them.
+
+The covariance of what was learned does not rest on independent errors of the tracks, which
+compression makes similar from frame to frame. With the slopes J of the reprojection residuals r in
+the parameters it is the "sandwich"
+
+    H^-1 M H^-1,   H = sum_n J_n' J_n,   M = sum_nm w(n - m) (J_n' r_n) (J_m' r_m)'
+
+with weights w that fall linearly to zero over as many frames as the residuals depend on each other
+(Newey and West 1987, Econometrica 55; their number after Andrews 1991, Econometrica 59).
+
+The tracks themselves may share an error, too: see `trailing_errors`.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .calibrate import Rig, camera_parameters, reconstruct, residuals, with_parameters
+from .synchronise import OUTLIER, PROBE, Synchrony, align
+
+_PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width
+_TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
+
+
+def systematic_errors(
+    tracks: Sequence[np.ndarray], rig: Rig, learned: Rig, lags: Synchrony
+) -> np.ndarray:
+    """Errors of the reconstructed path that come from what was learned of cameras and lags.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n_i, 2)
+        As the videos show them, each from its own first frame.
+    rig, learned : Rig
+        Before and after `learn_cameras`.
+    lags : Synchrony
+        Lags with a standard error of zero or infinity are taken as they are.
+
+    Returns
+    -------
+    ndarray, shape (k, n, 3)
+        Scene units; what k independent causes, each off by one standard error, add to the path.
+        Zero where nothing can be reconstructed.
+    """
+    start = camera_parameters(rig, learned)
+    moving = np.flatnonzero((lags.errors > 0) & np.isfinite(lags.errors))
+    steps = np.concatenate([np.full(len(start), _PROBE), np.full(len(moving), PROBE)])
+
+    def both(change):
+        shifted = lags.lags.copy()
+        shifted[moving] += change[len(start) :]
+        aligned = align(tracks, shifted, lags.rates)
+        cameras = with_parameters(rig, start + change[: len(start)])
+        missed = np.hstack(residuals(aligned, cameras))
+        return np.hstack((missed, reconstruct(aligned, cameras)))
+
+    here = both(0 * steps)
+    slopes = [(both(e) - both(-e)) / (2 * h) for e, h in zip(np.diag(steps), steps, strict=True)]
+    slopes = np.reshape(slopes, (len(steps), *here.shape))
+    missed, slope = here[:, :-3], np.moveaxis(slopes[:, :, :-3], 0, -1)
+    used = np.isfinite(missed) & np.isfinite(slope).all(axis=-1)
+    limit = OUTLIER * np.median(np.abs(missed[used])) if used.any() else 0.0
+    used &= ~(np.abs(missed) > limit).any(axis=1, keepdims=True)
+    factor = _sandwich(np.where(used, missed, 0), np.where(used[..., None], slope, 0))
+    return np.einsum("ik,inj->knj", factor, np.nan_to_num(slopes[:, :, -3:]))
+
+
+def trailing_errors(tracks: Sequence[np.ndarray], rig: Rig) -> np.ndarray:
+    """Errors of the reconstructed path if tracks stay a constant distance behind the motion.
+
+    A codec that codes changes leaves out the smallest ones, so that a trace of the target stays
+    where it just was, and the track behind. The residuals show little of it, because all views do
+    it alike; so it is allowed for in proportion to the noise that they do show.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n, 2)
+        One per camera, at the same instants.
+    rig : Rig
+        All cameras calibrated.
+
+    Returns
+    -------
+    ndarray, shape (m, n, 3)
+        Scene units; what the trail of each camera, one standard deviation long, adds to the path.
+        Zero where nothing can be reconstructed.
+    """
+    x = reconstruct(tracks, rig)
+    missed = np.hstack(residuals(tracks, rig))
+    count = missed.shape[1]
+    missed = np.abs(missed[np.isfinite(missed)])
+    noise = 1.4826 * np.median(missed) * np.sqrt(count / (count - 3)) if missed.size else 0.0
+    modes = []
+    for i, track in enumerate(tracks):
+        step = np.gradient(track, axis=0)
+        # Noise has no direction: the trail ends where the target moves by less than that.
+        length = np.sqrt((step**2).sum(axis=1, keepdims=True) + noise**2)
+        trail = _TRAIL * noise * np.nan_to_num(step / np.maximum(length, 1e-300))
+        modes.append(reconstruct([*tracks[:i], track - trail, *tracks[i + 1 :]], rig) - x)
+    return np.nan_to_num(np.array(modes))
+
+
+def _sandwich(missed: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """A factor F of the covariance F F' of the parameters, from residuals (n, m) and slopes."""
+    bread = np.linalg.inv(np.einsum("nmk,nml->kl", slope, slope))
+    scores = np.einsum("nmk,nm->nk", slope, missed) @ bread
+    # Not Cholesky's: exact tracks leave a covariance of zero but for rounding.
+    values, vectors = np.linalg.eigh(long_run_covariance(scores) * len(scores))
+    return vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+def long_run_covariance(series: np.ndarray) -> np.ndarray:
+    """Covariance of the mean of a stationary series of mean zero, times its length.
+
+    Parameters
+    ----------
+    series : ndarray, shape (n, k)
+
+    Returns
+    -------
+    ndarray, shape (k, k)
+        ``sum_h w_h E[s_n s_(n+h)']`` with Bartlett's weights; their width is that which is best
+        for autoregressive series of first order.
+    """
+    n = len(series)
+    power = np.maximum((series**2).sum(axis=0), 1e-300)
+    rho = np.clip((series[1:] * series[:-1]).sum(axis=0) / power, -0.97, 0.97)
+    curvature = np.mean(4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)) if len(rho) else 0.0
+    width = 1.1447 * (curvature * n) ** (1 / 3)
+    total = series.T @ series
+    for lag in range(1, min(int(np.ceil(width)), n - 1) + 1):
+        product = series[lag:].T @ series[:-lag]
+        total += (1 - lag / (width + 1)) * (product + product.T)
+    return total / n

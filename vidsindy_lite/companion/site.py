@@ -1,0 +1,183 @@
+"""The README, the notebooks, the figures and the package's reference as a folder of web pages.
+
+Everything lies in the folder, MathJax included, which draws the formulas: the pages need no network
+and no server.
+"""
+
+import ast
+import os
+import re
+import shutil
+from pathlib import Path
+
+import jupyter_server_mathjax
+import nbformat
+import pdoc
+from nbconvert import HTMLExporter
+from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
+from pygments.formatters import HtmlFormatter
+
+from ..stamp import PACKAGE, repository_root, write_file
+from .run import find_notebooks
+
+__all__ = ["build_site", "heading_anchor", "page_of"]
+
+PAGE = """\
+<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<link rel="icon" href="data:,">
+<link rel="stylesheet" href="{top}site.css">
+{formulas}</head>
+<body>
+<nav><a href="{top}index.html">vidsindy_lite</a>
+<a href="{top}index.html#the-notebooks">notebooks</a>
+<a href="{top}figures/index.html">figures</a>
+<a href="{top}api/index.html">reference</a></nav>
+<main>
+{body}
+</main>
+</body>
+</html>
+"""
+
+
+# MathJax's own font, so that the pages look the same everywhere. Its style "@font-face" asks for
+# the page about:blank, which browsers refuse; assistive MathML for fonts that are not there.
+FORMULAS = """\
+<script type="text/x-mathjax-config">
+MathJax.Hub.Config({{
+  jax: ["input/TeX", "output/HTML-CSS"],
+  tex2jax: {{inlineMath: [["$", "$"]], displayMath: [["$$", "$$"]]}},
+  "HTML-CSS": {{availableFonts: [], webFont: "STIX-Web", linebreaks: {{automatic: true}},
+    styles: {{"@font-face": {{src: "local('serif')"}}}}}},
+  AssistiveMML: {{disabled: true}}, showMathMenu: false, messageStyle: "none",
+}});
+</script>
+<script src="{top}mathjax/MathJax.js?config=TeX-AMS-MML_HTMLorMML-full"></script>
+"""
+
+
+def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None) -> list[Path]:
+    """Write the pages and what they show into a folder, which is emptied before.
+
+    Parameters
+    ----------
+    output : path
+        A folder that this function wrote, an empty one, or one that does not exist.
+    root : path, optional
+        The repository; by default the one around the working directory. Its executed notebooks
+        are shown as they are.
+
+    Returns
+    -------
+    list of Path
+        All pages.
+
+    Raises
+    ------
+    ValueError
+        If the folder holds something else than a site.
+    FileNotFoundError
+        If there is no repository, or a notebook has not been executed yet.
+    """
+    root, output = repository_root(root), Path(output)
+    if output.exists() and any(output.iterdir()) and not (output / "site.css").exists():
+        raise ValueError(f"output: expected a new or empty folder or a site, got {str(output)!r}")
+    shutil.rmtree(output, ignore_errors=True)
+    style = (PACKAGE / "site.css").read_text("utf-8")
+    colours = HtmlFormatter(style="default").get_style_defs(".highlight")
+    write_file(output / "site.css", f"{style}\n{colours}\n".encode())
+    shutil.copytree(root / "figures", output / "figures")
+    shutil.copytree(Path(jupyter_server_mathjax.__file__).parent / "static", output / "mathjax")
+    for name in ("LICENSE", "CITATION.cff"):
+        shutil.copy(root / name, output / name)
+
+    notebooks = [path.with_suffix(".ipynb") for path in find_notebooks(root)]
+    for path in notebooks:
+        _write_page(output / "notebooks" / f"{path.stem}.html", _notebook_body(path))
+    for folder in (output, output / "figures"):
+        source = root / folder.relative_to(output) / "README.md"
+        _write_page(folder / "index.html", _html(source.read_text("utf-8")))
+    _write_reference(output / "api")
+    return sorted(output.rglob("*.html"))
+
+
+def page_of(url: str) -> str:
+    """Where a link of the repository leads in the site; others stay as they are.
+
+    A notebook is its page, a folder and its README.md are the folder's index.
+    """
+    if re.match(r"[a-z]+:|#", url):
+        return url
+    path, mark, anchor = url.partition("#")
+    path = re.sub(r"\.ipynb$", ".html", path)
+    path = re.sub(r"(^|/)README\.md$", r"\1index.html", path)
+    path = re.sub(r"/$", "/index.html", path)
+    return path + mark + anchor
+
+
+def heading_anchor(text: str) -> str:
+    """The anchor of a heading, as code hosts make it: lower case, hyphens, no punctuation."""
+    return re.sub(r"[^\w\- ]", "", re.sub(r"<[^>]*>", "", text)).strip().lower().replace(" ", "-")
+
+
+# ------------------------------------------------------------------------------------------ details
+
+
+class _Renderer(IPythonRenderer):
+    """Markdown as nbconvert knows it, with links within the site and plain anchors."""
+
+    def heading(self, text: str, level: int, **_) -> str:
+        return f'<h{level} id="{heading_anchor(text)}">{text}</h{level}>\n'
+
+    def link(self, text: str, url: str, title: str | None = None) -> str:
+        return super().link(text, page_of(url), title)
+
+
+def _html(markdown: str) -> str:
+    page = MarkdownWithMath(renderer=_Renderer(escape=False)).render(markdown)
+    return re.sub(r"(<table>.*?</table>)", r'<div class="wide">\1</div>', page, flags=re.DOTALL)
+
+
+def _notebook_body(path: Path) -> str:
+    notebook = nbformat.read(path, as_version=4)
+    exporter = HTMLExporter(
+        template_name="basic",
+        filters={"markdown2html": _html},
+        exclude_input_prompt=True,
+        exclude_output_prompt=True,
+    )
+    return exporter.from_notebook_node(notebook)[0]
+
+
+def _write_reference(folder: Path) -> None:
+    """A page of each module, as pdoc makes it, and a list of them."""
+    pdoc.render.configure(docformat="numpy", show_source=False, search=False)
+    modules = sorted(path for path in PACKAGE.glob("*.py") if not path.stem.startswith("__"))
+    names = [PACKAGE.name, *(f"{PACKAGE.name}.{path.stem}" for path in modules)]
+    pdoc.pdoc(*names, output_directory=folder)
+    for page in folder.rglob("*.html"):  # a long name or signature scrolls, too
+        narrow = "<style>main { overflow-x: auto; overflow-wrap: anywhere; }</style>\n</head>"
+        write_file(page, page.read_text("utf-8").replace("</head>", narrow).encode())
+    lines = [
+        f"* [{path.stem}]({PACKAGE.name}/{path.stem}.html): "
+        + ast.get_docstring(ast.parse(path.read_text("utf-8"))).split("\n\n")[0].replace("\n", " ")
+        for path in modules
+    ]
+    head = f"# Reference\n\n`import {PACKAGE.name}` has [these names]({PACKAGE.name}.html)."
+    page = f"{head} They and all others, by module:\n\n" + "\n".join(lines)
+    _write_page(folder / "index.html", _html(page))
+
+
+def _write_page(path: Path, body: str) -> None:
+    title = re.search(r"<h1[^>]*>(.*?)</h1>", body, re.DOTALL)
+    top = "" if (path.parent / "site.css").exists() else "../"
+    formulas = FORMULAS.format(top=top) if "$" in body else ""
+    page = PAGE.format(
+        title=re.sub(r"<[^>]*>", "", title[1]), top=top, body=body, formulas=formulas
+    )
+    write_file(path, page.encode())

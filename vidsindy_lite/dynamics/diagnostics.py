@@ -1,0 +1,238 @@
+"""Whether a discovered law should be trusted: each doubt in words, with advice.
+
+A doubt is a necessary sign of trouble, not a sufficient one; a law without any may still be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from .collocation import CLEANEST, Collocation, Linearisation, State
+from .information import equilibrated
+from .polynomials import PolynomialSystem
+from .selection import closest_rival
+from .trajectories import Record, typical_step
+
+MISFIT = 1.5
+"""Residual over estimated noise beyond which the law does not fit."""
+NEAR_TIE = 4.0
+"""Two laws whose criteria differ by less than this (a likelihood ratio of 7) are not told apart."""
+TURNS = 1.5
+"""Turns of the motion that a record should cover."""
+COARSE = 1.0
+"""Longest typical time step, in time scales of the motion (about 6 to a turn)."""
+RESOLVED = 1e-3
+"""Residual, relative to the spread of the data, below which a misfit does not matter."""
+STRAY = 30.0
+"""Distance of a sample from those around it, over how far nine samples in ten are from the median,
+and over the typical distance of those around it, that no motion explains. Noise of 50 % makes 6."""
+GUARD, REACH = 2, 8
+"""The samples around one are those from 3 to 8 before and after it: so up to three errors in a row
+are compared with what is none."""
+CHANCE = 1e-4
+"""Probability below which what the left-out terms explain together is no chance."""
+UNMET = 1e-2
+"""Root mean square residual of the law along the curve, relative to the speed."""
+
+
+def doubts(
+    law: PolynomialSystem,
+    state: State,
+    problem: Collocation,
+    charges: np.ndarray,
+    records: Sequence[Record],
+    noise: np.ndarray,
+) -> list[str]:
+    """Reasons not to trust a law.
+
+    Parameters
+    ----------
+    law : PolynomialSystem
+        The law, for its names.
+    state, problem
+        The final fit in standard units, the noise re-estimated from its residual.
+    charges : ndarray, shape (l,)
+        Price of each term.
+    records : sequence of Record
+        The data in standard units.
+    noise : ndarray, shape (d,)
+        Noise as the smoothing estimated it, before any law was known.
+
+    Returns
+    -------
+    list of str
+    """
+    return [
+        *_misfit(law, problem, noise),
+        *_unmet(state, problem),
+        *_selection(law, state, problem, charges),
+        *_sampling(records),
+    ]
+
+
+def strays(records: Sequence[Record]) -> list[str]:
+    """Samples so far from those around them that they must be errors.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The data in the user's units.
+
+    Returns
+    -------
+    list of str
+    """
+    found = []
+    for t, x in records:
+        away = np.abs(x - np.median(x, axis=0))
+        spread = np.quantile(away, 0.9, axis=0)
+        rows, columns = np.nonzero((away > STRAY * spread) & (spread > 0))
+        far = {row for row, j in zip(rows, columns, strict=True) if _leaps(x[:, j], row)}
+        found += [
+            f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in sorted(far)
+        ]
+    if not found:
+        return []
+    more = f" and {len(found) - 3} more" if len(found) > 3 else ""
+    return [
+        f"a sample lies far from those before and after it: {'; '.join(found[:3])}{more}: no "
+        "motion explains that; put NaN in its place"
+    ]
+
+
+def _leaps(values: np.ndarray, row: int) -> bool:
+    """Whether a sample is far from those around it, too, and not part of a motion far away."""
+    before, after = values[max(row - REACH, 0) : max(row - GUARD, 0)], values[row + GUARD + 1 :]
+    beside = np.concatenate((before, after[: REACH - GUARD]))
+    middle = np.median(beside)
+    return bool(abs(values[row] - middle) > STRAY * np.median(np.abs(beside - middle)))
+
+
+def _misfit(law: PolynomialSystem, problem: Collocation, noise: np.ndarray) -> list[str]:
+    residual = problem.data_weights**-0.5
+    ratio = np.where(residual > RESOLVED, residual / noise, 0.0)
+    j = int(ratio.argmax())
+    if ratio[j] < MISFIT:
+        return []
+    return [
+        f"the curve misses the data of {law.names[j]} by {ratio[j]:.1f} times the noise estimated "
+        "beforehand: the law may lie outside the library (raise the degree), or the motion may "
+        "not be autonomous"
+    ]
+
+
+def _unmet(state: State, problem: Collocation) -> list[str]:
+    residual = float(np.sqrt((problem.physics_residual(state) ** 2).mean()))
+    if residual < UNMET:
+        return []
+    return [
+        f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit did "
+        "not converge; use more or cleaner samples, or another degree"
+    ]
+
+
+def _selection(
+    law: PolynomialSystem, state: State, problem: Collocation, charges: np.ndarray
+) -> list[str]:
+    if (problem.data_weights**-0.5 <= CLEANEST).all():
+        return []  # what is left is the error of the splines, not noise: it settles nothing
+    # The offset stays where it is: with it free, the same law in another frame would count.
+    model = problem.linearise(state, np.arange(law.coefficients.size))
+    return [*_left_over(model, state), *_near_tie(model, law, state, charges)]
+
+
+def _left_over(model: Linearisation, state: State) -> list[str]:
+    """Would all candidates together explain more than chance (Rao's score test)?"""
+    matrix, scale = equilibrated(model.information)
+    pull = scale * model.gradient
+    gain = float(pull @ np.linalg.solve(matrix, pull))
+    unused = int((~state.active).sum())
+    if not unused or chi2.sf(gain, unused) > CHANCE:
+        return []
+    return [
+        f"the terms left out explain more than chance (chi-square {gain:.0f} for {unused}): a term "
+        "may be missing, or the errors of the measurements depend on each other"
+    ]
+
+
+def _near_tie(
+    model: Linearisation, law: PolynomialSystem, state: State, charges: np.ndarray
+) -> list[str]:
+    cost, dropped, added = closest_rival(
+        model.information,
+        model.gradient,
+        state.coefficients.T.ravel(),
+        np.tile(charges, law.d),
+        state.active.T.ravel(),
+    )
+    if cost > NEAR_TIE:
+        return []
+    out, into = (" and ".join(_place(law, k) for k in entries) for entries in (dropped, added))
+    change = (
+        f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
+    )
+    frame = "in its own frame, " if state.moving.any() else ""
+    return [
+        f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
+        "do not settle it: use a longer or cleaner record"
+    ]
+
+
+def frame_doubts(law: PolynomialSystem, margins: np.ndarray) -> list[str]:
+    """Reasons not to trust what a law became in the frame of the data.
+
+    Parameters
+    ----------
+    law : PolynomialSystem
+        The law in that frame.
+    margins : ndarray, shape (l d,)
+        By how much the criterion rises if a term is taken out or put back, equation by equation.
+
+    Returns
+    -------
+    list of str
+    """
+    return [*_standstill(law), *_narrow(law, margins)]
+
+
+def _standstill(law: PolynomialSystem) -> list[str]:
+    return [
+        f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
+        for name, moves in zip(law.names, law.support.any(axis=0), strict=True)
+        if not moves
+    ]
+
+
+def _narrow(law: PolynomialSystem, margins: np.ndarray) -> list[str]:
+    close = np.flatnonzero(margins < NEAR_TIE)
+    if not len(close):
+        return []
+    kept = law.support.T.ravel()
+    changes = ", ".join(f"{'without' if kept[k] else 'with'} {_place(law, k)}" for k in close)
+    return [
+        f"in the frame of the data another law fits almost as well: {changes} (criterion "
+        f"{margins[close].min():+.1f}); the standard errors do not count this in"
+    ]
+
+
+def _place(law: PolynomialSystem, entry: int) -> str:
+    """Name of an entry of the coefficients, counted equation by equation."""
+    equation, term = divmod(int(entry), len(law.terms))
+    return f"{law.terms[term]} in d{law.names[equation]}/dt"
+
+
+def _sampling(records: Sequence[Record]) -> list[str]:
+    found = []
+    turns = sum(t[-1] - t[0] for t, _ in records) / (2 * np.pi)
+    if turns < TURNS and records[0][1].shape[1] > 1:  # on a line nothing turns
+        found.append(
+            f"the record covers only {turns:.1f} turns of the motion: terms may be "
+            "indistinguishable on it; record longer"
+        )
+    step = typical_step(records)
+    if step > COARSE:
+        found.append(f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster")
+    return found

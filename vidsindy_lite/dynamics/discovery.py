@@ -1,0 +1,298 @@
+"""The result of a discovery: the law in two frames, its uncertainty, and whether to trust it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from ..checks import check_array
+from .collocation import Collocation, State
+from .diagnostics import frame_doubts
+from .information import inverse
+from .polynomials import PolynomialSystem, shift_generators, shift_matrix, variable_names
+
+
+@dataclass(frozen=True)
+class Units:
+    """Standard units of a fit: every coordinate with mean 0 and variance 1, time in time scales.
+
+    Parameters
+    ----------
+    centre, scale : ndarray, shape (d,)
+        Mean and standard deviation of the data.
+    time : float
+        Length of a standard time unit.
+    """
+
+    centre: np.ndarray
+    scale: np.ndarray
+    time: float
+
+    def standard(self, point: np.ndarray) -> np.ndarray:
+        """A point of the data's frame in standard units."""
+        return (point - self.centre) / self.scale
+
+    def point(self, standard: np.ndarray) -> np.ndarray:
+        """A standard point in the data's frame and units."""
+        return standard * self.scale + self.centre
+
+    def factors(self, exponents: np.ndarray) -> np.ndarray:
+        """What turns standard coefficients into those of the data's units, shape (l, d)."""
+        return self.scale / np.prod(self.scale**exponents, axis=1)[:, None] / self.time
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the history of a discovery.
+
+    Parameters
+    ----------
+    stage : str
+        What was done.
+    seconds : float
+        Time since the start.
+    physics_weight : float
+        Relative weight of the physics loss.
+    data_loss : float
+        Mean square residual of the data over the noise variance.
+    physics_loss : float
+        Mean square residual of the law in standard units.
+    terms : int
+        Number of active terms.
+    offset : ndarray, shape (d,)
+        Origin of the law in the data's frame.
+    """
+
+    stage: str
+    seconds: float
+    physics_weight: float
+    data_loss: float
+    physics_loss: float
+    terms: int
+    offset: np.ndarray
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """A discovered law.
+
+    Parameters
+    ----------
+    system : PolynomialSystem
+        The law in the frame of the data.
+    native : PolynomialSystem
+        The law in the frame in which it is sparsest, or in one such frame if there are several:
+        ``system`` is ``native.shift(offset)``, less the terms that the data cannot tell from zero.
+    offset : ndarray, shape (d,)
+        Origin of the native frame, in units of the data.
+    covariance, native_covariance : ndarray, shape (l d, l d)
+        Of the coefficients, equation by equation, if the terms are the right ones; zero for
+        inactive terms.
+    offset_errors : ndarray, shape (d,)
+        Standard errors of the offset; zero along an axis that was not moved.
+    noise : ndarray, shape (d,)
+        Estimated standard deviation of the measurement noise, in units of the data.
+    warnings : tuple of str
+        Why the law should not be trusted, with advice; empty if nothing was found.
+    history : tuple of Step
+        How the fit went.
+    curves : tuple of scipy.interpolate.BSpline
+        The fitted curve, one spline per stretch of data, in units of the data.
+    """
+
+    system: PolynomialSystem
+    native: PolynomialSystem
+    offset: np.ndarray
+    covariance: np.ndarray
+    native_covariance: np.ndarray
+    offset_errors: np.ndarray
+    noise: np.ndarray
+    warnings: tuple[str, ...]
+    history: tuple[Step, ...]
+    curves: tuple[BSpline, ...]
+
+    @property
+    def status(self) -> str:
+        """``"ok"``, or ``"suspect"`` if there is a warning."""
+        return "suspect" if self.warnings else "ok"
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """``Lambda`` in the frame of the data, shape (l, d)."""
+        return self.system.coefficients
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the candidate terms, length l."""
+        return self.system.terms
+
+    @property
+    def standard_errors(self) -> np.ndarray:
+        """Standard errors of `coefficients`, shape (l, d)."""
+        return _errors(self.covariance, self.system)
+
+    @property
+    def native_standard_errors(self) -> np.ndarray:
+        """Standard errors of the coefficients of `native`, shape (l, d)."""
+        return _errors(self.native_covariance, self.native)
+
+    def equations(self, frame: str = "data") -> str:
+        """The law as text, every coefficient with its standard error.
+
+        Parameters
+        ----------
+        frame : {"data", "native"}
+            Which frame.
+        """
+        if frame not in ("data", "native"):
+            raise ValueError(f"frame: must be 'data' or 'native', got {frame!r}")
+        law, errors = (
+            (self.system, self.standard_errors)
+            if frame == "data"
+            else (self.native, self.native_standard_errors)
+        )
+        lines = []
+        for j, name in enumerate(law.names):
+            rows = np.flatnonzero(law.coefficients[:, j])
+            terms = (_with_error(law.coefficients[r, j], errors[r, j], law.terms[r]) for r in rows)
+            text = " ".join(terms).removeprefix("+ ") or "0"
+            lines.append(f"d{name}/dt = {text}")
+        return "\n".join(lines)
+
+    def curve(self, t: np.ndarray) -> np.ndarray:
+        """The fitted curve, shape (n, d), in the frame of the data; NaN outside the stretches."""
+        t = check_array("t", t)
+        values = np.full((*t.shape, self.system.d), np.nan)
+        for spline in self.curves:
+            low, high = spline.t[0], spline.t[-1]
+            slack = 1e-9 * (high - low)
+            inside = (t >= low - slack) & (t <= high + slack)
+            values[inside] = spline(np.clip(t[inside], low, high))
+        return values
+
+    def __str__(self) -> str:
+        return "\n".join([self.equations(), *(f"warning: {text}" for text in self.warnings)])
+
+
+def report(
+    state: State,
+    problem: Collocation,
+    units: Units,
+    charges: np.ndarray,
+    warnings: Sequence[str],
+    history: Sequence[Step],
+) -> Discovery:
+    """Turn the last state of a fit into a `Discovery` in the units of the data.
+
+    Parameters
+    ----------
+    state, problem
+        The fit, at a physics weight at which the law holds exactly.
+    units : Units
+        Standard units of the fit.
+    charges : ndarray, shape (l,)
+        Price of each term: a coefficient whose squared score is lower cannot be told from zero.
+    warnings, history
+        Passed on.
+    """
+    exponents, (l, d) = problem.exponents, state.coefficients.shape
+    names = variable_names(d)
+    columns = np.flatnonzero(state.free())
+    covariance = np.zeros((l * d + d, l * d + d))
+    information = problem.linearise(state, columns).information
+    covariance[np.ix_(columns, columns)] = inverse(information)
+    unit = np.concatenate([units.factors(exponents).T.ravel(), units.scale])
+    covariance *= unit[:, None] * unit
+    coefficients = state.coefficients * units.factors(exponents)
+    offset = np.where(state.moving, units.point(state.offset), 0.0)
+
+    native_covariance = covariance[: l * d, : l * d]
+    moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
+    moved, moved_covariance, margins = _pruned(moved, moved_covariance, charges)
+    law = PolynomialSystem(names, exponents, moved)
+    if not state.moving.any():
+        margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
+    splines = (
+        BSpline(knots * units.time, control * units.scale + units.centre, 3)
+        for knots, control in problem.splines(state.control_points)
+    )
+    return Discovery(
+        system=law,
+        native=PolynomialSystem(names, exponents, coefficients),
+        offset=offset,
+        covariance=moved_covariance,
+        native_covariance=native_covariance,
+        offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
+        noise=problem.data_weights**-0.5 * units.scale,
+        warnings=(*warnings, *frame_doubts(law, margins)),
+        history=tuple(history),
+        curves=tuple(splines),
+    )
+
+
+def _shifted(
+    exponents: np.ndarray, coefficients: np.ndarray, offset: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Law in the data's frame, with the covariance of coefficients and offset carried along."""
+    l, d = exponents.shape
+    matrix = shift_matrix(exponents, offset)
+    moved = matrix @ coefficients
+    jacobian = np.zeros((l * d, l * d + d))
+    jacobian[:, : l * d] = np.kron(np.eye(d), matrix)
+    for i, generator in enumerate(shift_generators(exponents)):
+        jacobian[:, l * d + i] = -(generator @ moved).T.ravel()
+    return moved, jacobian @ covariance @ jacobian.T
+
+
+def _pruned(
+    coefficients: np.ndarray, covariance: np.ndarray, charges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Set what cannot be told from zero to zero, one by one, and correct the others for it.
+
+    Shifting a law by an estimated offset leaves remainders where the exact shift cancels. The
+    least significant is taken out by conditioning the Gaussian estimate on its being zero. Comes
+    back with the margin of each decision, in chi-square units; infinite where none was taken.
+    """
+    shape = coefficients.shape[::-1]
+    flat = coefficients.T.ravel().copy()
+    covariance = covariance.copy()
+    original = np.diag(covariance).copy()
+    charge = np.tile(charges, shape[0])
+    margins = np.full(len(flat), np.inf)
+    while True:
+        variance = np.diag(covariance)
+        live = np.flatnonzero(flat)
+        # After conditioning, a dependent entry has neither value nor variance left.
+        known = variance[live] <= 1e-12 * original[live]
+        score = np.where(known, np.inf, flat[live] ** 2 / np.where(known, 1.0, variance[live]))
+        gone = live[known & (flat[live] ** 2 < 1e-6 * original[live])]
+        if len(gone):
+            flat[gone] = 0.0
+            continue
+        weakness = score / charge[live]
+        if not len(live) or weakness.min() >= 1:
+            margins[live] = score - charge[live]
+            break
+        weakest = weakness.argmin()
+        k = live[weakest]
+        margins[k] = charge[k] - score[weakest]
+        gain = covariance[:, k] / covariance[k, k]
+        flat -= gain * flat[k]
+        covariance -= np.outer(gain, covariance[k])
+        flat[k] = 0.0
+        covariance[k] = covariance[:, k] = 0.0
+    dead = flat == 0
+    covariance[dead] = covariance[:, dead] = 0.0
+    return flat.reshape(shape).T, covariance, margins
+
+
+def _errors(covariance: np.ndarray, law: PolynomialSystem) -> np.ndarray:
+    variance = np.maximum(np.diag(covariance), 0.0)
+    return np.sqrt(variance).reshape(law.coefficients.shape[::-1]).T
+
+
+def _with_error(value: float, error: float, term: str) -> str:
+    digits = 4 if error <= 0 else int(np.clip(1 - np.floor(np.log10(error)), 0, 12))
+    number = f"({abs(value):.{digits}f} ± {error:.{digits}f})"
+    return f"{'-' if value < 0 else '+'} {number}" + ("" if term == "1" else f" {term}")

@@ -1,0 +1,462 @@
+"""Polynomial dynamical systems: the one type of both the ground truth and the discovered law.
+
+The law is ``dx/dt = phi(x) Lambda`` (paper: Eq. 7), with a row ``phi`` of monomials and a sparse
+matrix ``Lambda`` of coefficients. A polynomial library is closed under a shift of the origin, so
+the law in any other frame follows exactly (paper: Eq. 10) and is never typed by hand.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import combinations_with_replacement
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.special import comb as binomial
+
+from ..checks import check_array, check_integer, check_number, check_times, check_vector
+
+
+def variable_names(d: int) -> tuple[str, ...]:
+    """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
+    return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
+
+
+def monomial_exponents(d: int, degree: int) -> np.ndarray:
+    """Exponents of all monomials of ``d`` variables up to ``degree``, in graded order.
+
+    Parameters
+    ----------
+    d : int
+        Number of variables, at least 1.
+    degree : int
+        Highest total degree, at least 0.
+
+    Returns
+    -------
+    ndarray of int, shape (l, d)
+        For d = 2, degree = 2: 1, x, y, x^2, xy, y^2.
+    """
+    d, degree = check_integer("d", d, 1), check_integer("degree", degree)
+    rows = [
+        [picked.count(i) for i in range(d)]
+        for total in range(degree + 1)
+        for picked in combinations_with_replacement(range(d), total)
+    ]
+    return np.array(rows, dtype=int).reshape(-1, d)
+
+
+def monomials(x: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+    """Evaluate monomials.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n, d)
+        Points.
+    exponents : ndarray of int, shape (l, d)
+        One row a monomial.
+
+    Returns
+    -------
+    ndarray, shape (n, l)
+        ``phi(x)``, one row a point.
+    """
+    # By products, one monomial a row: ten times faster than powers, one point a row.
+    powers = np.ones((exponents.max(initial=0) + 1, *x.T.shape))
+    for k in range(1, len(powers)):
+        np.multiply(powers[k - 1], x.T, out=powers[k])
+    values = powers[exponents[:, 0], 0]
+    for i in range(1, exponents.shape[1]):
+        values *= powers[exponents[:, i], i]
+    return values.T
+
+
+def monomial_gradients(x: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+    """Derivatives of monomials, shape (n, l, d); see `monomials`."""
+    gradients = []
+    for i in range(x.shape[1]):
+        lowered = exponents.copy()
+        lowered[:, i] = np.maximum(lowered[:, i] - 1, 0)
+        gradients.append(exponents[:, i] * monomials(x, lowered))
+    return np.stack(gradients, axis=-1)
+
+
+def shift_matrix(exponents: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l).
+
+    The library has to be closed: with every monomial it holds all its divisors.
+    """
+    factors, lowered = _binomials(exponents.tobytes(), *exponents.shape)
+    return (factors * (-np.asarray(offset, dtype=float)) ** lowered).prod(axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _binomials(exponents: bytes, l: int, d: int) -> tuple[np.ndarray, np.ndarray]:
+    powers = np.frombuffer(exponents, dtype=int).reshape(l, d)
+    lowered = powers[None, :, :] - powers[:, None, :]
+    factors = np.where(lowered >= 0, binomial(powers[None, :, :], powers[:, None, :]), 0.0)
+    return factors, np.maximum(lowered, 0)
+
+
+def closure(exponents: np.ndarray) -> np.ndarray:
+    """Exponents of all divisors of the given monomials, in graded order, shape (l, d)."""
+    divisors = {divisor for powers in exponents for divisor in np.ndindex(*(powers + 1))}
+    ordered = sorted(divisors, key=lambda e: (sum(e), tuple(-p for p in e)))
+    return np.array(ordered, dtype=int).reshape(-1, exponents.shape[1])
+
+
+def divides(exponents: np.ndarray) -> np.ndarray:
+    """Which monomial (row) divides which (column), itself included; shape (l, l)."""
+    return (exponents[:, None, :] <= exponents[None, :, :]).all(axis=-1)
+
+
+def closure_mask(exponents: np.ndarray, support: np.ndarray) -> np.ndarray:
+    """Widen a support (l, d) to all divisors of its terms: what any shift of it may contain."""
+    return divides(exponents) @ support
+
+
+def shift_generators(exponents: np.ndarray) -> np.ndarray:
+    """Matrices ``N_i`` with ``d phi / d x_i = phi N_i``, shape (d, l, l).
+
+    ``-N_i`` is the rate of change of `shift_matrix` with the offset along axis i.
+    """
+    d = exponents.shape[1]
+    lowered = exponents[None, :, :] - exponents[:, None, :]
+    return np.stack(
+        [
+            np.where((lowered == axis).all(axis=-1), exponents[None, :, i], 0.0)
+            for i, axis in enumerate(np.eye(d, dtype=int))
+        ]
+    )
+
+
+def runge_kutta_4(
+    rate: Callable[[np.ndarray], np.ndarray], t: np.ndarray, x0: np.ndarray, substeps: int = 10
+) -> np.ndarray:
+    """Integrate with the classical 4th-order Runge-Kutta method, as the paper does.
+
+    Parameters
+    ----------
+    rate : callable
+        The law: time derivative of a state, or of several at once; a `PolynomialSystem` is one.
+    t : ndarray, shape (n,)
+        Increasing times of the returned rows.
+    x0 : array_like, shape (d,) or (m, d)
+        State, or states of several motions, at ``t[0]``.
+    substeps : int
+        Equal steps between two times.
+
+    Returns
+    -------
+    ndarray, shape (n, d) or (n, m, d)
+    """
+    states = [check_array("x0", x0)]
+    if isinstance(rate, PolynomialSystem) and states[0].shape[-1:] != (rate.d,):
+        raise ValueError(f"x0: must have shape ({rate.d},) or (m, {rate.d}), got {states[0].shape}")
+    if not np.isfinite(states[0]).all():
+        raise ValueError(f"x0: must be finite, got {x0!r:.60}")
+    for step in np.diff(check_times(t)) / check_integer("substeps", substeps, 1):
+        x = states[-1]
+        for _ in range(substeps):
+            k1 = rate(x)
+            k2 = rate(x + step / 2 * k1)
+            k3 = rate(x + step / 2 * k2)
+            k4 = rate(x + step * k3)
+            x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states.append(x)
+    return np.array(states)
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialSystem:
+    """An autonomous polynomial system ``dx/dt = phi(x) Lambda`` (paper: Eq. 7).
+
+    Parameters
+    ----------
+    names : sequence of str, length d
+        Names of the state variables: a letter, then letters, digits and underscores.
+    exponents : array_like of int, shape (l, d)
+        The monomials of the library, one row each.
+    coefficients : array_like, shape (l, d)
+        ``Lambda``; column j is the right-hand side of variable j.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, a name is none, an exponent is negative, not whole or repeated, or a
+        value is not finite.
+    """
+
+    names: tuple[str, ...]
+    exponents: np.ndarray
+    coefficients: np.ndarray
+
+    def __post_init__(self) -> None:
+        names = tuple(self.names) if isinstance(self.names, Iterable) else ()
+        named = all(isinstance(name, str) and name.isidentifier() for name in names)
+        if not names or not named or len(set(names)) != len(names):
+            raise ValueError(
+                f"names: must be distinct names such as x or x1, at least one, got {self.names!r}"
+            )
+        powers = check_array("exponents", self.exponents)
+        coefficients = check_array("coefficients", self.coefficients).copy()
+        if powers.ndim != 2 or powers.shape[1] != len(names):
+            raise ValueError(
+                f"exponents: must have shape (l, {len(names)}), got shape {powers.shape}"
+            )
+        whole = np.isfinite(powers) & (powers >= 0) & (powers == np.rint(powers))
+        if not whole.all():
+            raise ValueError(
+                f"exponents: must be non-negative integers, got {powers[~whole][0]:g}"
+            )
+        exponents = powers.astype(int)
+        if len(np.unique(exponents, axis=0)) != len(exponents):
+            raise ValueError("exponents: every monomial may appear once, got a repeated row")
+        if coefficients.shape != exponents.shape:
+            raise ValueError(
+                f"coefficients: must have shape {exponents.shape}, got {coefficients.shape}"
+            )
+        if not np.isfinite(coefficients).all():
+            raise ValueError("coefficients: must be finite, got NaN or infinity")
+        for array in (exponents, coefficients):
+            array.setflags(write=False)
+        object.__setattr__(self, "names", names)
+        object.__setattr__(self, "exponents", exponents)
+        object.__setattr__(self, "coefficients", coefficients)
+
+    @classmethod
+    def from_terms(
+        cls, equations: Mapping[str, Mapping[str, float]], degree: int | None = None
+    ) -> PolynomialSystem:
+        """Build a system from named terms.
+
+        Parameters
+        ----------
+        equations : mapping of str to mapping of str to float
+            For each variable its terms, e.g. ``{"x": {"x": -10, "y": 10}, "y": {...}}``. A term
+            is a product of variables, ``"1"``, ``"xz"``, ``"x^2 y"`` or ``"x*y**2"``.
+        degree : int, optional
+            Degree of the full library; by default the highest degree among the terms.
+
+        Raises
+        ------
+        ValueError
+            If the equations are no such mapping, or a term names an unknown variable or has a
+            higher degree than the library.
+        """
+        given = equations.values() if isinstance(equations, Mapping) else ()
+        if not given or not all(isinstance(terms, Mapping) for terms in given):
+            raise ValueError(
+                "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
+                f"'y': {{'x': 1}}}}, got {equations!r:.60}"
+            )
+        names = tuple(equations)
+        parsed = [
+            {term: _parse_term(term, names) for term in terms} for terms in equations.values()
+        ]
+        highest = max((sum(e) for terms in parsed for e in terms.values()), default=0)
+        degree = highest if degree is None else check_integer("degree", degree)
+        if highest > degree:
+            raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
+        exponents = monomial_exponents(len(names), degree)
+        index = {tuple(e): row for row, e in enumerate(exponents)}
+        coefficients = np.zeros(exponents.shape)
+        for column, (terms, values) in enumerate(zip(parsed, equations.values(), strict=True)):
+            for term, value in values.items():
+                number = check_number(f"coefficient of {term}", value)
+                coefficients[index[terms[term]], column] += number
+        return cls(names, exponents, coefficients)
+
+    @property
+    def d(self) -> int:
+        """Dimension of the state."""
+        return len(self.names)
+
+    @property
+    def degree(self) -> int:
+        """Highest total degree of the library."""
+        return int(self.exponents.sum(axis=1).max(initial=0))
+
+    @cached_property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the monomials, e.g. ``("1", "x", "x^2", "xy")``."""
+        return tuple(_term_text(e, self.names) for e in self.exponents)
+
+    @property
+    def support(self) -> np.ndarray:
+        """Where a coefficient is not zero, bool, shape (l, d)."""
+        return self.coefficients != 0
+
+    def library(self, x: np.ndarray) -> np.ndarray:
+        """Candidate terms ``phi(x)``: (n, d) points to (n, l) values."""
+        return monomials(self._points(x), self.exponents)
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
+        x = check_array("x", x)
+        return (self.library(np.atleast_2d(x)) @ self.coefficients).reshape(x.shape)
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Jacobian of the right-hand side.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n, d) or (d,)
+            Points.
+
+        Returns
+        -------
+        ndarray, shape (n, d, d) or (d, d)
+            ``[..., j, i]`` is the derivative of equation j with respect to variable i.
+        """
+        x = check_array("x", x)
+        points = self._points(np.atleast_2d(x))
+        jacobian = np.einsum(
+            "nli,lj->nji", monomial_gradients(points, self.exponents), self.coefficients
+        )
+        return jacobian.reshape(*x.shape, self.d)
+
+    def shift(self, offset: Sequence[float]) -> PolynomialSystem:
+        """The same motion seen from a shifted origin, exactly (paper: Eq. 10).
+
+        If x(t) solves this system, x(t) + offset solves the returned one.
+
+        Parameters
+        ----------
+        offset : array_like, shape (d,)
+            Shift of the trajectory, in state units.
+        """
+        offset = check_vector("offset", offset, self.d)
+        exponents = closure(self.exponents)
+        rows = {tuple(e): row for row, e in enumerate(exponents)}
+        closed = np.zeros(exponents.shape)
+        closed[[rows[tuple(e)] for e in self.exponents]] = self.coefficients
+        matrix = shift_matrix(exponents, offset)
+        shifted = matrix @ closed
+        # What cancels in exact arithmetic must not survive as a term of 1e-16.
+        shifted[np.abs(shifted) <= 1e-13 * (np.abs(matrix) @ np.abs(closed))] = 0.0
+        return replace(self, exponents=exponents, coefficients=shifted)
+
+    def simulate(self, t: np.ndarray, x0: np.ndarray) -> np.ndarray:
+        """Integrate from ``x0`` at ``t[0]`` with an adaptive 8th-order Runge-Kutta method.
+
+        Parameters
+        ----------
+        t : array_like, shape (n,)
+            Increasing, finite times.
+        x0 : array_like, shape (d,)
+            State at ``t[0]``.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+            The trajectory; rows after a blow-up are NaN.
+
+        Raises
+        ------
+        ValueError
+            If the times do not increase, or a time or a number of the state is not finite.
+        """
+        t, x0 = check_times(t), check_vector("x0", x0, self.d)
+
+        def escaped(_, x):
+            return 1e8 * (1 + np.abs(x0).max()) - np.abs(x).max()
+
+        escaped.terminal = True
+        def rate(_, x):  # as calling the law, without its checks, which take as long
+            return (monomials(x[None], self.exponents) @ self.coefficients)[0]
+
+        trajectory = np.full((len(t), self.d), np.nan)
+        trajectory[0] = x0
+        if len(t) > 1:
+            solution = solve_ivp(
+                rate, (t[0], t[-1]), x0, method="DOP853", t_eval=t,
+                rtol=1e-11, atol=1e-11, events=escaped,
+            )  # fmt: skip
+            trajectory[: solution.y.shape[1]] = solution.y.T
+        return trajectory
+
+    def text(self, digits: int = 4) -> str:
+        """The equations as lines of plain text, e.g. ``dx/dt = -10 x + 10 y``."""
+        return "\n".join(
+            f"d{name}/dt = {_sum_text(self.coefficients[:, j], self.terms, digits)}"
+            for j, name in enumerate(self.names)
+        )
+
+    def latex(self, digits: int = 4) -> str:
+        """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
+        terms = [_term_latex(e, self.names) for e in self.exponents]
+        rows = (
+            rf"\dot{{{_name_latex(name)}}} &= "
+            + _sum_text(self.coefficients[:, j], terms, digits, r"\,")
+            for j, name in enumerate(self.names)
+        )
+        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def _repr_latex_(self) -> str:
+        return f"${self.latex()}$"
+
+    def _points(self, x: np.ndarray) -> np.ndarray:
+        x = check_array("x", x)
+        if x.ndim != 2 or x.shape[1] != self.d:
+            raise ValueError(f"x: must have shape (n, {self.d}), got {x.shape}")
+        return x
+
+
+def _parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
+    if not isinstance(term, str) or not term.strip():
+        raise ValueError(f"term: must be '1' or a product of the variables {names}, got {term!r}")
+    exponents = dict.fromkeys(names, 0)
+    rest = "" if term.strip() == "1" else term.replace("**", "^").replace("*", " ").strip()
+    longest_first = "|".join(sorted(map(re.escape, names), key=len, reverse=True))
+    factor = re.compile(rf"({longest_first})(?:\s*\^\s*(\d+))?\s*")
+    while rest:
+        match = factor.match(rest)
+        if match is None:
+            raise ValueError(f"term: must be a product of the variables {names}, got {term!r}")
+        exponents[match[1]] += int(match[2] or 1)
+        rest = rest[match.end() :]
+    return tuple(exponents.values())
+
+
+def _term_text(exponents: np.ndarray, names: tuple[str, ...]) -> str:
+    factors = [
+        name if power == 1 else f"{name}^{power}"
+        for name, power in zip(names, exponents, strict=True)
+        if power
+    ]
+    return ("" if all(len(name) == 1 for name in names) else " ").join(factors) or "1"
+
+
+def _name_latex(name: str) -> str:
+    letters = name.rstrip("0123456789")
+    return name if letters == name else f"{letters}_{{{name[len(letters) :]}}}"
+
+
+def _term_latex(exponents: np.ndarray, names: tuple[str, ...]) -> str:
+    return (
+        " ".join(
+            _name_latex(name) + (f"^{{{power}}}" if power > 1 else "")
+            for name, power in zip(names, exponents, strict=True)
+            if power
+        )
+        or "1"
+    )
+
+
+def _sum_text(coefficients: np.ndarray, terms: Sequence[str], digits: int, times: str = " ") -> str:
+    text = ""
+    # The highest monomials last, the constant first in the library: print it the way it is read.
+    for row in sorted(np.flatnonzero(coefficients), key=lambda r: terms[r] == "1"):
+        value, term = coefficients[row], terms[row]
+        number = f"{abs(value):.{digits}g}"
+        size = number if term == "1" else term if number == "1" else f"{number}{times}{term}"
+        sign = "-" if value < 0 else "+"
+        text += f" {sign} {size}" if text else (f"-{size}" if value < 0 else size)
+    return text or "0"

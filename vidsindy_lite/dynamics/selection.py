@@ -1,0 +1,252 @@
+"""Sparse regression in small algebra: the paper's STRidge and our subset search."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from .information import equilibrated
+
+COLLINEAR = 1e-9
+"""Share of a column that is not a combination of others, below which it is taken to be one."""
+PLATEAU = 1e-6
+"""Changes of the function below this are taken for rounding."""
+
+
+def subset_search(
+    information: np.ndarray,
+    gradient: np.ndarray,
+    present: np.ndarray,
+    charge: np.ndarray,
+    start: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Minimise a quadratic function of ``c`` plus charges of its non-zero entries, by local search.
+
+    The function is ``(c - p)' S (c - p) - 2 g' (c - p)``: what Gauss-Newton knows around ``p``.
+    Takes the best of all single drops, adds and swaps until none helps, once from the given
+    support and once from nothing; then asks of every entry left out whether it lets others go
+    that it does not pay for by itself (where a conserved quantity ties terms together, only that
+    leads on). Unlike a threshold it weighs a term by what the fit loses with it, re-fitting all
+    others, so it survives collinear columns and coefficients of very different size.
+
+    Parameters
+    ----------
+    information : ndarray, shape (m, m)
+        ``S``, symmetric positive semi-definite.
+    gradient : ndarray, shape (m,)
+        ``g``.
+    present : ndarray, shape (m,)
+        ``p``; zeros for a plain regression.
+    charge : ndarray, shape (m,)
+        Price of each non-zero entry, in the units of the objective; minus infinity keeps it in.
+    start : ndarray of bool, shape (m,)
+        First support.
+
+    Returns
+    -------
+    support : ndarray of bool, shape (m,)
+    solution : ndarray, shape (m,)
+        Minimiser on the support, zero elsewhere.
+    value : float
+        The function with charges.
+    """
+    model = _Quadratic(information, gradient, present, charge)
+    starts = (start, np.isneginf(charge))
+    best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
+    while (deeper := _through_newcomer(model, best)) is not None:
+        best = deeper
+    solution = np.zeros(len(charge))
+    solution[best.inside] = best.fitted * model.scale[best.inside]
+    return best.support, solution, best.value
+
+
+def closest_rival(
+    information: np.ndarray,
+    gradient: np.ndarray,
+    present: np.ndarray,
+    charge: np.ndarray,
+    support: np.ndarray,
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """The single change of a support that costs least.
+
+    Parameters
+    ----------
+    information, gradient, present, charge
+        See `subset_search`.
+    support : ndarray of bool, shape (m,)
+        A support at which `subset_search` has stopped.
+
+    Returns
+    -------
+    cost : float
+        By how much the function with charges rises.
+    dropped, added : ndarray of int
+        The entries that leave and enter, at most one each.
+    """
+    model = _Quadratic(information, gradient, present, charge)
+    fit = model.fit(support)
+    rivals = []
+    for cost, dropped, added in _single_changes(model, _Tableau.of(model, fit)):
+        if np.isfinite(cost):  # a rough one where terms are tied together: work it out again
+            cost = model.fit(_changed(support, dropped, added)).value - fit.value
+        rivals.append((cost, dropped, added))
+    return min(rivals, key=lambda rival: rival[0])
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A quadratic function at its minimum on a support, all in scaled entries."""
+
+    support: np.ndarray
+    inside: np.ndarray
+    inverse: np.ndarray
+    fitted: np.ndarray
+    left: np.ndarray
+    value: float
+
+
+class _Quadratic:
+    """A quadratic function with charges, its entries scaled to a unit diagonal.
+
+    Everything is reckoned from the present point: with data that are nearly exact the function
+    itself has more digits than a computer, its changes do not.
+    """
+
+    def __init__(self, information, gradient, present, charge) -> None:
+        self.matrix, self.scale = equilibrated(information)
+        self.gradient, self.present = gradient * self.scale, present / self.scale
+        self.charge = charge
+
+    def fit(self, support: np.ndarray) -> _Fit:
+        inside = np.flatnonzero(support)
+        block = self.matrix[inside[:, None], inside]
+        inverse = np.linalg.inv(block)
+        step = -self.present
+        step[inside] = 0.0
+        target = (self.gradient - self.matrix @ step)[inside]
+        moved = inverse @ target
+        moved += inverse @ (target - block @ moved)
+        step[inside] = moved
+        left = self.gradient - self.matrix @ step
+        paid = self.charge[inside[np.isfinite(self.charge[inside])]].sum()
+        value = float(paid - step @ (left + self.gradient))
+        return _Fit(support, inside, inverse, self.present[inside] + moved, left, value)
+
+
+def _descend(model: _Quadratic, start: np.ndarray) -> _Fit:
+    """Take the best of all drops, adds and swaps until none helps."""
+    best = model.fit(start)
+    while True:
+        changes = _single_changes(model, _Tableau.of(model, best))
+        change, dropped, added = min(changes, key=lambda item: item[0])
+        if not change < -PLATEAU:
+            return best
+        # Rounding may promise a fall that does not come: what counts is the value itself.
+        fit = model.fit(_changed(best.support, dropped, added))
+        if not fit.value < best.value - PLATEAU:
+            return best
+        best = fit
+
+
+def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
+    """A lower value reached by forcing one entry in, which may let several others go."""
+    none = np.array([], dtype=int)
+    tableau = _Tableau.of(model, best)
+    for i, entry in enumerate(tableau.outside):
+        # Most newcomers change nothing for the others, which a rank-one update tells.
+        if tableau.room[i] > COLLINEAR:
+            changes = _single_changes(model, tableau.joined(model, i))
+            if not min(cost for cost, _, _ in changes) < -PLATEAU:
+                continue
+        forced = copy(model)
+        forced.charge = model.charge.copy()
+        forced.charge[entry] = -np.inf
+        trial = _descend(forced, _changed(best.support, none, entry))
+        if trial.value + model.charge[entry] < best.value - PLATEAU:
+            return _descend(model, trial.support)
+    return None
+
+
+def _changed(support: np.ndarray, dropped: np.ndarray, added: np.ndarray) -> np.ndarray:
+    changed = support.copy()
+    changed[dropped] = False
+    changed[added] = True
+    return changed
+
+
+@dataclass(frozen=True)
+class _Tableau:
+    """What single changes of a support hang on: entries that may leave, and that may join.
+
+    ``spread`` is the inverse's diagonal, ``response`` (outside, inside) how far those inside give
+    way to a newcomer, ``left`` the gradient that is left to it, ``room`` the share of it that is no
+    combination of those inside.
+    """
+
+    inside: np.ndarray
+    outside: np.ndarray
+    fitted: np.ndarray
+    spread: np.ndarray
+    response: np.ndarray
+    left: np.ndarray
+    room: np.ndarray
+
+    @classmethod
+    def of(cls, model: _Quadratic, fit: _Fit) -> _Tableau:
+        inside, outside = fit.inside, np.flatnonzero(~fit.support)
+        shared = model.matrix[outside[:, None], inside]
+        response = shared @ fit.inverse
+        room = 1 - (response * shared).sum(axis=1)
+        return cls(
+            inside, outside, fit.fitted, np.diag(fit.inverse), response, fit.left[outside], room
+        )
+
+    def joined(self, model: _Quadratic, i: int) -> _Tableau:
+        """The same after outside entry number i has joined to stay: rank-one updates."""
+        others, entry = np.arange(len(self.outside)) != i, self.outside[i]
+        response, outside = self.response[others], self.outside[others]
+        common = model.matrix[outside, entry] - response @ model.matrix[self.inside, entry]
+        weight = common / self.room[i]
+        return _Tableau(
+            inside=self.inside,
+            outside=outside,
+            fitted=self.fitted - self.response[i] * (self.left[i] / self.room[i]),
+            spread=self.spread + self.response[i] ** 2 / self.room[i],
+            response=response - weight[:, None] * self.response[i],
+            left=self.left[others] - weight * self.left[i],
+            room=self.room[others] - weight * common,
+        )
+
+
+def _single_changes(
+    model: _Quadratic, tableau: _Tableau
+) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Best drop, add and swap: change of the function, entries dropped, entries added."""
+    inside, outside, fitted, spread = (
+        tableau.inside, tableau.outside, tableau.fitted, tableau.spread
+    )
+    response, left, room = tableau.response, tableau.left, tableau.room
+    none = np.array([], dtype=int)
+    charge = model.charge
+    loss = fitted**2 / spread - charge[inside]
+    cost = charge[outside] - _gain(left, room)
+    changes = [(np.inf, none, none)]
+    if len(inside):
+        changes.append((loss.min(), inside[[loss.argmin()]], none))
+    if len(outside):
+        changes.append((cost.min(), none, outside[[cost.argmin()]]))
+    if len(inside) and len(outside):
+        # A drop changes what the others leave over, and the room a newcomer has, by rank one.
+        swapped_left = left[:, None] + response * (fitted / spread)
+        swapped_room = room[:, None] + response**2 / spread
+        swap = loss + charge[outside][:, None] - _gain(swapped_left, swapped_room)
+        add, drop = np.unravel_index(swap.argmin(), swap.shape)
+        changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
+    return changes
+
+
+def _gain(left: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """What a newcomer explains; nothing if it is a combination of those that are in."""
+    return np.where(room > COLLINEAR, left**2 / np.maximum(room, COLLINEAR), -np.inf)

@@ -1,0 +1,137 @@
+"""Measured trajectories: checked input, and its cut into stretches without gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..checks import check_array, check_times
+
+Record = tuple[np.ndarray, np.ndarray]
+"""Times (n,) and states (n, d) without missing rows."""
+
+
+def check_record(t: np.ndarray, x: np.ndarray) -> Record:
+    """Check one trajectory and leave out its missing rows.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Increasing, finite times.
+    x : array_like, shape (n, d)
+        States; a row with a NaN, or with a masked entry of a masked array, is missing.
+
+    Returns
+    -------
+    t : ndarray, shape (m,)
+    x : ndarray, shape (m, d)
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, ``t`` does not increase, a value is infinite or nothing is left.
+    """
+    t, x = check_array("t", t), check_array("x", x)
+    if x.ndim != 2 or x.shape[1] < 1:
+        raise ValueError(f"x: must have shape (n, d) with d of at least 1, got {x.shape}")
+    if t.shape != (len(x),):
+        raise ValueError(f"t: must have shape ({len(x)},) as x has {len(x)} rows, got {t.shape}")
+    t = check_times(t)
+    if np.isinf(x).any():
+        raise ValueError(
+            f"x: must not be infinite (NaN marks a missing row), "
+            f"got infinity in row {int(np.flatnonzero(np.isinf(x).any(axis=1))[0])}"
+        )
+    seen = ~np.isnan(x).any(axis=1)
+    if not seen.any():
+        raise ValueError(f"x: must hold at least one row without NaN, got {len(x)} missing rows")
+    return t[seen], x[seen]
+
+
+def check_records(
+    t: np.ndarray | Sequence[tuple[np.ndarray, np.ndarray]], x: np.ndarray | None = None
+) -> list[Record]:
+    """Check one trajectory ``t, x``, or a list of several pairs ``(t, x)`` of one dimension.
+
+    Raises
+    ------
+    ValueError
+        If ``t`` is neither, or a trajectory is malformed; see `check_record`.
+    """
+    pairs = t if x is None else [(t, x)]
+    if not isinstance(pairs, list | tuple) or not all(
+        isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs
+    ):
+        raise ValueError(
+            f"x: must be given, unless t is a list of pairs (t, x), got t = {t!r:.60}"
+        )
+    records = [check_record(*pair) for pair in pairs]
+    if len({values.shape[1] for _, values in records}) != 1:
+        raise ValueError(
+            "t: a list of trajectories must hold at least one, all of the same dimension, "
+            f"got shapes {[values.shape for _, values in records]}"
+        )
+    return records
+
+
+def check_systematic(
+    systematic: np.ndarray | Sequence[np.ndarray] | None,
+    times: Sequence[np.ndarray],
+    records: Sequence[Record],
+) -> list[np.ndarray]:
+    """Systematic errors of records, as `discover` takes them, at the samples that are not missing.
+
+    Parameters
+    ----------
+    systematic : array_like, shape (k, n, d), or list of such, or None
+        For one record, or for each.
+    times : sequence of array_like, shape (n,)
+        Of all samples of each record, missing or not.
+    records : sequence of Record
+
+    Returns
+    -------
+    list of ndarray, shape (m, d, k)
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, or a value at a sample is not finite.
+    """
+    if systematic is None:
+        return [np.empty((*x.shape, 0)) for _, x in records]
+    parts = [systematic] if len(records) == 1 and np.ndim(systematic) == 3 else systematic
+    if len(parts) != len(records):
+        raise ValueError(
+            f"systematic: must be one array per trajectory ({len(records)}), got {len(parts)}"
+        )
+    checked = []
+    for part, t, (seen, x) in zip(parts, times, records, strict=True):
+        part = check_array("systematic", part)
+        if part.ndim != 3 or part.shape[1:] != (len(t), x.shape[1]):
+            raise ValueError(
+                f"systematic: must have shape (k, {len(t)}, {x.shape[1]}), got {part.shape}"
+            )
+        part = np.moveaxis(part, 0, -1)[np.searchsorted(t, seen)]
+        if not np.isfinite(part).all():
+            raise ValueError("systematic: must be finite where x is, got NaN or infinity")
+        checked.append(part)
+    if len({part.shape[-1] for part in checked}) != 1:
+        raise ValueError(
+            "systematic: must hold the same causes for all trajectories, got "
+            f"{[part.shape[-1] for part in checked]} of them"
+        )
+    return checked
+
+
+def cut(record: Record, longest_step: float) -> list[Record]:
+    """Cut a record wherever two samples are further apart than ``longest_step``."""
+    t, x = record
+    ends = np.flatnonzero(np.diff(t) > longest_step) + 1
+    return list(zip(np.split(t, ends), np.split(x, ends), strict=True))
+
+
+def typical_step(records: Sequence[Record]) -> float:
+    """Median time between two samples of the records."""
+    return float(np.median(np.concatenate([np.diff(t) for t, _ in records])))

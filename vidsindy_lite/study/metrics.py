@@ -1,0 +1,246 @@
+"""How good a discovered law is: the paper's scores, and the ones it promises without a formula."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checks import check_array
+from ..dynamics import Discovery, PolynomialSystem
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """A discovered law beside the truth, term by term.
+
+    Parameters
+    ----------
+    terms_found : bool
+        Every true term was found (the paper's column "Terms Found").
+    false_positives : int
+        Terms found that are not true.
+    missing : int
+        True terms that were not found.
+    l2 : float
+        ``|Lambda_found - Lambda_true| / |Lambda_true|``, 2-norms over all coefficients.
+    precision : float
+        Fraction of the found terms that are true; 0 if nothing was found.
+    recall : float
+        Fraction of the true terms that were found.
+    coefficient_errors : ndarray, shape (l, d)
+        ``|found - true| / |true|`` of every true term, in the library of the truth; NaN off its
+        support. It is 1 for a missing term. `l2` hides a small coefficient beside a large one.
+    """
+
+    terms_found: bool
+    false_positives: int
+    missing: int
+    l2: float
+    precision: float
+    recall: float
+    coefficient_errors: np.ndarray
+
+    @property
+    def exact(self) -> bool:
+        """The support is right: no term is missing and none is false."""
+        return self.terms_found and self.false_positives == 0
+
+    @property
+    def max_coefficient_error(self) -> float:
+        """Largest of `coefficient_errors`."""
+        return float(np.nanmax(self.coefficient_errors))
+
+    def __str__(self) -> str:
+        found = "all true terms found" if self.terms_found else f"{self.missing} terms missing"
+        return (
+            f"{found}, {self.false_positives} false; relative l2 {self.l2:.2g}, "
+            f"worst coefficient {self.max_coefficient_error:.2g}, "
+            f"precision {self.precision:.0%}, recall {self.recall:.0%}"
+        )
+
+
+def score(found, truth: PolynomialSystem) -> Score:
+    """Compare a discovered law with the truth in the same frame (paper: evaluation metrics).
+
+    Parameters
+    ----------
+    found : PolynomialSystem or any result that has one as its ``system``
+        The discovered law.
+    truth : PolynomialSystem
+        The true law. Libraries may differ in size and order: terms are matched by monomial,
+        variables by position.
+
+    Raises
+    ------
+    ValueError
+        If one of them is no law, the dimensions differ or the truth has no term.
+
+    Examples
+    --------
+    >>> truth = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET)
+    >>> score(truth, truth).exact
+    True
+    """
+    found = getattr(found, "system", found)
+    for name, law in (("found", found), ("truth", truth)):
+        if not isinstance(law, PolynomialSystem):
+            raise ValueError(
+                f"{name}: must be a PolynomialSystem (what was found comes first, the truth "
+                f"second), got {law!r:.60}"
+            )
+    if found.d != truth.d:
+        raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {found.d}")
+    if not truth.support.any():
+        raise ValueError("truth: must have at least one term, got none")
+    library = np.unique(np.concatenate([found.exponents, truth.exponents]), axis=0)
+    guess, true = coefficients_in(found, library), coefficients_in(truth, library)
+    hits = int(((guess != 0) & (true != 0)).sum())
+    claimed, actual = int(np.count_nonzero(guess)), int(np.count_nonzero(true))
+    here = coefficients_in(found, truth.exponents)
+    errors = np.full(truth.coefficients.shape, np.nan)
+    support = truth.support
+    errors[support] = np.abs(here[support] / truth.coefficients[support] - 1)
+    return Score(
+        terms_found=hits == actual,
+        false_positives=claimed - hits,
+        missing=actual - hits,
+        l2=float(np.linalg.norm(guess - true) / np.linalg.norm(true)),
+        precision=hits / claimed if claimed else 0.0,
+        recall=hits / actual,
+        coefficient_errors=errors,
+    )
+
+
+def summary(scores: Sequence[Score]) -> dict[str, object]:
+    """Repeated trials as a row of the paper's tables, in its units: means, and one spread.
+
+    Parameters
+    ----------
+    scores : sequence of Score
+
+    Returns
+    -------
+    dict
+        In how many trials all true terms were found; means of false positives, relative l2 error
+        (with its standard deviation over the trials), precision and recall.
+    """
+    errors = np.array([100 * s.l2 for s in scores])
+    return {
+        "terms found": f"{sum(s.terms_found for s in scores)} of {len(scores)}",
+        "false positives": float(np.mean([s.false_positives for s in scores])),
+        "l2 (e-2)": float(errors.mean()),
+        "spread of l2 (e-2)": float(errors.std()),
+        "precision (%)": float(np.mean([100 * s.precision for s in scores])),
+        "recall (%)": float(np.mean([100 * s.recall for s in scores])),
+    }
+
+
+def term_errors(found: PolynomialSystem, truth: PolynomialSystem) -> tuple[list[str], list[str]]:
+    """Names of the true terms that are missing and of the false ones, e.g. "x in dy/dt"."""
+
+    def active(law: PolynomialSystem) -> dict[tuple[int, ...], str]:
+        return {
+            (equation, *law.exponents[row]): f"{law.terms[row]} in d{truth.names[equation]}/dt"
+            for row, equation in np.argwhere(law.support)
+        }
+
+    guess, true = active(found), active(truth)
+    missing = [name for place, name in true.items() if place not in guess]
+    return missing, [name for place, name in guess.items() if place not in true]
+
+
+def pulls(found: Discovery, truth: PolynomialSystem) -> np.ndarray:
+    """Errors of the true terms that were found, in units of their standard errors.
+
+    Parameters
+    ----------
+    found : Discovery
+    truth : PolynomialSystem
+        In the frame of the data.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        ``(found - true) / standard error``. If the standard errors are right, and the law is, its
+        mean square is 1; the coefficients of one law are correlated.
+    """
+    laws = (
+        PolynomialSystem(truth.names, found.system.exponents, table)
+        for table in (found.standard_errors, found.coefficients)
+    )
+    errors, values = (coefficients_in(law, truth.exponents) for law in laws)
+    seen = truth.support & (errors > 0)
+    return (values - truth.coefficients)[seen] / errors[seen]
+
+
+def coefficients_in(system: PolynomialSystem, library: np.ndarray) -> np.ndarray:
+    """Coefficients of a system in another library.
+
+    Parameters
+    ----------
+    system : PolynomialSystem
+    library : ndarray of int, shape (l, d)
+        Exponents, one row a monomial. Terms of the system outside it are left out.
+
+    Returns
+    -------
+    ndarray, shape (l, d)
+        Zero for monomials that the system does not have.
+    """
+    rows = {tuple(powers): row for row, powers in enumerate(system.exponents)}
+    none = np.zeros(system.d)
+    return np.array(
+        [
+            system.coefficients[rows[tuple(powers)]] if tuple(powers) in rows else none
+            for powers in library
+        ]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryError:
+    """How far a measured trajectory is from the true one.
+
+    Parameters
+    ----------
+    rmse : ndarray, shape (d,)
+        Root mean square error of each axis, in scene units.
+    relative : ndarray, shape (d,)
+        The same over the standard deviation of the true trajectory along the axis; NaN along an
+        axis that does not move.
+    """
+
+    rmse: np.ndarray
+    relative: np.ndarray
+
+
+def trajectory_error(x: np.ndarray, truth: np.ndarray) -> TrajectoryError:
+    """Root mean square error of a reconstructed trajectory, axis by axis.
+
+    It separates the error of tracking and cameras from that of the regression.
+
+    Parameters
+    ----------
+    x : array_like, shape (n, d)
+        Reconstructed states; rows with a NaN are ignored.
+    truth : array_like, shape (n, d)
+        True states at the same times.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, the truth is not finite or ``x`` has no row without NaN.
+    """
+    x, truth = check_array("x", x), check_array("truth", truth)
+    if truth.ndim != 2 or not np.isfinite(truth).all():
+        raise ValueError(f"truth: must be finite with shape (n, d), got shape {truth.shape}")
+    if x.shape != truth.shape:
+        raise ValueError(f"x: must have the shape of truth, {truth.shape}, got {x.shape}")
+    seen = ~np.isnan(x).any(axis=1)
+    if not seen.any():
+        raise ValueError(f"x: must hold at least one row without NaN, got {len(x)} missing rows")
+    rmse = np.sqrt(((x - truth)[seen] ** 2).mean(axis=0))
+    spread = truth.std(axis=0)
+    return TrajectoryError(rmse, rmse / np.where(spread > 0, spread, np.nan))

@@ -1,0 +1,249 @@
+"""Many independent tasks in parallel; what is finished is kept, so a stopped sweep goes on later.
+
+A task is a frozen dataclass that says all there is to say about it, its seed included, and what is
+done with it is a function of this package:
+
+    results = sweep(trial, [Trial("Lorenz", noise, seed) for noise in levels for seed in seeds])
+
+Each result goes to a file as soon as it is there, build/cache/<stamp>/<function>/<task>.pkl in the
+repository, or in place of build/cache the folder that the environment variable VIDSINDY_CACHE
+names. The stamp is that of the package's code and requirements: other code finds no results. A
+package installed outside a clone of its repository stores nothing.
+
+The tasks run in processes of this machine, or on a Dask cluster of any size. Two sweeps of this
+machine that share tasks may run at the same time: who comes second waits for the first one's
+result.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+from uuid import uuid4
+
+import cv2
+from filelock import FileLock
+from joblib import Parallel, delayed, parallel_config
+from tqdm import tqdm
+
+from ..stamp import PACKAGE, package_stamp, repository_root, write_file
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+class TaskError(RuntimeError):
+    """A task of a sweep raised; the message names the task."""
+
+
+def sweep(
+    function: Callable[[Task], Result],
+    tasks: Iterable[Task],
+    *,
+    jobs: int = 2,
+    desc: str = "sweep",
+    dask: str | None = None,
+) -> list[Result]:
+    """Call a function for each task, in parallel; results that are stored are read back.
+
+    Parameters
+    ----------
+    function : callable
+        A top-level function of this package, of one task. Its result must be picklable.
+    tasks : iterable
+        Frozen dataclasses of numbers, text and tuples of them: a result is stored under the repr.
+    jobs : int
+        Processes on this machine, one thread each; 1 works in this very process.
+    desc : str
+        Label of the progress bar, which starts at what is stored.
+    dask : str, optional
+        Address of a Dask scheduler whose workers run the tasks instead, e.g.
+        "tcp://10.0.0.1:8786"; by default the environment variable VIDSINDY_DASK, if set.
+
+    Returns
+    -------
+    list
+        The results in the order of the tasks.
+
+    Raises
+    ------
+    ValueError
+        If the function is not one of the package, a task is no frozen dataclass, or jobs < 1.
+    TaskError
+        If a task raises: the sweep stops, and what was finished stays stored.
+    ImportError
+        If a cluster is asked for and `distributed` is not installed.
+    RuntimeError
+        If a worker of the cluster has other code of this package.
+    """
+    tasks = list(tasks)
+    _check(function, tasks, jobs)
+    address = dask or os.environ.get("VIDSINDY_DASK")
+    files = _files(function, tasks)
+    results = _stored(files)
+    todo = {number: task for number, task in enumerate(tasks) if number not in results}
+    if address:
+        work = _on_cluster(function, todo, address, files)
+    else:
+        work = _here(function, todo, jobs, files)
+    with tqdm(total=len(tasks), initial=len(results), desc=desc) as bar:
+        for number, result in work if todo else ():
+            results[number] = result
+            bar.update()
+    return [results[number] for number in range(len(tasks))]
+
+
+def remember(function: Callable[[Task], Result], task: Task) -> Result:
+    """Call a function for one task in this process, or read the stored result back.
+
+    For a task that builds on the results of another sweep. While another process of this machine
+    is at the same task, this one waits for its result.
+
+    Parameters
+    ----------
+    function, task
+        As for `sweep`.
+    """
+    _check(function, [task], jobs=1)
+    return _remember(function, task, _files(function, [task]).get(0))
+
+
+def _check(function: Callable, tasks: list, jobs: int) -> None:
+    home, name = getattr(function, "__module__", ""), getattr(function, "__qualname__", "")
+    if home.partition(".")[0] != __package__ or not name.isidentifier():
+        raise ValueError(
+            f"function: must be a top-level function of {__package__}, whose code the stored "
+            f"results depend on, got {function!r}"
+        )
+    for task in tasks:
+        parameters = getattr(type(task), "__dataclass_params__", None)
+        # Hashable, hence without arrays: the repr of a large one leaves numbers out.
+        if not (parameters and parameters.frozen and _is_hashable(task)):
+            raise ValueError(
+                "tasks: each must be a frozen dataclass of numbers, text and tuples of them, "
+                f"got {task!r}"
+            )
+    if jobs < 1:
+        raise ValueError(f"jobs: must be at least 1, got {jobs}")
+
+
+def _is_hashable(task: object) -> bool:
+    try:
+        hash(task)
+    except TypeError:
+        return False
+    return True
+
+
+def _remember(function: Callable, task: object, file: Path | None) -> object:
+    if file is None:
+        return function(task)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(f"{file}.lock"):
+        results = _stored({0: file})
+        if not results:
+            results[0] = function(task)
+            _store(file, results[0])
+    return results[0]
+
+
+def _call(
+    function: Callable, number: int, task: object, file: Path | None = None
+) -> tuple[int, object]:
+    try:
+        return number, _remember(function, task, file)
+    except Exception as error:
+        raise TaskError(
+            f"{function.__name__}({task!r}) raised {type(error).__name__}: {error}"
+        ) from error
+
+
+def _here(
+    function: Callable, todo: dict[int, object], jobs: int, files: dict[int, Path]
+) -> Iterator[tuple[int, object]]:
+    """Numbers and results of the tasks as they come, from processes of this machine."""
+    one_thread = {
+        "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
+        "initializer": cv2.setNumThreads,
+        "initargs": (1,),
+    }
+    with parallel_config("loky", n_jobs=jobs, **one_thread):
+        # One task a batch: a result comes when it is there, not when its batch is.
+        parallel = Parallel(return_as="generator_unordered", batch_size=1)
+        yield from parallel(
+            delayed(_call)(function, number, task, files.get(number))
+            for number, task in todo.items()
+        )
+
+
+def _on_cluster(
+    function: Callable, todo: dict[int, object], address: str, files: dict[int, Path]
+) -> Iterator[tuple[int, object]]:
+    """Numbers and results of the tasks as they come, from the workers of a Dask cluster.
+
+    The workers need not see the files of this machine, so the results are stored here. Not by
+    joblib's Dask backend: that waits for ever for a task that ends its worker.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise ImportError(
+            "dask: a cluster needs the package distributed, which the extra 'cluster' installs: "
+            f'pip install "{__package__}[cluster]"'
+        ) from None
+    with Client(address) as client:
+        client.wait_for_workers(1, timeout=60)
+        theirs = client.run(package_stamp)
+        differing = [worker for worker, stamp in theirs.items() if stamp != package_stamp()]
+        if differing:
+            raise RuntimeError(
+                f"dask: all workers must have this very code of {__package__}, "
+                f"got other code on {', '.join(differing)}"
+            )
+        # The key is what Dask calls a task, in its errors too.
+        keys = [f"{function.__name__}({task!r}) {uuid4().hex}" for task in todo.values()]
+        futures = client.map(partial(_call, function), todo, todo.values(), key=keys)
+        for _, (number, result) in as_completed(futures, with_results=True):
+            if number in files:
+                _store(files[number], result)
+            yield number, result
+
+
+# ----------------------------------------------------------------------------------- stored results
+
+
+def _files(function: Callable, tasks: list) -> dict[int, Path]:
+    """The file of each task's result by number of the task; none outside a clone."""
+    try:
+        root = repository_root(PACKAGE)
+    except FileNotFoundError:
+        return {}
+    named = os.environ.get("VIDSINDY_CACHE")
+    cache = Path(named) if named else root / "build" / "cache"
+    module = function.__module__.removeprefix(f"{__package__}.")
+    folder = cache / package_stamp(root) / f"{module}.{function.__name__}"
+    names = [hashlib.sha256(repr(task).encode()).hexdigest()[:32] for task in tasks]
+    return {number: folder / f"{name}.pkl" for number, name in enumerate(names)}
+
+
+def _store(file: Path, result: object) -> None:
+    content = pickle.dumps(result)
+    write_file(file, content + hashlib.sha256(content).digest())
+
+
+def _stored(files: dict[int, Path]) -> dict[int, object]:
+    """The results that are stored as they were written: the digest at the end says so."""
+    results = {}
+    for number, file in files.items():
+        content = file.read_bytes() if file.exists() else b""
+        result, digest = content[:-_DIGEST], content[-_DIGEST:]
+        if hashlib.sha256(result).digest() == digest:
+            results[number] = pickle.loads(result)
+    return results
