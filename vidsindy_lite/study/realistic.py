@@ -5,7 +5,7 @@ once: a target of irregular shape, random self-rotation, a size that changes as 
 and receded, image noise of variance 0.01, and a tree in front of each camera, behind which the
 target vanishes.
 
-    runs = sweep(run, [SceneTask(trial) for trial in range(5)])
+    runs = sweep(run_scene, [SceneTask(trial) for trial in range(5)])
 
 Paper: section "Simulating Realistic Scenarios", Fig. 4.
 """
@@ -140,12 +140,12 @@ class SceneRun:
     seconds: float
 
 
-def run(task: SceneTask) -> SceneRun:
+def run_scene(task: SceneTask) -> SceneRun:
     """Film the scene, track it, learn cameras 2 and 3, reconstruct and discover."""
     truth = replace(SYSTEMS["SprottF"], x0=START).shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(task.frames, SAMPLES_PER_PERIOD)
     rig = Rig.around(x, task.image_size)
-    views = film(rig, x, task.trial)
+    views = film_scene(rig, x, task.trial)
     tracks = [view.track.pixels for view in views]
     path = reconstruct(tracks, learn_cameras(tracks, rig.uncalibrated(keep=0)))
     began = time.perf_counter()
@@ -154,7 +154,7 @@ def run(task: SceneTask) -> SceneRun:
     return SceneRun(task, truth, views, t, x, path, found, score(found, truth), seconds)
 
 
-def film(rig: Rig, x: np.ndarray, seed: int = 0) -> tuple[View, ...]:
+def film_scene(rig: Rig, x: np.ndarray, seed: int = 0) -> tuple[View, ...]:
     """Film a path with each camera of a rig and track it; the videos are removed.
 
     Parameters
