@@ -25,7 +25,6 @@ from .pipeline import VideoDiscovery, discover_from_videos
 from .vision import (
     Scene,
     Track,
-    follow,
     read_frame,
     read_video,
     render_video,
@@ -37,7 +36,6 @@ __all__ = [
     "discover_from_videos",
     "VideoDiscovery",
     "track",
-    "follow",
     "Track",
     "read_video",
     "read_frame",
