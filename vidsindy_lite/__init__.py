@@ -9,9 +9,10 @@ into figures and pages is `vidsindy_lite.companion`.
 
 from .cameras import (
     Camera,
+    Lags,
+    OrthographicCamera,
     PerspectiveCamera,
     Rig,
-    Synchrony,
     align,
     learn_cameras,
     learn_lags,
@@ -24,7 +25,6 @@ from .pipeline import VideoDiscovery, discover_from_videos
 from .vision import (
     Scene,
     Track,
-    follow,
     read_frame,
     read_video,
     render_video,
@@ -36,7 +36,6 @@ __all__ = [
     "discover_from_videos",
     "VideoDiscovery",
     "track",
-    "follow",
     "Track",
     "read_video",
     "read_frame",
@@ -45,8 +44,9 @@ __all__ = [
     "Scene",
     "align",
     "learn_lags",
-    "Synchrony",
+    "Lags",
     "Camera",
+    "OrthographicCamera",
     "PerspectiveCamera",
     "Rig",
     "rig_template",
