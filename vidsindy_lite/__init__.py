@@ -24,7 +24,6 @@ from .pipeline import Observation, VideoDiscovery, discover_from_videos, observe
 from .vision import (
     Scene,
     Track,
-    follow,
     read_frame,
     read_video,
     render_video,
@@ -38,7 +37,6 @@ __all__ = [
     "observe",
     "Observation",
     "track",
-    "follow",
     "Track",
     "read_video",
     "read_frame",

@@ -29,7 +29,7 @@ from .cameras import (
 )
 from .checks import check_integer, check_path, check_times, check_vector
 from .dynamics import Discovery, discover
-from .vision import Track, VideoInfo, check_detector, follow, video_info
+from .vision import Track, VideoInfo, check_detector, track, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
@@ -186,7 +186,7 @@ def observe(
 
     bar = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
     seen = [_tracked(path, shot.frames, detector) for path, shot in bar]
-    raw = [track.pixels for track in seen]
+    raw = [one.pixels for one in seen]
     learned_lags = learn_lags(raw, rig, rates, start=lags)
     synchrony = learned_lags if lags is None else _given(lags, learned_lags)
     tracks = align(raw, synchrony.lags, rates)
@@ -201,7 +201,7 @@ def observe(
         systematic=np.concatenate(shared),
         warnings=(
             *_rig_warnings(tracks, learned, rig, files, learned_lags),
-            *(warning for track in seen for warning in track.warnings),
+            *(warning for one in seen for warning in one.warnings),
             *synchrony.doubts,
         ),
     )
@@ -267,7 +267,7 @@ def _check_overlap(
 
 def _tracked(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     """Track a video that should have so many frames and one moving target."""
-    found = follow(path, detector)
+    found = track(path, detector)
     if len(found.pixels) != frames:
         raise ValueError(
             f"paths: {path.name} must hold the {frames} frames that its header states, got "
