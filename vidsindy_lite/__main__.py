@@ -269,7 +269,7 @@ def _discover(options: argparse.Namespace) -> int:
     # First the law: if the report cannot be written, it is not lost.
     print(found)
     print(
-        f"status: {found.status}; lags of the videos: {list_lags(found.lags.lags)} frames",
+        f"status: {found.status}; lags of the videos: {list_lags(found.lags.frames)} frames",
         flush=True,
     )
     write_report(found, options.videos, options.out, told)

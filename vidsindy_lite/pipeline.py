@@ -14,8 +14,8 @@ from tqdm import tqdm
 from .arrays import Floats
 from .cameras import (
     DISAGREEMENT,
+    Lags,
     Rig,
-    Synchrony,
     align,
     check_learnable,
     disagreement,
@@ -44,7 +44,7 @@ class Observation:
         Pixels of the target in each video at the instants ``t``; NaN where it was not seen.
     rig : Rig
         The cameras, all calibrated.
-    lags : Synchrony
+    lags : Lags
         When each video started.
     t : ndarray, shape (n,)
         Time of each frame of the first video.
@@ -59,7 +59,7 @@ class Observation:
 
     tracks: tuple[Floats, ...]
     rig: Rig
-    lags: Synchrony
+    lags: Lags
     t: Floats
     x: Floats
     systematic: Floats
@@ -189,7 +189,7 @@ def observe(
     raw = [one.pixels for one in seen]
     learned_lags = learn_lags(raw, rig, rates, start=lags)
     synchrony = learned_lags if lags is None else _given(lags, learned_lags)
-    tracks = align(raw, synchrony.lags, rates)
+    tracks = align(raw, synchrony.frames, rates)
     learned = learn_cameras(tracks, rig)
     shared = systematic_errors(raw, rig, learned, synchrony), trailing_errors(tracks, learned)
     return Observation(
@@ -202,7 +202,7 @@ def observe(
         warnings=(
             *_rig_warnings(tracks, learned, rig, files, learned_lags),
             *(warning for one in seen for warning in one.warnings),
-            *synchrony.doubts,
+            *synchrony.warnings,
         ),
     )
 
@@ -282,15 +282,15 @@ def _tracked(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     return found
 
 
-def _given(lags: Floats, learned: Synchrony) -> Synchrony:
+def _given(lags: Floats, learned: Lags) -> Lags:
     """The lags that are given, unless others are clearly those of the tracks."""
-    apart = np.abs(learned.lags - lags) > _WRONG_LAG + 5 * learned.errors
+    apart = np.abs(learned.frames - lags) > _WRONG_LAG + 5 * learned.errors
     if learned.agree and apart.any():
         raise ValueError(
             f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
-            f"({list_lags(learned.lags)}) do: leave them out, or check them"
+            f"({list_lags(learned.frames)}) do: leave them out, or check them"
         )
-    return replace(learned, lags=lags, errors=0 * lags, doubts=())
+    return replace(learned, frames=lags, errors=0 * lags, warnings=())
 
 
 def _rig_warnings(
@@ -298,7 +298,7 @@ def _rig_warnings(
     learned: Rig,
     given: Rig,
     paths: Sequence[Path],
-    synchrony: Synchrony,
+    synchrony: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
     missed = disagreement(tracks, learned)
@@ -312,7 +312,7 @@ def _rig_warnings(
     if synchrony.agree:  # at lags that differ by too little from the given ones to refuse these
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({list_lags(synchrony.lags)}) would explain it best"
+            f"({list_lags(synchrony.frames)}) would explain it best"
         ]
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
     others = [learn_normal(tracks, given, i) for i in range(len(paths))]

@@ -13,7 +13,7 @@ import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras import Synchrony
+from vidsindy_lite.cameras import Lags
 from vidsindy_lite.companion.report import FILES, check_folder_is_free, summary, write_report
 from vidsindy_lite.pipeline import Observation
 
@@ -35,7 +35,7 @@ def case(tmp_path_factory):
     tracks[2] = np.where(np.arange(150)[:, None] < 5, np.nan, tracks[2])
     x[:5] = np.nan
     law = vl.discover(t, x, degree=2)
-    lags = Synchrony(np.array([0, 3.5, 0]), np.ones(3), np.array([0, 0.01, np.inf]), 0.1)
+    lags = Lags(np.array([0, 3.5, 0]), np.ones(3), np.array([0, 0.01, np.inf]), 0.1)
     seen = Observation(tuple(tracks), rig, lags, t, x, np.empty((0, *x.shape)), law.warnings)
     return vl.VideoDiscovery(**vars(seen), discovery=law), paths
 

@@ -1,7 +1,6 @@
 """Pixels and space: camera models, calibration, triangulation, synchronisation."""
 
 from .calibrate import (
-    Camera,
     Rig,
     calibration_errors,
     check_learnable,
@@ -11,17 +10,18 @@ from .calibrate import (
     residuals,
 )
 from .geometry import rodrigues, rotation_to_z
-from .perspective import PerspectiveCamera
-from .synchronise import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
+from .models import Camera, OrthographicCamera, PerspectiveCamera
+from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
 from .template import rig_template
 from .uncertainty import systematic_errors, trailing_errors
 
 __all__ = [
     "Camera",
+    "OrthographicCamera",
     "DISAGREEMENT",
     "PerspectiveCamera",
     "Rig",
-    "Synchrony",
+    "Lags",
     "align",
     "calibration_errors",
     "check_learnable",
