@@ -48,7 +48,6 @@ import numpy as np
 from vidsindy_lite import (
     Scene,
     dynamics,
-    follow,
     learn_cameras,
     read_frame,
     read_video,
@@ -182,7 +181,7 @@ save_figure("videos_disturbances", fig, caption=caption, numbers={"place": spot[
 # %%
 names = {"full": ("SprottE", "NoseHoover", "WangSun"), "quick": ("SprottE",)}[profile]
 shots = [film(n, folder.name, frames, seed + i) for i, n in enumerate(names)]
-tracks = [[track(path) for path in shot.paths] for shot in shots]
+tracks = [[track(path).pixels for path in shot.paths] for shot in shots]
 
 # %%
 middle = frames // 2
@@ -292,13 +291,13 @@ save_figure("videos_tracker_steps", fig, caption=caption, numbers={"coverage": c
 # %%
 def errors_of(scene, stream, places=truth):
     path = render_video(Path(folder.name) / "one.mov", places, scene, seed=stream)
-    return np.linalg.norm(track(path) - places, axis=1)
+    return np.linalg.norm(track(path).pixels - places, axis=1)
 
 
 scene, number = shot.scenes[0], {"full": 20, "quick": 3}[profile]
 errors = {
     "clean": errors_of(scene, seed),
-    "lossy codec (mp4v)": np.linalg.norm(track(lossy) - truth, axis=1),
+    "lossy codec (mp4v)": np.linalg.norm(track(lossy).pixels - truth, axis=1),
     "noise, variance 0.01": errors_of(replace(scene, noise_variance=0.01), seed),
     "a post in the way": errors_of(replace(scene, occluders=((300, 0, 50, 512),)), seed),
     "a post where it lingers": errors_of(replace(scene, occluders=((230, 0, 50, 512),)), seed),
@@ -404,7 +403,7 @@ for name, (background, shifts, brightness) in cases.items():
     clip = vision.render_restless(brief, view, shifts, brightness, seed)
     path = write_video(Path(folder.name) / "restless.mov", clip)
     last.append(read_frame(path, centre))
-    found[name] = {way: follow(path, way) for way in ("background", "learned", "auto")}
+    found[name] = {way: track(path, way) for way in ("background", "learned", "auto")}
     print(f"{name}: auto takes {found[name]['auto'].detector}", *found[name]["auto"].warnings, sep="\n  ")
 
 # %%
@@ -447,7 +446,7 @@ save_figure("detector_tracks", fig, caption=caption, numbers=dict(zip(names, fla
 # %%
 posts = ((160, 0, 40, 512), (330, 0, 40, 512))
 shot = film("SprottF", folder.name, frames, seed, occluders=posts)
-seen = [track(path) for path in shot.paths]
+seen = [track(path).pixels for path in shot.paths]
 rig = learn_cameras(seen, shot.rig.uncalibrated(keep=0))
 x = reconstruct(seen, rig)
 for number, one in enumerate(seen, start=1):

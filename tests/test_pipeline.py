@@ -149,7 +149,7 @@ def test_different_frame_rates(shot, tmp_path):
 def test_a_grey_video(shot, tmp_path):
     grey = (cv2.cvtColor(f, cv2.COLOR_BGR2GRAY) for f in vl.read_video(shot.paths[0]))
     path = vl.write_video(tmp_path / "grey.mkv", (np.dstack([g] * 3) for g in grey))
-    error = vl.track(path) - shot.tracks[0]
+    error = vl.track(path).pixels - shot.tracks[0]
     assert np.isfinite(error).all(axis=1).mean() > 0.8
     assert np.sqrt(np.nanmean(error**2)) < 0.5
 

@@ -24,7 +24,6 @@ from .pipeline import VideoDiscovery, discover_from_videos
 from .vision import (
     Scene,
     Track,
-    follow,
     read_frame,
     read_video,
     render_video,
@@ -36,7 +35,6 @@ __all__ = [
     "discover_from_videos",
     "VideoDiscovery",
     "track",
-    "follow",
     "Track",
     "read_video",
     "read_frame",

@@ -27,7 +27,7 @@ from .cameras import (
 )
 from .checks import check_integer, check_path, check_times, check_vector
 from .dynamics import Discovery, discover
-from .vision import Track, VideoInfo, check_detector, follow, video_info
+from .vision import Track, VideoInfo, check_detector, track, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
@@ -134,7 +134,7 @@ def discover_from_videos(
     if lags is not None:
         _check_overlap(lags, rates, shots, paths)
     bar = tqdm(list(zip(paths, shots, strict=True)), desc="track", disable=not progress)
-    followed = [_follow(path, shot.frames, detector) for path, shot in bar]
+    followed = [_track(path, shot.frames, detector) for path, shot in bar]
     raw = [seen.pixels for seen in followed]
     learned_lags = learn_lags(raw, rig, rates, start=lags)
     synchrony = learned_lags if lags is None else _given(lags, learned_lags)
@@ -186,9 +186,9 @@ def _check_overlap(
             )
 
 
-def _follow(path: Path, frames: int, detector: str | os.PathLike) -> Track:
+def _track(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     """Track a video that should have so many frames and one moving target."""
-    found = follow(path, detector)
+    found = track(path, detector)
     if len(found.pixels) != frames:
         raise ValueError(
             f"paths: {path.name} must hold the {frames} frames that its header states, got "

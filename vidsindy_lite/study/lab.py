@@ -218,7 +218,7 @@ def film(rig, x, folder, seed=0):
             # All clips of one camera show the same cloth.
             number = len(rig.cameras) * seed + i
             render_video(file, centroids, scene, FPS, number, 2 / scene.size * shapes)
-            parts.append(track(file))
+            parts.append(track(file).pixels)
         tracks.append(np.vstack(parts))
     return tracks
 
