@@ -9,9 +9,10 @@ into figures and pages is `vidsindy_lite.companion`.
 
 from .cameras import (
     Camera,
+    Lags,
+    OrthographicCamera,
     PerspectiveCamera,
     Rig,
-    Synchrony,
     align,
     learn_cameras,
     learn_lags,
@@ -43,8 +44,9 @@ __all__ = [
     "Scene",
     "align",
     "learn_lags",
-    "Synchrony",
+    "Lags",
     "Camera",
+    "OrthographicCamera",
     "PerspectiveCamera",
     "Rig",
     "rig_template",

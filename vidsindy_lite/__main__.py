@@ -268,7 +268,7 @@ def _discover(options: argparse.Namespace) -> int:
     told |= {"frames in a unit of time": options.fps} if options.fps is not None else {}
     write_report(found, options.videos, options.out, told)
     print(found)
-    print(f"status: {found.status}; lags of the videos: {list_lags(found.lags.lags)} frames")
+    print(f"status: {found.status}; lags of the videos: {list_lags(found.lags.frames)} frames")
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
 

@@ -12,8 +12,8 @@ from tqdm import tqdm
 
 from .cameras import (
     DISAGREEMENT,
+    Lags,
     Rig,
-    Synchrony,
     align,
     check_learnable,
     disagreement,
@@ -42,7 +42,7 @@ class VideoDiscovery(Discovery):
         Pixels of the target in each video at these times; NaN where it was not seen.
     rig : Rig
         The cameras, all calibrated.
-    lags : Synchrony
+    lags : Lags
         When each video started.
     t : ndarray, shape (n,)
         Time of each frame of the first video.
@@ -52,7 +52,7 @@ class VideoDiscovery(Discovery):
 
     tracks: tuple[np.ndarray, ...]
     rig: Rig
-    lags: Synchrony
+    lags: Lags
     t: np.ndarray
     x: np.ndarray
 
@@ -138,7 +138,7 @@ def discover_from_videos(
     raw = [seen.pixels for seen in followed]
     learned_lags = learn_lags(raw, rig, rates, start=lags)
     synchrony = learned_lags if lags is None else _given(lags, learned_lags)
-    tracks = align(raw, synchrony.lags, rates)
+    tracks = align(raw, synchrony.frames, rates)
     learned = learn_cameras(tracks, rig)
     x = reconstruct(tracks, learned)
     shared = np.concatenate(
@@ -149,7 +149,7 @@ def discover_from_videos(
     parts["warnings"] = (
         *_rig_doubts(tracks, learned, rig, paths, learned_lags),
         *(warning for seen in followed for warning in seen.warnings),
-        *synchrony.doubts,
+        *synchrony.warnings,
         *found.warnings,
     )
     return VideoDiscovery(**parts, tracks=tracks, rig=learned, lags=synchrony, t=t, x=x)
@@ -203,15 +203,15 @@ def _track(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     return found
 
 
-def _given(lags: np.ndarray, learned: Synchrony) -> Synchrony:
+def _given(lags: np.ndarray, learned: Lags) -> Lags:
     """The lags that are given, unless others are clearly those of the tracks."""
-    apart = np.abs(learned.lags - lags) > _WRONG_LAG + 5 * learned.errors
+    apart = np.abs(learned.frames - lags) > _WRONG_LAG + 5 * learned.errors
     if learned.agree and apart.any():
         raise ValueError(
             f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
-            f"({list_lags(learned.lags)}) do: leave them out, or check them"
+            f"({list_lags(learned.frames)}) do: leave them out, or check them"
         )
-    return replace(learned, lags=lags, errors=0 * lags, doubts=())
+    return replace(learned, frames=lags, errors=0 * lags, warnings=())
 
 
 def _rig_doubts(
@@ -219,7 +219,7 @@ def _rig_doubts(
     learned: Rig,
     given: Rig,
     paths: Sequence[Path],
-    synchrony: Synchrony,
+    lags: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
     missed = disagreement(tracks, learned)
@@ -230,10 +230,10 @@ def _rig_doubts(
         "in one frame of ten, tracked and reconstructed target lie more than "
         f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
     )
-    if synchrony.agree:  # at lags that differ by too little from the given ones to refuse these
+    if lags.agree:  # at lags that differ by too little from the given ones to refuse these
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({list_lags(synchrony.lags)}) would explain it best"
+            f"({list_lags(lags.frames)}) would explain it best"
         ]
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
     others = [learn_normal(tracks, given, i) for i in range(len(paths))]

@@ -13,7 +13,7 @@ import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras import Synchrony
+from vidsindy_lite.cameras import Lags
 from vidsindy_lite.companion.report import FILES, check_folder_is_free, summary, write_report
 from vidsindy_lite.dynamics import Discovery
 
@@ -36,7 +36,7 @@ def case(tmp_path_factory):
     x[:5] = np.nan
     law = vl.discover(t, x, degree=2)
     parts = {field.name: getattr(law, field.name) for field in fields(Discovery)}
-    lags = Synchrony(np.array([0, 3.5, 0]), np.ones(3), np.array([0, 0.01, np.inf]), 0.1)
+    lags = Lags(np.array([0, 3.5, 0]), np.ones(3), np.array([0, 0.01, np.inf]), 0.1)
     return vl.VideoDiscovery(**parts, tracks=tuple(tracks), rig=rig, lags=lags, t=t, x=x), paths
 
 

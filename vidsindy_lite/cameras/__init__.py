@@ -1,7 +1,6 @@
 """Pixels and space: camera models, calibration, triangulation, synchronisation."""
 
 from .calibrate import (
-    Camera,
     Rig,
     calibration_errors,
     check_learnable,
@@ -17,17 +16,18 @@ from .geometry import (
     rotation_to_z,
     signed_distance,
 )
-from .perspective import PerspectiveCamera
-from .synchronise import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
+from .models import Camera, OrthographicCamera, PerspectiveCamera
+from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
 from .template import rig_template
 from .uncertainty import systematic_errors, trailing_errors
 
 __all__ = [
     "Camera",
+    "OrthographicCamera",
     "DISAGREEMENT",
     "PerspectiveCamera",
     "Rig",
-    "Synchrony",
+    "Lags",
     "align",
     "calibration_errors",
     "check_learnable",

@@ -131,7 +131,7 @@ def summary(
             "image_size": list(shot.size), "model": camera.model,
             "position": camera.position, "normal": camera.normal,
             "scale": camera.scale, "angle": camera.angle,
-            "lag": found.lags.lags[i], "lag_error": found.lags.errors[i],
+            "lag": found.lags.frames[i], "lag_error": found.lags.errors[i],
             "share_of_frames_seen": seen.mean(),
             "residual_rms": np.sqrt(np.mean(length**2)) if len(length) else np.nan,
             "residual_of_nine_in_ten": np.quantile(length, 0.9) if len(length) else np.nan,
@@ -299,7 +299,7 @@ def _figures(found, paths):
 
 def _first_look(found, paths, instant):
     """The frames of all videos at one instant of the first."""
-    places = [(Path(path), found.lags.frame(i, instant)) for i, path in enumerate(paths)]
+    places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
     images = [next(islice(read_video(path), frame, None)) for path, frame in places]
     titles = [f"{path.name}, frame {frame}" for path, frame in places]
     return plot_views(images, titles, found.tracks, instant)
