@@ -55,10 +55,9 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import discover_from_videos, read_video
-from vidsindy_lite.companion.artifacts import save_animation, save_figure, save_table
+from vidsindy_lite import discover_from_videos, read_frame, read_video
+from vidsindy_lite.companion.artifacts import save_animation, save_figure, save_table, versions
 from vidsindy_lite.study import SYSTEMS, film, plots, score, trajectory_error
-from vidsindy_lite.vision import read_frame
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 frames = {"full": 1500, "quick": 400}[profile]
@@ -331,6 +330,4 @@ folder.cleanup()
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())
