@@ -9,7 +9,13 @@ from .calibrate import (
     reconstruct,
     residuals,
 )
-from .geometry import rodrigues, rotation_to_z
+from .geometry import (
+    plane_projection,
+    plane_through,
+    rodrigues,
+    rotation_to_z,
+    signed_distance,
+)
 from .models import Camera, OrthographicCamera, PerspectiveCamera
 from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
 from .template import rig_template
@@ -30,11 +36,14 @@ __all__ = [
     "learn_lags",
     "learn_normal",
     "list_lags",
+    "plane_projection",
+    "plane_through",
     "reconstruct",
     "residuals",
     "rig_template",
     "rodrigues",
     "rotation_to_z",
+    "signed_distance",
     "systematic_errors",
     "trailing_errors",
 ]
