@@ -22,7 +22,7 @@ from ..checks import check_choice
 from ..dynamics import Discovery, PolynomialSystem, discover
 from ..pipeline import observe_tracks
 from .corruption import add_noise, drop_blocks, drop_fibers
-from .films import FilmResult, FilmTask, film_result
+from .films import TOGETHER, FilmResult, FilmTask, film_result
 from .metrics import Score, pulls, score
 from .systems import SYSTEMS
 
@@ -195,7 +195,7 @@ def source_path(filmed: FilmResult, source: str) -> tuple[Floats, Floats | None]
     if source == "videos":
         return filmed.x, filmed.systematic
     tracks = [np.round(track) for track in filmed.tracks]
-    coarse = observe_tracks(tracks, filmed.rig.uncalibrated(keep=0), filmed.t, filmed.lags.frames)
+    coarse = observe_tracks(tracks, filmed.rig.uncalibrated(keep=0), filmed.t, lags=TOGETHER)
     return coarse.x, coarse.systematic
 
 
