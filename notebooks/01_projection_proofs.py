@@ -343,6 +343,6 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())

@@ -536,6 +536,6 @@ folder.cleanup()
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())

@@ -390,6 +390,6 @@ assert "cameras[1] and cameras[2]" in message
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())

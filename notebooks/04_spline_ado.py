@@ -791,6 +791,6 @@ save_table("solver_pendulum", rows, caption=caption)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())

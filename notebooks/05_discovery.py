@@ -444,6 +444,6 @@ for method in baselines.BASELINES:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())

@@ -270,6 +270,6 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())

@@ -439,6 +439,6 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())

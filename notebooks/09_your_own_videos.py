@@ -406,6 +406,6 @@ else:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())

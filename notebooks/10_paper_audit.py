@@ -828,6 +828,6 @@ save_table("audit", findings, caption=caption)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
+from vidsindy_lite.companion.artifacts import versions
 
 print(versions())
