@@ -44,7 +44,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from vidsindy_lite.companion.artifacts import save_figure, save_table
-from vidsindy_lite.dynamics import cramer_rao, term_charges
+from vidsindy_lite.dynamics import cramer_rao, term_penalties
 from vidsindy_lite.study import (
     ABLATION,
     METHODS,
@@ -351,7 +351,7 @@ save_table("study_failures", rows, caption=caption)
 # ([notebook 04](04_spline_ado.ipynb)). It grows in proportion to the noise. So for each system, its
 # weakest term sets a level beyond which our method cannot be expected to find it, nor any other that
 # is as careful about false terms: where the square of its coefficient, in bounds, is what our method
-# charges for the term.
+# asks of the term.
 
 
 # %%
@@ -359,7 +359,7 @@ def weakest(name):
     law = SYSTEMS[name]
     t, x = law.trajectory(frames)
     bound = cramer_rao(law, t, law.x0, np.std(x, axis=0), moving=[True, True, False]).coefficients
-    needed = bound * np.sqrt(term_charges(law.exponents))[:, None]
+    needed = bound * np.sqrt(term_penalties(law.exponents))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         level = np.where(law.support, np.abs(law.coefficients) / needed, np.inf)
     row, equation = np.unravel_index(level.argmin(), level.shape)

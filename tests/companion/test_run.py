@@ -9,10 +9,10 @@ import nbformat
 import pytest
 from helpers import TinyRepository
 
+from vidsindy_lite import stamp as repository
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion import artifacts
 from vidsindy_lite.companion import run as runner
-from vidsindy_lite import stamp as repository
 from vidsindy_lite.companion.run import NotebookError
 
 pytestmark = pytest.mark.slow  # starts kernels

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from vidsindy_lite.__main__ import main
 from vidsindy_lite import stamp as repository
+from vidsindy_lite.__main__ import main
 from vidsindy_lite.study.sweeps import remember, sweep
 from vidsindy_lite.vision import Scene, video_info
 
