@@ -49,6 +49,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import approx_fprime
 from tqdm import tqdm
 
+<<<<<<< HEAD
 from vidsindy_lite import discover
 from vidsindy_lite.companion.artifacts import save_figure, save_table
 
@@ -68,6 +69,10 @@ from vidsindy_lite.dynamics import (
     subset_search,
     term_penalties,
 )
+=======
+from vidsindy_lite import discover, dynamics
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+>>>>>>> rebuild
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, discover_paper, plots, score
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -98,9 +103,9 @@ print(truth.text())
 
 # %%
 breakpoints = np.linspace(0, 0.15, 9)
-knots = clamped_knots(breakpoints)
+knots = dynamics.clamped_knots(breakpoints)
 fine = np.linspace(0, 0.15, 601)
-basis = design_matrix(knots, fine)
+basis = dynamics.design_matrix(knots, fine)
 assert (np.count_nonzero(basis, axis=1) <= 4).all()
 
 # %%
@@ -125,7 +130,7 @@ save_figure("solver_basis", fig, caption=caption, numbers={"t": fine, "basis": b
 # %%
 P = rng.normal(size=(basis.shape[1], 3))
 offset = np.array([10.0, 10.0, 0.0])
-slopes = design_matrix(knots, fine, order=1)
+slopes = dynamics.design_matrix(knots, fine, order=1)
 assert np.allclose(basis.sum(axis=1), 1, atol=1e-12)
 assert np.allclose(basis @ P + offset, basis @ (P + offset), atol=1e-12)
 assert np.allclose(slopes @ P, slopes @ (P + offset), atol=1e-9)
@@ -159,12 +164,18 @@ assert (native.support.sum(), moved.support.sum()) == (7, 12)
 # $\mathbf J^T\mathbf J$. Here are the misfits of a small problem, 48 samples and the seven true terms, ...
 
 # %%
+<<<<<<< HEAD
 segment = Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
 problem = Collocation([segment], native.exponents, np.ones(3), np.ones(3))
 G = design_matrix(problem.knots[0], segment.t)
+=======
+segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], record=0)
+problem = dynamics.Collocation([segment], native.exponents, np.ones(3), np.ones(3))
+G = dynamics.design_matrix(problem.knots[0], segment.t)
+>>>>>>> rebuild
 P = np.linalg.lstsq(G, segment.x)[0]
 all_axes = np.ones(3, dtype=bool)
-state = State(P, native.coefficients, native.support, offset, moving=all_axes)
+state = dynamics.State(P, native.coefficients, native.support, offset, moving=all_axes)
 
 
 def misfits(unknowns):
@@ -215,15 +226,15 @@ assert np.allclose(schur, information, rtol=1e-3, atol=1e-6 * np.abs(schur).max(
 # The time of one step, with all 30 terms up to degree 2 as unknowns:
 
 # %%
-exponents = monomial_exponents(3, 2)
+exponents = dynamics.monomial_exponents(3, 2)
 everything = np.arange(exponents.size)
 
 
 def step_row(n):
     times, states = truth.trajectory(n)
-    whole = Collocation([Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
-    P = smooth([(times, states)], rng).splines[0].c
-    start = State(P, np.zeros(exponents.shape), np.ones(exponents.shape, bool), offset, ~all_axes)
+    whole = dynamics.Collocation([dynamics.Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
+    P = dynamics.smooth([(times, states)], rng).splines[0].c
+    start = dynamics.State(P, np.zeros(exponents.shape), np.ones(exponents.shape, bool), offset, ~all_axes)
     seconds = min(timed(lambda: whole.linearise(start, everything), number=1, repeat=3))
     return {"samples": n, "in the band": 12 * P.size, "if dense": P.size**2, "seconds": seconds}
 
@@ -264,7 +275,7 @@ assert np.abs(unmet(nodes)).max() < 0.01 * np.abs(unmet(window)).max()
 
 # %%
 seen = (t >= low) & (t <= high)
-first = smooth([(t, x)], rng).splines[0]
+first = dynamics.smooth([(t, x)], rng).splines[0]
 at = nodes[inside]
 samples = {"t": t[seen], "data": x[seen, 0]}
 curves = {"first": (window, first(window)[:, 0]), "final": (window, spline(window)[:, 0])}
@@ -375,12 +386,12 @@ assert ours.history[-1].terms == native.support.sum()
 
 # %%
 def start(t, x):
-    spline, origin = smooth([(t, x)], np.random.default_rng(seed)).splines[0], x.mean(axis=0)
-    problem = Collocation([Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
+    spline, origin = dynamics.smooth([(t, x)], np.random.default_rng(seed)).splines[0], x.mean(axis=0)
+    problem = dynamics.Collocation([dynamics.Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
     curve, slope = problem.node_states(spline.c)
-    coefficients, squares, *_ = np.linalg.lstsq(monomials(curve - origin, exponents), slope)
+    coefficients, squares, *_ = np.linalg.lstsq(dynamics.monomials(curve - origin, exponents), slope)
     terms = np.ones(exponents.shape, dtype=bool)
-    state = State(spline.c, coefficients, terms, origin, moving=~all_axes)
+    state = dynamics.State(spline.c, coefficients, terms, origin, moving=~all_axes)
     return state, problem, squares / len(curve)
 
 
@@ -390,7 +401,11 @@ def unpruned(t, x):
         problem = problem.weighted(problem.data_weights, alpha / unmet)
         state = problem.solve(state, tolerance=1.0)
     information = problem.linearise(state, everything).information
+<<<<<<< HEAD
     return ShiftedLaw(exponents, state.coefficients, information), state
+=======
+    return dynamics.ShiftedLaw(exponents, state.coefficients, information), state
+>>>>>>> rebuild
 
 
 # %% [markdown]
@@ -401,7 +416,11 @@ def unpruned(t, x):
 # the loss plus a penalty per term falls; the penalties are the same for all systems.
 
 # %%
+<<<<<<< HEAD
 penalty = np.tile(term_penalties(exponents), 3)
+=======
+charge = np.tile(dynamics.term_penalties(exponents), 3)
+>>>>>>> rebuild
 
 
 def flat_support(law):
@@ -412,7 +431,11 @@ def flat_support(law):
 def search(algebra, shift):
     coefficients, S = algebra.at(shift)
     c = coefficients.T.ravel()
+<<<<<<< HEAD
     support, solution, _ = subset_search(S, 0 * c, c, penalty, np.ones(len(c), dtype=bool))
+=======
+    support, solution, _ = dynamics.subset_search(S, 0 * c, c, charge, np.ones(len(c), dtype=bool))
+>>>>>>> rebuild
     return c, S, support, solution
 
 
@@ -457,7 +480,11 @@ save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 # How sure is the search? `closest_rival` is the single change that costs least.
 
 # %%
+<<<<<<< HEAD
 cost, dropped, added = closest_rival(S, 0 * c, c, penalty, support)
+=======
+cost, dropped, added = dynamics.closest_rival(S, 0 * c, c, charge, support)
+>>>>>>> rebuild
 names = [f"{term} in d{j}/dt" for j in "xyz" for term in truth.terms[: len(exponents)]]
 out, into = (", ".join(names[k] for k in ks) or "nothing" for ks in (dropped, added))
 print(f"drop {out}, add {into}: {cost:.1f} worse (the penalty of a term is about {bar**2:.0f})")
@@ -574,7 +601,7 @@ assert found.native.support.sum() < found.system.support.sum()
 draws, part, noise = (24, 500, 0.05) if full else (3, 300, 0.05)
 axes_moved = np.array([True, True, False])
 sigma = noise * clean[:part].std(axis=0)
-bound = cramer_rao(native, t[:part], native.x0, sigma, moving=axes_moved)
+bound = dynamics.cramer_rao(native, t[:part], native.x0, sigma, moving=axes_moved)
 
 
 def repeat(stream):
@@ -791,6 +818,4 @@ save_table("solver_pendulum", rows, caption=caption)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())

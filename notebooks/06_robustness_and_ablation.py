@@ -43,8 +43,8 @@ from itertools import product
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite.companion.artifacts import save_figure, save_table
-from vidsindy_lite.dynamics import cramer_rao, term_penalties
+from vidsindy_lite import dynamics
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     ABLATION,
     METHODS,
@@ -358,8 +358,9 @@ save_table("study_failures", rows, caption=caption)
 def weakest(name):
     law = SYSTEMS[name]
     t, x = law.trajectory(frames)
-    bound = cramer_rao(law, t, law.x0, np.std(x, axis=0), moving=[True, True, False]).coefficients
-    needed = bound * np.sqrt(term_penalties(law.exponents))[:, None]
+    spread, moving = np.std(x, axis=0), [True, True, False]
+    bound = dynamics.cramer_rao(law, t, law.x0, spread, moving).coefficients
+    needed = bound * np.sqrt(dynamics.term_penalties(law.exponents))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         level = np.where(law.support, np.abs(law.coefficients) / needed, np.inf)
     row, equation = np.unravel_index(level.argmin(), level.shape)
@@ -643,6 +644,4 @@ for row in rows:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())

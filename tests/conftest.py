@@ -31,7 +31,7 @@ def pytest_collection_modifyitems(items):
 def tracked_once():
     """Tracks each video file once, however many tests of a module discover from it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "follow", cache(pipeline.follow))
+        patch.setattr(pipeline, "track", cache(pipeline.track))
         yield
 
 

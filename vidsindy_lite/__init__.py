@@ -9,9 +9,10 @@ into figures and pages is `vidsindy_lite.companion`.
 
 from .cameras import (
     Camera,
+    Lags,
+    OrthographicCamera,
     PerspectiveCamera,
     Rig,
-    Synchrony,
     align,
     learn_cameras,
     learn_lags,
@@ -20,11 +21,10 @@ from .cameras import (
     rig_template,
 )
 from .dynamics import Discovery, PolynomialSystem, discover
-from .pipeline import VideoDiscovery, discover_from_videos
+from .pipeline import Observation, VideoDiscovery, discover_from_videos, observe
 from .vision import (
     Scene,
     Track,
-    follow,
     read_frame,
     read_video,
     render_video,
@@ -35,8 +35,9 @@ from .vision import (
 __all__ = [
     "discover_from_videos",
     "VideoDiscovery",
+    "observe",
+    "Observation",
     "track",
-    "follow",
     "Track",
     "read_video",
     "read_frame",
@@ -45,8 +46,9 @@ __all__ = [
     "Scene",
     "align",
     "learn_lags",
-    "Synchrony",
+    "Lags",
     "Camera",
+    "OrthographicCamera",
     "PerspectiveCamera",
     "Rig",
     "rig_template",

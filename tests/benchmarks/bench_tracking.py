@@ -18,7 +18,6 @@ from vidsindy_lite.vision import (
     LearnedDetector,
     Scene,
     detections,
-    follow,
     read_video,
     render,
     render_restless,
@@ -59,7 +58,7 @@ def test_clean_textured_video(tmp_path, background):
     writing = seconds(lambda: render_video(path, truth, Scene(background), seed=100))
     decoding = min(seconds(lambda: sum(1 for _ in read_video(path))) for _ in range(REPEATS))
     tracking = min(seconds(lambda: track(path)) for _ in range(REPEATS))
-    error = np.linalg.norm(track(path) - truth, axis=1)
+    error = np.linalg.norm(track(path).pixels - truth, axis=1)
     rms = np.sqrt(np.mean(error**2))
     print(
         f"\n{background}: rms {rms:.4f} px, lost {np.isnan(error).sum()}; ms a frame: "
@@ -78,7 +77,7 @@ def test_unseen_random_scenes(tmp_path):
     for seed in range(200, 220):
         truth, scene = lorenz_track(seed), Scene.random(seed)
         error = np.linalg.norm(
-            track(render_video(path, truth, scene, seed=seed)) - truth, axis=1
+            track(render_video(path, truth, scene, seed=seed)).pixels - truth, axis=1
         )
         errors.append(error)
         print(
@@ -97,7 +96,7 @@ def test_noise(tmp_path, seed):
     scene = Scene.random(seed, noise_variance=0.01)
     path = render_video(tmp_path / "clip.mov", truth, scene, seed=seed)
     for detector in ("auto", "learned"):
-        error = np.linalg.norm(track(path, detector) - truth, axis=1)
+        error = np.linalg.norm(track(path, detector).pixels - truth, axis=1)
         rms = np.sqrt(np.nanmean(error**2))
         print(f"\n{detector}: rms {rms:.3f} px, found {np.isfinite(error).mean():.3f}", end="")
         assert rms <= (0.5 if detector == "auto" else 1.0)
@@ -115,7 +114,7 @@ def test_restless(tmp_path, background, light, motion):
     scene = Scene(background, "irregular", size=20, shape_seed=500)
     frames = render_restless(truth, scene, shifts, 1 + light * np.sin(k / 10), seed=500)
     path = write_video(tmp_path / "clip.mov", frames)
-    found = {name: follow(path, name) for name in ("background", "learned", "auto")}
+    found = {name: track(path, name) for name in ("background", "learned", "auto")}
     error = {name: np.linalg.norm(f.pixels - truth, axis=1) for name, f in found.items()}
     print(f"\n{background}, {motion}, light {light}: auto takes {found['auto'].detector}", end="")
     for name, values in error.items():

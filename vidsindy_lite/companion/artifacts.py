@@ -34,7 +34,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from ..stamp import repository_root, write_file
+from ..stamp import repository_root, versions, write_file
 
 __all__ = [
     "Table",
@@ -49,6 +49,7 @@ __all__ = [
     "save_animation",
     "save_figure",
     "save_table",
+    "versions",
     "write_index",
 ]
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..cameras import (
-    Camera,
+    OrthographicCamera,
     PerspectiveCamera,
     Rig,
     calibration_errors,
@@ -140,7 +140,7 @@ def orthographic(rig):
         Of orthographic cameras.
     """
     return Rig(
-        Camera(
+        OrthographicCamera(
             position=c.position,
             normal=c.normal,
             scale=c.scale * (c.normal @ (c.position - MIDDLE)),
@@ -218,7 +218,7 @@ def film(rig, x, folder, seed=0):
             # All clips of one camera show the same cloth.
             number = len(rig.cameras) * seed + i
             render_video(file, centroids, scene, FPS, number, 2 / scene.size * shapes)
-            parts.append(track(file))
+            parts.append(track(file).pixels)
         tracks.append(np.vstack(parts))
     return tracks
 

@@ -22,7 +22,7 @@ import numpy as np
 from ..cameras import Rig, learn_cameras, reconstruct
 from ..checks import check_integer
 from ..dynamics import Discovery, discover
-from ..vision import Scene, Track, follow, read_frame, render_labelled, write_video
+from ..vision import Scene, Track, read_frame, render_labelled, track, write_video
 from .metrics import Score, score
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
 from .trials import SAMPLES_PER_PERIOD
@@ -197,8 +197,8 @@ def _view(pixels, scene, seed):
 
     with TemporaryDirectory() as folder:
         video = write_video(Path(folder) / "view.mov", frames())
-        track = follow(video)
-        seen = np.flatnonzero(np.isfinite(track.pixels).all(axis=1))
+        found = track(video)
+        seen = np.flatnonzero(np.isfinite(found.pixels).all(axis=1))
         shown = int(seen[len(seen) // 2]) if len(seen) else 0
         image = read_frame(video, shown)
-    return View(scene, shown, image, track, pixels, np.array(visible))
+    return View(scene, shown, image, found, pixels, np.array(visible))

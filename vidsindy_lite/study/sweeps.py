@@ -117,9 +117,9 @@ def remember(function: Callable[[Task], Result], task: Task) -> Result:
 
 def _check(function: Callable, tasks: list, jobs: int) -> None:
     home, name = getattr(function, "__module__", ""), getattr(function, "__qualname__", "")
-    if home.partition(".")[0] != __package__ or not name.isidentifier():
+    if home.partition(".")[0] != PACKAGE.name or not name.isidentifier():
         raise ValueError(
-            f"function: must be a top-level function of {__package__}, whose code the stored "
+            f"function: must be a top-level function of {PACKAGE.name}, whose code the stored "
             f"results depend on, got {function!r}"
         )
     for task in tasks:
@@ -196,7 +196,7 @@ def _on_cluster(
     except ImportError:
         raise ImportError(
             "dask: a cluster needs the package distributed, which the extra 'cluster' installs: "
-            f'pip install "{__package__}[cluster]"'
+            f'pip install "{PACKAGE.name}[cluster]"'
         ) from None
     with Client(address) as client:
         client.wait_for_workers(1, timeout=60)
@@ -204,7 +204,7 @@ def _on_cluster(
         differing = [worker for worker, stamp in theirs.items() if stamp != package_stamp()]
         if differing:
             raise RuntimeError(
-                f"dask: all workers must have this very code of {__package__}, "
+                f"dask: all workers must have this very code of {PACKAGE.name}, "
                 f"got other code on {', '.join(differing)}"
             )
         # The key is what Dask calls a task, in its errors too.
@@ -227,7 +227,7 @@ def _files(function: Callable, tasks: list) -> dict[int, Path]:
         return {}
     named = os.environ.get("VIDSINDY_CACHE")
     cache = Path(named) if named else root / "build" / "cache"
-    module = function.__module__.removeprefix(f"{__package__}.")
+    module = function.__module__.removeprefix(f"{PACKAGE.name}.")
     folder = cache / package_stamp(root) / f"{module}.{function.__name__}"
     names = [hashlib.sha256(repr(task).encode()).hexdigest()[:32] for task in tasks]
     return {number: folder / f"{name}.pkl" for number, name in enumerate(names)}

@@ -198,7 +198,7 @@ def record(task: FilmTask) -> Recording:
     with TemporaryDirectory() as folder:
         shot = film(task.system, folder, task.frames, task.trial)
         began = time.perf_counter()
-        tracks = tuple(track(path) for path in shot.paths)
+        tracks = tuple(track(path).pixels for path in shot.paths)
     rig = learn_cameras(tracks, shot.rig.uncalibrated(keep=0))
     x = reconstruct(tracks, rig)
     seconds = time.perf_counter() - began

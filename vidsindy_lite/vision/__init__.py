@@ -1,7 +1,7 @@
 """Video files and pixels: reading and writing, drawing scenes, tracking."""
 
 from .detector import WEIGHTS, LearnedDetector, detections
-from .tracking import Track, check_detector, follow, track
+from .tracking import Track, check_detector, track
 from .training import SEEN_BACKGROUNDS, SEEN_SHAPES
 from .video import (
     BACKGROUNDS,
@@ -30,7 +30,6 @@ __all__ = [
     "WEIGHTS",
     "check_detector",
     "detections",
-    "follow",
     "read_frame",
     "read_video",
     "render",

@@ -12,7 +12,6 @@ A frame gets NaN where the target is not seen, or not for sure.
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -62,12 +61,12 @@ class Track:
     warnings: tuple[str, ...] = ()
 
 
-def track(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") -> np.ndarray:
+def track(path: str | os.PathLike, detector: str | os.PathLike = "auto") -> Track:
     """Track the one moving target of a video.
 
     Parameters
     ----------
-    video_path : path
+    path : path
         A video of one target in colours unlike the background's.
     detector : {"auto", "background", "learned"} or path
         * "background": for a camera at rest, the most exact. The target may turn and change its
@@ -81,47 +80,21 @@ def track(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") -
 
     Returns
     -------
-    track : (n, 2) array
-        Centroid of the target in each frame, (u right, v down) in pixels, pixel centres at
-        integers; NaN in frames where it is not seen, or only a part of it, or where it cannot be
-        told from the background.
-
-    Warns
-    -----
-    UserWarning
-        If the camera or the background is not at rest.
+    Track
+        Its warnings say whether the camera or the background is not at rest.
 
     Raises
     ------
     FileNotFoundError, ValueError
         If the file is missing, empty, not a video, or holds no frame, or if there is no such
         detector or .onnx file.
-
-    See Also
-    --------
-    follow : the same with a confidence for each frame.
-    """
-    found = follow(video_path, detector)
-    for warning in found.warnings:
-        warnings.warn(warning, stacklevel=2)
-    return found.pixels
-
-
-def follow(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") -> Track:
-    """Track the one moving target of a video, and say how sure that is.
-
-    Parameters and errors are those of `track`; warnings are part of the result.
-
-    Returns
-    -------
-    Track
     """
     check_detector(detector)
     if detector not in ("auto", "background"):
-        return _link_detections(video_path, _detector(detector), str(detector))
-    model = BackgroundModel(sample_frames(video_path))
-    found = _follow_model(video_path, model)
-    name, doubts = Path(video_path).name, []
+        return _link_detections(path, _detector(detector), str(detector))
+    model = BackgroundModel(sample_frames(path))
+    found = _follow_model(path, model)
+    name, doubts = Path(path).name, []
     if model.shake > _SHAKY:
         doubts.append(
             f"{name}: the camera moves, typically by {model.shake:.1f} px or more; its motion is "
@@ -133,7 +106,7 @@ def follow(video_path: str | os.PathLike, detector: str | os.PathLike = "auto") 
             f"{model.unrest:.1f} times its area changes in a typical frame"
         )
         if detector == "auto":
-            found = _surer(found, _link_detections(video_path, _detector("learned"), "learned"))
+            found = _surer(found, _link_detections(path, _detector("learned"), "learned"))
     return replace(found, warnings=tuple(doubts))
 
 
