@@ -49,30 +49,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import approx_fprime
 from tqdm import tqdm
 
-<<<<<<< HEAD
-from vidsindy_lite import discover
-from vidsindy_lite.companion.artifacts import save_figure, save_table
-
-# %%
-from vidsindy_lite.dynamics import (
-    Collocation,
-    Segment,
-    ShiftedLaw,
-    State,
-    clamped_knots,
-    closest_rival,
-    cramer_rao,
-    design_matrix,
-    monomial_exponents,
-    monomials,
-    smooth,
-    subset_search,
-    term_penalties,
-)
-=======
 from vidsindy_lite import discover, dynamics
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
->>>>>>> rebuild
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, discover_paper, plots, score
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -164,15 +142,9 @@ assert (native.support.sum(), moved.support.sum()) == (7, 12)
 # $\mathbf J^T\mathbf J$. Here are the misfits of a small problem, 48 samples and the seven true terms, ...
 
 # %%
-<<<<<<< HEAD
-segment = Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
-problem = Collocation([segment], native.exponents, np.ones(3), np.ones(3))
-G = design_matrix(problem.knots[0], segment.t)
-=======
-segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], record=0)
+segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
 problem = dynamics.Collocation([segment], native.exponents, np.ones(3), np.ones(3))
 G = dynamics.design_matrix(problem.knots[0], segment.t)
->>>>>>> rebuild
 P = np.linalg.lstsq(G, segment.x)[0]
 all_axes = np.ones(3, dtype=bool)
 state = dynamics.State(P, native.coefficients, native.support, offset, moving=all_axes)
@@ -401,11 +373,7 @@ def unpruned(t, x):
         problem = problem.weighted(problem.data_weights, alpha / unmet)
         state = problem.solve(state, tolerance=1.0)
     information = problem.linearise(state, everything).information
-<<<<<<< HEAD
-    return ShiftedLaw(exponents, state.coefficients, information), state
-=======
     return dynamics.ShiftedLaw(exponents, state.coefficients, information), state
->>>>>>> rebuild
 
 
 # %% [markdown]
@@ -416,11 +384,7 @@ def unpruned(t, x):
 # the loss plus a penalty per term falls; the penalties are the same for all systems.
 
 # %%
-<<<<<<< HEAD
-penalty = np.tile(term_penalties(exponents), 3)
-=======
-charge = np.tile(dynamics.term_penalties(exponents), 3)
->>>>>>> rebuild
+penalty = np.tile(dynamics.term_penalties(exponents), 3)
 
 
 def flat_support(law):
@@ -431,11 +395,7 @@ def flat_support(law):
 def search(algebra, shift):
     coefficients, S = algebra.at(shift)
     c = coefficients.T.ravel()
-<<<<<<< HEAD
-    support, solution, _ = subset_search(S, 0 * c, c, penalty, np.ones(len(c), dtype=bool))
-=======
-    support, solution, _ = dynamics.subset_search(S, 0 * c, c, charge, np.ones(len(c), dtype=bool))
->>>>>>> rebuild
+    support, solution, _ = dynamics.subset_search(S, 0 * c, c, penalty, np.ones(len(c), dtype=bool))
     return c, S, support, solution
 
 
@@ -480,11 +440,7 @@ save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 # How sure is the search? `closest_rival` is the single change that costs least.
 
 # %%
-<<<<<<< HEAD
-cost, dropped, added = closest_rival(S, 0 * c, c, penalty, support)
-=======
-cost, dropped, added = dynamics.closest_rival(S, 0 * c, c, charge, support)
->>>>>>> rebuild
+cost, dropped, added = dynamics.closest_rival(S, 0 * c, c, penalty, support)
 names = [f"{term} in d{j}/dt" for j in "xyz" for term in truth.terms[: len(exponents)]]
 out, into = (", ".join(names[k] for k in ks) or "nothing" for ks in (dropped, added))
 print(f"drop {out}, add {into}: {cost:.1f} worse (the penalty of a term is about {bar**2:.0f})")
