@@ -38,8 +38,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from vidsindy_lite.cameras import Rig, geometry
-from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite import Rig, cameras
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -77,7 +77,7 @@ save_figure("figure_S1", fig, caption=caption, numbers={"t": t, "x": x})
 
 # %%
 axis, angle = np.array([1.0, 2.0, 2.0]) / 3, 0.7
-R = geometry.rodrigues(axis, angle)
+R = cameras.rodrigues(axis, angle)
 assert np.allclose(R, Rotation.from_rotvec(angle * axis).as_matrix(), atol=1e-15)
 R.round(6)
 
@@ -95,7 +95,7 @@ R.round(6)
 
 # %%
 n = camera.normal
-R = geometry.rotation_to_z(n)
+R = cameras.rotation_to_z(n)
 assert np.allclose(R @ n, e_z, atol=1e-15)
 assert np.allclose(R[2], n, atol=1e-15)
 R.round(4)
@@ -123,8 +123,8 @@ print("R n, text's", (text @ n).round(4))
 with np.errstate(invalid="ignore"):
     axis = np.cross(e_z, e_z) / np.linalg.norm(np.cross(e_z, e_z))
 assert np.isnan(axis).all()
-assert np.allclose(geometry.rotation_to_z(e_z), np.eye(3))
-assert np.allclose(geometry.rotation_to_z(-e_z), np.diag([1, -1, -1]))
+assert np.allclose(cameras.rotation_to_z(e_z), np.eye(3))
+assert np.allclose(cameras.rotation_to_z(-e_z), np.diag([1, -1, -1]))
 print("axis as written:", axis)
 
 # %% [markdown]
@@ -135,14 +135,14 @@ print("axis as written:", axis)
 # %%
 def as_written(normal):
     axis = np.cross(normal, e_z)
-    return geometry.rodrigues(axis, np.arccos(normal @ e_z))
+    return cameras.rodrigues(axis, np.arccos(normal @ e_z))
 
 
 tilt = np.logspace(-12, 0, 49)
 normals = np.column_stack([np.sin(tilt), 0 * tilt, np.cos(tilt)])
 errors = {
     "angle by arccos, as written": [np.linalg.norm(as_written(n) @ n - e_z) for n in normals],
-    "angle by atan2, ours": [np.linalg.norm(geometry.rotation_to_z(n) @ n - e_z) for n in normals],
+    "angle by atan2, ours": [np.linalg.norm(cameras.rotation_to_z(n) @ n - e_z) for n in normals],
 }
 assert max(errors["angle by arccos, as written"]) > 1e-9 > max(errors["angle by atan2, ours"])
 
@@ -171,7 +171,7 @@ save_figure("projection_near_z", fig, caption=caption, numbers={"tilt": tilt, **
 
 # %%
 d = np.linspace(-80, 80, 41)
-feet = np.array([geometry.plane_projection(x[0], n, value) for value in d])
+feet = np.array([cameras.plane_projection(x[0], n, value) for value in d])
 turned = {"R takes n to $e_z$": feet @ R.T, "as in the text: $e_z$ to n": feet @ text.T}
 spread = [np.ptp(values[:, :2], axis=0).max() for values in turned.values()]
 assert spread[0] < 1e-12
@@ -240,9 +240,9 @@ assert abs(coefficient_of_d(np.cross(e_z, n))) > 0.1
 X, Y, Z = R
 origin, C = np.zeros(3), camera.position
 distance = {
-    "Y'OZ' (delta_x)": geometry.signed_distance(C, *geometry.plane_through(origin, Y, Z)),
-    "X'OZ' (delta_y)": geometry.signed_distance(C, *geometry.plane_through(origin, Z, X)),
-    "X'OY' (depth)": geometry.signed_distance(C, *geometry.plane_through(origin, X, Y)),
+    "Y'OZ' (delta_x)": cameras.signed_distance(C, *cameras.plane_through(origin, Y, Z)),
+    "X'OZ' (delta_y)": cameras.signed_distance(C, *cameras.plane_through(origin, Z, X)),
+    "X'OY' (depth)": cameras.signed_distance(C, *cameras.plane_through(origin, X, Y)),
 }
 assert np.allclose(list(distance.values())[:2], camera.offset, atol=1e-12)
 assert min(distance.values()) < 0
@@ -287,7 +287,7 @@ save_figure("projection_offset_signs", fig, caption=caption, numbers=curves)
 
 # %%
 pixels = camera.project(x)
-on_plane = geometry.plane_projection(x, camera.normal, -camera.normal @ camera.position)
+on_plane = cameras.plane_projection(x, camera.normal, -camera.normal @ camera.position)
 assert np.allclose(camera.project(on_plane), pixels, atol=1e-9)
 assert np.allclose(camera.plane_coordinates(pixels), seen, atol=1e-9)
 print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round(1))
@@ -329,7 +329,7 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 #
 # <details><summary>Solution</summary>
 #
-# `geometry.rotation_to_z([1e-6, 0, -1]) - geometry.rotation_to_z([-1e-6, 0, -1])` is zero to about
+# `cameras.rotation_to_z([1e-6, 0, -1]) - cameras.rotation_to_z([-1e-6, 0, -1])` is zero to about
 # $2\cdot10^{-6}$: both turn about the y axis, by nearly $\pi$, in opposite directions. But
 # `[0, 1e-6, -1]` turns about the x axis, and its X' and Y' have the opposite sign. So near
 # $-\mathbf e_z$ the in-plane angle of a camera jumps as its normal moves; learn the angle with the
@@ -343,6 +343,4 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.companion.artifacts import versions
-
 print(versions())

@@ -44,8 +44,8 @@ from time import perf_counter
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite.cameras import Rig, calibration_errors, learn_cameras, reconstruct, residuals
-from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite import Rig, cameras, learn_cameras, reconstruct, residuals
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -133,7 +133,7 @@ learned = learn_cameras(tracks, start, method="paper")
 for found, true in zip(learned.cameras, truth.cameras, strict=True):
     print(f"scale {found.scale:.12f} (true {true.scale:.12f})", end="   ")
     print(f"angle {found.angle:+.12f} (true {true.angle:+.12f})")
-assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
 
 # %% [markdown]
 # ## What Eq. (4) leaves out
@@ -175,7 +175,7 @@ def row(pixels, observed, method):
     began = perf_counter()
     found = learn_cameras(observed, start, method)
     seconds = perf_counter() - began
-    scale, angle = np.abs(calibration_errors(found, truth)).max(axis=0)
+    scale, angle = np.abs(cameras.calibration_errors(found, truth)).max(axis=0)
     rmse = np.sqrt(np.mean((reconstruct(observed, found) - x) ** 2)) / pixel
     errors = {"error of scale": scale, "error of angle (rad)": angle, "3D rmse (px)": rmse}
     return {"pixels": pixels, "method": method, **errors, "seconds": seconds}
@@ -203,7 +203,7 @@ def errors_of(method, noise, number):
     def trial(stream):
         generator = np.random.default_rng(stream)
         observed = [track + noise * generator.normal(size=track.shape) for track in tracks]
-        return calibration_errors(learn_cameras(observed, start, method), truth)[1:]
+        return cameras.calibration_errors(learn_cameras(observed, start, method), truth)[1:]
 
     return np.array([trial(stream) for stream in np.random.SeedSequence(seed).spawn(number)])
 
@@ -301,7 +301,7 @@ gappy = [track.copy() for track in tracks]
 for i, track in enumerate(gappy):
     track[i::3] = np.nan
 learned = learn_cameras(gappy, start)
-assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
 assert np.allclose(reconstruct(gappy, learned), x, atol=1e-9)
 
 # %% [markdown]
@@ -375,7 +375,7 @@ assert "cameras[1] and cameras[2]" in message
 # ```python
 # pair = Rig(start.cameras[:2])
 # found = learn_cameras(tracks[:2], pair)
-# print(calibration_errors(found, Rig(truth.cameras[:2])))
+# print(cameras.calibration_errors(found, Rig(truth.cameras[:2])))
 # ```
 #
 # Yes. Two views leave one condition per frame, the epipolar one, and with it two unknowns against
@@ -390,6 +390,4 @@ assert "cameras[1] and cameras[2]" in message
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.companion.artifacts import versions
-
 print(versions())

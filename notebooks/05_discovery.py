@@ -44,7 +44,7 @@ import numpy as np
 from IPython.display import Math, display
 
 from vidsindy_lite import discover
-from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SCORES,
@@ -444,6 +444,4 @@ for method in baselines.BASELINES:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.companion.artifacts import versions
-
 print(versions())

@@ -40,7 +40,7 @@ jobs: int = 2  # trials at a time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import DISTURBANCES, START, SYSTEMS, SceneTask, plots, pulls, run, sweep
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -270,6 +270,4 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.companion.artifacts import versions
-
 print(versions())

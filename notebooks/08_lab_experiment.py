@@ -45,10 +45,9 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite.cameras import Rig, calibration_errors, learn_cameras, reconstruct, residuals
-from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite import Rig, cameras, learn_cameras, read_frame, reconstruct, residuals
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import lab, plots
-from vidsindy_lite.vision import read_frame
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
@@ -255,7 +254,7 @@ with TemporaryDirectory() as folder:
 # %%
 pixels = [camera.project(x) for camera in truth.cameras]  # of the centre: exact
 learned = learn_cameras(pixels, start)
-assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
+assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
 assert rms(reconstruct(pixels, learned) - x) < 1e-6  # mm
 learned = learn_cameras(tracks, start)  # of the ball in the videos
 by_pinhole = reconstruct(tracks, learned)
@@ -315,7 +314,7 @@ results = {
 # %%
 rows = []
 for name, (rig, path) in results.items():
-    scale, angle = np.abs(calibration_errors(rig, lab.orthographic(truth) if rig is flat else truth)).max(0)
+    scale, angle = np.abs(cameras.calibration_errors(rig, lab.orthographic(truth) if rig is flat else truth)).max(0)
     row = {"cameras": name, "rms (mm)": rms(path - x), "largest (mm)": length(path - x).max()}
     row |= {"marked point (mm)": length(path - x)[marked]}
     rows.append(row | {"error of scale (%)": 100 * scale, "error of angle (mrad)": 1000 * angle})
@@ -348,9 +347,9 @@ save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 
 # %%
 def misplaced(name, **change):
-    cameras = list(start.cameras)
-    cameras[1] = replace(cameras[1], **change)
-    rig = learn_cameras(pixels, Rig(cameras))
+    measured = list(start.cameras)
+    measured[1] = replace(measured[1], **change)
+    rig = learn_cameras(pixels, Rig(measured))
     missed = np.hstack(residuals(pixels, rig))
     values = rms(reconstruct(pixels, rig) - x), np.sqrt(np.mean(missed**2))
     return {"camera 2": name} | dict(
@@ -439,6 +438,4 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.companion.artifacts import versions
-
 print(versions())

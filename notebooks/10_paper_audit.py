@@ -45,16 +45,8 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite.cameras import (
-    Rig,
-    calibration_errors,
-    geometry,
-    learn_cameras,
-    reconstruct,
-    residuals,
-)
-from vidsindy_lite.companion.artifacts import save_figure, save_table
-from vidsindy_lite.dynamics import splines
+from vidsindy_lite import Rig, cameras, dynamics, learn_cameras, reconstruct, residuals
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     ABLATION,
     DATASETS_CLAIMED,
@@ -126,8 +118,8 @@ t, x = truths["Lorenz"].trajectory(frames)
 rig = Rig.around(x)
 across = np.array([-1.0, -1.0, 1.0])
 for camera in rig.cameras:
-    R = geometry.rotation_to_z(camera.normal)
-    assert np.allclose(geometry.rotation_to_z(across * camera.normal), R.T)
+    R = cameras.rotation_to_z(camera.normal)
+    assert np.allclose(cameras.rotation_to_z(across * camera.normal), R.T)
 as_text = Rig([replace(camera, normal=across * camera.normal) for camera in rig.cameras])
 
 # %% [markdown]
@@ -197,7 +189,7 @@ save_figure("audit_rotation", fig, caption=caption, numbers=paths)
 
 # %%
 n = rig.cameras[0].normal
-R = geometry.rotation_to_z(n)
+R = cameras.rotation_to_z(n)
 proof = R.copy()
 proof[1, 2] *= -1
 of_d = {"R": R @ n, "text": R.T @ n, "proof": proof @ n}
@@ -228,7 +220,7 @@ with np.errstate(invalid="ignore"):
 assert np.isnan(axis).all()
 offsets = np.array([camera.offset for camera in rig.cameras])
 signed = np.array([
-    [geometry.signed_distance(c.position, row, 0.0) for row in geometry.rotation_to_z(c.normal)]
+    [cameras.signed_distance(c.position, row, 0.0) for row in cameras.rotation_to_z(c.normal)]
     for c in rig.cameras
 ])  # fmt: skip
 assert np.allclose(signed[:, :2], offsets, atol=1e-12)
@@ -266,7 +258,7 @@ assert np.allclose(eq_4 @ stack, 0, atol=1e-12)
 assert (np.linalg.matrix_rank(eq_4), conditions) == (2, 3)
 
 closed = learn_cameras(tracks, rig.uncalibrated(keep=0), method="paper")
-worst = np.abs(calibration_errors(closed, rig)).max()
+worst = np.abs(cameras.calibration_errors(closed, rig)).max()
 print(f"closed form: scales and angles off by at most {worst:.0e}")
 assert worst < 1e-9
 
@@ -289,9 +281,9 @@ note("Eq. (4)", "the loss for learning cameras 2 and 3", "drops the condition be
 # the same: they say nothing about $\Delta$.
 
 # %%
-knots = splines.clamped_knots(np.linspace(0, 1, 31))
+knots = dynamics.clamped_knots(np.linspace(0, 1, 31))
 times = np.linspace(0, 1, 200)
-G, slope = (splines.design_matrix(knots, times, order) for order in (0, 1))
+G, slope = (dynamics.design_matrix(knots, times, order) for order in (0, 1))
 assert np.allclose(G @ np.ones(G.shape[1]), 1)
 rng = np.random.default_rng(seed)
 P, Delta, c = rng.normal(size=(G.shape[1], 3)), rng.normal(size=3), rng.normal(size=3)
@@ -828,6 +820,4 @@ save_table("audit", findings, caption=caption)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.companion.artifacts import versions
-
 print(versions())

@@ -22,8 +22,8 @@ def shot(tmp_path_factory):
 
 def test_exact_equations_from_video_files(shot):
     found = vl.discover_from_videos(shot.paths, shot.rig.uncalibrated(keep=0), shot.t)
-    assert study.score(found, shot.truth).exact
-    assert study.score(found, shot.truth).l2 < 5e-3
+    assert study.score(found.discovery, shot.truth).exact
+    assert study.score(found.discovery, shot.truth).l2 < 5e-3
     assert all(camera.is_calibrated for camera in found.rig.cameras)
     assert found.x.shape == (200, 3)
     assert [track.shape for track in found.tracks] == [(200, 2)] * 3
@@ -99,8 +99,8 @@ def late(shot):
 def test_videos_of_different_length_that_start_at_different_times(shot, late):
     paths = [shot.paths[0], late, shot.paths[2]]
     found = vl.discover_from_videos(paths, shot.rig.uncalibrated(), shot.t)
-    np.testing.assert_allclose(found.lags.lags, (0, 7, 0), atol=0.01)
-    assert study.score(found, shot.truth).exact
+    np.testing.assert_allclose(found.lags.frames, (0, 7, 0), atol=0.01)
+    assert study.score(found.discovery, shot.truth).exact
     assert np.isnan(found.tracks[1][:7]).all()
     np.testing.assert_allclose(found.tracks[1][7:180], shot.tracks[1][7:180], atol=0.1)
     assert len(found.x) == len(found.t) == 200
@@ -112,7 +112,7 @@ def test_given_lags_are_used(shot, late):
     first, second, third = shot.rig.cameras
     rig = vl.Rig([second, first, third])
     found = vl.discover_from_videos(paths, rig, shot.t[7:180], lags=(7, 0, 0), degree=2)
-    assert found.lags.lags.tolist() == [0, -7, -7]
+    assert found.lags.frames.tolist() == [0, -7, -7]
     assert found.lags.errors.tolist() == [0, 0, 0]
     assert max(np.nanmax(np.abs(r)) for r in vl.residuals(found.tracks, found.rig)) < 0.2
     assert not any("lags" in warning for warning in found.warnings)
@@ -128,7 +128,7 @@ def test_a_wrong_lag_of_zero_is_not_accepted(shot, late):
 
 def test_a_lag_that_is_slightly_wrong_is_not_blamed_on_the_rig(shot):
     found = vl.discover_from_videos(shot.paths, shot.rig, lags=(0, 0.4, 0), degree=2)
-    assert found.lags.lags.tolist() == [0, 0.4, 0]
+    assert found.lags.frames.tolist() == [0, 0.4, 0]
     assert found.warnings[0].startswith(
         "the rig does not agree with the tracks at the lags that are given: in one frame of ten, "
     )
@@ -142,7 +142,7 @@ def test_different_frame_rates(shot, tmp_path):
     vl.write_video(half, list(vl.read_video(shot.paths[2]))[::2], fps=12.5)
     found = vl.discover_from_videos([*shot.paths[:2], half], shot.rig, degree=2)
     np.testing.assert_allclose(found.lags.rates, (1, 1, 0.5))
-    np.testing.assert_allclose(found.lags.lags, 0, atol=0.01)
+    np.testing.assert_allclose(found.lags.frames, 0, atol=0.01)
     assert np.nanmax(np.abs(found.x - shot.x)) < 5 * shot.rig.cameras[0].scale
 
 

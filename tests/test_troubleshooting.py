@@ -99,7 +99,7 @@ def repeating(studio):
     rig = vl.Rig.around(x)
     tracks = [camera.project(x) for camera in rig.cameras]
     tracks[1] = tracks[1][15:]
-    return "\n".join(vl.learn_lags(tracks, rig).doubts)
+    return "\n".join(vl.learn_lags(tracks, rig).warnings)
 
 
 def pendulum(degree):

@@ -9,9 +9,10 @@ into figures and pages is `vidsindy_lite.companion`.
 
 from .cameras import (
     Camera,
+    Lags,
+    OrthographicCamera,
     PerspectiveCamera,
     Rig,
-    Synchrony,
     align,
     learn_cameras,
     learn_lags,
@@ -20,7 +21,7 @@ from .cameras import (
     rig_template,
 )
 from .dynamics import Discovery, PolynomialSystem, discover
-from .pipeline import VideoDiscovery, discover_from_videos
+from .pipeline import Observation, VideoDiscovery, discover_from_videos, observe
 from .vision import (
     Scene,
     Track,
@@ -34,6 +35,8 @@ from .vision import (
 __all__ = [
     "discover_from_videos",
     "VideoDiscovery",
+    "observe",
+    "Observation",
     "track",
     "Track",
     "read_video",
@@ -43,8 +46,9 @@ __all__ = [
     "Scene",
     "align",
     "learn_lags",
-    "Synchrony",
+    "Lags",
     "Camera",
+    "OrthographicCamera",
     "PerspectiveCamera",
     "Rig",
     "rig_template",

@@ -8,8 +8,8 @@ from helpers import trajectory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidsindy_lite.cameras.calibrate import (
-    Camera,
+from vidsindy_lite.cameras import (
+    OrthographicCamera,
     Rig,
     calibration_errors,
     learn_cameras,
@@ -32,7 +32,7 @@ def random_rig(rng, x, cameras=3):
         if np.linalg.eigvalsh(cameras * np.eye(3) - normals.T @ normals)[0] > cameras / 3:
             break
     return Rig(
-        Camera(
+        OrthographicCamera(
             position=(low + high) / 2 + reach * (rng.uniform(-2, 2) * n + 0.1 * rng.normal(size=3)),
             normal=n,
             scale=reach / rng.uniform(180, 230),
@@ -62,18 +62,18 @@ def small():
 class TestCamera:
     def test_convention_by_hand(self):
         # Looking down the z axis, unturned: x to the right, y up, so v falls as y grows.
-        camera = Camera(position=(1, 2, 50), normal=(0, 0, 1), scale=0.5, angle=0.0)
+        camera = OrthographicCamera(position=(1, 2, 50), normal=(0, 0, 1), scale=0.5, angle=0.0)
         np.testing.assert_allclose(camera.project([[1, 2, -9]]), [[255.5, 255.5]])
         np.testing.assert_allclose(camera.project([[2, 2, 0]]), [[257.5, 255.5]])
         np.testing.assert_allclose(camera.project([[1, 3, 0]]), [[255.5, 253.5]])
 
     def test_in_plane_angle_by_hand(self):
         # T(pi/2) takes (0, 1) to (1, 0): a step along x is seen as a step up the image.
-        camera = Camera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=np.pi / 2)
+        camera = OrthographicCamera(position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=np.pi / 2)
         np.testing.assert_allclose(camera.project([[1, 0, 0]]), [[255.5, 254.5]])
 
     def test_image_size(self):
-        camera = Camera(
+        camera = OrthographicCamera(
             position=(0, 0, 0), normal=(0, 0, 1), scale=1, angle=0, image_size=(641, 481)
         )
         np.testing.assert_allclose(camera.project([[0, 0, 0]]), [[320, 240]])
@@ -105,13 +105,13 @@ class TestCamera:
             np.testing.assert_allclose(nearer.project(x), track, atol=1e-9)
 
     def test_nan_rows_pass_through(self):
-        camera = Camera(position=(0, 0, 0), normal=(1, 1, 1), scale=1, angle=0)
+        camera = OrthographicCamera(position=(0, 0, 0), normal=(1, 1, 1), scale=1, angle=0)
         pixels = camera.project([[np.nan, 0, 0], [0, 0, 0]])
         assert np.isnan(pixels[0]).all()
         np.testing.assert_allclose(pixels[1], 255.5)
 
     def test_is_frozen_and_normalises(self):
-        camera = Camera(position=[1, 2, 3], normal=[0, 3, 4])
+        camera = OrthographicCamera(position=[1, 2, 3], normal=[0, 3, 4])
         np.testing.assert_allclose(camera.normal, [0, 0.6, 0.8], rtol=1e-15)
         assert not camera.is_calibrated
         with pytest.raises(FrozenInstanceError):
@@ -121,19 +121,19 @@ class TestCamera:
 
     def test_does_not_share_memory_with_its_arguments(self):
         position = np.zeros(3)
-        camera = Camera(position=position, normal=[0, 0, 1])
+        camera = OrthographicCamera(position=position, normal=[0, 0, 1])
         position[0] = 9
         assert camera.position[0] == 0
 
     def test_equality(self):
-        camera = Camera(position=[1, 2, 3], normal=[0, 3, 4], scale=1, angle=0)
+        camera = OrthographicCamera(position=[1, 2, 3], normal=[0, 3, 4], scale=1, angle=0)
         assert camera == replace(camera)
         assert camera != replace(camera, scale=2)
         assert camera != "camera"
 
     def test_hash_agrees_with_equality(self):
-        camera = Camera(position=[1, 2, 0.0], normal=[0, 3, 4], scale=1, angle=0)
-        twin = Camera(position=(1, 2, -0.0), normal=(0, 3.0, 4), scale=1.0, angle=-0.0)
+        camera = OrthographicCamera(position=[1, 2, 0.0], normal=[0, 3, 4], scale=1, angle=0)
+        twin = OrthographicCamera(position=(1, 2, -0.0), normal=(0, 3.0, 4), scale=1.0, angle=-0.0)
         assert camera == twin
         assert len({camera, twin, replace(camera, scale=2), replace(camera, angle=1)}) == 3
         rig = Rig([camera, replace(camera, normal=(1, 0, 0))])
@@ -141,7 +141,7 @@ class TestCamera:
 
     @pytest.mark.parametrize("length", [1e-200, 1e200, 5e-324])
     def test_normals_of_any_length(self, length):
-        camera = Camera(position=[0, 0, 0], normal=[0, 0, length])
+        camera = OrthographicCamera(position=[0, 0, 0], normal=[0, 0, length])
         assert camera.normal.tolist() == [0, 0, 1]
 
     @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ class TestCamera:
     def test_bad_camera(self, change, message):
         good = {"position": (0, 0, 0), "normal": (0, 0, 1), "scale": 1.0, "angle": 0.0}
         with pytest.raises(ValueError, match=message):
-            Camera(**good | change)
+            OrthographicCamera(**good | change)
 
     def test_bad_points(self, small):
         camera = small[1].cameras[0]
@@ -177,7 +177,7 @@ class TestCamera:
             camera.plane_coordinates([1, 2])
 
     def test_uncalibrated_camera_cannot_project(self):
-        camera = Camera(position=(0, 0, 0), normal=(0, 0, 1))
+        camera = OrthographicCamera(position=(0, 0, 0), normal=(0, 0, 1))
         for use in (camera.project, camera.plane_coordinates):
             with pytest.raises(ValueError, match="scale and angle must be known, got None"):
                 use(np.zeros((1, 3)))
@@ -204,8 +204,8 @@ class TestRig:
         )
         assert Rig.load(path) == Rig(
             [
-                Camera(position=(0, 0, 10), normal=(0, 0, 1), scale=1.0, angle=0.5),
-                Camera(position=(10, 0, 0), normal=(1, 0, 0), image_size=(640, 480)),
+                OrthographicCamera(position=(0, 0, 10), normal=(0, 0, 1), scale=1.0, angle=0.5),
+                OrthographicCamera(position=(10, 0, 0), normal=(1, 0, 0), image_size=(640, 480)),
             ]
         )
 
@@ -254,7 +254,8 @@ class TestRig:
 
     @pytest.mark.parametrize("second", [(0, 0, 1), (0, 0, -1), (1e-9, 0, 1)])
     def test_parallel_normals(self, second):
-        cameras = [Camera(position=(0, 0, 0), normal=n) for n in ((0, 0, 1), second, (0, 0, 2))]
+        normals = ((0, 0, 1), second, (0, 0, 2))
+        cameras = [OrthographicCamera(position=(0, 0, 0), normal=n) for n in normals]
         with pytest.raises(ValueError, match="cameras: must have at least two independent normals"):
             Rig(cameras)
 

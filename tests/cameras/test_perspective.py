@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from vidsindy_lite.cameras.calibrate import (
-    Camera,
+from vidsindy_lite.cameras import (
+    OrthographicCamera,
+    PerspectiveCamera,
     Rig,
     calibration_errors,
     learn_cameras,
     reconstruct,
     residuals,
 )
-from vidsindy_lite.cameras.perspective import PerspectiveCamera
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -42,7 +42,7 @@ def scene(seed, n=200, cameras=3, kinds=(PerspectiveCamera,)):
             kind(
                 position=(x.min(0) + x.max(0)) / 2 + distance * direction,
                 normal=direction + 0.1 * rng.normal(size=3),
-                scale=pixel if kind is Camera else pixel / distance,
+                scale=pixel if kind is OrthographicCamera else pixel / distance,
                 angle=rng.uniform(-np.pi, np.pi),
             )
         )
@@ -104,7 +104,7 @@ class TestProjection:
                 place = {"position": middle + away * camera.normal, "normal": camera.normal}
                 pixel = np.ptp(x) / 400
                 near = PerspectiveCamera(**place, scale=pixel / away, angle=camera.angle)
-                far = Camera(**place, scale=pixel, angle=camera.angle)
+                far = OrthographicCamera(**place, scale=pixel, angle=camera.angle)
                 difference = near.project(x) - far.project(x)
                 assert np.abs(difference).max() < 1000 / distance
 
@@ -147,7 +147,7 @@ class TestRig:
     @given(SEEDS, st.integers(2, 6), st.booleans())
     @settings(max_examples=20)
     def test_file_round_trip_is_exact(self, tmp_path_factory, seed, cameras, calibrated):
-        _, rig, _, _ = scene(seed, 5, cameras, (Camera, PerspectiveCamera))
+        _, rig, _, _ = scene(seed, 5, cameras, (OrthographicCamera, PerspectiveCamera))
         rig = rig if calibrated else rig.uncalibrated(keep=1)
         path = tmp_path_factory.mktemp("rig") / "rig.toml"
         rig.save(path)
@@ -162,8 +162,8 @@ class TestRig:
         )
         first, second = Rig.load(path).cameras
         assert first == PerspectiveCamera(position=(0, 0, 10), normal=(0, 0, 1))
-        assert first != Camera(position=(0, 0, 10), normal=(0, 0, 1))
-        assert second == Camera(position=(10, 0, 0), normal=(1, 0, 0))
+        assert first != OrthographicCamera(position=(0, 0, 10), normal=(0, 0, 1))
+        assert second == OrthographicCamera(position=(10, 0, 0), normal=(1, 0, 0))
 
     def test_unknown_model(self, tmp_path):
         path = tmp_path / "rig.toml"
@@ -190,7 +190,8 @@ class TestLearning:
     @given(SEEDS, st.integers(3, 6), st.data())
     @settings(max_examples=30)
     def test_exact_pixels_give_exact_cameras(self, seed, cameras, data):
-        kinds = data.draw(st.sampled_from([(PerspectiveCamera,), (Camera, PerspectiveCamera)]))
+        mixed = (OrthographicCamera, PerspectiveCamera)
+        kinds = data.draw(st.sampled_from([mixed[1:], mixed]))
         x, truth, tracks, rng = scene(seed, 100, cameras, kinds)
         seen = rng.random((100, cameras)) < 0.8
         for i, track in enumerate(tracks):
@@ -340,7 +341,7 @@ class TestReconstruction:
 
 def test_a_position_beside_a_perspective_camera_cannot_be_learned():
     _, rig, tracks, _ = scene(1, kinds=(PerspectiveCamera,))
-    flat = Camera(normal=rig.cameras[0].normal, scale=1.0, angle=0.0)
+    flat = OrthographicCamera(normal=rig.cameras[0].normal, scale=1.0, angle=0.0)
     mixed = Rig([flat, *rig.cameras[1:]])
     with pytest.raises(ValueError, match=r"all positions must be given .* none of cameras\[0\]"):
         learn_cameras(tracks, mixed)

@@ -101,8 +101,8 @@ def test_fractional_lags_and_different_lengths(motion, keep):
     tracks = filmed(motion, (250, 230, 240), lags)
     found = learn_lags(tracks, motion[1].uncalibrated(keep))
     assert found.agree
-    assert found.doubts == ()
-    pulls = (found.lags - lags)[1:] / found.errors[1:]
+    assert found.warnings == ()
+    pulls = (found.frames - lags)[1:] / found.errors[1:]
     assert np.abs(pulls).max() < 4
     assert found.errors.max() < 0.01
     assert found.errors[0] == 0
@@ -113,13 +113,13 @@ def test_fractional_lags_and_different_lengths(motion, keep):
 )
 def test_whole_lags_come_out_whole(motion, lags):
     found = learn_lags(filmed(motion, (250, 240, 230), lags), motion[1].uncalibrated())
-    assert found.lags.tolist() == list(lags)
-    assert found.missed < 5 * NOISE
+    assert found.frames.tolist() == list(lags)
+    assert found.residual < 5 * NOISE
 
 
 def test_a_small_fraction_is_not_rounded_away(motion):
     found = learn_lags(filmed(motion, (250,) * 3, (0, 0.1, 0)), motion[1].uncalibrated())
-    np.testing.assert_allclose(found.lags, (0, 0.1, 0), atol=0.01)
+    np.testing.assert_allclose(found.frames, (0, 0.1, 0), atol=0.01)
 
 
 @pytest.mark.slow
@@ -127,9 +127,9 @@ def test_different_frame_rates(motion):
     lags, rates = (0, 10.3, -20), (1, 1.2, 0.5)
     tracks = filmed(motion, (250, 250, 120), lags, rates)
     found = learn_lags(tracks, motion[1].uncalibrated(), rates)
-    np.testing.assert_allclose(found.lags, lags, atol=0.02)
+    np.testing.assert_allclose(found.frames, lags, atol=0.02)
     np.testing.assert_allclose(found.rates, rates)
-    assert found.frame(1, 100) == round((100 - 10.3) * 1.2)
+    assert found.frame_at(1, 100) == round((100 - 10.3) * 1.2)
 
 
 def test_calibrated_rig_and_outliers(motion):
@@ -137,7 +137,7 @@ def test_calibrated_rig_and_outliers(motion):
     for i, track in enumerate(tracks):
         track[20 + i :: 50] += 60  # jumps of the tracker, in up to six frames of a hundred
     found = learn_lags(tracks, motion[1])
-    np.testing.assert_allclose(found.lags, (0, 7, -4), atol=0.02)
+    np.testing.assert_allclose(found.frames, (0, 7, -4), atol=0.02)
 
 
 @pytest.mark.slow
@@ -145,7 +145,7 @@ def test_a_camera_without_a_position(motion):
     first, second, third = motion[1].uncalibrated().cameras
     rig = vl.Rig([first, replace(second, position=None), third])
     found = learn_lags(filmed(motion, (250, 250, 250), (0, 7, -4)), rig)
-    assert found.lags.tolist() == [0, 7, -4]
+    assert found.frames.tolist() == [0, 7, -4]
 
 
 @pytest.mark.slow
@@ -164,7 +164,7 @@ def test_perspective_cameras():
     tracks = [camera.project(x) for camera in cameras]
     tracks[1] = tracks[1][9:]
     found = learn_lags(tracks, vl.Rig(cameras).uncalibrated())
-    np.testing.assert_allclose(found.lags, (0, 9, 0), atol=1e-6)
+    np.testing.assert_allclose(found.frames, (0, 9, 0), atol=1e-6)
 
 
 # ------------------------------------------------------------------------ what cannot be told apart
@@ -183,9 +183,9 @@ def test_a_motion_that_repeats_itself_leaves_several_lags():
     tracks = filmed((periodic, rig), (180, 180, 180), (0, 20, 5))
     found = learn_lags(tracks, rig.uncalibrated())
     assert found.agree
-    assert found.lags.tolist() == [0, 20, 5]  # the smallest
-    assert "the lags of the videos cannot be told: (" in found.doubts[0]
-    assert "because the motion repeats itself" in found.doubts[0]
+    assert found.frames.tolist() == [0, 20, 5]  # the smallest
+    assert "the lags of the videos cannot be told: (" in found.warnings[0]
+    assert "because the motion repeats itself" in found.warnings[0]
 
 
 def test_a_target_that_hardly_moves_tells_no_lag():
@@ -195,7 +195,7 @@ def test_a_target_that_hardly_moves_tells_no_lag():
         return rig.cameras[0].scale * np.outer(k, [0.01, 0.02, 0.01])
 
     found = learn_lags(filmed((slow, rig), (150,) * 3, (0, 0, 0), noise=0.4), rig)
-    assert any("the target moves too little or too slowly" in doubt for doubt in found.doubts)
+    assert any("the target moves too little or too slowly" in warning for warning in found.warnings)
 
 
 def test_a_wrong_rig_is_not_explained_by_lags(motion):
@@ -204,8 +204,8 @@ def test_a_wrong_rig_is_not_explained_by_lags(motion):
     tracks = filmed(motion, (250,) * 3, (0, 0, 0))
     found = learn_lags(tracks, vl.Rig([first, turned, third]))
     assert not found.agree
-    assert found.missed > DISAGREEMENT
-    assert found.lags.tolist() == [0, 0, 0]
+    assert found.residual > DISAGREEMENT
+    assert found.frames.tolist() == [0, 0, 0]
     assert np.isinf(found.errors).all()
 
 
@@ -228,8 +228,8 @@ def test_no_lags_are_tried_twice(motion, monkeypatch):
 def test_lags_that_are_given_are_the_start(motion):
     tracks = filmed(motion, (250,) * 3, (0, 7, 0))
     rig = motion[1].uncalibrated()
-    assert learn_lags(tracks, rig, start=(1, 8, 1)).lags.tolist() == [0, 7, 0]
-    assert learn_lags(tracks, rig, start=(0, 60, 0)).lags.tolist() == [0, 7, 0]
+    assert learn_lags(tracks, rig, start=(1, 8, 1)).frames.tolist() == [0, 7, 0]
+    assert learn_lags(tracks, rig, start=(0, 60, 0)).frames.tolist() == [0, 7, 0]
 
 
 def test_outliers_do_not_count_as_disagreement(motion):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras.template import MODELS, rig_template
+from vidsindy_lite.cameras import rig_template
+from vidsindy_lite.cameras.models import MODELS
 
 
 @pytest.mark.parametrize("model", MODELS)

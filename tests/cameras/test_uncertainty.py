@@ -7,7 +7,7 @@ from helpers import trajectory
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras.calibrate import camera_parameters
-from vidsindy_lite.cameras.synchronise import Synchrony
+from vidsindy_lite.cameras.synchronise import Lags
 from vidsindy_lite.cameras.uncertainty import (
     long_run_covariance,
     systematic_errors,
@@ -32,7 +32,7 @@ def learned_rig(rng, memory, frames=250):
     rig = truth.uncalibrated()
     tracks = [c.project(x) + NOISE * dependent(rng, frames, memory) for c in truth.cameras]
     learned = vl.learn_cameras(tracks, rig)
-    still = Synchrony(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
+    still = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
     modes = systematic_errors(tracks, rig, learned, still)
     return camera_parameters(rig, learned) - camera_parameters(rig, truth), modes, x, learned
 
@@ -56,7 +56,7 @@ def test_known_cameras_share_no_errors():
     x = trajectory(np.random.default_rng(1), 50)
     rig = vl.Rig.around(x)
     tracks = [camera.project(x) for camera in rig.cameras]
-    still = Synchrony(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
+    still = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
     assert systematic_errors(tracks, rig, rig, still).shape == (0, 50, 3)
 
 
@@ -65,7 +65,7 @@ def test_an_uncertain_lag_moves_the_path_along_its_motion():
     x = trajectory(rng, 200)
     rig = vl.Rig.around(x)
     tracks = [camera.project(x) + NOISE * rng.normal(size=(200, 2)) for camera in rig.cameras]
-    lags = Synchrony(np.zeros(3), np.ones(3), np.array([0, 0.01, np.inf]), 0.0)
+    lags = Lags(np.zeros(3), np.ones(3), np.array([0, 0.01, np.inf]), 0.0)
     modes = systematic_errors(tracks, rig, rig, lags)
     assert modes.shape == (1, 200, 3)
     speed, shift = (np.linalg.norm(part, axis=1) for part in (np.gradient(x, axis=0), modes[0]))

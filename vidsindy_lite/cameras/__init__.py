@@ -1,7 +1,6 @@
 """Pixels and space: camera models, calibration, triangulation, synchronisation."""
 
 from .calibrate import (
-    Camera,
     Rig,
     calibration_errors,
     check_learnable,
@@ -10,18 +9,25 @@ from .calibrate import (
     reconstruct,
     residuals,
 )
-from .geometry import rodrigues, rotation_to_z
-from .perspective import PerspectiveCamera
-from .synchronise import DISAGREEMENT, Synchrony, align, disagreement, learn_lags, list_lags
+from .geometry import (
+    plane_projection,
+    plane_through,
+    rodrigues,
+    rotation_to_z,
+    signed_distance,
+)
+from .models import Camera, OrthographicCamera, PerspectiveCamera
+from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
 from .template import rig_template
 from .uncertainty import systematic_errors, trailing_errors
 
 __all__ = [
     "Camera",
+    "OrthographicCamera",
     "DISAGREEMENT",
     "PerspectiveCamera",
     "Rig",
-    "Synchrony",
+    "Lags",
     "align",
     "calibration_errors",
     "check_learnable",
@@ -30,11 +36,14 @@ __all__ = [
     "learn_lags",
     "learn_normal",
     "list_lags",
+    "plane_projection",
+    "plane_through",
     "reconstruct",
     "residuals",
     "rig_template",
     "rodrigues",
     "rotation_to_z",
+    "signed_distance",
     "systematic_errors",
     "trailing_errors",
 ]

@@ -21,8 +21,6 @@ Paper: Section "Coordinates Transformation", Eq. (4)-(6).
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from math import hypot
-from typing import ClassVar
 
 import numpy as np
 from scipy.linalg import null_space
@@ -32,14 +30,11 @@ from ..checks import (
     check_image_size,
     check_instance,
     check_integer,
-    check_number,
     check_path,
-    check_positive,
     check_rows,
     check_tracks,
-    check_vector,
 )
-from .geometry import in_plane_offset, rotation_to_z, unit_vector
+from .models import MODELS, Camera, OrthographicCamera
 from .triangulate import PARALLEL, epipolar_equations, intersect
 
 METHODS = ("joint", "paper", "gradient")
@@ -47,167 +42,6 @@ METHODS = ("joint", "paper", "gradient")
 # A frame that is missed by more than so many robust standard deviations holds an outlier.
 _OUTLIER = 8.0
 _ROUNDING = 1e-6  # pixels; missing by less is no disagreement
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Camera:
-    """A scaled orthographic camera.
-
-    Parameters
-    ----------
-    position : array_like, shape (3,), optional
-        The point of the reference frame that is seen in the middle of the image, or any other
-        point on the same line of sight. Scene units. None: to be learned, as the one of these
-        points that is closest to the origin.
-    normal : array_like, shape (3,)
-        Normal of the view plane, pointing from the scene to the camera. Stored with unit length.
-    scale : float, optional
-        s, scene units per pixel. None: to be learned.
-    angle : float, optional
-        theta, in-plane angle in radians. None: to be learned, together with the scale.
-    image_size : tuple of int, default (512, 512)
-        Width and height in pixels.
-
-    Raises
-    ------
-    ValueError
-        If an argument has a wrong shape, is not finite, or only one of scale and angle is given.
-    """
-
-    model: ClassVar[str] = "orthographic"  # its name in the file of a rig
-
-    position: np.ndarray | None = None
-    normal: np.ndarray
-    scale: float | None = None
-    angle: float | None = None
-    image_size: tuple[int, int] = (512, 512)
-
-    def __post_init__(self):
-        normal = check_vector("normal", self.normal, 3)
-        if abs(hypot(*normal) - 1) > 1e-15:  # a unit vector stays as it is: files round-trip
-            normal = unit_vector("normal", normal)
-        normal.flags.writeable = False
-        object.__setattr__(self, "normal", normal)
-        if self.is_placed:
-            position = check_vector("position", self.position, 3)
-            position.flags.writeable = False
-            object.__setattr__(self, "position", position)
-
-        if (self.scale is None) != (self.angle is None):
-            raise ValueError(
-                "scale and angle: give both (calibrated) or neither (to be learned), got "
-                f"scale={self.scale}, angle={self.angle}"
-            )
-        if self.is_calibrated:
-            object.__setattr__(self, "scale", check_positive("scale", self.scale))
-            object.__setattr__(self, "angle", check_number("angle", self.angle))
-        object.__setattr__(self, "image_size", check_image_size(self.image_size))
-
-    def __eq__(self, other):
-        if not isinstance(other, Camera):
-            return NotImplemented
-        return self._values == other._values
-
-    def __hash__(self):
-        return hash(self._values)
-
-    @property
-    def _values(self):
-        position = tuple(self.position.tolist()) if self.is_placed else None
-        normal = tuple(self.normal.tolist())
-        return self.model, position, normal, self.scale, self.angle, self.image_size
-
-    @property
-    def is_calibrated(self):
-        """Whether scale and angle are known."""
-        return self.scale is not None
-
-    @property
-    def is_placed(self):
-        """Whether the position is known."""
-        return self.position is not None
-
-    @property
-    def rows(self):
-        """R^-, shape (2, 3): the plane's axes, in which R^- x are in-plane coordinates."""
-        return rotation_to_z(self.normal)[:2]
-
-    @property
-    def offset(self):
-        """Delta_c = R^- position, shape (2,), scene units."""
-        if not self.is_placed:
-            raise ValueError("camera: position must be known, got None; see learn_cameras")
-        return in_plane_offset(self.position, self.normal)
-
-    @property
-    def matrix(self):
-        """Camera matrix, shape (3, 4): s T(theta) x_c = (X, Y) / W, (X, Y, W) = matrix @ (x, 1)."""
-        return np.vstack((np.column_stack((self.rows, -self.offset)), [0, 0, 0, 1]))
-
-    def project(self, x):
-        """Pixels at which points are seen.
-
-        Parameters
-        ----------
-        x : array_like, shape (n, 3)
-            Points in the reference frame, scene units. A row holding NaN gives NaN pixels.
-
-        Returns
-        -------
-        ndarray, shape (n, 2)
-            Pixels (u to the right, v down), the centre of the first pixel being (0, 0). NaN for
-            points behind a perspective camera.
-
-        Raises
-        ------
-        ValueError
-            If the camera is not calibrated, or x has a wrong shape or an infinite value.
-        """
-        self._require_calibrated()
-        x = check_rows("x", x, 3)
-        matrix = self.matrix
-        image = x @ matrix[:, :3].T + matrix[:, 3]
-        image[~(image[:, 2] > 0)] = np.nan
-        plane = image[:, :2] / (self.scale * image[:, 2:])
-        centred = plane @ _turn(self.angle)  # row vectors: (T^-1 w)^T = w^T T
-        width, height = self.image_size
-        return np.column_stack(((width - 1) / 2 + centred[:, 0], (height - 1) / 2 - centred[:, 1]))
-
-    def plane_coordinates(self, pixels):
-        """In-plane coordinates R^- x = s T(theta) x_c + Delta_c of what is seen at the pixels.
-
-        For a perspective camera, of what is seen there at distance 1.
-
-        Parameters
-        ----------
-        pixels : array_like, shape (n, 2)
-
-        Returns
-        -------
-        ndarray, shape (n, 2)
-            Scene units; NaN rows pass through.
-
-        Raises
-        ------
-        ValueError
-            If the camera is not calibrated, or pixels has a wrong shape or an infinite value.
-        """
-        return self.scale * self.turned(pixels) + self.offset
-
-    def turned(self, pixels):
-        """Pixels along the axes of the view plane: T(theta) x_c, shape (n, 2)."""
-        self._require_calibrated()
-        return self.centred(pixels) @ _turn(self.angle).T
-
-    def centred(self, pixels):
-        """Pixels measured from the middle of the image, right and *up*: x_c, shape (n, 2)."""
-        pixels = check_rows("pixels", pixels, 2)
-        width, height = self.image_size
-        return np.column_stack((pixels[:, 0] - (width - 1) / 2, (height - 1) / 2 - pixels[:, 1]))
-
-    def _require_calibrated(self):
-        if not self.is_calibrated:
-            raise ValueError("camera: scale and angle must be known, got None; see learn_cameras")
 
 
 @dataclass(frozen=True)
@@ -237,7 +71,7 @@ class Rig:
         if len(cameras) < 2:
             raise ValueError(f"cameras: must be two or more, got {len(cameras)}")
         if not _independent(cameras):
-            kind = "normal" if cameras[0].model == Camera.model else "position"
+            kind = "normal" if cameras[0].model == OrthographicCamera.model else "position"
             raise ValueError(
                 f"cameras: must have at least two independent {kind}s, got only "
                 f"{[getattr(camera, kind).tolist() for camera in cameras]}"
@@ -246,7 +80,7 @@ class Rig:
     @property
     def is_orthographic(self):
         """Whether all cameras are: then agreement of the views is linear in what is unknown."""
-        return all(camera.model == Camera.model for camera in self.cameras)
+        return all(camera.model == OrthographicCamera.model for camera in self.cameras)
 
     @classmethod
     def around(cls, x, image_size=(512, 512)):
@@ -283,7 +117,7 @@ class Rig:
         for azimuth, elevation, roll in np.deg2rad([[20, 20, 6], [140, 15, -9], [260, 25, 14]]):
             across = np.array([np.cos(azimuth), np.sin(azimuth), 0])
             normal = np.cos(elevation) * across + np.sin(elevation) * np.array([0, 0, 1])
-            camera = Camera(
+            camera = OrthographicCamera(
                 position=middle + reach * normal,
                 normal=normal,
                 scale=1.0,
@@ -890,12 +724,6 @@ def _calibrate(rig, unknown, turned):
     return Rig(cameras)
 
 
-def _turn(angle):
-    """T(theta) of the paper."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, s], [-s, c]])
-
-
 def _visibility(tracks):
     """Groups of frames with the same two or more views: pairs (cameras, frames) of indices."""
     seen = np.column_stack([np.isfinite(track).all(axis=1) for track in tracks])
@@ -912,8 +740,8 @@ def _independent(cameras):
 
     The centre is the pinhole, or a point at infinity in the direction of an orthographic normal.
     """
-    normals = np.array([c.normal for c in cameras if c.model == Camera.model])
-    pinholes = np.array([c.position for c in cameras if c.model != Camera.model])
+    normals = np.array([c.normal for c in cameras if c.model == OrthographicCamera.model])
+    pinholes = np.array([c.position for c in cameras if c.model != OrthographicCamera.model])
     if len(normals) < 2 and len(pinholes) < 2:
         return len(normals) == len(pinholes) == 1
     apart = len(pinholes) > 1 and np.ptp(pinholes, axis=0).max() > 1e-9 * np.abs(pinholes).max()
@@ -951,7 +779,7 @@ def _check_tracks(tracks, rig):
 
 def _to_table(camera):
     """A camera as plain numbers under the keys of the file; None is left out."""
-    table = {} if camera.model == Camera.model else {"model": camera.model}
+    table = {} if camera.model == OrthographicCamera.model else {"model": camera.model}
     if camera.is_placed:
         table["position"] = camera.position.tolist()
     table["normal"] = camera.normal.tolist()
@@ -962,7 +790,6 @@ def _to_table(camera):
 
 def _from_table(index, table):
     keys = ["model", *(field.name for field in fields(Camera))]
-    models = {kind.model: kind for kind in (Camera, *Camera.__subclasses__())}
     try:
         if not isinstance(table, dict):
             raise ValueError(f"must be a table, got {table!r}")
@@ -971,10 +798,10 @@ def _from_table(index, table):
                 raise ValueError(f"{key}: must be one of {', '.join(keys)}")
         if "normal" not in table:
             raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
-        model = table.get("model", Camera.model)
-        if model not in models:
-            raise ValueError(f"model: must be one of {', '.join(models)}, got {model!r}")
-        return models[model](**{key: value for key, value in table.items() if key != "model"})
+        model = table.get("model", OrthographicCamera.model)
+        if model not in MODELS:
+            raise ValueError(f"model: must be one of {', '.join(MODELS)}, got {model!r}")
+        return MODELS[model](**{key: value for key, value in table.items() if key != "model"})
     except ValueError as error:
         raise ValueError(f"camera {index}: {error}") from error
 

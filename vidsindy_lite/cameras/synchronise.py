@@ -54,12 +54,12 @@ _ROUNDING = 1e-6  # pixels; residuals below that are none
 
 
 @dataclass(frozen=True)
-class Synchrony:
+class Lags:
     """Lags of the videos.
 
     Parameters
     ----------
-    lags : ndarray, shape (m,)
+    frames : ndarray, shape (m,)
         By how many frames of the first video each one starts later than the first.
     rates : ndarray, shape (m,)
         Frames of each video in one frame of the first.
@@ -67,26 +67,26 @@ class Synchrony:
         Standard errors of the lags, if the errors of the tracks are independent; infinite if the
         tracks do not tell them, zero if they were given. Lags that whole numbers fit as well are
         whole.
-    missed : float
-        The `disagreement` of the worst camera that is left.
-    doubts : tuple of str
+    residual : float
+        The `disagreement` of the worst camera that is left, pixels.
+    warnings : tuple of str
         Why the lags should not be trusted although the views agree, with advice.
     """
 
-    lags: np.ndarray
+    frames: np.ndarray
     rates: np.ndarray
     errors: np.ndarray
-    missed: float
-    doubts: tuple[str, ...] = ()
+    residual: float
+    warnings: tuple[str, ...] = ()
 
     @property
     def agree(self) -> bool:
         """Whether all views agree on one target to within what tracking can be blamed for."""
-        return bool(self.missed <= DISAGREEMENT)
+        return bool(self.residual <= DISAGREEMENT)
 
-    def frame(self, i: int, instant: int) -> int:
+    def frame_at(self, i: int, instant: int) -> int:
         """Which frame of video i is closest to one of the first."""
-        return int(np.rint((instant - self.lags[i]) * self.rates[i]))
+        return int(np.rint((instant - self.frames[i]) * self.rates[i]))
 
 
 def align(
@@ -140,7 +140,7 @@ def learn_lags(
     rig: Rig,
     rates: Sequence[float] | None = None,
     start: Sequence[float] | None = None,
-) -> Synchrony:
+) -> Lags:
     """Learn by how much each video starts later than the first.
 
     Parameters
@@ -157,7 +157,7 @@ def learn_lags(
 
     Returns
     -------
-    Synchrony
+    Lags
         If no lags make the views agree, ``agree`` is false and the lags are those of the start.
 
     Raises
@@ -178,12 +178,12 @@ def learn_lags(
         found = [views.refined(first)]
     else:
         found = [views.refined(lags) for lags in _whole_lags(views)]
-    found = sorted((s for s in found if s.agree), key=lambda s: s.missed)
+    found = sorted((s for s in found if s.agree), key=lambda s: s.residual)
     if not found:
-        return Synchrony(first, views.rates, np.full(len(first), np.inf), missed)
-    alike = [s for s in found if s.missed <= max(ALIKE * found[0].missed, FINE)]
-    best = min(alike, key=lambda s: np.abs(s.lags).sum())
-    return replace(best, doubts=tuple(_ambiguous(alike) + _blurred(best)))
+        return Lags(first, views.rates, np.full(len(first), np.inf), missed)
+    alike = [s for s in found if s.residual <= max(ALIKE * found[0].residual, FINE)]
+    best = min(alike, key=lambda s: np.abs(s.frames).sum())
+    return replace(best, warnings=tuple(_ambiguous(alike) + _blurred(best)))
 
 
 def list_lags(lags: Sequence[float]) -> str:
@@ -191,21 +191,21 @@ def list_lags(lags: Sequence[float]) -> str:
     return ", ".join(f"{round(lag, 2) + 0.0:g}" for lag in lags)
 
 
-def _ambiguous(alike: Sequence[Synchrony]) -> list[str]:
+def _ambiguous(alike: Sequence[Lags]) -> list[str]:
     if len(alike) < 2:
         return []
-    lags = " or ".join(f"({list_lags(s.lags)})" for s in alike[:_SHOWN])
+    lags = " or ".join(f"({list_lags(s.frames)})" for s in alike[:_SHOWN])
     return [
         f"the lags of the videos cannot be told: {lags} frames fit about equally well, because the "
         "motion repeats itself; give the lags if you know them"
     ]
 
 
-def _blurred(best: Synchrony) -> list[str]:
+def _blurred(best: Lags) -> list[str]:
     return [
         f"the lag of video {i + 1} cannot be told, because the target moves too little or too "
         f"slowly: {lag:g} frames were taken; give the lags if you know them"
-        for i, (lag, error) in enumerate(zip(best.lags, best.errors, strict=True))
+        for i, (lag, error) in enumerate(zip(best.frames, best.errors, strict=True))
         if error > BLURRED
     ]
 
@@ -245,13 +245,13 @@ class _Views:
         return np.inf if rig is None else max(disagreement(self.at(lags), rig))
 
     def refined(self, whole):
-        """The lags of the smallest reprojection error near whole ones, as `Synchrony`."""
+        """The lags of the smallest reprojection error near whole ones, as `Lags`."""
         lags, step = np.array(whole, float), np.inf
         shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
         for _ in range(_STEPS):
             tried = [self.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)]
             if any(part is None for part in tried):
-                return Synchrony(lags, self.rates, np.full(len(lags), np.inf), self.missed(lags))
+                return Lags(lags, self.rates, np.full(len(lags), np.inf), self.missed(lags))
             here, ahead, behind = tried[0], *np.split(np.array(tried[1:]), 2)
             used = np.isfinite(tried).all(axis=0)
             limit = max(OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
@@ -267,14 +267,14 @@ class _Views:
         information = slope.T @ slope / noise * np.sqrt(np.outer(told, told))
         if not told.all():
             errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-            return Synchrony(np.array(whole, float), self.rates, errors, self.missed(whole))
+            return Lags(np.array(whole, float), self.rates, errors, self.missed(whole))
         errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information)))))
         # Schwarz's criterion: a fraction is one more unknown per video.
         rounded = np.rint(lags) + 0.0  # and not -0
         beside = (rounded - lags)[1:]
         if beside @ information @ beside < len(beside) * np.log(used.sum()):
             lags = rounded
-        return Synchrony(lags, self.rates, errors, self.missed(lags))
+        return Lags(lags, self.rates, errors, self.missed(lags))
 
     def _told(self, lags, used, noise, slopes):
         """Share of each lag's squared slope that is motion and not noise, between 0 and 1.

@@ -3,10 +3,7 @@
 import numpy as np
 
 from ..checks import check_image_size, check_integer
-from .calibrate import Camera
-from .perspective import PerspectiveCamera
-
-MODELS = (Camera.model, PerspectiveCamera.model)
+from .models import MODELS
 
 _HEAD = """\
 # Rig file: one [[camera]] table per video, in the order of the videos.
@@ -15,12 +12,12 @@ _HEAD = """\
 # scale and angle must be given.
 """
 _SCALES = {
-    Camera.model: "scale = 0.005    # scene units per pixel: length of an object over its pixels",
-    PerspectiveCamera.model: "scale = 0.001    # one over the focal length in pixels",
+    "orthographic": "scale = 0.005    # scene units per pixel: length of an object over its pixels",
+    "perspective": "scale = 0.001    # one over the focal length in pixels",
 }
 _POSITIONS = {
-    Camera.model: "# of the camera, or a landmark in the middle of its image",
-    PerspectiveCamera.model: "# of the camera: of its pinhole, near the lens",
+    "orthographic": "# of the camera, or a landmark in the middle of its image",
+    "perspective": "# of the camera: of its pinhole, near the lens",
 }
 _ANGLE = """\
 angle = {angle:.3f}    # radians: for this normal and the z axis upright in the image; add how
@@ -28,7 +25,7 @@ angle = {angle:.3f}    # radians: for this normal and the z axis upright in the 
 
 
 def rig_template(
-    cameras: int = 3, model: str = Camera.model, image_size: tuple[int, int] = (1920, 1080)
+    cameras: int = 3, model: str = "orthographic", image_size: tuple[int, int] = (1920, 1080)
 ) -> str:
     """Text of a rig file, to be filled in with what was measured.
 
@@ -64,7 +61,7 @@ def rig_template(
         across = np.array([np.cos(azimuth), np.sin(azimuth), 0])
         normal = np.cos(elevation) * across + [0, 0, np.sin(elevation)]
         lines = ["[[camera]]"]
-        if model != Camera.model:
+        if model != "orthographic":
             lines.append(f'model = "{model}"')
         lines += [
             f"position = {_vector(3 * normal)}    {_POSITIONS[model]}",

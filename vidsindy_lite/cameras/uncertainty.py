@@ -21,14 +21,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from .calibrate import Rig, camera_parameters, reconstruct, residuals, with_parameters
-from .synchronise import OUTLIER, PROBE, Synchrony, align
+from .synchronise import OUTLIER, PROBE, Lags, align
 
 _PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 
 
 def systematic_errors(
-    tracks: Sequence[np.ndarray], rig: Rig, learned: Rig, lags: Synchrony
+    tracks: Sequence[np.ndarray], rig: Rig, learned: Rig, lags: Lags
 ) -> np.ndarray:
     """Errors of the reconstructed path that come from what was learned of cameras and lags.
 
@@ -38,7 +38,7 @@ def systematic_errors(
         As the videos show them, each from its own first frame.
     rig, learned : Rig
         Before and after `learn_cameras`.
-    lags : Synchrony
+    lags : Lags
         Lags with a standard error of zero or infinity are taken as they are.
 
     Returns
@@ -52,7 +52,7 @@ def systematic_errors(
     steps = np.concatenate([np.full(len(start), _PROBE), np.full(len(moving), PROBE)])
 
     def both(change):
-        shifted = lags.lags.copy()
+        shifted = lags.frames.copy()
         shifted[moving] += change[len(start) :]
         aligned = align(tracks, shifted, lags.rates)
         cameras = with_parameters(rig, start + change[: len(start)])

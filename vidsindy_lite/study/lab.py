@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..cameras import (
-    Camera,
+    OrthographicCamera,
     PerspectiveCamera,
     Rig,
     calibration_errors,
@@ -140,7 +140,7 @@ def orthographic(rig):
         Of orthographic cameras.
     """
     return Rig(
-        Camera(
+        OrthographicCamera(
             position=c.position,
             normal=c.normal,
             scale=c.scale * (c.normal @ (c.position - MIDDLE)),
