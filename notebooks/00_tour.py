@@ -72,14 +72,15 @@ frames = {"full": 1500, "quick": 400}[profile]
 folder = TemporaryDirectory()
 shot = film(system, folder.name, frames, seed)
 found = discover_from_videos(shot.paths, shot.rig.uncalibrated(keep=0), shot.t)
-print(found.equations("native"))
+law = found.discovery
+print(law.equations("native"))
 
 # %% [markdown]
 # The law that made the motion was
 
 # %%
 print(SYSTEMS[system].text())
-assert (found.native.support == SYSTEMS[system].support).all()
+assert (law.native.support == SYSTEMS[system].support).all()
 assert found.status == "ok"
 
 # %% [markdown]
@@ -172,14 +173,14 @@ save_figure("tour_path", fig, caption=caption, numbers=numbers)
 # 04 and [05](05_discovery.ipynb)). Each coefficient comes with its standard error:
 
 # %%
-print(found.equations())
+print(law.equations())
 
 # %% [markdown]
 # This is longer than the law above, because the origin of the cameras' frame of reference is not that
 # of the equations: it lies elsewhere by an offset that the program had to find.
 
 # %%
-for name, value, error in zip("xyz", found.offset, found.offset_errors, strict=True):
+for name, value, error in zip("xyz", law.offset, law.offset_errors, strict=True):
     print(f"offset along {name}: {value:.7f} ± {error:.7f}")
 
 # %% [markdown]
@@ -187,10 +188,10 @@ for name, value, error in zip("xyz", found.offset, found.offset_errors, strict=T
 # shift of a polynomial is exact, so the one law follows from the other.
 
 # %%
-fig = plots.plot_coefficients(found, shot.truth)
+fig = plots.plot_coefficients(law, shot.truth)
 caption = "Each coefficient's distance from the truth, with its standard error, in millionths."
 numbers = {
-    "found": found.coefficients, "standard error": found.standard_errors,
+    "found": law.coefficients, "standard error": law.standard_errors,
     "truth": shot.truth.coefficients,
 }  # fmt: skip
 save_figure("tour_coefficients", fig, caption=caption, numbers=numbers)
@@ -209,7 +210,7 @@ save_figure("tour_coefficients", fig, caption=caption, numbers=numbers)
 # system it reports one false positive and an error of $1.50\cdot10^{-2}$.
 
 # %%
-scored = score(found, shot.truth)
+scored = score(law, shot.truth)
 assert scored.exact
 assert scored.l2 <= 0.5e-2
 rows = [{
@@ -232,7 +233,7 @@ save_table("tour_score", rows, caption=caption)
 period = shot.truth.period
 t = shot.truth.times(8000, samples_per_period=400)
 truth = shot.truth.simulate(t, shot.truth.x0)
-forecast = found.system.simulate(t, found.curve(t[:1])[0])
+forecast = law.system.simulate(t, law.curve(t[:1])[0])
 apart = np.linalg.norm(forecast - truth, axis=1) > 0.1 * truth.std(axis=0).max()
 good = int(np.argmax(apart)) if apart.any() else len(t)
 print(f"good for {t[good - 1] / period:.1f} periods; the videos last {shot.t[-1] / period:.1f}")
@@ -255,7 +256,7 @@ save_figure("tour_attractor", fig, caption=caption, numbers=numbers)
 moments = np.arange(0, 300, 6)
 readers = [enumerate(read_video(path)) for path in shot.paths]
 films = [[image for i, image in video if i in moments] for video in readers]
-laws = found.equations("native").splitlines()
+laws = law.equations("native").splitlines()
 pictures = plots.draw_tour(films, moments, found.tracks, found.x, laws)
 caption = "Three videos, the tracks in them, the path in space, and its law."
 save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "equations": laws})

@@ -187,7 +187,7 @@ for name in names:
         found = discover_from_videos(files, Rig.load(Path(other) / "rig.toml"), t)
         size = sum(path.stat().st_size for path in files)
     plain = sum(path.stat().st_size for path in folders[name].glob("*.avi"))
-    scored = score(found, truth)
+    scored = score(found.discovery, truth)
     rows.append({
         "system": name, "size (% of motion JPEG)": 100 * size / plain, "l2": scored.l2,
         "missing": scored.missing, "false": scored.false_positives, "verdict": found.status,

@@ -266,9 +266,13 @@ def _discover(options: argparse.Namespace) -> int:
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"detector": options.detector}
     told |= {"frames in a unit of time": options.fps} if options.fps is not None else {}
-    write_report(found, options.videos, options.out, told)
+    # First the law: if the report cannot be written, it is not lost.
     print(found)
-    print(f"status: {found.status}; lags of the videos: {list_lags(found.lags.frames)} frames")
+    print(
+        f"status: {found.status}; lags of the videos: {list_lags(found.lags.frames)} frames",
+        flush=True,
+    )
+    write_report(found, options.videos, options.out, told)
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
 
@@ -304,11 +308,12 @@ def _demo(options: argparse.Namespace) -> int:
         found = discover_from_videos(
             shot.paths, shot.rig.uncalibrated(keep=0), shot.t, seed=options.seed, progress=True
         )
+    law = found.discovery
     print("the law, in the frame of the cameras:")
     print(found)
-    print(f"the same around the origin ({', '.join(f'{value:.4f}' for value in found.offset)}):")
-    print(found.equations("native"))
-    print(f"against the truth: {score(found, shot.truth)}")
+    print(f"the same around the origin ({', '.join(f'{value:.4f}' for value in law.offset)}):")
+    print(law.equations("native"))
+    print(f"against the truth: {score(law, shot.truth)}")
     return 0
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from tqdm import tqdm
 
+from .arrays import Floats
 from .cameras import (
     DISAGREEMENT,
     Lags,
@@ -32,14 +34,14 @@ from .vision import Track, VideoInfo, check_detector, track, video_info
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
-@dataclass(frozen=True)
-class VideoDiscovery(Discovery):
-    """A law discovered from videos, with what the pipeline found on the way.
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What the videos of one target tell before any law is asked for.
 
     Parameters
     ----------
     tracks : tuple of ndarray, shape (n, 2)
-        Pixels of the target in each video at these times; NaN where it was not seen.
+        Pixels of the target in each video at the instants ``t``; NaN where it was not seen.
     rig : Rig
         The cameras, all calibrated.
     lags : Lags
@@ -47,20 +49,49 @@ class VideoDiscovery(Discovery):
     t : ndarray, shape (n,)
         Time of each frame of the first video.
     x : ndarray, shape (n, 3)
-        Reconstructed trajectory in scene units; NaN where fewer than two cameras saw the target.
+        Reconstructed path in scene units; NaN where fewer than two cameras saw the target.
+    systematic : ndarray, shape (k, n, 3)
+        Errors of the path that all frames share: what k independent causes, each off by one
+        standard error, add to it, in scene units. See `discover`.
+    warnings : tuple of str
+        Why the result should not be trusted, with advice; empty if nothing was found.
     """
 
-    tracks: tuple[np.ndarray, ...]
+    tracks: tuple[Floats, ...]
     rig: Rig
     lags: Lags
-    t: np.ndarray
-    x: np.ndarray
+    t: Floats
+    x: Floats
+    systematic: Floats
+    warnings: tuple[str, ...]
+
+    @property
+    def status(self) -> str:
+        """``"ok"``, or ``"suspect"`` if there is a warning."""
+        return "suspect" if self.warnings else "ok"
+
+
+@dataclass(frozen=True, eq=False)
+class VideoDiscovery(Observation):
+    """An observation and the law that it obeys; its warnings are those of both.
+
+    Parameters
+    ----------
+    discovery : Discovery
+        The law in the frame of the rig and in its own, sparsest frame.
+    """
+
+    discovery: Discovery
+
+    def __str__(self) -> str:
+        warnings = (f"warning: {text}" for text in self.warnings)
+        return "\n".join([self.discovery.equations(), *warnings])
 
 
 def discover_from_videos(
     paths: Sequence[str | Path],
     rig: Rig,
-    t: np.ndarray | None = None,
+    t: ArrayLike | None = None,
     *,
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
@@ -69,6 +100,45 @@ def discover_from_videos(
     progress: bool = False,
 ) -> VideoDiscovery:
     """Discover the governing equations of a target filmed by several fixed cameras.
+
+    This is `observe`, then `discover` on the path that it reconstructs.
+
+    Parameters
+    ----------
+    paths, rig, t, lags, detector, progress
+        See `observe`. The unit of time is that of the equations.
+    degree, seed : int
+        See `discover`.
+
+    Returns
+    -------
+    VideoDiscovery
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        See `observe` and `discover`. What can be told before a video is tracked is.
+    """
+    check_integer("degree", degree, 1)
+    check_integer("seed", seed)
+    seen = observe(paths, rig, t, lags=lags, detector=detector, progress=progress)
+    found = discover(
+        seen.t, seen.x, degree=degree, seed=seed, progress=progress, systematic=seen.systematic
+    )
+    parts = vars(seen) | {"warnings": (*seen.warnings, *found.warnings)}
+    return VideoDiscovery(**parts, discovery=found)
+
+
+def observe(
+    paths: Sequence[str | Path],
+    rig: Rig,
+    t: ArrayLike | None = None,
+    *,
+    lags: Sequence[float] | None = None,
+    detector: str | os.PathLike = "auto",
+    progress: bool = False,
+) -> Observation:
+    """Track a target in the videos of several fixed cameras and reconstruct its path.
 
     The frames of the first video are the clock; the others may start earlier or later, differ in
     length, and in frame rate if their files state it.
@@ -81,21 +151,18 @@ def discover_from_videos(
         Positions and normals of all cameras, scale and angle of at least one.
     t : array_like, shape (n,), optional
         Time of each frame of the first video, increasing; all videos then have the same frame rate.
-        By default the frame number over the frame rate, in seconds. The unit of time is that of the
-        equations.
+        By default the frame number over the frame rate, in seconds.
     lags : array_like, shape (m,), optional
         By how many frames of the first video each one starts later; only differences count. By
         default they are learned, see `learn_lags`.
     detector : str or path
         See `track`.
-    degree, seed : int
-        See `discover`.
     progress : bool
         Show progress bars.
 
     Returns
     -------
-    VideoDiscovery
+    Observation
         Its first warnings are that the rig does not agree with the tracks, if it does not, and
         which backgrounds are not at rest.
 
@@ -103,26 +170,60 @@ def discover_from_videos(
     ------
     FileNotFoundError, ValueError
         If a file is missing, cut off or no video, if the numbers of files and cameras disagree, if
-        a target is not found, if the given lags are clearly wrong, or if cameras or law cannot be
-        learned (see `learn_cameras` and `discover`). What can be told before a video is tracked is.
+        a target is not found, if the given lags are clearly wrong, or if the cameras cannot be
+        learned (see `learn_cameras`). What can be told before a video is tracked is.
     """
     check_learnable(rig)
-    check_integer("degree", degree, 1)
-    check_integer("seed", seed)
     check_detector(detector)
+    files = _check_paths(paths, rig)
+    if lags is not None:
+        lags = check_vector("lags", lags, len(files))
+        lags -= lags[0]
+    shots = _check_shots(files, rig)
+    t, rates = _clock(shots, t)
+    if lags is not None:
+        _check_overlap(lags, rates, shots, files)
+
+    bar = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
+    seen = [_tracked(path, shot.frames, detector) for path, shot in bar]
+    raw = [one.pixels for one in seen]
+    learned_lags = learn_lags(raw, rig, rates, start=lags)
+    synchrony = learned_lags if lags is None else _given(lags, learned_lags)
+    tracks = align(raw, synchrony.frames, rates)
+    learned = learn_cameras(tracks, rig)
+    shared = systematic_errors(raw, rig, learned, synchrony), trailing_errors(tracks, learned)
+    return Observation(
+        tracks=tuple(tracks),
+        rig=learned,
+        lags=synchrony,
+        t=t,
+        x=reconstruct(tracks, learned),
+        systematic=np.concatenate(shared),
+        warnings=(
+            *_rig_warnings(tracks, learned, rig, files, learned_lags),
+            *(warning for one in seen for warning in one.warnings),
+            *synchrony.warnings,
+        ),
+    )
+
+
+def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
+    """One file name per camera."""
     if isinstance(paths, str) or not isinstance(paths, Iterable):
         raise ValueError(f"paths: must be a list of files, one per camera, got {paths!r:.60}")
-    paths = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
-    if len(paths) != len(rig.cameras):
+    files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
+    if len(files) != len(rig.cameras):
         raise ValueError(
             f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
-            f"got {len(paths)}"
+            f"got {len(files)}"
         )
-    if lags is not None:
-        lags = check_vector("lags", lags, len(paths))
-        lags -= lags[0]
-    shots = [video_info(path) for path in paths]
-    for path, shot, camera in zip(paths, shots, rig.cameras, strict=True):
+    return files
+
+
+def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
+    """What each file is, if it is a video of the size that its camera has."""
+    shots = [video_info(path) for path in files]
+    for path, shot, camera in zip(files, shots, rig.cameras, strict=True):
         if shot.frames < 2:
             raise ValueError(f"paths: {path.name} must be a video, got a single frame")
         if shot.size != camera.image_size:
@@ -130,34 +231,12 @@ def discover_from_videos(
                 f"paths: {path.name} must have the image size of its camera in the rig, "
                 f"{camera.image_size}, got {shot.size}"
             )
-    t, rates = _clock(shots, t)
-    if lags is not None:
-        _check_overlap(lags, rates, shots, paths)
-    bar = tqdm(list(zip(paths, shots, strict=True)), desc="track", disable=not progress)
-    followed = [_track(path, shot.frames, detector) for path, shot in bar]
-    raw = [seen.pixels for seen in followed]
-    learned_lags = learn_lags(raw, rig, rates, start=lags)
-    synchrony = learned_lags if lags is None else _given(lags, learned_lags)
-    tracks = align(raw, synchrony.frames, rates)
-    learned = learn_cameras(tracks, rig)
-    x = reconstruct(tracks, learned)
-    shared = np.concatenate(
-        (systematic_errors(raw, rig, learned, synchrony), trailing_errors(tracks, learned))
-    )
-    found = discover(t, x, degree=degree, seed=seed, progress=progress, systematic=shared)
-    parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
-    parts["warnings"] = (
-        *_rig_doubts(tracks, learned, rig, paths, learned_lags),
-        *(warning for seen in followed for warning in seen.warnings),
-        *synchrony.warnings,
-        *found.warnings,
-    )
-    return VideoDiscovery(**parts, tracks=tracks, rig=learned, lags=synchrony, t=t, x=x)
+    return shots
 
 
 def _clock(
-    shots: Sequence[VideoInfo], t: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray | None]:
+    shots: Sequence[VideoInfo], t: Floats | None
+) -> tuple[Floats, Floats | None]:
     """Time of each frame of the first video, and frames of each video in one frame of the first."""
     if t is not None:
         t = check_times(t)
@@ -174,7 +253,7 @@ def _clock(
 
 
 def _check_overlap(
-    lags: np.ndarray, rates: np.ndarray | None, shots: Sequence[VideoInfo], paths: Sequence[Path]
+    lags: Floats, rates: Floats | None, shots: Sequence[VideoInfo], paths: Sequence[Path]
 ) -> None:
     """That every video runs, at its given lag, during some of the first."""
     rates = np.ones(len(lags)) if rates is None else rates
@@ -186,7 +265,7 @@ def _check_overlap(
             )
 
 
-def _track(path: Path, frames: int, detector: str | os.PathLike) -> Track:
+def _tracked(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     """Track a video that should have so many frames and one moving target."""
     found = track(path, detector)
     if len(found.pixels) != frames:
@@ -203,7 +282,7 @@ def _track(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     return found
 
 
-def _given(lags: np.ndarray, learned: Lags) -> Lags:
+def _given(lags: Floats, learned: Lags) -> Lags:
     """The lags that are given, unless others are clearly those of the tracks."""
     apart = np.abs(learned.frames - lags) > _WRONG_LAG + 5 * learned.errors
     if learned.agree and apart.any():
@@ -214,12 +293,12 @@ def _given(lags: np.ndarray, learned: Lags) -> Lags:
     return replace(learned, frames=lags, errors=0 * lags, warnings=())
 
 
-def _rig_doubts(
-    tracks: Sequence[np.ndarray],
+def _rig_warnings(
+    tracks: Sequence[Floats],
     learned: Rig,
     given: Rig,
     paths: Sequence[Path],
-    lags: Lags,
+    synchrony: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
     missed = disagreement(tracks, learned)
@@ -230,10 +309,10 @@ def _rig_doubts(
         "in one frame of ten, tracked and reconstructed target lie more than "
         f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
     )
-    if lags.agree:  # at lags that differ by too little from the given ones to refuse these
+    if synchrony.agree:  # at lags that differ by too little from the given ones to refuse these
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({list_lags(lags.frames)}) would explain it best"
+            f"({list_lags(synchrony.frames)}) would explain it best"
         ]
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
     others = [learn_normal(tracks, given, i) for i in range(len(paths))]
