@@ -80,4 +80,4 @@ def test_text_holds_the_warnings():
     t = np.linspace(0, 2, 200)
     x = np.stack([np.sin(t), np.cos(t)], axis=1)
     short = discover(t, add_noise(x, 0.05, np.random.default_rng(0)))
-    assert "warning: the record covers only" in str(short)
+    assert "warning: the trajectory covers only" in str(short)

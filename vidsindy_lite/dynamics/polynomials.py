@@ -209,9 +209,7 @@ class PolynomialSystem:
             )
         whole = np.isfinite(powers) & (powers >= 0) & (powers == np.rint(powers))
         if not whole.all():
-            raise ValueError(
-                f"exponents: must be non-negative integers, got {powers[~whole][0]:g}"
-            )
+            raise ValueError(f"exponents: must be non-negative integers, got {powers[~whole][0]:g}")
         exponents = powers.astype(int)
         if len(np.unique(exponents, axis=0)) != len(exponents):
             raise ValueError("exponents: every monomial may appear once, got a repeated row")
@@ -366,6 +364,7 @@ class PolynomialSystem:
             return 1e8 * (1 + np.abs(x0).max()) - np.abs(x).max()
 
         escaped.terminal = True
+
         def rate(_, x):  # as calling the law, without its checks, which take as long
             return (monomials(x[None], self.exponents) @ self.coefficients)[0]
 
