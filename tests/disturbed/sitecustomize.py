@@ -33,7 +33,8 @@ def disturbed(function, size, seed):
             rng = np.random.default_rng([seed, *value.shape])
             return value * (1 + size * rng.standard_normal(value.shape))
         if is_dataclass(value):
-            return replace(value, **{f.name: disturb(getattr(value, f.name)) for f in fields(value)})
+            parts = {field.name: getattr(value, field.name) for field in fields(value)}
+            return replace(value, **{name: disturb(part) for name, part in parts.items()})
         return value
 
     @wraps(function)
