@@ -95,14 +95,14 @@ def check_tracks(tracks: Sequence[ArrayLike], cameras: int | None = None) -> lis
         )
     if cameras is not None and len(tracks) != cameras:
         raise ValueError(f"tracks: must be one per camera, got {len(tracks)} for {cameras} cameras")
-    tracks = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
-    for i, track in enumerate(tracks):
+    checked = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    for i, track in enumerate(checked):
         largest = np.nanmax(np.abs(track), initial=0.0)
         if largest > FARTHEST_PIXEL:
             raise ValueError(
                 f"tracks[{i}]: must be pixels of at most {FARTHEST_PIXEL:g}, got {largest:g}"
             )
-    return tracks
+    return checked
 
 
 def check_times(t: ArrayLike) -> Floats:
