@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from vidsindy_lite.dynamics.collocation import Collocation, Segment, State
-from vidsindy_lite.dynamics.polynomials import monomial_exponents
+from vidsindy_lite.dynamics.library import monomial_exponents
 
 
 @pytest.fixture

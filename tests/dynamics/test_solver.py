@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem, monomial_exponents
+from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover, term_penalties
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
 

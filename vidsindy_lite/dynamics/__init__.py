@@ -3,15 +3,10 @@
 from .collocation import Collocation, Segment, State
 from .cramer_rao import cramer_rao
 from .discovery import Discovery, Units
+from .integrate import runge_kutta_4
+from .library import monomial_exponents, monomial_gradients, monomials, variable_names
 from .origin import ShiftedLaw
-from .polynomials import (
-    PolynomialSystem,
-    monomial_exponents,
-    monomial_gradients,
-    monomials,
-    runge_kutta_4,
-    variable_names,
-)
+from .polynomials import PolynomialSystem
 from .selection import closest_rival, subset_search
 from .smoothing import smooth
 from .solver import discover, term_penalties

@@ -17,7 +17,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
-from .polynomials import monomials, shift_generators
+from .library import monomials, shift_generators
 from .selection import RIDGE, equilibrated
 from .splines import DEGREE, clamped_knots, local_basis
 

@@ -9,7 +9,8 @@ from scipy.interpolate import BSpline
 from ..checks import check_array
 from .collocation import Collocation, State
 from .diagnostics import frame_warnings
-from .polynomials import PolynomialSystem, shift_generators, shift_matrix, variable_names
+from .library import shift_generators, shift_matrix, variable_names
+from .polynomials import PolynomialSystem
 from .selection import inverse
 
 

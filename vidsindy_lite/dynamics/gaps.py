@@ -12,7 +12,8 @@ import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
 from .collocation import Segment
-from .polynomials import PolynomialSystem, runge_kutta_4
+from .integrate import runge_kutta_4
+from .polynomials import PolynomialSystem
 from .trajectories import Trajectory
 
 Gap = tuple[int, float]

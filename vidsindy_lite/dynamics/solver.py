@@ -24,15 +24,15 @@ from .collocation import CLEANEST, Collocation, Segment, State
 from .diagnostics import diagnose, outliers
 from .discovery import Discovery, Step, Units, report
 from .gaps import Gap, gaps, join
-from .origin import ShiftedLaw, sparse_origins
-from .polynomials import (
-    PolynomialSystem,
+from .library import (
     closure_mask,
     monomial_exponents,
     monomials,
     shift_matrix,
     variable_names,
 )
+from .origin import ShiftedLaw, sparse_origins
+from .polynomials import PolynomialSystem
 from .selection import inverse, subset_search
 from .smoothing import smooth
 from .splines import DEGREE, clamped_knots
