@@ -142,7 +142,7 @@ assert (native.support.sum(), moved.support.sum()) == (7, 12)
 # $\mathbf J^T\mathbf J$. Here are the misfits of a small problem, 48 samples and the seven true terms, ...
 
 # %%
-segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], record=0)
+segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
 problem = dynamics.Collocation([segment], native.exponents, np.ones(3), np.ones(3))
 G = dynamics.design_matrix(problem.knots[0], segment.t)
 P = np.linalg.lstsq(G, segment.x)[0]
@@ -259,7 +259,7 @@ save_figure("solver_curve", fig, caption=caption, numbers=samples | curves | che
 # %% [markdown]
 # *Above: a spline that is only smooth (dashed) follows the noise, one that has to obey a law (blue) does
 # not. Below: the law holds at the nodes (ticks), and between them as well as cubic pieces can do it. Nodes
-# elsewhere would ask the pieces for what they cannot do, and charge the true law for it.*
+# elsewhere would ask the pieces for what they cannot do, and penalise the true law for it.*
 
 # %% [markdown]
 # ## Two optimisers
@@ -339,7 +339,7 @@ caption = "Gradient descent settles at a compromise; continuation makes the law 
 save_figure("solver_histories", fig, caption=caption, numbers=histories)
 
 # %% [markdown]
-# *The paper's optimiser (red) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
+# *The paper's optimiser (vermilion) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
 # STRidge drops terms, but not all false ones. Ours (blue) goes through a quadratic library (30 terms) and a cubic one (60), prunes each,
 # moves the origin, and ends at seven terms, a data loss of one noise variance, and a law that holds.*
 
@@ -373,7 +373,7 @@ def unpruned(t, x):
         problem = problem.weighted(problem.data_weights, alpha / unmet)
         state = problem.solve(state, tolerance=1.0)
     information = problem.linearise(state, everything).information
-    return dynamics.FrameAlgebra(exponents, state.coefficients, information), state
+    return dynamics.ShiftedLaw(exponents, state.coefficients, information), state
 
 
 # %% [markdown]
@@ -381,10 +381,10 @@ def unpruned(t, x):
 # have, for any $\boldsymbol\lambda$, what the fit would lose: $(\boldsymbol\lambda-\mathbf c)^T
 # \mathbf S\,(\boldsymbol\lambda-\mathbf c)$. That is a small regression problem, and a threshold or
 # a search can be tried on it. `subset_search` drops, adds and swaps single terms as long as
-# the loss plus a charge per term falls; the charges are the same for all systems.
+# the loss plus a penalty per term falls; the penalties are the same for all systems.
 
 # %%
-charge = np.tile(dynamics.term_charges(exponents), 3)
+penalty = np.tile(dynamics.term_penalties(exponents), 3)
 
 
 def flat_support(law):
@@ -395,7 +395,7 @@ def flat_support(law):
 def search(algebra, shift):
     coefficients, S = algebra.at(shift)
     c = coefficients.T.ravel()
-    support, solution, _ = dynamics.subset_search(S, 0 * c, c, charge, np.ones(len(c), dtype=bool))
+    support, solution, _ = dynamics.subset_search(S, 0 * c, c, penalty, np.ones(len(c), dtype=bool))
     return c, S, support, solution
 
 
@@ -417,7 +417,7 @@ def scores(S, coefficients):
 
 z, z_after = scores(S, c), np.zeros(len(c))
 z_after[support] = scores(S[np.ix_(support, support)], solution[support])
-bar = np.sqrt(charge[1])
+bar = np.sqrt(penalty[1])
 assert z[is_true].min() < bar < z_after[is_true].min()
 
 # %%
@@ -434,16 +434,16 @@ save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # *Left: in the order of magnitude, false terms stand above true ones. Middle: in units of the standard
 # error the weakest true term is no better than noise, because collinear columns share what they explain.
-# Right: after the search, with the impostors gone, each true term is far above its charge (dashed).*
+# Right: after the search, with the impostors gone, each true term is far above its penalty (dashed).*
 
 # %% [markdown]
 # How sure is the search? `closest_rival` is the single change that costs least.
 
 # %%
-cost, dropped, added = dynamics.closest_rival(S, 0 * c, c, charge, support)
+cost, dropped, added = dynamics.closest_rival(S, 0 * c, c, penalty, support)
 names = [f"{term} in d{j}/dt" for j in "xyz" for term in truth.terms[: len(exponents)]]
 out, into = (", ".join(names[k] for k in ks) or "nothing" for ks in (dropped, added))
-print(f"drop {out}, add {into}: {cost:.1f} worse (the charge of a term is about {bar**2:.0f})")
+print(f"drop {out}, add {into}: {cost:.1f} worse (the penalty of a term is about {bar**2:.0f})")
 assert cost > 0
 
 # %% [markdown]
@@ -496,7 +496,7 @@ save_figure("solver_windows", fig, caption=caption, numbers={"threshold": thresh
 
 # %% [markdown]
 # *Thresholds that leave exactly the true terms, at 10 % noise (blue): for some systems there is none, and
-# no single one for the others. Who knows the truth can pick one. The subset search with its charges
+# no single one for the others. Who knows the truth can pick one. The subset search with its penalties
 # gets more systems right than any one threshold, even here, before law and curve are refined together.*
 
 # %% [markdown]
@@ -506,7 +506,7 @@ save_figure("solver_windows", fig, caption=caption, numbers={"threshold": thresh
 # is its information. So the unpruned fit need not be repeated to ask how many terms are significant at another
 # origin. Each term with score $z$ counts smoothly:
 #
-# $$N(\Delta)=\sum\frac{z^2}{z^2+\text{charge}} .$$
+# $$N(\Delta)=\sum\frac{z^2}{z^2+\text{penalty}} .$$
 
 # %%
 x_axis = y_axis = np.linspace(-10, 30, 81)
@@ -515,7 +515,7 @@ all_terms = np.ones(exponents.shape, dtype=bool)
 
 def count(x0, y0):
     origin = np.array([x0, y0, 0.0]) - fit.offset
-    return algebra.smooth_count(origin, all_terms, charge.max())[0]
+    return algebra.smooth_count(origin, all_terms, penalty.max())[0]
 
 
 counts = np.array([[count(x0, y0) for x0 in x_axis] for y0 in y_axis])
@@ -665,8 +665,8 @@ caption = "How often the law is exact, and what the solver says about it, in thr
 save_figure("solver_failures_figure", fig, caption=caption, numbers=verdicts)
 
 # %% [markdown]
-# *Laws that are wrong (orange, red) come with low sampling, high noise, or a library without the
-# law's terms (degree 1). A warning (orange) is what one hopes for then; red is a wrong law that nobody
+# *Laws that are wrong (orange, vermilion) come with low sampling, high noise, or a library without the
+# law's terms (degree 1). A warning (orange) is what one hopes for then; vermilion is a wrong law that nobody
 # flagged, light blue a right one that was doubted.*
 
 # %%
@@ -740,7 +740,7 @@ save_table("solver_pendulum", rows, caption=caption)
 # ```
 #
 # At z = 28 the term 28 x in dy/dt is absorbed by xz, and a constant -74.67 appears in dz/dt. The number of
-# terms is the same, so the data alone cannot decide. The solver charges every axis along which the origin
+# terms is the same, so the data alone cannot decide. The solver penalises every axis along which the origin
 # is moved nearly as much as a term, and the one that leaves z alone wins.
 # </details>
 #

@@ -331,15 +331,16 @@ save_table("study_failures", rows, caption=caption)
 # ([notebook 04](04_spline_ado.ipynb)). It grows in proportion to the noise. So for each system, its
 # weakest term sets a level beyond which our method cannot be expected to find it, nor any other that
 # is as careful about false terms: where the square of its coefficient, in bounds, is what our method
-# charges for the term.
+# asks of the term.
 
 
 # %%
 def weakest(name):
     law = SYSTEMS[name]
     t, x = law.trajectory(frames)
-    bound = dynamics.cramer_rao(law, t, law.x0, np.std(x, axis=0), moving=[True, True, False]).coefficients
-    needed = bound * np.sqrt(dynamics.term_charges(law.exponents))[:, None]
+    spread, moving = np.std(x, axis=0), [True, True, False]
+    bound = dynamics.cramer_rao(law, t, law.x0, spread, moving).coefficients
+    needed = bound * np.sqrt(dynamics.term_penalties(law.exponents))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         level = np.where(law.support, np.abs(law.coefficients) / needed, np.inf)
     row, equation = np.unravel_index(level.argmin(), level.shape)
@@ -489,8 +490,8 @@ caption = "How often the law is exact, and what the solver says of it, over all 
 save_figure("study_verdicts_figure", fig, caption=caption, numbers=verdicts)
 
 # %% [markdown]
-# *All systems. Blue is right and light blue right but doubted, orange wrong with a warning, red
-# wrong without one.*
+# *All systems. Blue is right and light blue right but doubted, orange wrong with a warning,
+# vermilion wrong without one.*
 
 # %%
 mine = table[table.method == "ours"]  # each trial once

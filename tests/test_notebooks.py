@@ -68,7 +68,8 @@ def freshness_problems(path):
     """Whether the executed half is that of this code, in the full profile and with its outputs."""
     executed = executed_half(path)
     problems = []
-    if executed.metadata.get("vidsindy_lite", {}).get("stamp") != runner.code_stamp(path, "full"):
+    made_by = executed.metadata.get("vidsindy_lite", {}).get("stamp")
+    if made_by != runner.notebook_stamp(path, "full"):
         problems.append("not executed with this code: " + RUN.format(path.stem))
     for index, cell in enumerate(executed.cells):
         if cell.cell_type == "code" and cell.execution_count is None:
@@ -205,7 +206,7 @@ def test_every_executed_half_has_its_source():
 
 
 def test_figures_are_complete_and_of_this_code():
-    stamps = {path.stem: runner.code_stamp(path, "full") for path in NOTEBOOKS}
+    stamps = {path.stem: runner.notebook_stamp(path, "full") for path in NOTEBOOKS}
     assert artifacts.check_folder(ROOT / "figures", stamps) == []
 
 
@@ -231,7 +232,7 @@ def test_quick_run(path, quick):
 def pair(tiny):
     """A pair that passes every gate; its executed half was made without running it."""
     path = tiny.write("01_first", "x = 1", "x + 1")
-    stamp = runner.code_stamp(path, "full")
+    stamp = runner.notebook_stamp(path, "full")
     executed = jupytext.read(path)
     for count, cell in enumerate((c for c in executed.cells if c.cell_type == "code"), start=1):
         cell.execution_count = count
@@ -284,8 +285,8 @@ def test_freshness_gate_fails_on_edited_code(pair):
 
 
 def test_freshness_gate_fails_on_a_quick_run(pair):
-    quick = runner.code_stamp(pair, "quick")
-    edit(pair.with_suffix(".ipynb"), runner.code_stamp(pair, "full"), quick)
+    quick = runner.notebook_stamp(pair, "quick")
+    edit(pair.with_suffix(".ipynb"), runner.notebook_stamp(pair, "full"), quick)
     assert freshness_problems(pair)
 
 

@@ -11,6 +11,9 @@ from numbers import Integral, Real
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import Floats
 
 FARTHEST_PIXEL = 1e100
 """Largest coordinate of a track: the squares of larger ones are no numbers any more."""
@@ -58,7 +61,7 @@ def check_positive(name: str, value: float) -> float:
     return float(value)
 
 
-def check_array(name: str, values: np.ndarray) -> np.ndarray:
+def check_array(name: str, values: ArrayLike) -> Floats:
     """Real numbers as an array of floats, in which the masked entries of a masked array are NaN."""
     try:
         array = values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
@@ -69,7 +72,7 @@ def check_array(name: str, values: np.ndarray) -> np.ndarray:
         raise ValueError(f"{name}: must be an array of real numbers, got {values!r:.60}") from None
 
 
-def check_vector(name: str, values: np.ndarray, size: int) -> np.ndarray:
+def check_vector(name: str, values: ArrayLike, size: int) -> Floats:
     """So many finite numbers, shape (size,); a copy."""
     vector = check_array(name, values).copy()
     if vector.shape != (size,) or not np.isfinite(vector).all():
@@ -77,7 +80,7 @@ def check_vector(name: str, values: np.ndarray, size: int) -> np.ndarray:
     return vector
 
 
-def check_rows(name: str, values: np.ndarray, width: int) -> np.ndarray:
+def check_rows(name: str, values: ArrayLike, width: int) -> Floats:
     """Points or pixels row by row, shape (n, width); a row holding NaN is a missing one."""
     rows = check_array(name, values)
     if rows.ndim != 2 or rows.shape[1] != width:
@@ -89,7 +92,7 @@ def check_rows(name: str, values: np.ndarray, width: int) -> np.ndarray:
     return rows
 
 
-def check_tracks(tracks: Sequence[np.ndarray], cameras: int | None = None) -> list[np.ndarray]:
+def check_tracks(tracks: Sequence[ArrayLike], cameras: int | None = None) -> list[Floats]:
     """Pixels of the target in each camera, (n_i, 2) each; so many if given."""
     is_array = isinstance(tracks, np.ndarray) and tracks.ndim
     if not (is_array or isinstance(tracks, list | tuple)) or not len(tracks):
@@ -98,17 +101,17 @@ def check_tracks(tracks: Sequence[np.ndarray], cameras: int | None = None) -> li
         )
     if cameras is not None and len(tracks) != cameras:
         raise ValueError(f"tracks: must be one per camera, got {len(tracks)} for {cameras} cameras")
-    tracks = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
-    for i, track in enumerate(tracks):
+    checked = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    for i, track in enumerate(checked):
         largest = np.nanmax(np.abs(track), initial=0.0)
         if largest > FARTHEST_PIXEL:
             raise ValueError(
                 f"tracks[{i}]: must be pixels of at most {FARTHEST_PIXEL:g}, got {largest:g}"
             )
-    return tracks
+    return checked
 
 
-def check_times(t: np.ndarray) -> np.ndarray:
+def check_times(t: ArrayLike) -> Floats:
     """Finite, increasing times, at least one, shape (n,)."""
     t = check_array("t", t)
     if t.ndim != 1 or not len(t):

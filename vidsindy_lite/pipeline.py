@@ -173,30 +173,16 @@ def observe(
         a target is not found, if the given lags are clearly wrong, or if the cameras cannot be
         learned (see `learn_cameras`). What can be told before a video is tracked is.
     """
-    check_learnable(rig)
-    check_detector(detector)
-    files = _check_paths(paths, rig)
-    if lags is not None:
-        lags = check_vector("lags", lags, len(files))
-        lags -= lags[0]
-    shots = _check_shots(files, rig)
-    t, rates = _clock(shots, t)
-    if lags is not None:
-        _check_overlap(lags, rates, shots, files)
-
-    bar = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
-    seen = [_tracked(path, shot.frames, detector) for path, shot in bar]
-    tracks = [one.pixels for one in seen]
-    doubts = [warning for one in seen for warning in one.warnings]
-    return _observed(tracks, rig, t, lags, rates, [path.name for path in files], doubts)
+    footage = _check_footage(paths, rig, t, lags, detector)
+    seen = _track_all(footage, detector, progress)
+    tracks = [track.pixels for track in seen]
+    doubts = [warning for track in seen for warning in track.warnings]
+    names = [path.name for path in footage.paths]
+    return _observed(tracks, rig, footage.t, footage.lags, footage.rates, names, doubts)
 
 
 def observe_tracks(
-    tracks: Sequence[ArrayLike],
-    rig: Rig,
-    t: ArrayLike,
-    *,
-    lags: Sequence[float] | None = None,
+    tracks: Sequence[ArrayLike], rig: Rig, t: ArrayLike, *, lags: Sequence[float] | None = None
 ) -> Observation:
     """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
 
@@ -226,10 +212,10 @@ def observe_tracks(
         raise ValueError(
             f"t: must have shape ({len(raw[0])},), one per row of tracks[0], got {t.shape}"
         )
-    if lags is not None:
-        lags = check_vector("lags", lags, len(raw))
-        lags -= lags[0]
-    return _observed(raw, rig, t, lags, None, [f"tracks[{i}]" for i in range(len(raw))], ())
+    given = None if lags is None else check_vector("lags", lags, len(raw))
+    if given is not None:
+        given -= given[0]
+    return _observed(raw, rig, t, given, None, [f"tracks[{i}]" for i in range(len(raw))])
 
 
 def _observed(
@@ -239,27 +225,58 @@ def _observed(
     lags: Floats | None,
     rates: Floats | None,
     names: Sequence[str],
-    doubts: Sequence[str],
+    doubts: Sequence[str] = (),
 ) -> Observation:
-    """What tracks of these names tell, with the tracker's doubts about them."""
+    """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     learned_lags = learn_lags(raw, rig, rates, start=lags)
-    synchrony = learned_lags if lags is None else _given(lags, learned_lags)
-    tracks = align(raw, synchrony.frames, rates)
+    used_lags = learned_lags if lags is None else _given(lags, learned_lags)
+    tracks = align(raw, used_lags.frames, rates)
     learned = learn_cameras(tracks, rig)
-    shared = systematic_errors(raw, rig, learned, synchrony), trailing_errors(tracks, learned)
+    shared = systematic_errors(raw, rig, learned, used_lags), trailing_errors(tracks, learned)
     return Observation(
-        tracks=tuple(tracks),
+        tracks=tracks,
         rig=learned,
-        lags=synchrony,
+        lags=used_lags,
         t=t,
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
             *_rig_warnings(tracks, learned, rig, names, learned_lags),
             *doubts,
-            *synchrony.warnings,
+            *used_lags.warnings,
         ),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Footage:
+    """Video files that fit a rig, their clock, and their lags if they are given."""
+
+    paths: list[Path]
+    shots: list[VideoInfo]
+    t: Floats
+    rates: Floats | None
+    lags: Floats | None
+
+
+def _check_footage(
+    paths: Sequence[str | Path],
+    rig: Rig,
+    t: ArrayLike | None,
+    lags: Sequence[float] | None,
+    detector: str | os.PathLike,
+) -> _Footage:
+    """All that can be told before a video is tracked."""
+    check_learnable(rig)
+    check_detector(detector)
+    files = _check_paths(paths, rig)
+    given = None if lags is None else check_vector("lags", lags, len(files))
+    shots = _check_shots(files, rig)
+    times, rates = _clock(shots, t)
+    if given is not None:
+        given = given - given[0]
+        _check_overlap(given, rates, shots, files)
+    return _Footage(files, shots, times, rates, given)
 
 
 def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
@@ -289,18 +306,16 @@ def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
     return shots
 
 
-def _clock(
-    shots: Sequence[VideoInfo], t: Floats | None
-) -> tuple[Floats, Floats | None]:
+def _clock(shots: Sequence[VideoInfo], t: ArrayLike | None) -> tuple[Floats, Floats | None]:
     """Time of each frame of the first video, and frames of each video in one frame of the first."""
     if t is not None:
-        t = check_times(t)
-        if t.shape != (shots[0].frames,):
+        times = check_times(t)
+        if times.shape != (shots[0].frames,):
             raise ValueError(
                 f"t: must have shape ({shots[0].frames},), one per frame of the first video, "
-                f"got {t.shape}"
+                f"got {times.shape}"
             )
-        return t, None
+        return times, None
     fps = np.array([shot.fps for shot in shots])
     if not (np.isfinite(fps) & (fps > 0)).all():
         raise ValueError(f"t: must be given if a file states no frame rate, got {fps.tolist()}")
@@ -320,7 +335,14 @@ def _check_overlap(
             )
 
 
-def _tracked(path: Path, frames: int, detector: str | os.PathLike) -> Track:
+def _track_all(footage: _Footage, detector: str | os.PathLike, progress: bool) -> list[Track]:
+    """The track of the target in each video."""
+    videos = list(zip(footage.paths, footage.shots, strict=True))
+    bar = tqdm(videos, desc="track", disable=not progress)
+    return [_track_one(path, shot.frames, detector) for path, shot in bar]
+
+
+def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     """Track a video that should have so many frames and one moving target."""
     found = track(path, detector)
     if len(found.pixels) != frames:
@@ -353,7 +375,7 @@ def _rig_warnings(
     learned: Rig,
     given: Rig,
     names: Sequence[str],
-    synchrony: Lags,
+    lags: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
     missed = disagreement(tracks, learned)
@@ -364,10 +386,10 @@ def _rig_warnings(
         "in one frame of ten, tracked and reconstructed target lie more than "
         f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
     )
-    if synchrony.agree:  # at lags that differ by too little from the given ones to refuse these
+    if lags.agree:  # at lags that differ by too little from the given ones to refuse these
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({list_lags(synchrony.frames)}) would explain it best"
+            f"({list_lags(lags.frames)}) would explain it best"
         ]
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
     others = [learn_normal(tracks, given, i) for i in range(len(names))]

@@ -93,7 +93,7 @@ def test_quick_run_goes_to_the_build_folder_only(good):
 def test_executed_notebook_is_clean(executed_once):
     cleaned = nbformat.read(executed_once.notebooks / "01_first.ipynb", as_version=4)
     assert set(cleaned.metadata) == {"jupytext", "kernelspec", "vidsindy_lite"}
-    stamp = runner.code_stamp(executed_once.notebooks / "01_first.py", "full")
+    stamp = runner.notebook_stamp(executed_once.notebooks / "01_first.py", "full")
     assert cleaned.metadata.vidsindy_lite == {"profile": "full", "stamp": stamp}
     kept = [dict(cell.metadata) for cell in cleaned.cells]
     assert kept == [{}, {"tags": ["parameters"]}, {}, {}, {}]
@@ -110,7 +110,7 @@ def test_executed_notebook_is_clean(executed_once):
 def test_index_has_the_run_times(executed_once):
     figures = executed_once.root / "figures"
     times = json.loads((figures / artifacts.RUN_TIMES).read_text())
-    stamp = runner.code_stamp(executed_once.notebooks / "01_first.py", "full")
+    stamp = runner.notebook_stamp(executed_once.notebooks / "01_first.py", "full")
     assert times["01_first"]["stamp"] == stamp
     assert "01_first.ipynb) | about " in (figures / artifacts.INDEX).read_text()
 
@@ -380,28 +380,28 @@ def test_quick_run_cannot_overwrite_the_repository(tiny):
 
 def test_stamp_follows_code_profile_and_requirements(tiny):
     path = tiny.write("01_first", "x = 1")
-    stamps = [runner.code_stamp(path, "full"), runner.code_stamp(path, "quick")]
+    stamps = [runner.notebook_stamp(path, "full"), runner.notebook_stamp(path, "quick")]
     tiny.write("01_first", "x = 2")
-    stamps.append(runner.code_stamp(path, "full"))
+    stamps.append(runner.notebook_stamp(path, "full"))
     (tiny.root / "requirements.txt").write_text("numpy==1.0\n")
-    stamps.append(runner.code_stamp(path, "full"))
+    stamps.append(runner.notebook_stamp(path, "full"))
     assert len(set(stamps)) == 4
 
 
 def test_stamp_follows_the_package(tiny, tmp_path, monkeypatch):
     path = tiny.write("01_first", "x = 1")
-    before = runner.code_stamp(path, "full")
+    before = runner.notebook_stamp(path, "full")
     package = tmp_path / "package"
     package.mkdir()
     monkeypatch.setattr(repository, "PACKAGE", package)
-    assert runner.code_stamp(path, "full") != before
+    assert runner.notebook_stamp(path, "full") != before
 
 
 def test_stamp_does_not_follow_the_prose_of_a_notebook(tiny):
     path = tiny.write("01_first", "x = 1")
-    before = runner.code_stamp(path, "full")
+    before = runner.notebook_stamp(path, "full")
     path.write_text(path.read_text().replace("A tiny notebook", "A small notebook"))
-    assert runner.code_stamp(path, "full") == before
+    assert runner.notebook_stamp(path, "full") == before
 
 
 # ----------------------------------------------------------------------------- the command line

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from vidsindy_lite.dynamics.collocation import Collocation, Segment, State
-from vidsindy_lite.dynamics.polynomials import monomial_exponents
+from vidsindy_lite.dynamics.library import monomial_exponents
 
 
 @pytest.fixture
@@ -15,9 +15,9 @@ def problem():
     """Two segments of a plane curve, a cubic law with a moving offset, uneven weights."""
     rng = np.random.default_rng(0)
     segments = []
-    for record, (low, high) in enumerate([(0.0, 2.0), (3.0, 3.6)]):
+    for trajectory, (low, high) in enumerate([(0.0, 2.0), (3.0, 3.6)]):
         t = np.sort(rng.uniform(low, high, 9))
-        segments.append(Segment.even(t, rng.normal(size=(9, 2)), 0.5, record))
+        segments.append(Segment.even(t, rng.normal(size=(9, 2)), 0.5, trajectory))
     return Collocation(segments, monomial_exponents(2, 2), np.array([4.0, 1.0]), np.array([3.0, 7]))
 
 

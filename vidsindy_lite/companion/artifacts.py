@@ -24,9 +24,11 @@ import io
 import json
 import math
 import os
+import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -34,7 +36,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from ..stamp import repository_root, versions, write_file
+from ..stamp import LIBRARIES, repository_root, write_file
 
 __all__ = [
     "Table",
@@ -66,6 +68,12 @@ def figures_folder() -> Path:
     """The folder that figures and tables go to: VIDSINDY_FIGURES, or figures/ of the repository."""
     named = os.environ.get("VIDSINDY_FIGURES")
     return Path(named) if named else repository_root() / "figures"
+
+
+def versions() -> str:
+    """Python and the libraries that results depend on, as they are here, a line each."""
+    lines = [f"{name} {metadata.version(name)}" for name in LIBRARIES]
+    return "\n".join([f"Python {platform.python_version()}", *lines])
 
 
 # ------------------------------------------------------------------------------------- what goes in

@@ -40,7 +40,7 @@ from PIL import Image
 from tqdm import tqdm
 from traitlets.config import Config
 
-from ..stamp import PACKAGE, package_stamp, repository_root, write_file
+from ..stamp import PACKAGE, repository_root, source_stamp, write_file
 from . import artifacts
 from .readme import write_readme
 
@@ -50,7 +50,7 @@ __all__ = [
     "Report",
     "check_parameters",
     "clean",
-    "code_stamp",
+    "notebook_stamp",
     "execute",
     "find_notebooks",
     "run",
@@ -217,7 +217,7 @@ def run(
     usual = artifacts.load_run_times(figures)
     outcomes, due = {}, []
     for number, path in enumerate(chosen, start=1):
-        label, stamp = f"[{number}/{len(chosen)}] {path.stem}", code_stamp(path, profile)
+        label, stamp = f"[{number}/{len(chosen)}] {path.stem}", notebook_stamp(path, profile)
         reads = _reads_tables(path)
         known = None if force or reads else _ledger(output).get(path.stem)
         if known and known == _ledger_entry(output, path, stamp, known["seconds"]):
@@ -442,19 +442,14 @@ def clean(
     return notebook
 
 
-def code_stamp(path: str | os.PathLike, profile: str) -> str:
-    """Hash of what a notebook's outputs depend on.
+def notebook_stamp(path: str | os.PathLike, profile: str) -> str:
+    """Hash of what a notebook's outputs depend on: profile, code cells, and what these reach.
 
-    That is the profile, the notebook's code cells, the package and requirements.txt. Prose does
-    not count (see `package_stamp`): editing it does not make an executed notebook stale.
+    Prose does not count, nor what the code does not use: see `vidsindy_lite.stamp`.
     """
     path = Path(path)
-    digest = hashlib.sha256(profile.encode())
-    for cell in jupytext.read(path).cells:
-        if cell.cell_type == "code":
-            digest.update(b"\0" + cell.source.encode())
-    digest.update(package_stamp(path.parent.parent).encode())
-    return digest.hexdigest()[:16]
+    code = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
+    return source_stamp("\n".join([f"{profile!r}", *code]), path.parent.parent)
 
 
 # --------------------------------------------------------------------------------------- the ledger

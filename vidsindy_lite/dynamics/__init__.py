@@ -3,32 +3,27 @@
 from .collocation import Collocation, Segment, State
 from .cramer_rao import cramer_rao
 from .discovery import Discovery, Units
-from .origin import FrameAlgebra
-from .polynomials import (
-    PolynomialSystem,
-    monomial_exponents,
-    monomial_gradients,
-    monomials,
-    runge_kutta_4,
-    variable_names,
-)
+from .integrate import runge_kutta_4
+from .library import monomial_exponents, monomial_gradients, monomials, variable_names
+from .origin import ShiftedLaw
+from .polynomials import PolynomialSystem
 from .selection import closest_rival, subset_search
 from .smoothing import smooth
-from .solver import discover, term_charges
+from .solver import discover, term_penalties
 from .splines import DEGREE, clamped_knots, design_matrix, local_basis
-from .trajectories import Record, check_record, cut, typical_step
+from .trajectories import Trajectory, check_trajectory, cut, typical_step
 
 __all__ = [
     "Collocation",
     "DEGREE",
     "Discovery",
-    "FrameAlgebra",
+    "ShiftedLaw",
     "PolynomialSystem",
-    "Record",
+    "Trajectory",
     "Segment",
     "State",
     "Units",
-    "check_record",
+    "check_trajectory",
     "clamped_knots",
     "closest_rival",
     "cramer_rao",
@@ -42,7 +37,7 @@ __all__ = [
     "smooth",
     "runge_kutta_4",
     "subset_search",
-    "term_charges",
+    "term_penalties",
     "typical_step",
     "variable_names",
 ]

@@ -17,8 +17,8 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
-from .information import RIDGE, equilibrated
-from .polynomials import monomials, shift_generators
+from .library import monomials, shift_generators
+from .selection import RIDGE, equilibrated
 from .splines import DEGREE, clamped_knots, local_basis
 
 WIDTH = DEGREE + 1
@@ -28,7 +28,7 @@ CLEANEST = 1e-5
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of one record of data, with the breakpoints of its spline.
+    """A stretch of one trajectory of data, with the breakpoints of its spline.
 
     Parameters
     ----------
@@ -36,20 +36,20 @@ class Segment:
     x : ndarray, shape (n, d)
     breakpoints : ndarray, shape (m + 1,)
         Ends of the knot spans.
-    record : int
-        Which record the stretch is cut from.
+    trajectory : int
+        Which trajectory the stretch is cut from.
     """
 
     t: np.ndarray
     x: np.ndarray
     breakpoints: np.ndarray
-    record: int = 0
+    trajectory: int = 0
 
     @classmethod
-    def even(cls, t: np.ndarray, x: np.ndarray, spacing: float, record: int) -> Segment:
+    def even(cls, t: np.ndarray, x: np.ndarray, spacing: float, trajectory: int) -> Segment:
         """A segment with knots at even distances of at most ``spacing``."""
         spans = max(1, int(np.ceil((t[-1] - t[0]) / spacing)))
-        return cls(t, x, np.linspace(t[0], t[-1], spans + 1), record)
+        return cls(t, x, np.linspace(t[0], t[-1], spans + 1), trajectory)
 
     def refined(self) -> Segment:
         """The same stretch with every knot span halved."""

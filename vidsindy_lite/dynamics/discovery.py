@@ -8,9 +8,10 @@ from scipy.interpolate import BSpline
 
 from ..checks import check_array
 from .collocation import Collocation, State
-from .diagnostics import frame_doubts
-from .information import inverse
-from .polynomials import PolynomialSystem, shift_generators, shift_matrix, variable_names
+from .diagnostics import frame_warnings
+from .library import shift_generators, shift_matrix, variable_names
+from .polynomials import PolynomialSystem
+from .selection import inverse
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ def report(
     state: State,
     problem: Collocation,
     units: Units,
-    charges: np.ndarray,
+    penalties: np.ndarray,
     warnings: Sequence[str],
     history: Sequence[Step],
 ) -> Discovery:
@@ -191,7 +192,7 @@ def report(
         The fit, at a physics weight at which the law holds exactly.
     units : Units
         Standard units of the fit.
-    charges : ndarray, shape (l,)
+    penalties : ndarray, shape (l,)
         Price of each term: a coefficient whose squared score is lower cannot be told from zero.
     warnings, history
         Passed on.
@@ -209,7 +210,7 @@ def report(
 
     native_covariance = covariance[: l * d, : l * d]
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
-    moved, moved_covariance, margins = _pruned(moved, moved_covariance, charges)
+    moved, moved_covariance, margins = _pruned(moved, moved_covariance, penalties)
     law = PolynomialSystem(names, exponents, moved)
     if not state.moving.any():
         margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
@@ -225,7 +226,7 @@ def report(
         native_covariance=native_covariance,
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
         noise=problem.data_weights**-0.5 * units.scale,
-        warnings=(*warnings, *frame_doubts(law, margins)),
+        warnings=(*warnings, *frame_warnings(law, margins)),
         history=tuple(history),
         curves=tuple(splines),
     )
@@ -246,7 +247,7 @@ def _shifted(
 
 
 def _pruned(
-    coefficients: np.ndarray, covariance: np.ndarray, charges: np.ndarray
+    coefficients: np.ndarray, covariance: np.ndarray, penalties: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Set what cannot be told from zero to zero, one by one, and correct the others for it.
 
@@ -258,7 +259,7 @@ def _pruned(
     flat = coefficients.T.ravel().copy()
     covariance = covariance.copy()
     original = np.diag(covariance).copy()
-    charge = np.tile(charges, shape[0])
+    penalty = np.tile(penalties, shape[0])
     margins = np.full(len(flat), np.inf)
     while True:
         variance = np.diag(covariance)
@@ -270,13 +271,13 @@ def _pruned(
         if len(gone):
             flat[gone] = 0.0
             continue
-        weakness = score / charge[live]
+        weakness = score / penalty[live]
         if not len(live) or weakness.min() >= 1:
-            margins[live] = score - charge[live]
+            margins[live] = score - penalty[live]
             break
         weakest = weakness.argmin()
         k = live[weakest]
-        margins[k] = charge[k] - score[weakest]
+        margins[k] = penalty[k] - score[weakest]
         gain = covariance[:, k] / covariance[k, k]
         flat -= gain * flat[k]
         covariance -= np.outer(gain, covariance[k])

@@ -21,23 +21,22 @@ from tqdm import tqdm
 
 from ..checks import check_integer
 from .collocation import CLEANEST, Collocation, Segment, State
-from .diagnostics import doubts, strays
+from .diagnostics import diagnose, outliers
 from .discovery import Discovery, Step, Units, report
 from .gaps import Gap, gaps, join
-from .information import inverse
-from .origin import FrameAlgebra, sparse_origins
-from .polynomials import (
-    PolynomialSystem,
+from .library import (
     closure_mask,
     monomial_exponents,
     monomials,
     shift_matrix,
     variable_names,
 )
-from .selection import subset_search
+from .origin import ShiftedLaw, sparse_origins
+from .polynomials import PolynomialSystem
+from .selection import inverse, subset_search
 from .smoothing import smooth
 from .splines import DEGREE, clamped_knots
-from .trajectories import Record, check_records, check_systematic, cut, typical_step
+from .trajectories import Trajectory, check_systematic, check_trajectories, cut, typical_step
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
 """Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
@@ -49,7 +48,7 @@ FALSE_ALARM = 0.004
 """Chance of a false term in a law, if all candidates were independent."""
 NEEDLESS_START = 0.1
 """Chance that a second start, from terms of all degrees, is made though the first left nothing."""
-OFFSET_CHARGE = 0.95
+OFFSET_PENALTY = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
@@ -103,13 +102,13 @@ def discover(
     >>> print(vl.discover(t, x).equations())
     """
     degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
-    records = check_records(t, x)
+    trajectories = check_trajectories(t, x)
     times = [t] if x is not None else [pair[0] for pair in t]
-    shared = check_systematic(systematic, times, records)
-    return _Search(records, shared, degree, seed, progress).run()
+    shared = check_systematic(systematic, times, trajectories)
+    return _Search(trajectories, shared, degree, seed, progress).run()
 
 
-def term_charges(exponents: np.ndarray) -> np.ndarray:
+def term_penalties(exponents: np.ndarray) -> np.ndarray:
     """Price of a term of each kind: how much of the chi-square it has to explain, shape (l,).
 
     Half of `FALSE_ALARM` goes to the constants, half of the rest to the linear terms, and so on;
@@ -131,12 +130,12 @@ class _Candidate:
 
 
 @dataclass(frozen=True)
-class _Hull:
+class _Closure:
     """A law in the centred frame, with every term that a shift of it may contain."""
 
     state: State
     columns: np.ndarray
-    algebra: FrameAlgebra
+    algebra: ShiftedLaw
     objective: float
 
 
@@ -144,7 +143,7 @@ class _Hull:
 class _Search:
     """One discovery: the data in standard units, and the stages that lead to the law."""
 
-    records: list[Record]
+    trajectories: list[Trajectory]
     systematic: list[np.ndarray]
     degree: int
     seed: int
@@ -153,43 +152,43 @@ class _Search:
 
     def __post_init__(self) -> None:
         self.began = time.perf_counter()
-        self.d = self.records[0][1].shape[1]
+        self.d = self.trajectories[0][1].shape[1]
         self.exponents = monomial_exponents(self.d, self.degree)
-        n = sum(len(t) for t, _ in self.records)
+        n = sum(len(t) for t, _ in self.trajectories)
         unknowns = len(self.exponents) + 1
         if n < unknowns:
             raise ValueError(
                 f"x: must hold at least as many samples as unknowns per equation "
                 f"({unknowns} for degree {self.degree} and d = {self.d}), got {n} samples"
             )
-        self.strays = strays(self.records)
+        self.outliers = outliers(self.trajectories)
         self._standardise()
         self.home = self.units.standard(np.zeros(self.d))
-        self.charges = term_charges(self.exponents)
-        self.axis_charge = OFFSET_CHARGE * self.charges[0]
+        self.penalties = term_penalties(self.exponents)
+        self.axis_penalty = OFFSET_PENALTY * self.penalties[0]
         self.rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(1)[0])
 
     def _standardise(self) -> None:
-        x = np.concatenate([values for _, values in self.records])
+        x = np.concatenate([values for _, values in self.trajectories])
         centre, scale = x.mean(axis=0), x.std(axis=0)
         if not (scale > 1e-12 * np.abs(centre)).all():
             still = int(np.argmin(scale))
             raise ValueError(f"x: every coordinate must move, got a constant column {still}")
         rng = np.random.default_rng(np.random.SeedSequence(self.seed).spawn(2)[1])
-        step = typical_step(self.records)
-        records = [(t / step, (values - centre) / scale) for t, values in self.records]
-        # Where the record pauses is a gap or not depending on how fast the target moves, which
+        step = typical_step(self.trajectories)
+        trajectories = [(t / step, (values - centre) / scale) for t, values in self.trajectories]
+        # Where the trajectory pauses is a gap or not depending on how fast the target moves, which
         # a first smoothing tells; if there are other gaps, a second one respects them.
-        first = _stretches(records, 5.0)
+        first = _stretches(trajectories, 5.0)
         smoothed = smooth([piece for _, piece in first], rng)
         speed = _rms_speed(smoothed.splines)
-        stretches = _stretches(records, max(2.5, GAP / speed))
+        stretches = _stretches(trajectories, max(2.5, GAP / speed))
         if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:
             smoothed = smooth([piece for _, piece in stretches], rng)
             speed = _rms_speed(smoothed.splines)
         self.units = Units(centre, scale, step / speed)
         self.step = speed
-        self.records = [(t * speed, values) for t, values in records]
+        self.trajectories = [(t * speed, values) for t, values in trajectories]
         self.systematic = [modes / scale[:, None] for modes in self.systematic]
         self.stretches = [(i, (t * speed, values)) for i, (t, values) in stretches]
         self.noise = self.smoothed_noise = np.maximum(smoothed.noise, CLEANEST)
@@ -204,7 +203,8 @@ class _Search:
     def run(self) -> Discovery:
         with tqdm(total=5, disable=not self.progress, desc="discover", leave=False) as bar:
             segments = [
-                Segment.even(t, x, self.spacing, record) for record, (t, x) in self.stretches
+                Segment.even(t, x, self.spacing, trajectory)
+                for trajectory, (t, x) in self.stretches
             ]
             problem = self._problem(segments)
             control = _fit_curves(problem, self.curves)
@@ -224,9 +224,11 @@ class _Search:
             state, problem = self._polish(state, problem)
             bar.update()
         law = PolynomialSystem(variable_names(self.d), self.exponents, state.coefficients)
-        warnings = doubts(law, state, problem, self.charges, self.records, self.smoothed_noise)
-        warnings = self.strays + warnings
-        return report(state, problem, self.units, self.charges, warnings, self.history)
+        warnings = diagnose(
+            law, state, problem, self.penalties, self.trajectories, self.smoothed_noise
+        )
+        warnings = self.outliers + warnings
+        return report(state, problem, self.units, self.penalties, warnings, self.history)
 
     def _measure_slack(self, problem: Collocation, control: np.ndarray) -> None:
         """Misfit of a plain regression on the smoothed curve: the scale of physics weights."""
@@ -242,15 +244,15 @@ class _Search:
 
     def _shared(self, segment: Segment) -> np.ndarray:
         """Systematic errors at the samples of a segment, shape (n, d, k)."""
-        t, _ = self.records[segment.record]
-        return self.systematic[segment.record][np.searchsorted(t, segment.t)]
+        t, _ = self.trajectories[segment.trajectory]
+        return self.systematic[segment.trajectory][np.searchsorted(t, segment.t)]
 
     def _weighted(self, problem: Collocation, weight: float) -> Collocation:
         return problem.weighted(self.noise**-2, weight / self.slack**2)
 
     def _criterion(self, problem: Collocation, state: State) -> float:
-        terms = self.charges @ state.active.sum(axis=1)
-        return problem.objective(state) + terms + self.axis_charge * state.moving.sum()
+        terms = self.penalties @ state.active.sum(axis=1)
+        return problem.objective(state) + terms + self.axis_penalty * state.moving.sum()
 
     def _log(self, stage: str, problem: Collocation, state: State, weight: float) -> None:
         data = problem.data_loss(state.control_points)
@@ -309,9 +311,9 @@ class _Search:
             columns = np.concatenate([np.arange(size), size + np.flatnonzero(state.moving)])
             model = problem.linearise(state, columns)
             present = state.flat()[columns]
-            charge = np.append(np.tile(self.charges, self.d), np.full(self.d, -np.inf))[columns]
+            penalty = np.append(np.tile(self.penalties, self.d), np.full(self.d, -np.inf))[columns]
             support, solution, _ = subset_search(
-                model.information, model.gradient, present, charge, state.free()[columns]
+                model.information, model.gradient, present, penalty, state.free()[columns]
             )
             if (support == state.free()[columns]).all():
                 break
@@ -328,17 +330,17 @@ class _Search:
         """Supports in the frames where the law is sparsest, by the quadratic model."""
         weight = FIRST_WEIGHTS[-1]
         state, _ = self._select(state, problem, weight, "subset search, centred frame")
-        hull = self._hull(state, problem, weight)
+        closed = self._closed(state, problem, weight)
         x = problem.x
         origins = sparse_origins(
-            hull.algebra, hull.state.active, self.home, (x.min(axis=0), x.max(axis=0)),
-            self.charges.max(), keep=4, rng=self.rng,
+            closed.algebra, closed.state.active, self.home, (x.min(axis=0), x.max(axis=0)),
+            self.penalties.max(), keep=4, rng=self.rng,
         )  # fmt: skip
         variants = [
             variant for origin in [self.home, *origins] for variant in self._variants(origin)
         ]
         unique = {tuple(np.round(origin, 2)): (origin, moving) for origin, moving in variants}
-        return [self._candidate(hull, *variant) for variant in unique.values()]
+        return [self._candidate(closed, *variant) for variant in unique.values()]
 
     def _variants(self, origin: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """An origin, and the same with some of its axes at home, where they cost nothing."""
@@ -347,7 +349,7 @@ class _Search:
         )
         return [(np.where(mask, origin, self.home), np.array(mask)) for mask in masks]
 
-    def _hull(self, state: State, problem: Collocation, weight: float) -> _Hull:
+    def _closed(self, state: State, problem: Collocation, weight: float) -> _Closure:
         problem = self._weighted(problem, weight)
         state = State(
             state.control_points,
@@ -361,26 +363,26 @@ class _Search:
         columns = np.flatnonzero(state.free())
         information = np.diag(np.where(state.free()[: self.exponents.size], 0.0, 1e30))
         information[np.ix_(columns, columns)] = problem.linearise(state, columns).information
-        algebra = FrameAlgebra(self.exponents, state.coefficients, information)
-        return _Hull(state, columns, algebra, problem.objective(state))
+        algebra = ShiftedLaw(self.exponents, state.coefficients, information)
+        return _Closure(state, columns, algebra, problem.objective(state))
 
-    def _candidate(self, hull: _Hull, origin: np.ndarray, moving: np.ndarray) -> _Candidate:
-        """The cheapest support at an origin, by the quadratic model around the hull."""
-        coefficients, information = hull.algebra.at(origin)
-        present = coefficients.T.ravel()[hull.columns]
-        information = information[np.ix_(hull.columns, hull.columns)]
+    def _candidate(self, closed: _Closure, origin: np.ndarray, moving: np.ndarray) -> _Candidate:
+        """The cheapest support at an origin, by the quadratic model around the closed."""
+        coefficients, information = closed.algebra.at(origin)
+        present = coefficients.T.ravel()[closed.columns]
+        information = information[np.ix_(closed.columns, closed.columns)]
         support, solution, value = subset_search(
             information,
-            np.zeros(len(hull.columns)),
+            np.zeros(len(closed.columns)),
             present,
-            np.tile(self.charges, self.d)[hull.columns],
-            np.ones(len(hull.columns), dtype=bool),
+            np.tile(self.penalties, self.d)[closed.columns],
+            np.ones(len(closed.columns), dtype=bool),
         )
         flat = np.zeros((2, self.exponents.size))
-        flat[:, hull.columns] = solution, support
+        flat[:, closed.columns] = solution, support
         coefficients, active = flat.reshape(2, self.d, -1).transpose(0, 2, 1)
-        state = State(hull.state.control_points, coefficients, active != 0, origin.copy(), moving)
-        cost = hull.objective + value + self.axis_charge * moving.sum()
+        state = State(closed.state.control_points, coefficients, active != 0, origin.copy(), moving)
+        cost = closed.objective + value + self.axis_penalty * moving.sum()
         return _Candidate(cost, state)
 
     def _best(self, candidates: list[_Candidate], problem: Collocation) -> State:
@@ -390,7 +392,7 @@ class _Search:
         stage = "subset search, own frame"
         for weight in SEARCH_WEIGHTS:
             refined = [self._select(state, problem, weight, stage) for state in states]
-            limit = min(value for _, value in refined) + self.charges.max()
+            limit = min(value for _, value in refined) + self.penalties.max()
             kept = {_key(state): state for state, value in refined if value <= limit}
             states = list(kept.values())
         settled = [self._come_home(state, problem) for state in states]
@@ -404,8 +406,8 @@ class _Search:
         value = self._criterion(self._weighted(problem, FINAL_WEIGHT), state)
         if not state.moving.any():
             return state, value
-        hull = self._hull(state, problem, FINAL_WEIGHT)
-        variants = [self._candidate(hull, *variant) for variant in self._variants(state.offset)]
+        closed = self._closed(state, problem, FINAL_WEIGHT)
+        variants = [self._candidate(closed, *variant) for variant in self._variants(state.offset)]
         closest = min(variants, key=lambda candidate: candidate.cost)
         if closest.cost < value and closest.state.moving.sum() < state.moving.sum():
             trial, cost = self._select(closest.state, problem, FINAL_WEIGHT, "offset home")
@@ -437,7 +439,7 @@ class _Search:
     ) -> tuple[State, Collocation]:
         problem = self._weighted(problem, FINAL_WEIGHT)
         joined, curves = join(
-            problem.segments, _splines(problem, state), group, self.records, self._law(state),
+            problem.segments, _splines(problem, state), group, self.trajectories, self._law(state),
             self.spacing,
         )  # fmt: skip
         bridged = self._problem(joined)
@@ -479,7 +481,7 @@ class _Search:
             if (error < np.maximum(0.1 * spread, SPLINE_ERROR)).all():
                 break
         # A term that only made up for the error of coarser splines goes, and the noise, known
-        # better now, may change what is worth its charge.
+        # better now, may change what is worth its penalty.
         state, _ = self._select(state, problem, FINAL_WEIGHT, "polish")
         return problem.solve(state, tolerance=1e-4), problem
 
@@ -502,8 +504,14 @@ def _rms_speed(splines: Sequence[BSpline]) -> float:
     return float(np.sqrt((np.concatenate(slopes) ** 2).mean()))
 
 
-def _stretches(records: Sequence[Record], longest_step: float) -> list[tuple[int, Record]]:
-    pieces = [(i, piece) for i, record in enumerate(records) for piece in cut(record, longest_step)]
+def _stretches(
+    trajectories: Sequence[Trajectory], longest_step: float
+) -> list[tuple[int, Trajectory]]:
+    pieces = [
+        (i, piece)
+        for i, trajectory in enumerate(trajectories)
+        for piece in cut(trajectory, longest_step)
+    ]
     longest = max(len(t) for _, (t, _) in pieces)
     return [piece for piece in pieces if len(piece[1][0]) >= min(SHORTEST_STRETCH, longest)]
 

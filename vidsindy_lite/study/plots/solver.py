@@ -174,7 +174,7 @@ def plot_ranks(panels: Mapping[str, tuple[Floats, float | None]], true: Bools) -
         axes.plot(rank[hit], values[order][hit], "oC0", ms=7, label="true term")
         axes.plot(rank[~hit], values[order][~hit], "xC1", ms=7, mew=2, label="false term")
         if threshold is not None:
-            axes.axhline(threshold, color="k", ls="--", lw=1, label="charge of a linear term")
+            axes.axhline(threshold, color="k", ls="--", lw=1, label="penalty of a linear term")
         axes.set(yscale="log", xlabel="rank", title=name, xlim=(0, len(values) + 1))
     handles = {}
     for axes in grid:
