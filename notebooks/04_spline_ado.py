@@ -339,7 +339,7 @@ caption = "Gradient descent settles at a compromise; continuation makes the law 
 save_figure("solver_histories", fig, caption=caption, numbers=histories)
 
 # %% [markdown]
-# *The paper's optimiser (red) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
+# *The paper's optimiser (vermilion) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
 # STRidge drops terms, but not all false ones. Ours (blue) goes through a quadratic library (30 terms) and a cubic one (60), prunes each,
 # moves the origin, and ends at seven terms, a data loss of one noise variance, and a law that holds.*
 
@@ -665,8 +665,8 @@ caption = "How often the law is exact, and what the solver says about it, in thr
 save_figure("solver_failures_figure", fig, caption=caption, numbers=verdicts)
 
 # %% [markdown]
-# *Laws that are wrong (orange, red) come with low sampling, high noise, or a library without the
-# law's terms (degree 1). A warning (orange) is what one hopes for then; red is a wrong law that nobody
+# *Laws that are wrong (orange, vermilion) come with low sampling, high noise, or a library without the
+# law's terms (degree 1). A warning (orange) is what one hopes for then; vermilion is a wrong law that nobody
 # flagged, light blue a right one that was doubted.*
 
 # %%

@@ -516,8 +516,8 @@ caption = "How often the law is exact, and what the solver says of it, over all 
 save_figure("study_verdicts_figure", fig, caption=caption, numbers=verdicts)
 
 # %% [markdown]
-# *All systems. Blue is right and light blue right but doubted, orange wrong with a warning, red
-# wrong without one.*
+# *All systems. Blue is right and light blue right but doubted, orange wrong with a warning,
+# vermilion wrong without one.*
 
 # %%
 counts = Counter(r.verdict for r in ours)

@@ -155,7 +155,7 @@ gap = np.isnan(first.path).any(axis=1)
 alone = [np.isnan(view.track.pixels).any(axis=1).mean() for view in first.views]
 print(f"no position in {gap.mean():.0%} of the frames; single cameras: {', '.join(f'{a:.0%}' for a in alone)}")
 error = np.sqrt(np.nanmean((first.path - first.x) ** 2, axis=0))
-print(f"rms error of the path: {error} scene units, where it spreads by {first.x.std(axis=0)}")
+print(f"rms error of the path: {error.round(4)} scene units, spread: {first.x.std(axis=0).round(2)}")
 assert 0 < gap.mean() < np.mean(alone)
 assert (error < 0.01 * first.x.std(axis=0)).all()
 
