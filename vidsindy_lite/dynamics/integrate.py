@@ -26,8 +26,8 @@ SHORTEST_STEP = 1e-13
 
 
 def runge_kutta_4(
-    rate: Callable[[np.ndarray], np.ndarray], t: np.ndarray, x0: np.ndarray, substeps: int = 10
-) -> np.ndarray:
+    rate: Callable[[Floats], Floats], t: Floats, x0: Floats, substeps: int = 10
+) -> Floats:
     """Integrate with the classical 4th-order Runge-Kutta method, as the paper does.
 
     Parameters

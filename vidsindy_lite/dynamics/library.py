@@ -11,13 +11,16 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy.special import comb as binomial
 
+from ..arrays import Bools, Floats, Ints
+from ..checks import check_integer
+
 
 def variable_names(d: int) -> tuple[str, ...]:
     """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
     return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
 
 
-def monomial_exponents(d: int, degree: int) -> np.ndarray:
+def monomial_exponents(d: int, degree: int) -> Ints:
     """Exponents of all monomials of ``d`` variables up to ``degree``, in graded order.
 
     Parameters
@@ -41,7 +44,7 @@ def monomial_exponents(d: int, degree: int) -> np.ndarray:
     return np.array(rows, dtype=int).reshape(-1, d)
 
 
-def monomials(x: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+def monomials(x: Floats, exponents: Ints) -> Floats:
     """Evaluate monomials.
 
     Parameters
@@ -66,7 +69,7 @@ def monomials(x: np.ndarray, exponents: np.ndarray) -> np.ndarray:
     return values.T
 
 
-def monomial_gradients(x: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+def monomial_gradients(x: Floats, exponents: Ints) -> Floats:
     """Derivatives of monomials, shape (n, l, d); see `monomials`."""
     gradients = []
     for i in range(x.shape[1]):
@@ -76,7 +79,7 @@ def monomial_gradients(x: np.ndarray, exponents: np.ndarray) -> np.ndarray:
     return np.stack(gradients, axis=-1)
 
 
-def shift_matrix(exponents: np.ndarray, offset: np.ndarray) -> np.ndarray:
+def shift_matrix(exponents: Ints, offset: Floats) -> Floats:
     """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l).
 
     The library has to be closed: with every monomial it holds all its divisors.
@@ -86,31 +89,31 @@ def shift_matrix(exponents: np.ndarray, offset: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _binomials(exponents: bytes, l: int, d: int) -> tuple[np.ndarray, np.ndarray]:
+def _binomials(exponents: bytes, l: int, d: int) -> tuple[Floats, Ints]:
     powers = np.frombuffer(exponents, dtype=int).reshape(l, d)
     lowered = powers[None, :, :] - powers[:, None, :]
     factors = np.where(lowered >= 0, binomial(powers[None, :, :], powers[:, None, :]), 0.0)
     return factors, np.maximum(lowered, 0)
 
 
-def closure(exponents: np.ndarray) -> np.ndarray:
+def closure(exponents: Ints) -> Ints:
     """Exponents of all divisors of the given monomials, in graded order, shape (l, d)."""
     divisors = {divisor for powers in exponents for divisor in np.ndindex(*(powers + 1))}
     ordered = sorted(divisors, key=lambda e: (sum(e), tuple(-p for p in e)))
     return np.array(ordered, dtype=int).reshape(-1, exponents.shape[1])
 
 
-def divides(exponents: np.ndarray) -> np.ndarray:
+def divides(exponents: Ints) -> Bools:
     """Which monomial (row) divides which (column), itself included; shape (l, l)."""
     return (exponents[:, None, :] <= exponents[None, :, :]).all(axis=-1)
 
 
-def closure_mask(exponents: np.ndarray, support: np.ndarray) -> np.ndarray:
+def closure_mask(exponents: Ints, support: Bools) -> Bools:
     """Widen a support (l, d) to all divisors of its terms: what any shift of it may contain."""
     return divides(exponents) @ support
 
 
-def shift_generators(exponents: np.ndarray) -> np.ndarray:
+def shift_generators(exponents: Ints) -> Floats:
     """Matrices ``N_i`` with ``d phi / d x_i = phi N_i``, shape (d, l, l).
 
     ``-N_i`` is the rate of change of `shift_matrix` with the offset along axis i.
