@@ -12,8 +12,8 @@ from vidsindy_lite.study import baselines, score
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.baselines import BASELINES
 from vidsindy_lite.study.corruption import add_noise, drop_blocks, drop_fibers
-from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.films import FilmResult, FilmTask, run_film
+from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.tables import by_condition, rate, significant, summary, tabulate
 from vidsindy_lite.study.trials import Trial, grid, run_trial, source_path
 
@@ -28,7 +28,14 @@ def simulated(task):
     truth = SYSTEMS[task.system].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(task.frames)
     seen = Observation((), None, None, t, x, np.zeros((0, *x.shape)), ())
-    return FilmResult(**vars(seen), task=task, truth=truth, pixel_error=(0.0,) * 3, path_error=np.zeros(3), seconds=0.0)
+    return FilmResult(
+        **vars(seen),
+        task=task,
+        truth=truth,
+        pixel_error=(0.0,) * 3,
+        path_error=np.zeros(3),
+        seconds=0.0,
+    )
 
 
 @pytest.fixture
@@ -49,16 +56,16 @@ def test_film_result_reports_every_error(filmed):
     assert max(filmed.pixel_error) < 0.1
     truth = source_path(filmed, "truth")[0]
     np.testing.assert_array_equal(truth, filmed.truth.trajectory(200)[1])
-    np.testing.assert_allclose(
-        filmed.path_error, np.sqrt(np.mean((filmed.x - truth) ** 2, axis=0))
-    )
+    np.testing.assert_allclose(filmed.path_error, np.sqrt(np.mean((filmed.x - truth) ** 2, axis=0)))
     assert (filmed.path_error < 0.01 * truth.std(axis=0)).all()
     assert all(camera.is_calibrated for camera in filmed.rig.cameras)
 
 
 def test_whole_pixels_are_coarser_but_near(filmed):
     truth = source_path(filmed, "truth")[0]
-    fine, coarse = (np.abs(source_path(filmed, s)[0] - truth).max() for s in ("videos", "whole pixels"))
+    fine, coarse = (
+        np.abs(source_path(filmed, s)[0] - truth).max() for s in ("videos", "whole pixels")
+    )
     pixel = max(camera.scale for camera in filmed.rig.cameras)
     assert fine < 0.2 * coarse
     assert coarse < 2 * pixel
@@ -124,6 +131,7 @@ def test_noise_of_two_levels_is_not_the_same_noise_scaled():
 def test_every_method_gets_the_same_data(condition, level, no_videos, monkeypatch):
     seen = {}
     for method in experiments.METHODS:
+
         def watch(t, x, seed=None, systematic=None, method=method):
             seen[method] = (t, x)
             return SYSTEMS["Lorenz"]
