@@ -51,7 +51,7 @@ from tqdm import tqdm
 
 from vidsindy_lite import discover, dynamics
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, discover_paper, plots, score
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, paper_ado, plots, score
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
@@ -279,13 +279,13 @@ some = slice(0, 400 if full else 300)
 def compare(noise):
     data = t[some], add_noise(clean[some], noise, np.random.default_rng(seed))
     results = []
-    for name, optimise, options in (("paper's", discover_paper, steps), ("ours", discover, {})):
+    for name, optimise, options in (("paper's", paper_ado.discover_paper, steps), ("ours", discover, {})):
         began = perf_counter()
         results.append((name, optimise(*data, **options), perf_counter() - began))
     return results
 
 
-discover_paper(t[:99], x[:99], pretraining=1, epochs=1)  # so that PyTorch's start is not timed
+paper_ado.discover_paper(t[:99], x[:99], pretraining=1, epochs=1)  # so that PyTorch's start is not timed
 runs = {noise: compare(noise) for noise in ((0.02, level) if full else (level,))}
 
 

@@ -41,7 +41,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
-from vidsindy_lite.study import DISTURBANCES, START, SYSTEMS, SceneTask, plots, pulls, run, sweep
+from vidsindy_lite.study import (
+    DISTURBANCES,
+    START,
+    SYSTEMS,
+    SceneTask,
+    plots,
+    pulls,
+    run_scene,
+    sweep,
+)
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
@@ -62,12 +71,12 @@ for name, value in DISTURBANCES.items():
     print(f"{name:15} {value}")
 
 # %% [markdown]
-# `run` makes the videos, tracks them, learns cameras 2 and 3, reconstructs the path and discovers the
+# `run_scene` makes the videos, tracks them, learns cameras 2 and 3, reconstructs the path and discovers the
 # law. Nothing is told to it but the times of the frames, where the cameras stand, and the calibration of
 # the first. Each trial has another scene.
 
 # %%
-runs = sweep(run, [SceneTask(n, frames) for n in trials], jobs=jobs, desc="trials")
+runs = sweep(run_scene, [SceneTask(n, frames) for n in trials], jobs=jobs, desc="trials")
 first = runs[0]
 
 # %%

@@ -106,7 +106,7 @@ for camera in truth.cameras:
 
 # %%
 with TemporaryDirectory() as folder:
-    tracks = lab.film(truth, paths, folder, seed)
+    tracks = lab.film_ball(truth, paths, folder, seed)
     clips = [Path(folder) / f"path_1_camera_{i}.mov" for i in (1, 2, 3)]
     images = [read_frame(clip, marked) for clip in clips]
 lost = sum(np.isnan(track).any(axis=1).sum() for track in tracks)

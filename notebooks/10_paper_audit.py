@@ -57,10 +57,9 @@ from vidsindy_lite.study import (
     SYSTEMS,
     SYSTEMS_S1,
     audit,
-    ensemble,
+    baselines,
     plots,
     score,
-    stlsq,
 )
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -497,8 +496,8 @@ for name, law in (("NoseHoover", LAWS["PySINDy", "NoseHoover"]), ("WangSun", men
     t, x = truths[name].trajectory(400)
     fits = {
         "Table S2": law,
-        "here, time step / 10": stlsq(t / 10, x),
-        "here, right time step": stlsq(t, x),
+        "here, time step / 10": baselines.stlsq(t / 10, x),
+        "here, right time step": baselines.stlsq(t, x),
     }
     ratios[name] = {key: audit.coefficient_ratios(fit, truths[name]) for key, fit in fits.items()}
 
@@ -570,7 +569,7 @@ assert same == ["Lorenz", "RayleighBenard", "NoseHoover", "Tsucs2"]
 
 # %%
 t, x = truths["NoseHoover"].trajectory(frames)
-fits = stlsq(t, x), ensemble(t, x, seed=seed)
+fits = baselines.stlsq(t, x), baselines.ensemble(t, x, seed=seed)
 plain, bagged = (score(fit, truths["NoseHoover"]).l2 for fit in fits)
 apart = abs(bagged / plain - 1)
 digits = 0.5e-4 / SCORES["Table 1", "PySINDy", "NoseHoover"].l2
