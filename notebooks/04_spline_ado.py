@@ -143,7 +143,7 @@ assert (native.support.sum(), moved.support.sum()) == (7, 12)
 
 # %%
 segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
-problem = dynamics.Collocation([segment], native.exponents, np.ones(3), np.ones(3))
+problem = dynamics.Collocation.of([segment], native.exponents, np.ones(3), np.ones(3))
 G = dynamics.design_matrix(problem.knots[0], segment.t)
 P = np.linalg.lstsq(G, segment.x)[0]
 all_axes = np.ones(3, dtype=bool)
@@ -155,7 +155,7 @@ def misfits(unknowns):
     flat[state.free()] = unknowns[P.size :]
     law = {"coefficients": flat[:-3].reshape(3, -1).T, "offset": flat[-3:]}
     unmet = problem.physics_residual(replace(state, control_points=control, **law))
-    weighted = np.sqrt(problem.node_weights)[:, None] * unmet
+    weighted = np.sqrt(problem.grid.node_weights)[:, None] * unmet
     return np.concatenate([(problem.curve(control) - segment.x).ravel(), weighted.ravel()])
 
 
@@ -204,7 +204,7 @@ everything = np.arange(exponents.size)
 
 def step_row(n):
     times, states = truth.trajectory(n)
-    whole = dynamics.Collocation([dynamics.Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
+    whole = dynamics.Collocation.of([dynamics.Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
     P = dynamics.smooth([(times, states)], rng).splines[0].c
     start = dynamics.State(P, np.zeros(exponents.shape), np.ones(exponents.shape, bool), offset, ~all_axes)
     seconds = min(timed(lambda: whole.linearise(start, everything), number=1, repeat=3))
@@ -359,7 +359,7 @@ assert ours.history[-1].terms == native.support.sum()
 # %%
 def start(t, x):
     spline, origin = dynamics.smooth([(t, x)], np.random.default_rng(seed)).splines[0], x.mean(axis=0)
-    problem = dynamics.Collocation([dynamics.Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
+    problem = dynamics.Collocation.of([dynamics.Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
     curve, slope = problem.node_states(spline.c)
     coefficients, squares, *_ = np.linalg.lstsq(dynamics.monomials(curve - origin, exponents), slope)
     terms = np.ones(exponents.shape, dtype=bool)
@@ -371,7 +371,7 @@ def unpruned(t, x):
     state, problem, unmet = start(t, x)
     for alpha in (0.1, 1.0, 10.0, 100.0):
         problem = problem.weighted(problem.data_weights, alpha / unmet)
-        state = problem.solve(state, tolerance=1.0)
+        state = problem.solve(state, tolerance=1.0).state
     information = problem.linearise(state, everything).information
     return dynamics.ShiftedLaw(exponents, state.coefficients, information), state
 

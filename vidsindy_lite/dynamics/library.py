@@ -105,7 +105,7 @@ def closure(exponents: Ints) -> Ints:
 
 def divides(exponents: Ints) -> Bools:
     """Which monomial (row) divides which (column), itself included; shape (l, l)."""
-    return (exponents[:, None, :] <= exponents[None, :, :]).all(axis=-1)
+    return np.all(exponents[:, None, :] <= exponents[None, :, :], axis=-1)
 
 
 def closure_mask(exponents: Ints, support: Bools) -> Bools:

@@ -167,7 +167,7 @@ class PolynomialSystem:
         )
         return jacobian.reshape(*x.shape, self.d)
 
-    def shift(self, offset: Sequence[float]) -> PolynomialSystem:
+    def shift(self, offset: Sequence[float] | Floats) -> PolynomialSystem:
         """The same motion seen from a shifted origin, exactly (paper: Eq. 10).
 
         If x(t) solves this system, x(t) + offset solves the returned one.
@@ -177,12 +177,11 @@ class PolynomialSystem:
         offset : array_like, shape (d,)
             Shift of the trajectory, in state units.
         """
-        offset = check_vector("offset", offset, self.d)
         exponents = closure(self.exponents)
         rows = {tuple(e): row for row, e in enumerate(exponents)}
         closed = np.zeros(exponents.shape)
         closed[[rows[tuple(e)] for e in self.exponents]] = self.coefficients
-        matrix = shift_matrix(exponents, offset)
+        matrix = shift_matrix(exponents, check_vector("offset", offset, self.d))
         shifted = matrix @ closed
         # What cancels in exact arithmetic must not survive as a term of 1e-16.
         shifted[np.abs(shifted) <= 1e-13 * (np.abs(matrix) @ np.abs(closed))] = 0.0
