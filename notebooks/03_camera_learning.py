@@ -131,8 +131,8 @@ assert not np.allclose(stack @ np.linalg.pinv(stack), np.eye(6), atol=0.1)
 # %%
 learned = learn_cameras(tracks, start, method="paper")
 for found, true in zip(learned.cameras, truth.cameras, strict=True):
-    print(f"scale {found.scale:.12f} (true {true.scale:.12f})", end="   ")
-    print(f"angle {found.angle:+.12f} (true {true.angle:+.12f})")
+    print(f"scale {found.scale:.9f} (true {true.scale:.9f})", end="   ")
+    print(f"angle {found.angle:+.9f} (true {true.angle:+.9f})")
 assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
 
 # %% [markdown]
@@ -185,9 +185,9 @@ def row(pixels, observed, method):
 cases = {"exact": tracks, "rounded": rounded, "2 px noise": noisy}
 methods = ("paper", "gradient", "joint")
 rows = [row(name, observed, method) for name, observed in cases.items() for method in methods]
-for entry in rows:  # below 1e-9, a number says nothing but "rounding"
-    entry |= {k: "< 1e-9" for k, v in entry.items() if isinstance(v, float) and v < 1e-9}
-assert all(entry["error of scale"] == "< 1e-9" for entry in rows[:3:2])
+for entry in rows:  # so small a number says nothing but "rounding"
+    entry |= {k: "below 1e-6" for k in tuple(entry)[2:5] if entry[k] < 1e-6}
+assert all(entry["error of scale"] == "below 1e-6" for entry in rows[:3])
 caption = (
     "The closed form is exact; the joint fit is closer than Eq. (4) when pixels are not exact."
 )
@@ -221,7 +221,7 @@ caption = (
 save_figure("cameras_trials", fig, caption=caption, numbers=errors)
 
 # %% [markdown]
-# *Each point is one trial with 2 px noise: with the epipolar condition (red), scales and angles of the
+# *Each point is one trial with 2 px noise: with the epipolar condition (vermilion), scales and angles of the
 # learned cameras scatter less than by Eq. (4) alone (blue).*
 
 # %% [markdown]
@@ -302,7 +302,7 @@ for i, track in enumerate(gappy):
     track[i::3] = np.nan
 learned = learn_cameras(gappy, start)
 assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
-assert np.allclose(reconstruct(gappy, learned), x, atol=1e-9)
+assert np.allclose(reconstruct(gappy, learned), x, atol=1e-6)
 
 # %% [markdown]
 # And Eq. (4) says that it has nothing to go by:

@@ -51,7 +51,7 @@ from tqdm import tqdm
 
 from vidsindy_lite import discover, dynamics
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, discover_paper, plots, score
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, paper_ado, plots, score
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
@@ -143,7 +143,7 @@ assert (native.support.sum(), moved.support.sum()) == (7, 12)
 
 # %%
 segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
-problem = dynamics.Collocation([segment], native.exponents, np.ones(3), np.ones(3))
+problem = dynamics.Collocation.of([segment], native.exponents, np.ones(3), np.ones(3))
 G = dynamics.design_matrix(problem.knots[0], segment.t)
 P = np.linalg.lstsq(G, segment.x)[0]
 all_axes = np.ones(3, dtype=bool)
@@ -155,7 +155,7 @@ def misfits(unknowns):
     flat[state.free()] = unknowns[P.size :]
     law = {"coefficients": flat[:-3].reshape(3, -1).T, "offset": flat[-3:]}
     unmet = problem.physics_residual(replace(state, control_points=control, **law))
-    weighted = np.sqrt(problem.node_weights)[:, None] * unmet
+    weighted = np.sqrt(problem.grid.node_weights)[:, None] * unmet
     return np.concatenate([(problem.curve(control) - segment.x).ravel(), weighted.ravel()])
 
 
@@ -204,7 +204,7 @@ everything = np.arange(exponents.size)
 
 def step_row(n):
     times, states = truth.trajectory(n)
-    whole = dynamics.Collocation([dynamics.Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
+    whole = dynamics.Collocation.of([dynamics.Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
     P = dynamics.smooth([(times, states)], rng).splines[0].c
     start = dynamics.State(P, np.zeros(exponents.shape), np.ones(exponents.shape, bool), offset, ~all_axes)
     seconds = min(timed(lambda: whole.linearise(start, everything), number=1, repeat=3))
@@ -279,13 +279,13 @@ some = slice(0, 400 if full else 300)
 def compare(noise):
     data = t[some], add_noise(clean[some], noise, np.random.default_rng(seed))
     results = []
-    for name, optimise, options in (("paper's", discover_paper, steps), ("ours", discover, {})):
+    for name, optimise, options in (("paper's", paper_ado.discover_paper, steps), ("ours", discover, {})):
         began = perf_counter()
         results.append((name, optimise(*data, **options), perf_counter() - began))
     return results
 
 
-discover_paper(t[:99], x[:99], pretraining=1, epochs=1)  # so that PyTorch's start is not timed
+paper_ado.discover_paper(t[:99], x[:99], pretraining=1, epochs=1)  # so that PyTorch's start is not timed
 runs = {noise: compare(noise) for noise in ((0.02, level) if full else (level,))}
 
 
@@ -339,7 +339,7 @@ caption = "Gradient descent settles at a compromise; continuation makes the law 
 save_figure("solver_histories", fig, caption=caption, numbers=histories)
 
 # %% [markdown]
-# *The paper's optimiser (red) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
+# *The paper's optimiser (vermilion) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
 # STRidge drops terms, but not all false ones. Ours (blue) goes through a quadratic library (30 terms) and a cubic one (60), prunes each,
 # moves the origin, and ends at seven terms, a data loss of one noise variance, and a law that holds.*
 
@@ -359,7 +359,7 @@ assert ours.history[-1].terms == native.support.sum()
 # %%
 def start(t, x):
     spline, origin = dynamics.smooth([(t, x)], np.random.default_rng(seed)).splines[0], x.mean(axis=0)
-    problem = dynamics.Collocation([dynamics.Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
+    problem = dynamics.Collocation.of([dynamics.Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
     curve, slope = problem.node_states(spline.c)
     coefficients, squares, *_ = np.linalg.lstsq(dynamics.monomials(curve - origin, exponents), slope)
     terms = np.ones(exponents.shape, dtype=bool)
@@ -371,7 +371,7 @@ def unpruned(t, x):
     state, problem, unmet = start(t, x)
     for alpha in (0.1, 1.0, 10.0, 100.0):
         problem = problem.weighted(problem.data_weights, alpha / unmet)
-        state = problem.solve(state, tolerance=1.0)
+        state = problem.solve(state, tolerance=1.0).state
     information = problem.linearise(state, everything).information
     return dynamics.ShiftedLaw(exponents, state.coefficients, information), state
 
@@ -665,8 +665,8 @@ caption = "How often the law is exact, and what the solver says about it, in thr
 save_figure("solver_failures_figure", fig, caption=caption, numbers=verdicts)
 
 # %% [markdown]
-# *Laws that are wrong (orange, red) come with low sampling, high noise, or a library without the
-# law's terms (degree 1). A warning (orange) is what one hopes for then; red is a wrong law that nobody
+# *Laws that are wrong (orange, vermilion) come with low sampling, high noise, or a library without the
+# law's terms (degree 1). A warning (orange) is what one hopes for then; vermilion is a wrong law that nobody
 # flagged, light blue a right one that was doubted.*
 
 # %%

@@ -88,7 +88,7 @@ truth = lab.cameras()
 paths = lab.paths(frames)
 x = paths.reshape(-1, 3)
 marked = frames // 2  # index of the frame in which the ball is there
-assert np.array_equal(x[marked], lab.MARKED)
+assert np.allclose(x[marked], lab.MARKED, atol=1e-3)
 for camera in truth.cameras:
     print(f"at {camera.position.round()} mm, focal length {camera.focal_length:.0f} px")
 
@@ -106,7 +106,7 @@ for camera in truth.cameras:
 
 # %%
 with TemporaryDirectory() as folder:
-    tracks = lab.film(truth, paths, folder, seed)
+    tracks = lab.film_ball(truth, paths, folder, seed)
     clips = [Path(folder) / f"path_1_camera_{i}.mov" for i in (1, 2, 3)]
     images = [read_frame(clip, marked) for clip in clips]
 lost = sum(np.isnan(track).any(axis=1).sum() for track in tracks)
@@ -255,7 +255,7 @@ with TemporaryDirectory() as folder:
 pixels = [camera.project(x) for camera in truth.cameras]  # of the centre: exact
 learned = learn_cameras(pixels, start)
 assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
-assert rms(reconstruct(pixels, learned) - x) < 1e-6  # mm
+assert rms(reconstruct(pixels, learned) - x) < 1e-5  # mm
 learned = learn_cameras(tracks, start)  # of the ball in the videos
 by_pinhole = reconstruct(tracks, learned)
 print(f"error along the paths: {rms(by_pinhole - x):.3f} mm rms")
@@ -270,7 +270,7 @@ caption = "The paths from above: true, by orthographic and by perspective camera
 save_figure("lab_table", fig, caption=caption, numbers={"truth": paths, **found})
 
 # %% [markdown]
-# *Left: the paths from above; orthographic cameras (red) bend them, perspective cameras (blue) put them
+# *Left: the paths from above; orthographic cameras (vermilion) bend them, perspective cameras (blue) put them
 # on the truth (grey). Right: the scene, with the part of the table that the cameras look at.*
 
 # %% [markdown]
@@ -293,7 +293,7 @@ tracking = [
     length(track - camera.ball_image(x, lab.RADIUS)[0])
     for camera, track in zip(truth.cameras, tracks, strict=True)
 ]
-print(f"centroid beside centre: up to {np.max(shifts):.4f} px; tracker: up to {np.max(tracking):.4f} px")
+print(f"centroid beside centre: up to {np.max(shifts):.3f} px; tracker: up to {np.max(tracking):.3f} px")
 assert np.max(tracking) < 0.005
 assert 5 * np.max(tracking) < np.max(shifts) < 0.1
 
@@ -353,7 +353,7 @@ def misplaced(name, **change):
     missed = np.hstack(residuals(pixels, rig))
     values = rms(reconstruct(pixels, rig) - x), np.sqrt(np.mean(missed**2))
     return {"camera 2": name} | dict(
-        zip(("rms (mm)", "residuals (px rms)"), np.round(values, 6).tolist(), strict=True)
+        zip(("rms (mm)", "residuals (px rms)"), np.round(values, 3).tolist(), strict=True)
     )
 
 

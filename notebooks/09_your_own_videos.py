@@ -78,7 +78,7 @@ late, fps = 7, 30
 
 
 # %%
-def shoot(name, folder, suffix=".avi", codec="MJPG"):
+def shoot(name, folder, suffix=".avi", codec="MJPG", trial=0):
     truth = SYSTEMS[name].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(frames)
     rig = Rig.around(x)
@@ -86,7 +86,7 @@ def shoot(name, folder, suffix=".avi", codec="MJPG"):
     views = zip("abc", ("hills", "sea", "wood"), shown, rig.cameras, strict=True)
     for letter, background, rows, camera in views:
         scene = Scene(background=background, size=18)
-        images = vision.render(camera.project(x)[rows], scene, seed)
+        images = vision.render(camera.project(x)[rows], scene, seed + trial)
         write_video(folder / f"{letter}{suffix}", images, fps, codec)
     rig.uncalibrated(keep=0).save(folder / "rig.toml")
     return truth, t, rig
@@ -145,7 +145,7 @@ for name in names:
 # %%
 shown = names[0]
 report = folders[shown] / "report"
-print({path.name: f"{path.stat().st_size // 1000} kB" for path in sorted(report.iterdir())})
+print(", ".join(path.name for path in sorted(report.iterdir())))
 page = (report / "report.html").read_text(encoding="utf-8")
 assert "http" not in page
 data = {n: json.loads((f / "report/result.json").read_text("utf-8")) for n, f in folders.items()}
@@ -175,30 +175,43 @@ for name in names:
 #
 # Most cameras and phones do not write one JPEG a frame: they write what has changed, and leave out the
 # smallest changes. A trace of the target then stays where it just was, so that the track trails behind
-# it, by hundredths of a pixel, but all the time. Here are the same scenes as mp4v, at the low bit rate
-# that OpenCV chooses, this time from Python.
+# it, by hundredths of a pixel, but all the time. Here are such scenes as mp4v at a low bit rate, this
+# time from Python: several trials, as one proves little.
+
 
 # %%
-rows = []
-for name in names:
+def compressed(name, trial):
     with TemporaryDirectory() as other:
-        truth, t, _ = shoot(name, Path(other), ".mp4", "mp4v")
+        truth, t, _ = shoot(name, Path(other), ".mp4", "mp4v", trial)
         files = sorted(Path(other).glob("*.mp4"))
         found = discover_from_videos(files, Rig.load(Path(other) / "rig.toml"), t)
         size = sum(path.stat().st_size for path in files)
     plain = sum(path.stat().st_size for path in folders[name].glob("*.avi"))
-    scored = score(found.discovery, truth)
+    return size / plain, score(found.discovery, truth), found.status
+
+
+trials = range(3 if full else 1)
+outcomes = {name: [compressed(name, trial) for trial in trials] for name in names}
+
+# %%
+rows = []
+for name, results in outcomes.items():
+    sizes, scores, verdicts = zip(*results, strict=True)
     rows.append({
-        "system": name, "size (% of motion JPEG)": 100 * size / plain, "l2": scored.l2,
-        "missing": scored.missing, "false": scored.false_positives, "verdict": found.status,
+        "system": name, "trials": len(results),
+        "size (% of motion JPEG)": round(100 * np.median(sizes)),
+        "l2, median": np.median([scored.l2 for scored in scores]),
+        "exact": sum(scored.exact for scored in scores),
+        "suspect": verdicts.count("suspect"),
     })  # fmt: skip
-    assert scored.exact or not full
+assert all(row["l2, median"] < 1e-3 for row in rows)
 save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rate.")
 
 # %% [markdown]
-# These laws are exact, as the solver allows for trails (`uncertainty.trailing_errors`); that does not
-# always go so well. The verdict may be "suspect": the errors of the tracks last for several frames, so
-# that they look like terms that were left out. Film at a high bit rate if you can.
+# The coefficients are still good to a thousandth, as the solver allows for trails
+# (`cameras.trailing_errors`). The terms need not be: the errors of the tracks last for several frames, so
+# that they look like terms that were left out, and the verdict may be "suspect". Film at a high bit rate
+# if you can.
 
 # %% [markdown]
 # ### The path
@@ -349,8 +362,8 @@ start = shots[shown][2].uncalibrated(keep=0)  # what the rig file said
 first, second, third = start.cameras
 free = learn_cameras(tracks, Rig([first, second, replace(third, position=None)]))
 error = (free.cameras[2].offset - truth.cameras[2].offset) / truth.cameras[2].scale
-print(f"the offset of camera 3 is off by {np.linalg.norm(error):.3f} px")
-assert np.linalg.norm(error) < 0.5
+print(f"the offset of camera 3 is off by {np.linalg.norm(error):.2f} px")
+assert np.linalg.norm(error) < 0.1
 
 # %% [markdown]
 # Two cameras must keep theirs. With one, nothing would fix the scene in depth:

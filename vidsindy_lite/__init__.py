@@ -21,7 +21,7 @@ from .cameras import (
     rig_template,
 )
 from .dynamics import Discovery, PolynomialSystem, discover
-from .pipeline import Observation, VideoDiscovery, discover_from_videos, observe
+from .pipeline import Observation, VideoDiscovery, discover_from_videos, observe, observe_tracks
 from .vision import (
     Scene,
     Track,
@@ -36,6 +36,7 @@ __all__ = [
     "discover_from_videos",
     "VideoDiscovery",
     "observe",
+    "observe_tracks",
     "Observation",
     "track",
     "Track",

@@ -6,7 +6,7 @@ Booleans are no numbers here, and text is none even where numpy would read it as
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 
@@ -32,6 +32,12 @@ def check_path(name: str, value: str | os.PathLike) -> Path:
     if not isinstance(value, str | os.PathLike):
         raise ValueError(f"{name}: must be the name of a file, got {value!r:.60}")
     return Path(value)
+
+
+def check_choice(name: str, value: str, known: Iterable[str]) -> None:
+    """One of the known names."""
+    if value not in known:
+        raise ValueError(f"{name}: must be one of {', '.join(known)}, got {value!r:.60}")
 
 
 def check_integer(name: str, value: int, least: int = 0) -> int:

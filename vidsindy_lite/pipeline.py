@@ -27,7 +27,7 @@ from .cameras import (
     systematic_errors,
     trailing_errors,
 )
-from .checks import check_integer, check_path, check_times, check_vector
+from .checks import check_integer, check_path, check_times, check_tracks, check_vector
 from .dynamics import Discovery, discover
 from .vision import Track, VideoInfo, check_detector, track, video_info
 
@@ -175,22 +175,74 @@ def observe(
     """
     footage = _check_footage(paths, rig, t, lags, detector)
     seen = _track_all(footage, detector, progress)
-    raw = [track.pixels for track in seen]
-    learned_lags = learn_lags(raw, rig, footage.rates, start=footage.lags)
-    used_lags = learned_lags if footage.lags is None else _given(footage.lags, learned_lags)
-    tracks = align(raw, used_lags.frames, footage.rates)
+    tracks = [track.pixels for track in seen]
+    doubts = [warning for track in seen for warning in track.warnings]
+    names = [path.name for path in footage.paths]
+    return _observed(tracks, rig, footage.t, footage.lags, footage.rates, names, doubts)
+
+
+def observe_tracks(
+    tracks: Sequence[ArrayLike], rig: Rig, t: ArrayLike, *, lags: Sequence[float] | None = None
+) -> Observation:
+    """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n_i, 2)
+        Pixels of the target, one track per camera of the rig, each from its own first frame; all
+        cameras have the same frame rate. NaN where it was not seen.
+    rig, lags
+        See `observe`.
+    t : array_like, shape (n_0,)
+        Time of each frame of the first track, increasing.
+
+    Returns
+    -------
+    Observation
+
+    Raises
+    ------
+    ValueError
+        If the numbers of tracks, cameras and times disagree, or as `observe` does.
+    """
+    check_learnable(rig)
+    raw = check_tracks(tracks, len(rig.cameras))
+    t = check_times(t)
+    if t.shape != (len(raw[0]),):
+        raise ValueError(
+            f"t: must have shape ({len(raw[0])},), one per row of tracks[0], got {t.shape}"
+        )
+    given = None if lags is None else check_vector("lags", lags, len(raw))
+    if given is not None:
+        given -= given[0]
+    return _observed(raw, rig, t, given, None, [f"tracks[{i}]" for i in range(len(raw))])
+
+
+def _observed(
+    raw: Sequence[Floats],
+    rig: Rig,
+    t: Floats,
+    lags: Floats | None,
+    rates: Floats | None,
+    names: Sequence[str],
+    doubts: Sequence[str] = (),
+) -> Observation:
+    """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    learned_lags = learn_lags(raw, rig, rates, start=lags)
+    used_lags = learned_lags if lags is None else _given(lags, learned_lags)
+    tracks = align(raw, used_lags.frames, rates)
     learned = learn_cameras(tracks, rig)
     shared = systematic_errors(raw, rig, learned, used_lags), trailing_errors(tracks, learned)
     return Observation(
         tracks=tracks,
         rig=learned,
         lags=used_lags,
-        t=footage.t,
+        t=t,
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
-            *_rig_warnings(tracks, learned, rig, footage.paths, learned_lags),
-            *(warning for track in seen for warning in track.warnings),
+            *_rig_warnings(tracks, learned, rig, names, learned_lags),
+            *doubts,
             *used_lags.warnings,
         ),
     )
@@ -322,7 +374,7 @@ def _rig_warnings(
     tracks: Sequence[Floats],
     learned: Rig,
     given: Rig,
-    paths: Sequence[Path],
+    names: Sequence[str],
     lags: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
@@ -340,12 +392,12 @@ def _rig_warnings(
             f"({list_lags(lags.frames)}) would explain it best"
         ]
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
-    others = [learn_normal(tracks, given, i) for i in range(len(paths))]
+    others = [learn_normal(tracks, given, i) for i in range(len(names))]
     left = [max(disagreement(tracks, other)) for other in others]
     i = int(np.argmin(left))
     normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
     advice = (
-        f"the normal ({normal}) of cameras[{i}] ({paths[i].name}) would explain it best"
+        f"the normal ({normal}) of cameras[{i}] ({names[i]}) would explain it best"
         if left[i] <= DISAGREEMENT
         else "no single wrong normal explains it; check the positions, the scales and angles that "
         "are given, and that at least half of the shortest video is in common with the others"

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.discovery import Units, _pruned
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem, monomial_exponents
+from vidsindy_lite.dynamics.discovery import _pruned
+from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.problem import Units
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import add_noise
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import check_grad
 
+from vidsindy_lite.dynamics.library import closure_mask, monomial_exponents
 from vidsindy_lite.dynamics.origin import ShiftedLaw, sparse_origins
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem, closure_mask, monomial_exponents
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.study import SYSTEMS
 
 

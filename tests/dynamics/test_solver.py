@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem, monomial_exponents
-from vidsindy_lite.dynamics.solver import discover, term_penalties
+from vidsindy_lite.dynamics import solver
+from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.problem import term_penalties
+from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
 
 
@@ -237,6 +240,16 @@ def test_pure_noise_gives_no_law_without_doubt():
     x = np.random.default_rng(0).normal(size=(400, 2))
     found = discover(np.arange(400.0), x)
     assert found.status == "suspect"
+
+
+def test_a_last_fit_that_did_not_converge_is_told(monkeypatch):
+    terms, x0, duration = PLANAR["growth"]
+    t = np.linspace(0, duration, 300)
+    x = PolynomialSystem.from_terms(terms).simulate(t, x0)
+    x = add_noise(x, 0.02, np.random.default_rng(0))
+    assert discover(t, x).status == "ok"
+    monkeypatch.setattr(solver, "EXACT", -1.0)  # which no step can promise
+    assert any("the last fit did not converge" in text for text in discover(t, x).warnings)
 
 
 # -- input ---------------------------------------------------------------------------------------

@@ -1,20 +1,17 @@
 """A trajectory goes in, its law comes out."""
 
-from .collocation import Collocation, Segment, State
+from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao
-from .discovery import Discovery, Units
+from .discovery import Discovery
+from .grid import Segment
+from .integrate import runge_kutta_4
+from .library import monomial_exponents, monomial_gradients, monomials, variable_names
 from .origin import ShiftedLaw
-from .polynomials import (
-    PolynomialSystem,
-    monomial_exponents,
-    monomial_gradients,
-    monomials,
-    runge_kutta_4,
-    variable_names,
-)
+from .polynomials import PolynomialSystem
+from .problem import Units, term_penalties
 from .selection import closest_rival, subset_search
 from .smoothing import smooth
-from .solver import discover, term_penalties
+from .solver import discover
 from .splines import DEGREE, clamped_knots, design_matrix, local_basis
 from .trajectories import Trajectory, check_trajectory, cut, typical_step
 
@@ -27,6 +24,7 @@ __all__ = [
     "Trajectory",
     "Segment",
     "State",
+    "Status",
     "Units",
     "check_trajectory",
     "clamped_knots",

@@ -10,8 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from .collocation import CLEANEST, Collocation, Linearisation, State
+from ..arrays import Floats
+from .collocation import CLEANEST, Linearisation, State, Status
+from .library import variable_names
 from .polynomials import PolynomialSystem
+from .problem import Problem
+from .search import Fit
 from .selection import closest_rival, equilibrated
 from .trajectories import Trajectory, typical_step
 
@@ -35,41 +39,40 @@ CHANCE = 1e-4
 """Probability below which what the left-out terms explain together is no chance."""
 UNMET = 1e-2
 """Root mean square residual of the law along the curve, relative to the speed."""
+ADVICE = {
+    Status.MAX_STEPS: "its coefficients may be off by more than their errors; use cleaner samples, "
+    "or a lower degree",
+    Status.STALLED: "terms may be indistinguishable on these data; record longer, or lower the "
+    "degree",
+}
+"""What to do about a fit that ended so."""
 
 
-def diagnose(
-    law: PolynomialSystem,
-    state: State,
-    problem: Collocation,
-    penalties: np.ndarray,
-    trajectories: Sequence[Trajectory],
-    noise: np.ndarray,
-) -> list[str]:
+def diagnose(problem: Problem, fit: Fit, law: PolynomialSystem, margins: Floats) -> tuple[str, ...]:
     """Reasons not to trust a law.
 
     Parameters
     ----------
+    problem : Problem
+        The data, and the noise as it was estimated before any law was known.
+    fit : Fit
+        The final fit, its noise re-estimated from the residual.
     law : PolynomialSystem
-        The law, for its names.
-    state, problem
-        The final fit in standard units, the noise re-estimated from its residual.
-    penalties : ndarray, shape (l,)
-        Price of each term.
-    trajectories : sequence of Trajectory
-        The data in standard units.
-    noise : ndarray, shape (d,)
-        Noise as the smoothing estimated it, before any law was known.
-
-    Returns
-    -------
-    list of str
+        The law in the frame of the data.
+    margins : ndarray, shape (l d,)
+        By how much the criterion rises if a term of this law is taken out or put back, equation
+        by equation.
     """
-    return [
-        *_misfit(law, problem, noise),
-        *_unmet(state, problem),
-        *_selection(law, state, problem, penalties),
-        *_sampling(trajectories),
-    ]
+    return (
+        *outliers(problem.measured),
+        *_misfit(problem, fit),
+        *_unfinished(fit),
+        *_unmet(fit),
+        *_selection(problem, fit),
+        *_sampling(problem.trajectories),
+        *_standstill(law),
+        *_narrow(law, margins),
+    )
 
 
 def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
@@ -102,7 +105,7 @@ def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
     ]
 
 
-def _leaps(values: np.ndarray, row: int) -> bool:
+def _leaps(values: Floats, row: int) -> bool:
     """Whether a sample is far from those around it, too, and not part of a motion far away."""
     before, after = values[max(row - REACH, 0) : max(row - GUARD, 0)], values[row + GUARD + 1 :]
     beside = np.concatenate((before, after[: REACH - GUARD]))
@@ -110,21 +113,27 @@ def _leaps(values: np.ndarray, row: int) -> bool:
     return bool(abs(values[row] - middle) > OUTLIER * np.median(np.abs(beside - middle)))
 
 
-def _misfit(law: PolynomialSystem, problem: Collocation, noise: np.ndarray) -> list[str]:
-    residual = problem.data_weights**-0.5
-    ratio = np.where(residual > RESOLVED, residual / noise, 0.0)
+def _misfit(problem: Problem, fit: Fit) -> list[str]:
+    residual = fit.collocation.data_weights**-0.5
+    ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
     j = int(ratio.argmax())
     if ratio[j] < MISFIT:
         return []
     return [
-        f"the curve misses the data of {law.names[j]} by {ratio[j]:.1f} times the noise estimated "
-        "beforehand: the law may lie outside the library (raise the degree), or the motion may "
-        "not be autonomous"
+        f"the curve misses the data of {variable_names(problem.d)[j]} by {ratio[j]:.1f} times the "
+        "noise estimated beforehand: the law may lie outside the library (raise the degree), or "
+        "the motion may not be autonomous"
     ]
 
 
-def _unmet(state: State, problem: Collocation) -> list[str]:
-    residual = float(np.sqrt((problem.physics_residual(state) ** 2).mean()))
+def _unfinished(fit: Fit) -> list[str]:
+    if fit.status is Status.CONVERGED:
+        return []
+    return [f"the last fit did not converge ({fit.status.value}): {ADVICE[fit.status]}"]
+
+
+def _unmet(fit: Fit) -> list[str]:
+    residual = float(np.sqrt((fit.collocation.physics_residual(fit.state) ** 2).mean()))
     if residual < UNMET:
         return []
     return [
@@ -133,14 +142,12 @@ def _unmet(state: State, problem: Collocation) -> list[str]:
     ]
 
 
-def _selection(
-    law: PolynomialSystem, state: State, problem: Collocation, penalties: np.ndarray
-) -> list[str]:
-    if (problem.data_weights**-0.5 <= CLEANEST).all():
+def _selection(problem: Problem, fit: Fit) -> list[str]:
+    if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return []  # what is left is the error of the splines, not noise: it settles nothing
     # The offset stays where it is: with it free, the same law in another frame would count.
-    model = problem.linearise(state, np.arange(law.coefficients.size))
-    return [*_left_over(model, state), *_near_tie(model, law, state, penalties)]
+    model = fit.collocation.linearise(fit.state, np.arange(problem.exponents.size))
+    return [*_left_over(model, fit.state), *_near_tie(problem, fit.state, model)]
 
 
 def _left_over(model: Linearisation, state: State) -> list[str]:
@@ -157,14 +164,13 @@ def _left_over(model: Linearisation, state: State) -> list[str]:
     ]
 
 
-def _near_tie(
-    model: Linearisation, law: PolynomialSystem, state: State, penalties: np.ndarray
-) -> list[str]:
+def _near_tie(problem: Problem, state: State, model: Linearisation) -> list[str]:
+    law = problem.law(state)
     cost, dropped, added = closest_rival(
         model.information,
         model.gradient,
         state.coefficients.T.ravel(),
-        np.tile(penalties, law.d),
+        np.tile(problem.penalties, law.d),
         state.active.T.ravel(),
     )
     if cost > NEAR_TIE:
@@ -180,23 +186,6 @@ def _near_tie(
     ]
 
 
-def frame_warnings(law: PolynomialSystem, margins: np.ndarray) -> list[str]:
-    """Reasons not to trust what a law became in the frame of the data.
-
-    Parameters
-    ----------
-    law : PolynomialSystem
-        The law in that frame.
-    margins : ndarray, shape (l d,)
-        By how much the criterion rises if a term is taken out or put back, equation by equation.
-
-    Returns
-    -------
-    list of str
-    """
-    return [*_standstill(law), *_narrow(law, margins)]
-
-
 def _standstill(law: PolynomialSystem) -> list[str]:
     return [
         f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
@@ -205,7 +194,7 @@ def _standstill(law: PolynomialSystem) -> list[str]:
     ]
 
 
-def _narrow(law: PolynomialSystem, margins: np.ndarray) -> list[str]:
+def _narrow(law: PolynomialSystem, margins: Floats) -> list[str]:
     close = np.flatnonzero(margins < NEAR_TIE)
     if not len(close):
         return []

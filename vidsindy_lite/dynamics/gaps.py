@@ -11,8 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
-from .collocation import Segment
-from .polynomials import PolynomialSystem, runge_kutta_4
+from ..arrays import Floats
+from .grid import Segment
+from .integrate import runge_kutta_4
+from .polynomials import PolynomialSystem
 from .trajectories import Trajectory
 
 Gap = tuple[int, float]
@@ -45,7 +47,7 @@ class Joined:
         self.splines = splines
         self.law = law
 
-    def __call__(self, t: np.ndarray) -> np.ndarray:
+    def __call__(self, t: Floats) -> Floats:
         """Evaluate at increasing times, shape (n, d)."""
         values = np.empty((len(t), self.law.d))
         ends = [(spline.t[0], spline.t[-1]) for spline in self.splines]
@@ -62,7 +64,7 @@ class Joined:
         return values
 
     def _crossings(
-        self, crossed: np.ndarray, steps: int
+        self, crossed: Floats, steps: int
     ) -> tuple[list[CubicHermiteSpline], list[CubicHermiteSpline]]:
         """Each gap from its left and from its right end, as functions of the share covered."""
         x0 = np.array(

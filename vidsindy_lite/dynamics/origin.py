@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
-from .polynomials import divides, shift_generators, shift_matrix
+from .library import divides, shift_generators, shift_matrix
 from .selection import inverse
 
 DRAWS = 200

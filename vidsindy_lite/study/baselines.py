@@ -65,9 +65,7 @@ Rows = tuple[np.ndarray, np.ndarray]
 """Values of the candidate terms (k, l) and of the derivatives (k, d): a linear regression."""
 
 
-def stlsq(
-    t: np.ndarray, x: np.ndarray, degree: int = 3, ridge: float = RIDGE
-) -> PolynomialSystem:
+def stlsq(t: np.ndarray, x: np.ndarray, degree: int = 3, ridge: float = RIDGE) -> PolynomialSystem:
     """PySINDy: central differences, then sequentially thresholded least squares.
 
     Parameters
@@ -198,9 +196,7 @@ def _discover(
     split = int(TRAINING * len(record[0]))
     first, last = tuple(part[:split] for part in record), tuple(part[split:] for part in record)
     step = LONGEST_STEP * typical_step([record])
-    everything, training, held_out = (
-        rows(_segments(part, step)) for part in (record, first, last)
-    )
+    everything, training, held_out = (rows(_segments(part, step)) for part in (record, first, last))
     errors = np.array([_error(_fit(optimizer(h), training), held_out) for h in THRESHOLDS])
     chosen = THRESHOLDS[np.flatnonzero(errors <= TOLERANCE * errors.min())[-1]]
     coefficients = _fit(optimizer(chosen), everything)

@@ -26,9 +26,7 @@ from pathlib import Path
 from typing import TypeVar
 from uuid import uuid4
 
-import cv2
 from filelock import FileLock
-from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
 from ..stamp import PACKAGE, code_stamp, repository_root, write_file
@@ -169,6 +167,9 @@ def _here(
     function: Callable, todo: dict[int, object], jobs: int, files: dict[int, Path]
 ) -> Iterator[tuple[int, object]]:
     """Numbers and results of the tasks as they come, from processes of this machine."""
+    import cv2
+    from joblib import Parallel, delayed, parallel_config
+
     one_thread = {
         "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
         "initializer": cv2.setNumThreads,
