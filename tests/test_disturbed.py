@@ -26,7 +26,7 @@ from vidsindy_lite.stamp import PACKAGE
 ROOT = PACKAGE.parent
 HARNESS = Path(__file__).parent / "disturbed"
 SIZE = 1e-9
-# Figures of errors of thousandths of a pixel. Of some ten thousand pixels of a target's rim, one lies
+# Figures of errors of thousandths of a pixel. Of some ten thousand pixels of a target's rim, one is
 # so near to the next grey level that the disturbance moves it there, and the centroid by 1e-4 px.
 OF_GREY_LEVELS = {"videos_tracker_errors", "lab_model_errors"}
 
