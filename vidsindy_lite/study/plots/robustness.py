@@ -40,7 +40,7 @@ def plot_robustness(
         The paper's relative errors by level, by condition.
     """
     conditions = trials.condition.unique()
-    widths = [1 + n for n in trials.groupby("condition", sort=False).level.nunique()]
+    widths = [1 + n for n in trials.groupby("condition", sort=False)["level"].nunique()]
     figure, grid = plt.subplots(
         2, len(conditions), figsize=(9 if len(conditions) > 1 else 6.5, 5), sharex="col",
         sharey="row", squeeze=False, width_ratios=widths,
