@@ -11,6 +11,7 @@ from numbers import Integral, Real
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 FARTHEST_PIXEL = 1e100
 """Largest coordinate of a track: the squares of larger ones are no numbers any more."""
@@ -52,7 +53,7 @@ def check_positive(name: str, value: float) -> float:
     return float(value)
 
 
-def check_array(name: str, values: np.ndarray) -> np.ndarray:
+def check_array(name: str, values: ArrayLike) -> np.ndarray:
     """Real numbers as an array of floats, in which the masked entries of a masked array are NaN."""
     try:
         array = values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
@@ -63,7 +64,7 @@ def check_array(name: str, values: np.ndarray) -> np.ndarray:
         raise ValueError(f"{name}: must be an array of real numbers, got {values!r:.60}") from None
 
 
-def check_vector(name: str, values: np.ndarray, size: int) -> np.ndarray:
+def check_vector(name: str, values: ArrayLike, size: int) -> np.ndarray:
     """So many finite numbers, shape (size,); a copy."""
     vector = check_array(name, values).copy()
     if vector.shape != (size,) or not np.isfinite(vector).all():
@@ -71,7 +72,7 @@ def check_vector(name: str, values: np.ndarray, size: int) -> np.ndarray:
     return vector
 
 
-def check_rows(name: str, values: np.ndarray, width: int) -> np.ndarray:
+def check_rows(name: str, values: ArrayLike, width: int) -> np.ndarray:
     """Points or pixels row by row, shape (n, width); a row holding NaN is a missing one."""
     rows = check_array(name, values)
     if rows.ndim != 2 or rows.shape[1] != width:
