@@ -45,27 +45,20 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-# %%
 from vidsindy_lite import (
+    Scene,
+    dynamics,
     learn_cameras,
+    read_frame,
     read_video,
     reconstruct,
     render_video,
     track,
+    vision,
     write_video,
 )
-from vidsindy_lite.companion.artifacts import save_figure, save_table
-from vidsindy_lite.dynamics import runge_kutta_4
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import SAMPLES_PER_PERIOD, SYSTEMS, film, plots
-from vidsindy_lite.vision import (
-    BACKGROUNDS,
-    SHAPES,
-    WEIGHTS,
-    Scene,
-    read_frame,
-    render,
-    render_restless,
-)
 
 # %%
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -87,7 +80,7 @@ folder = TemporaryDirectory()
 differences = {}
 for name, system in SYSTEMS.items():
     t, x = system.trajectory(long)
-    other = runge_kutta_4(system, t, system.x0, substeps=10)
+    other = dynamics.runge_kutta_4(system, t, system.x0, substeps=10)
     differences[name] = np.linalg.norm(other - x, axis=1) / x.std(axis=0).max()
 periods = np.arange(long) / SAMPLES_PER_PERIOD
 worst = max(difference[periods <= 4].max() for difference in differences.values())
@@ -152,9 +145,9 @@ save_figure("videos_frame_rate_tsucs2", fig, caption=caption, numbers=numbers)
 spot = np.tile([256.0, 330.0], (10, 1))
 scenes = [
     Scene(background=background, shape=shape, size=40, tumbling=1, shape_seed=seed + 2)
-    for background, shape in zip(BACKGROUNDS, 2 * SHAPES, strict=True)
+    for background, shape in zip(vision.BACKGROUNDS, 2 * vision.SHAPES, strict=True)
 ]
-images = [next(render(spot, scene, seed)) for scene in scenes]
+images = [next(vision.render(spot, scene, seed)) for scene in scenes]
 titles = [f"{scene.background}, {scene.shape}" for scene in scenes]
 fig = plots.plot_frames(images, titles, [spot] * 6)
 caption = "The six backgrounds and the three kinds of target."
@@ -170,7 +163,7 @@ cases = {
     "noise of variance 0.01": replace(base, noise_variance=0.01),
     "a post in the way": replace(base, occluders=((262, 0, 40, 512),)),
 }
-images = [next(render(spot, scene, seed)) for scene in cases.values()]
+images = [next(vision.render(spot, scene, seed)) for scene in cases.values()]
 fig = plots.plot_frames(images, list(cases), [spot] * 3)
 caption = "One scene, clean, with the paper's image noise, and with an occluder."
 save_figure("videos_disturbances", fig, caption=caption, numbers={"place": spot[0]})
@@ -377,7 +370,7 @@ assert np.median([np.sqrt(np.nanmean(error**2)) for error in drawn]) < 0.15
 # answers that agree are averaged: that is where the fractions of a pixel come from.
 
 # %%
-record = json.loads(WEIGHTS.with_suffix(".json").read_text())
+record = json.loads(vision.WEIGHTS.with_suffix(".json").read_text())
 print(f"{record['parameters']:,} parameters, trained on {record['frames']:,} frames of")
 print(f"{', '.join(record['shapes'])} before {', '.join(record['backgrounds'])}")
 fig = plots.plot_loss(record["loss"], record["steps_per_loss"])
@@ -407,7 +400,7 @@ cases = {
 found, last = {}, []
 for name, (background, shifts, brightness) in cases.items():
     view = Scene(background, "irregular", size=20, shape_seed=seed)
-    clip = render_restless(brief, view, shifts, brightness, seed)
+    clip = vision.render_restless(brief, view, shifts, brightness, seed)
     path = write_video(Path(folder.name) / "restless.mov", clip)
     last.append(read_frame(path, centre))
     found[name] = {way: track(path, way) for way in ("background", "learned", "auto")}
@@ -428,7 +421,9 @@ save_table("detector_restless", rows, caption="Background model and learned dete
 for row in rows[1:]:
     assert row["auto"] == "learned"
     assert row["learned: rms error (px)"] < 1
-    assert row["background: within 1 px (%)"] < row["learned: within 1 px (%)"]
+    assert row["learned: within 1 px (%)"] > 90
+for row in (rows[1], rows[3]):  # where the camera trembles
+    assert row["background: within 1 px (%)"] < 60
 assert rows[0]["auto"] == "background"
 assert rows[0]["background: rms error (px)"] < rows[0]["learned: rms error (px)"]
 
@@ -536,6 +531,4 @@ folder.cleanup()
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())

@@ -49,26 +49,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import approx_fprime
 from tqdm import tqdm
 
-from vidsindy_lite import discover
-from vidsindy_lite.companion.artifacts import save_figure, save_table
-
-# %%
-from vidsindy_lite.dynamics import (
-    Collocation,
-    FrameAlgebra,
-    Segment,
-    State,
-    clamped_knots,
-    closest_rival,
-    cramer_rao,
-    design_matrix,
-    monomial_exponents,
-    monomials,
-    smooth,
-    subset_search,
-    term_charges,
-)
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, discover_paper, plots, score
+from vidsindy_lite import discover, dynamics
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, paper_ado, plots, score
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
@@ -98,9 +81,9 @@ print(truth.text())
 
 # %%
 breakpoints = np.linspace(0, 0.15, 9)
-knots = clamped_knots(breakpoints)
+knots = dynamics.clamped_knots(breakpoints)
 fine = np.linspace(0, 0.15, 601)
-basis = design_matrix(knots, fine)
+basis = dynamics.design_matrix(knots, fine)
 assert (np.count_nonzero(basis, axis=1) <= 4).all()
 
 # %%
@@ -125,7 +108,7 @@ save_figure("solver_basis", fig, caption=caption, numbers={"t": fine, "basis": b
 # %%
 P = rng.normal(size=(basis.shape[1], 3))
 offset = np.array([10.0, 10.0, 0.0])
-slopes = design_matrix(knots, fine, order=1)
+slopes = dynamics.design_matrix(knots, fine, order=1)
 assert np.allclose(basis.sum(axis=1), 1, atol=1e-12)
 assert np.allclose(basis @ P + offset, basis @ (P + offset), atol=1e-12)
 assert np.allclose(slopes @ P, slopes @ (P + offset), atol=1e-9)
@@ -159,12 +142,12 @@ assert (native.support.sum(), moved.support.sum()) == (7, 12)
 # $\mathbf J^T\mathbf J$. Here are the misfits of a small problem, 48 samples and the seven true terms, ...
 
 # %%
-segment = Segment.even(t[:48], clean[:48], spacing=3 * t[1], record=0)
-problem = Collocation([segment], native.exponents, np.ones(3), np.ones(3))
-G = design_matrix(problem.knots[0], segment.t)
+segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
+problem = dynamics.Collocation.of([segment], native.exponents, np.ones(3), np.ones(3))
+G = dynamics.design_matrix(problem.knots[0], segment.t)
 P = np.linalg.lstsq(G, segment.x)[0]
 all_axes = np.ones(3, dtype=bool)
-state = State(P, native.coefficients, native.support, offset, moving=all_axes)
+state = dynamics.State(P, native.coefficients, native.support, offset, moving=all_axes)
 
 
 def misfits(unknowns):
@@ -172,7 +155,7 @@ def misfits(unknowns):
     flat[state.free()] = unknowns[P.size :]
     law = {"coefficients": flat[:-3].reshape(3, -1).T, "offset": flat[-3:]}
     unmet = problem.physics_residual(replace(state, control_points=control, **law))
-    weighted = np.sqrt(problem.node_weights)[:, None] * unmet
+    weighted = np.sqrt(problem.grid.node_weights)[:, None] * unmet
     return np.concatenate([(problem.curve(control) - segment.x).ravel(), weighted.ravel()])
 
 
@@ -215,15 +198,15 @@ assert np.allclose(schur, information, rtol=1e-3, atol=1e-6 * np.abs(schur).max(
 # The time of one step, with all 30 terms up to degree 2 as unknowns:
 
 # %%
-exponents = monomial_exponents(3, 2)
+exponents = dynamics.monomial_exponents(3, 2)
 everything = np.arange(exponents.size)
 
 
 def step_row(n):
     times, states = truth.trajectory(n)
-    whole = Collocation([Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
-    P = smooth([(times, states)], rng).splines[0].c
-    start = State(P, np.zeros(exponents.shape), np.ones(exponents.shape, bool), offset, ~all_axes)
+    whole = dynamics.Collocation.of([dynamics.Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
+    P = dynamics.smooth([(times, states)], rng).splines[0].c
+    start = dynamics.State(P, np.zeros(exponents.shape), np.ones(exponents.shape, bool), offset, ~all_axes)
     seconds = min(timed(lambda: whole.linearise(start, everything), number=1, repeat=3))
     return {"samples": n, "in the band": 12 * P.size, "if dense": P.size**2, "seconds": seconds}
 
@@ -264,7 +247,7 @@ assert np.abs(unmet(nodes)).max() < 0.01 * np.abs(unmet(window)).max()
 
 # %%
 seen = (t >= low) & (t <= high)
-first = smooth([(t, x)], rng).splines[0]
+first = dynamics.smooth([(t, x)], rng).splines[0]
 at = nodes[inside]
 samples = {"t": t[seen], "data": x[seen, 0]}
 curves = {"first": (window, first(window)[:, 0]), "final": (window, spline(window)[:, 0])}
@@ -276,7 +259,7 @@ save_figure("solver_curve", fig, caption=caption, numbers=samples | curves | che
 # %% [markdown]
 # *Above: a spline that is only smooth (dashed) follows the noise, one that has to obey a law (blue) does
 # not. Below: the law holds at the nodes (ticks), and between them as well as cubic pieces can do it. Nodes
-# elsewhere would ask the pieces for what they cannot do, and charge the true law for it.*
+# elsewhere would ask the pieces for what they cannot do, and penalise the true law for it.*
 
 # %% [markdown]
 # ## Two optimisers
@@ -296,13 +279,13 @@ some = slice(0, 400 if full else 300)
 def compare(noise):
     data = t[some], add_noise(clean[some], noise, np.random.default_rng(seed))
     results = []
-    for name, optimise, options in (("paper's", discover_paper, steps), ("ours", discover, {})):
+    for name, optimise, options in (("paper's", paper_ado.discover_paper, steps), ("ours", discover, {})):
         began = perf_counter()
         results.append((name, optimise(*data, **options), perf_counter() - began))
     return results
 
 
-discover_paper(t[:99], x[:99], pretraining=1, epochs=1)  # so that PyTorch's start is not timed
+paper_ado.discover_paper(t[:99], x[:99], pretraining=1, epochs=1)  # so that PyTorch's start is not timed
 runs = {noise: compare(noise) for noise in ((0.02, level) if full else (level,))}
 
 
@@ -356,7 +339,7 @@ caption = "Gradient descent settles at a compromise; continuation makes the law 
 save_figure("solver_histories", fig, caption=caption, numbers=histories)
 
 # %% [markdown]
-# *The paper's optimiser (red) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
+# *The paper's optimiser (vermilion) soon gets to where its fixed $\alpha$ balances both losses, and stays there while
 # STRidge drops terms, but not all false ones. Ours (blue) goes through a quadratic library (30 terms) and a cubic one (60), prunes each,
 # moves the origin, and ends at seven terms, a data loss of one noise variance, and a law that holds.*
 
@@ -375,12 +358,12 @@ assert ours.history[-1].terms == native.support.sum()
 
 # %%
 def start(t, x):
-    spline, origin = smooth([(t, x)], np.random.default_rng(seed)).splines[0], x.mean(axis=0)
-    problem = Collocation([Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
+    spline, origin = dynamics.smooth([(t, x)], np.random.default_rng(seed)).splines[0], x.mean(axis=0)
+    problem = dynamics.Collocation.of([dynamics.Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
     curve, slope = problem.node_states(spline.c)
-    coefficients, squares, *_ = np.linalg.lstsq(monomials(curve - origin, exponents), slope)
+    coefficients, squares, *_ = np.linalg.lstsq(dynamics.monomials(curve - origin, exponents), slope)
     terms = np.ones(exponents.shape, dtype=bool)
-    state = State(spline.c, coefficients, terms, origin, moving=~all_axes)
+    state = dynamics.State(spline.c, coefficients, terms, origin, moving=~all_axes)
     return state, problem, squares / len(curve)
 
 
@@ -388,9 +371,9 @@ def unpruned(t, x):
     state, problem, unmet = start(t, x)
     for alpha in (0.1, 1.0, 10.0, 100.0):
         problem = problem.weighted(problem.data_weights, alpha / unmet)
-        state = problem.solve(state, tolerance=1.0)
+        state = problem.solve(state, tolerance=1.0).state
     information = problem.linearise(state, everything).information
-    return FrameAlgebra(exponents, state.coefficients, information), state
+    return dynamics.ShiftedLaw(exponents, state.coefficients, information), state
 
 
 # %% [markdown]
@@ -398,10 +381,10 @@ def unpruned(t, x):
 # have, for any $\boldsymbol\lambda$, what the fit would lose: $(\boldsymbol\lambda-\mathbf c)^T
 # \mathbf S\,(\boldsymbol\lambda-\mathbf c)$. That is a small regression problem, and a threshold or
 # a search can be tried on it. `subset_search` drops, adds and swaps single terms as long as
-# the loss plus a charge per term falls; the charges are the same for all systems.
+# the loss plus a penalty per term falls; the penalties are the same for all systems.
 
 # %%
-charge = np.tile(term_charges(exponents), 3)
+penalty = np.tile(dynamics.term_penalties(exponents), 3)
 
 
 def flat_support(law):
@@ -412,7 +395,7 @@ def flat_support(law):
 def search(algebra, shift):
     coefficients, S = algebra.at(shift)
     c = coefficients.T.ravel()
-    support, solution, _ = subset_search(S, 0 * c, c, charge, np.ones(len(c), dtype=bool))
+    support, solution, _ = dynamics.subset_search(S, 0 * c, c, penalty, np.ones(len(c), dtype=bool))
     return c, S, support, solution
 
 
@@ -434,7 +417,7 @@ def scores(S, coefficients):
 
 z, z_after = scores(S, c), np.zeros(len(c))
 z_after[support] = scores(S[np.ix_(support, support)], solution[support])
-bar = np.sqrt(charge[1])
+bar = np.sqrt(penalty[1])
 assert z[is_true].min() < bar < z_after[is_true].min()
 
 # %%
@@ -451,16 +434,16 @@ save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # *Left: in the order of magnitude, false terms stand above true ones. Middle: in units of the standard
 # error the weakest true term is no better than noise, because collinear columns share what they explain.
-# Right: after the search, with the impostors gone, each true term is far above its charge (dashed).*
+# Right: after the search, with the impostors gone, each true term is far above its penalty (dashed).*
 
 # %% [markdown]
 # How sure is the search? `closest_rival` is the single change that costs least.
 
 # %%
-cost, dropped, added = closest_rival(S, 0 * c, c, charge, support)
+cost, dropped, added = dynamics.closest_rival(S, 0 * c, c, penalty, support)
 names = [f"{term} in d{j}/dt" for j in "xyz" for term in truth.terms[: len(exponents)]]
 out, into = (", ".join(names[k] for k in ks) or "nothing" for ks in (dropped, added))
-print(f"drop {out}, add {into}: {cost:.1f} worse (the charge of a term is about {bar**2:.0f})")
+print(f"drop {out}, add {into}: {cost:.1f} worse (the penalty of a term is about {bar**2:.0f})")
 assert cost > 0
 
 # %% [markdown]
@@ -513,7 +496,7 @@ save_figure("solver_windows", fig, caption=caption, numbers={"threshold": thresh
 
 # %% [markdown]
 # *Thresholds that leave exactly the true terms, at 10 % noise (blue): for some systems there is none, and
-# no single one for the others. Who knows the truth can pick one. The subset search with its charges
+# no single one for the others. Who knows the truth can pick one. The subset search with its penalties
 # gets more systems right than any one threshold, even here, before law and curve are refined together.*
 
 # %% [markdown]
@@ -523,7 +506,7 @@ save_figure("solver_windows", fig, caption=caption, numbers={"threshold": thresh
 # is its information. So the unpruned fit need not be repeated to ask how many terms are significant at another
 # origin. Each term with score $z$ counts smoothly:
 #
-# $$N(\Delta)=\sum\frac{z^2}{z^2+\text{charge}} .$$
+# $$N(\Delta)=\sum\frac{z^2}{z^2+\text{penalty}} .$$
 
 # %%
 x_axis = y_axis = np.linspace(-10, 30, 81)
@@ -532,7 +515,7 @@ all_terms = np.ones(exponents.shape, dtype=bool)
 
 def count(x0, y0):
     origin = np.array([x0, y0, 0.0]) - fit.offset
-    return algebra.smooth_count(origin, all_terms, charge.max())[0]
+    return algebra.smooth_count(origin, all_terms, penalty.max())[0]
 
 
 counts = np.array([[count(x0, y0) for x0 in x_axis] for y0 in y_axis])
@@ -574,7 +557,7 @@ assert found.native.support.sum() < found.system.support.sum()
 draws, part, noise = (24, 500, 0.05) if full else (3, 300, 0.05)
 axes_moved = np.array([True, True, False])
 sigma = noise * clean[:part].std(axis=0)
-bound = cramer_rao(native, t[:part], native.x0, sigma, moving=axes_moved)
+bound = dynamics.cramer_rao(native, t[:part], native.x0, sigma, moving=axes_moved)
 
 
 def repeat(stream):
@@ -660,8 +643,8 @@ rows = [
     {
         "setting": setting.replace("_", " "), "value": value,
         "exact": sum(r["verdict"].startswith("exact") for r in results), "of": len(results),
-        "false (mean)": np.mean([r["false"] for r in results]),
-        "missing (mean)": np.mean([r["missing"] for r in results]),
+        "false (median)": np.median([r["false"] for r in results]),
+        "missing (median)": np.median([r["missing"] for r in results]),
         "suspect": sum(r["verdict"].endswith("suspect") for r in results),
         "wrong without warning": sum(r["verdict"] == "wrong, ok" for r in results),
     }
@@ -682,8 +665,8 @@ caption = "How often the law is exact, and what the solver says about it, in thr
 save_figure("solver_failures_figure", fig, caption=caption, numbers=verdicts)
 
 # %% [markdown]
-# *Laws that are wrong (orange, red) come with low sampling, high noise, or a library without the
-# law's terms (degree 1). A warning (orange) is what one hopes for then; red is a wrong law that nobody
+# *Laws that are wrong (orange, vermilion) come with low sampling, high noise, or a library without the
+# law's terms (degree 1). A warning (orange) is what one hopes for then; vermilion is a wrong law that nobody
 # flagged, light blue a right one that was doubted.*
 
 # %%
@@ -757,7 +740,7 @@ save_table("solver_pendulum", rows, caption=caption)
 # ```
 #
 # At z = 28 the term 28 x in dy/dt is absorbed by xz, and a constant -74.67 appears in dz/dt. The number of
-# terms is the same, so the data alone cannot decide. The solver charges every axis along which the origin
+# terms is the same, so the data alone cannot decide. The solver penalises every axis along which the origin
 # is moved nearly as much as a term, and the one that leaves z alone wins.
 # </details>
 #
@@ -791,6 +774,4 @@ save_table("solver_pendulum", rows, caption=caption)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())

@@ -38,27 +38,28 @@ jobs: int = 2  # trials at a time
 # %%
 from collections import Counter
 from dataclasses import replace
-from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite.companion.artifacts import save_figure, save_table
-from vidsindy_lite.dynamics import cramer_rao, term_charges
+from vidsindy_lite import dynamics
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     ABLATION,
     METHODS,
     REFERENCE_OFFSET,
     SYSTEMS,
     FilmTask,
-    by_level,
+    by_condition,
     grid,
     plots,
-    record,
+    rate,
+    run_film,
     run_trial,
-    select,
+    significant,
     summary,
     sweep,
+    tabulate,
     term_errors,
 )
 
@@ -68,7 +69,7 @@ full = profile == "full"
 systems = tuple(SYSTEMS) if full else ("SprottF", "Lorenz")
 frames = 1500 if full else 300
 trials = range(seed, seed + (5 if full else 1))
-methods = tuple(METHODS) if full else ("ours", "PySINDy", "Model-A")
+methods = METHODS if full else ("ours", "PySINDy", "Model-A")
 
 # %% [markdown]
 # ## The paths, and how exact they are
@@ -77,7 +78,7 @@ methods = tuple(METHODS) if full else ("ours", "PySINDy", "Model-A")
 # which the path is recovered as in [notebook 05](05_discovery.ipynb).
 
 # %%
-films = sweep(record, [FilmTask(s, n, frames) for s in systems for n in trials], jobs=jobs)
+films = sweep(run_film, [FilmTask(s, n, frames) for s in systems for n in trials], jobs=jobs)
 films_of = {s: [film for film in films if film.task.system == s] for s in systems}
 path_error = {
     s: np.sqrt(np.mean([(film.path_error**2).sum() for film in shots]))
@@ -118,7 +119,8 @@ assert all(row["error / noise of 10 %"] < 0.02 for row in rows)
 #
 # ## All trials
 #
-# Ours and PySINDy see everything. A level of zero is the same trial in all three conditions.
+# Ours and PySINDy see everything. The results are a table with one row a trial; its clean trials stand
+# in it as level zero of each condition.
 
 # %%
 levels = {
@@ -127,8 +129,10 @@ levels = {
     "fibers": (0.1, 0.2, 0.3) if full else (0.2,),
 }
 both = ("ours", "PySINDy")
-results = sweep(run_trial, grid(systems, levels, trials, both, frames), jobs=jobs, desc="trials")
-ours = select(results, method="ours")
+tasks = grid(systems, levels, trials, both, frames)
+table = tabulate(sweep(run_trial, tasks, jobs=jobs, desc="trials"))
+results = by_condition(table)
+ours = results[results.method == "ours"]
 
 # %% [markdown]
 # The other methods are slower. They see fewer levels, and fewer trials: SprottF in every condition,
@@ -138,9 +142,9 @@ ours = select(results, method="ours")
 noise = {"noise": (0, 0.1, 0.2, 0.3) if full else (0, 0.1)}
 fewer = noise | {"blocks": (0.2, 0.5) if full else (0.2,), "fibers": (0.2, 0.3) if full else (0.2,)}
 tasks = grid(["SprottF"], fewer, trials[:3], methods, frames)
-sprott = sweep(run_trial, tasks, jobs=jobs, desc="SprottF, all methods")
+sprott = by_condition(tabulate(sweep(run_trial, tasks, jobs=jobs, desc="SprottF, all methods")))
 tasks = grid(systems, noise, trials[:2], methods, frames)
-every = sweep(run_trial, tasks, jobs=jobs, desc="noise, all methods")
+every = by_condition(tabulate(sweep(run_trial, tasks, jobs=jobs, desc="noise, all methods")))
 
 # %% [markdown]
 # ## SprottF (Fig. 3)
@@ -150,16 +154,11 @@ every = sweep(run_trial, tasks, jobs=jobs, desc="noise, all methods")
 
 
 # %%
-def robustness(figure_id, caption, source, methods, published=None, **fields):
-    conditions = [c for c in levels if select(source, condition=c)]
-    curves = {c: {m: by_level(source, c, method=m, **fields) for m in methods} for c in conditions}
-    numbers = {
-        f"{c}, {m}, {level:g}": [(r.score.l2, r.wrong_terms) for r in group]
-        for c, by_method in curves.items()
-        for m, groups in by_method.items()
-        for level, group in groups.items()
-    }
-    fig = plots.plot_robustness(curves, published)
+def robustness(figure_id, caption, trials, published=None):
+    fig = plots.plot_robustness(trials, published)
+    groups = trials.groupby(["condition", "method", "level"], sort=False)[["l2", "wrong_terms"]]
+    numbers = {f"{c}, {m}, {level:g}": group.median() for (c, m, level), group in groups}
+    numbers = {key: [significant(v, 3) for v in value] for key, value in numbers.items()}
     save_figure(figure_id, fig, caption=caption, numbers=numbers)
 
 
@@ -170,21 +169,22 @@ paper = {
     for c, name in printed.items()
 }
 caption = "SprottF: error and wrong terms against noise and missing data; stars: paper's Table 2."
-robustness("fig_3", caption, results, ["ours"], published=paper, system="SprottF")
+robustness("fig_3", caption, ours[ours.system == "SprottF"], paper)
 
 # %% [markdown]
-# *Fig. 3: relative error (top) and wrong terms (bottom) of our method for SprottF; points are means
-# over the trials, bars reach from the best to the worst. Stars: what the paper prints for its own
+# *Fig. 3: relative error (top) and wrong terms (bottom) of our method for SprottF; points are
+# medians of the trials, bars hold the middle half of them. Stars: what the paper prints for its own
 # method.*
 
 # %%
-for condition, rates in paper.items():
-    groups = by_level(ours, condition, system="SprottF")
-    for level in rates.keys() & groups.keys() if full else ():
-        assert all(r.score.exact for r in groups[level]), (condition, level)
-        assert np.mean([r.score.l2 for r in groups[level]]) < rates[level], (condition, level)
-gaps = [r for r in select(ours, system="SprottF") if r.trial.condition in ("blocks", "fibers")]
-assert all(r.score.exact and r.score.l2 < 1e-4 for r in gaps)
+mine = ours[ours.system == "SprottF"].set_index(["condition", "level"])
+for condition, rates in paper.items() if full else ():
+    for level, known in rates.items():
+        assert mine.exact[condition, level].all(), (condition, level)
+        assert mine.l2[condition, level].median() < known, (condition, level)
+gaps = mine.drop("noise")
+assert gaps.exact.all()
+assert (gaps.l2 < 1e-4).all()
 
 # %% [markdown]
 # By and large the error grows with the noise (five trials scatter). Missing samples cost next to nothing as long as the others are
@@ -194,19 +194,17 @@ assert all(r.score.exact and r.score.l2 < 1e-4 for r in gaps)
 
 # %%
 caption = "PySINDy on SprottF: error and wrong terms against noise and missing data."
-robustness("figure_S4", caption, results, ["PySINDy"], system="SprottF")
+pysindy = results[(results.method == "PySINDy") & (results.system == "SprottF")]
+robustness("figure_S4", caption, pysindy)
 
 # %% [markdown]
 # *Fig. S4: the same data through PySINDy. Gaps matter less than noise, since the record is cut
 # there and derivatives are local; a difference of neighbours amplifies noise.*
 
 # %%
-hits = dict.fromkeys(both, 0)
-for method in both:
-    for level, group in by_level(select(results, method=method), "noise", system="SprottF").items():
-        exact = sum(r.score.exact for r in group)
-        print(f"{method}, {level:.0%} noise: exact in {exact} of {len(group)} trials")
-        hits[method] += exact if level else 0
+noisy = results[(results.condition == "noise") & (results.system == "SprottF") & (results.level > 0)]
+print(noisy.groupby(["level", "method"]).exact.agg(rate).unstack().to_string())
+hits = noisy.groupby("method").exact.sum()
 assert hits["PySINDy"] < hits["ours"] / 2
 
 # %% [markdown]
@@ -223,7 +221,7 @@ assert hits["PySINDy"] < hits["ours"] / 2
 def other(figure_id, name):
     if name in systems:
         caption = f"{name}: error and wrong terms against noise and missing data."
-        robustness(figure_id, caption, results, both, system=name)
+        robustness(figure_id, caption, results[results.system == name])
 
 
 other("figure_S5", "Lorenz")
@@ -268,48 +266,32 @@ other("figure_S10", "Tsucs2")
 
 
 # %%
-def share(condition, **fields):
-    groups = by_level(ours, condition, **fields)
-    return {level: np.mean([r.score.exact for r in group]) for level, group in groups.items()}
-
-
-shares = {c: {name: share(c, system=name) for name in systems} for c in levels}
+shares = ours.pivot_table("exact", "system", ["condition", "level"], sort=False)
+shares.loc["all"] = ours.groupby(["condition", "level"], sort=False).exact.mean()
 
 # %%
 rows = [
     {"condition": condition, "level (%)": 100 * level}
-    | {name: f"{100 * by_system[name][level]:.0f} %" for name in systems}
-    | {"all": f"{100 * mean:.0f} %"}
-    for condition, by_system in shares.items()
-    for level, mean in share(condition).items()
+    | {name: f"{share:.0%}" for name, share in column.items()}
+    for (condition, level), column in shares.items()
 ]
 caption = f"Share of {len(trials)} trials whose terms are all right and none is false."
 save_table("study_exact", rows, caption=caption)
 
 # %%
-fig = plots.plot_shares(shares)
-numbers = {
-    f"{c}, {name}": {f"{level:g}": value for level, value in values.items()}
-    for c, by_system in shares.items()
-    for name, values in by_system.items()
-}
+fig = plots.plot_shares(shares.drop("all"))
+numbers = {f"{c}, {level:g}": column.to_dict() for (c, level), column in shares.items()}
 save_figure("study_exact_figure", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
 # *Share of exact laws in percent, by system (row) and level (column).*
 
 # %%
-reach = {"noise": 0.2, "blocks": 0.5, "fibers": 0.2}
-for condition, furthest in reach.items():
-    within = [
-        r
-        for level, group in by_level(ours, condition).items()
-        for r in group
-        if level <= (0.1 if (r.trial.system, condition) == ("Tsucs2", "noise") else furthest)
-    ]
-    exact = np.mean([r.score.exact for r in within])
-    print(f"{condition}, up to {furthest:.0%}: {exact:.1%} of {len(within)} laws are exact")
-    assert exact >= 0.95
+reach = ours.condition.map({"noise": 0.2, "blocks": 0.5, "fibers": 0.2})
+reach[(ours.system == "Tsucs2") & (ours.condition == "noise")] = 0.1
+within = ours[ours.level <= reach].groupby("condition", sort=False).exact
+print(within.agg(["mean", "size"]).to_string(float_format="{:.0%}".format))
+assert (within.mean() >= 0.95).all()
 
 # %% [markdown]
 # Up to 20 % noise (Tsucs2: 10 %), 50 % in blocks and 20 % in fibers, hardly a law is wrong.
@@ -320,27 +302,25 @@ for condition, furthest in reach.items():
 # Every wrong law of ours, by system and condition: from which level on, and what was wrong with it.
 
 # %%
-wrong = [r for r in ours if not r.score.exact]
-groups = {}
-for result in wrong:
-    groups.setdefault((result.trial.system, result.trial.condition), []).append(result)
+wrong = ours[~ours.exact]
 
 
-def commonest(group, which):
-    truth = SYSTEMS[group[0].trial.system].shift(REFERENCE_OFFSET)
-    names = Counter(name for r in group for name in term_errors(r.law, truth)[which])
-    return "; ".join(f"{name} ({count})" for name, count in names.most_common(3)) or "none"
+def commonest(laws, name, which):
+    truth = SYSTEMS[name].shift(REFERENCE_OFFSET)
+    names = Counter(term for law in laws for term in term_errors(law, truth)[which])
+    return "; ".join(f"{term} ({count})" for term, count in names.most_common(3)) or "none"
 
 
 # %%
 rows = [
     {
-        "system": name, "condition": condition, "wrong laws": len(group),
-        "of": len(select(ours, system=name, condition=condition)),
-        "from level (%)": 100 * min(r.trial.level for r in group),
-        "missing, commonest": commonest(group, 0), "false, commonest": commonest(group, 1),
+        "system": name, "condition": condition,
+        "wrong laws": rate(~ours[(ours.system == name) & (ours.condition == condition)].exact),
+        "from level (%)": 100 * group.level.min(),
+        "missing, commonest": commonest(group.law, name, 0),
+        "false, commonest": commonest(group.law, name, 1),
     }
-    for (name, condition), group in groups.items()
+    for (name, condition), group in wrong.groupby(["system", "condition"], sort=False)
 ] or [{"system": "none"}]  # fmt: skip
 caption = "The wrong laws of our method; in brackets, how many trials had the error."
 save_table("study_failures", rows, caption=caption)
@@ -351,15 +331,16 @@ save_table("study_failures", rows, caption=caption)
 # ([notebook 04](04_spline_ado.ipynb)). It grows in proportion to the noise. So for each system, its
 # weakest term sets a level beyond which our method cannot be expected to find it, nor any other that
 # is as careful about false terms: where the square of its coefficient, in bounds, is what our method
-# charges for the term.
+# asks of the term.
 
 
 # %%
 def weakest(name):
     law = SYSTEMS[name]
     t, x = law.trajectory(frames)
-    bound = cramer_rao(law, t, law.x0, np.std(x, axis=0), moving=[True, True, False]).coefficients
-    needed = bound * np.sqrt(term_charges(law.exponents))[:, None]
+    spread, moving = np.std(x, axis=0), [True, True, False]
+    bound = dynamics.cramer_rao(law, t, law.x0, spread, moving).coefficients
+    needed = bound * np.sqrt(dynamics.term_penalties(law.exponents))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         level = np.where(law.support, np.abs(law.coefficients) / needed, np.inf)
     row, equation = np.unravel_index(level.argmin(), level.shape)
@@ -393,20 +374,21 @@ if full:
 # %%
 six = {condition: (0.1, 0.2) for condition in printed}
 tasks = grid(["SprottF"], six, trials, ("ours", "Model-A"), frames)
-ablation = sweep(run_trial, tasks, jobs=jobs, desc="ablation")
+ablation = tabulate(sweep(run_trial, tasks, jobs=jobs, desc="ablation"))
 
 # %%
-rows = []
-for (condition, name), level in product(printed.items(), (0.1, 0.2)):
-    for method in ("ours", "Model-A"):
-        chosen = select(ablation, condition=condition, level=level, method=method)
-        known = ABLATION[name, round(100 * level), method.replace("ours", "Ours")]
-        rows.append({
-            "condition": name, "rate (%)": 100 * level, "method": method,
-            **summary([r.score for r in chosen]),
-            "paper: false positives": known.false_positives, "paper: l2 (e-2)": 100 * known.l2,
-        })  # fmt: skip
-caption = f"SprottF, ours and the ablated model, means of {len(trials)} trials beside the paper's."
+table_2 = summary(ablation, ["condition", "level", "method"])
+keys = zip(
+    table_2.condition.map(printed), (100 * table_2.level).round().astype(int),
+    table_2.method.replace("ours", "Ours"), strict=True,
+)  # fmt: skip
+known = [ABLATION[key] for key in keys]
+table_2["paper: false positives"] = [row.false_positives for row in known]
+table_2["paper: l2 (e-2)"] = [100 * row.l2 for row in known]
+table_2["condition"] = table_2.condition.map(printed)
+table_2["level"] = 100 * table_2.level
+rows = table_2.rename(columns={"level": "rate (%)"}).to_dict("records")
+caption = f"SprottF, ours and the ablated model, medians of {len(trials)} trials beside the paper's."
 save_table("table_2", rows, caption=caption)
 
 # %%
@@ -426,33 +408,31 @@ for best, ablated in zip(rows[::2], rows[1::2], strict=True):
 
 # %%
 caption = "SprottF: all methods on the same data."
-robustness("study_methods_sprottf", caption, sprott, methods, system="SprottF")
+robustness("study_methods_sprottf", caption, sprott)
 
 # %% [markdown]
-# *SprottF, all methods: each point is a mean over three trials.*
+# *SprottF, all methods: each point is the median of three trials.*
 
 # %%
-caption = f"All methods under noise: means over {len(systems)} systems, {len(trials[:2])} trials."
-robustness("study_methods_all", caption, every, methods)
+caption = f"All methods under noise: medians of {len(systems)} systems, {len(trials[:2])} trials."
+robustness("study_methods_all", caption, every)
 
 # %% [markdown]
-# *The mean over the systems under noise, two trials each. An $\ell_2$ error of 100 % is what no law at all would
+# *The median over the systems under noise, two trials each; bars hold the middle half. An $\ell_2$ error of 100 % is what no law at all would
 # have.*
 
 # %%
-rows = [
-    {"noise (%)": 100 * level}
-    | {m: f"{100 * np.mean([r.score.exact for r in group]):.0f} %" for m, group in groups.items()}
-    for level in noise["noise"]
-    for groups in [{m: by_level(every, "noise", method=m)[level] for m in methods}]
-]
-save_table("study_methods", rows, caption="Share of exact laws under noise, mean over the systems.")
+by_method = every.groupby(["level", "method"], sort=False)
+rows = by_method.exact.agg(rate).unstack(sort=False).reset_index(names="noise (%)")
+rows["noise (%)"] *= 100
+save_table("study_methods", rows.to_dict("records"), caption="Exact laws under noise, all systems.")
 
 # %%
+error, share = by_method.l2.median().unstack(), by_method.exact.mean().unstack()
 for level in noise["noise"][1:]:
-    groups = [by_level(every, "noise", method=m)[level] for m in methods]
-    assert np.argmin([np.mean([r.score.l2 for r in group]) for group in groups]) == 0, level
-    assert np.argmax([np.mean([r.score.exact for r in group]) for group in groups]) == 0, level
+    others = [method for method in methods if method != "ours"]
+    assert (error.loc[level, others] > 1.5 * error.loc[level, "ours"]).all(), level
+    assert (share.loc[level, others] < share.loc[level, "ours"]).all(), level
 
 # %% [markdown]
 # ## Do the error bars hold?
@@ -461,23 +441,21 @@ for level in noise["noise"][1:]:
 # should be that of a normal distribution: 68 % within one, 95 % within two.
 
 # %%
-exact = {
-    f"{100 * level:.0f} % noise": [r for r in group if r.score.exact]
-    for level, group in by_level(ours, "noise").items()
-    if level
-}
+noisy = ours[ours.exact & (ours.condition == "noise") & (ours.level > 0)]
+groups = {f"{100 * level:.0f} % noise": group for level, group in noisy.groupby("level")}
+pulled = {name: np.concatenate(list(group.pulls)) for name, group in groups.items()}
 
 # %%
-pulled = {name: np.concatenate([r.pulls for r in group]) for name, group in exact.items() if group}
 rows = [
     {
         "noise": name, "coefficients": len(values),
         "within 1 (%)": 100 * np.mean(np.abs(values) < 1),
-        "within 2 (%)": 100 * np.mean(np.abs(values) < 2), "rms": np.sqrt(np.mean(values**2)),
-        "l2, rms (e-2)": 100 * np.sqrt(np.mean([r.score.l2**2 for r in exact[name]])),
-        "l2, promised (e-2)": 100 * np.sqrt(np.mean([r.promised_l2**2 for r in exact[name]])),
+        "within 2 (%)": 100 * np.mean(np.abs(values) < 2),
+        "rms": significant(np.sqrt(np.mean(values**2)), 3),
+        "l2, median (e-2)": significant(100 * group.l2.median()),
+        "l2, promised (e-2)": significant(100 * group.promised_l2.median()),
     }
-    for name, values in pulled.items()
+    for (name, group), values in zip(groups.items(), pulled.values(), strict=True)
 ]  # fmt: skip
 caption = "Errors in units of their standard errors, and as what the error bars promise; exact laws."
 save_table("study_pulls", rows, caption=caption)
@@ -504,37 +482,33 @@ if full:
 
 # %%
 verdicts = {
-    condition: {
-        f"{100 * level:.0f}": [r.verdict for r in group]
-        for level, group in by_level(ours, condition).items()
-    }
-    for condition in levels
+    condition: {f"{100 * level:.0f}": list(group.verdict) for level, group in part.groupby("level")}
+    for condition, part in ours.groupby("condition", sort=False)
 }
 fig = plots.plot_verdicts({f"{c} (%)": v for c, v in verdicts.items()})
 caption = "How often the law is exact, and what the solver says of it, over all systems."
 save_figure("study_verdicts_figure", fig, caption=caption, numbers=verdicts)
 
 # %% [markdown]
-# *All systems. Blue is right and light blue right but doubted, orange wrong with a warning, red
-# wrong without one.*
+# *All systems. Blue is right and light blue right but doubted, orange wrong with a warning,
+# vermilion wrong without one.*
 
 # %%
-counts = Counter(r.verdict for r in ours)
+mine = table[table.method == "ours"]  # each trial once
+counts = mine.verdict.value_counts()
 rows = [
-    {"law": law, "ok": counts[f"{law}, ok"], "suspect": counts[f"{law}, suspect"]}
+    {"law": law}
+    | {s: f"{counts.get(f'{law}, {s}', 0) / len(mine):.0%}" for s in ("ok", "suspect")}
     for law in ("exact", "wrong")
 ]
-caption = f"Law and status in {len(ours)} trials of our method."
+caption = f"Law and status in {len(mine)} trials of our method."
 save_table("study_verdicts", rows, caption=caption)
 
 # %%
-silent = [r for r in ours if r.verdict == "wrong, ok"]
-doubted = counts["exact, suspect"] / max(1, counts["exact, ok"] + counts["exact, suspect"])
-print(f"{len(wrong)} of {len(ours)} laws are wrong, {len(silent)} of them without a warning:")
-print(dict(Counter(r.trial.system for r in silent)))
+silent = mine[mine.verdict == "wrong, ok"]
+doubted = (mine[mine.exact].status == "suspect").mean()
+print("wrong laws without a warning:", silent.system.value_counts().to_dict())
 print(f"{doubted:.0%} of the exact laws are doubted")
-native = [r for r in ours if r.native_exact]
-print(f"exact in the native frame: {len(native)}, in the reference frame: {len(ours) - len(wrong)}")
 assert doubted < 0.2
 
 # %% [markdown]
@@ -550,23 +524,20 @@ assert doubted < 0.2
 # %%
 level = noise["noise"][-1]
 tasks = grid(systems, {"noise": (0, level)}, trials[:1], frames=frames)
-filmed = sweep(run_trial, tasks, jobs=jobs, desc="videos")
-tasks = [replace(task, source="truth") for task in tasks]
-simulated = sweep(run_trial, tasks, jobs=jobs, desc="truth")
+tasks += [replace(task, source="truth") for task in tasks]
+two = tabulate(sweep(run_trial, tasks, jobs=jobs, desc="videos and truth"))
+l2 = two.set_index(["source", "level", "system"]).l2
 
 
 # %%
-def error(source, name, level):
-    return 100 * np.mean([r.score.l2 for r in select(source, system=name, level=level)])
-
-
 rows = [
     {
         "system": name,
-        "path / spread (e-2)": 100 * path_error[name] / np.linalg.norm(x.std(axis=0)),
-        "l2, videos (e-2)": error(filmed, name, 0), "l2, truth (e-2)": error(simulated, name, 0),
-        "l2, videos, noise (e-2)": error(filmed, name, level),
-        "l2, truth, noise (e-2)": error(simulated, name, level),
+        "path / spread (e-2)": significant(100 * path_error[name] / np.linalg.norm(x.std(axis=0))),
+        "l2, videos (e-2)": significant(100 * l2["videos", 0, name]),
+        "l2, truth (e-2)": significant(100 * l2["truth", 0, name]),
+        "l2, videos, noise (e-2)": significant(100 * l2["videos", level, name], 3),
+        "l2, truth, noise (e-2)": significant(100 * l2["truth", level, name], 3),
     }
     for name in systems
     for x in [SYSTEMS[name].trajectory(frames)[1]]
@@ -613,12 +584,12 @@ for row in rows:
 #
 # ```python
 # from vidsindy_lite import discover
-# from vidsindy_lite.study import score
-# from vidsindy_lite.study.corruption import add_noise, drop_blocks
+# from vidsindy_lite.study import add_noise, drop_blocks, score
 #
 # rng = np.random.default_rng(0)
 # film = films[[film.truth.name for film in films].index("SprottF")]
-# found = discover(film.t, drop_blocks(add_noise(film.x, 0.1, rng), 0.2, rng))
+# x = drop_blocks(add_noise(film.x, 0.1, rng), 0.2, rng)
+# found = discover(film.t, x, systematic=film.systematic)
 # print(score(found, film.truth))
 # ```
 # </details>
@@ -643,6 +614,4 @@ for row in rows:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())

@@ -40,8 +40,17 @@ jobs: int = 2  # trials at a time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite.companion.artifacts import save_figure, save_table
-from vidsindy_lite.study import DISTURBANCES, START, SYSTEMS, SceneTask, plots, pulls, run, sweep
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+from vidsindy_lite.study import (
+    DISTURBANCES,
+    START,
+    SYSTEMS,
+    SceneTask,
+    plots,
+    pulls,
+    run_scene,
+    sweep,
+)
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
@@ -62,12 +71,12 @@ for name, value in DISTURBANCES.items():
     print(f"{name:15} {value}")
 
 # %% [markdown]
-# `run` makes the videos, tracks them, learns cameras 2 and 3, reconstructs the path and discovers the
+# `run_scene` makes the videos, tracks them, learns cameras 2 and 3, reconstructs the path and discovers the
 # law. Nothing is told to it but the times of the frames, where the cameras stand, and the calibration of
 # the first. Each trial has another scene.
 
 # %%
-runs = sweep(run, [SceneTask(n, frames) for n in trials], jobs=jobs, desc="trials")
+runs = sweep(run_scene, [SceneTask(n, frames) for n in trials], jobs=jobs, desc="trials")
 first = runs[0]
 
 # %%
@@ -155,7 +164,7 @@ gap = np.isnan(first.path).any(axis=1)
 alone = [np.isnan(view.track.pixels).any(axis=1).mean() for view in first.views]
 print(f"no position in {gap.mean():.0%} of the frames; single cameras: {', '.join(f'{a:.0%}' for a in alone)}")
 error = np.sqrt(np.nanmean((first.path - first.x) ** 2, axis=0))
-print(f"rms error of the path: {error} scene units, where it spreads by {first.x.std(axis=0)}")
+print(f"rms error of the path: {error.round(4)} scene units, spread: {first.x.std(axis=0).round(2)}")
 assert 0 < gap.mean() < np.mean(alone)
 assert (error < 0.01 * first.x.std(axis=0)).all()
 
@@ -270,6 +279,4 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())

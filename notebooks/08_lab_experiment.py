@@ -38,6 +38,7 @@ profile: str = "full"  # full or quick
 seed: int = 0  # of the cloth in the videos, and of the rigs put up at random
 
 # %%
+import re
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -45,10 +46,9 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite.cameras import Rig, calibration_errors, learn_cameras, reconstruct, residuals
-from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite import Rig, cameras, learn_cameras, read_frame, reconstruct, residuals
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import lab, plots
-from vidsindy_lite.vision import read_frame
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
@@ -89,7 +89,7 @@ truth = lab.cameras()
 paths = lab.paths(frames)
 x = paths.reshape(-1, 3)
 marked = frames // 2  # index of the frame in which the ball is there
-assert np.array_equal(x[marked], lab.MARKED)
+assert np.allclose(x[marked], lab.MARKED, atol=1e-3)
 for camera in truth.cameras:
     print(f"at {camera.position.round()} mm, focal length {camera.focal_length:.0f} px")
 
@@ -107,7 +107,7 @@ for camera in truth.cameras:
 
 # %%
 with TemporaryDirectory() as folder:
-    tracks = lab.film(truth, paths, folder, seed)
+    tracks = lab.film_ball(truth, paths, folder, seed)
     clips = [Path(folder) / f"path_1_camera_{i}.mov" for i in (1, 2, 3)]
     images = [read_frame(clip, marked) for clip in clips]
 lost = sum(np.isnan(track).any(axis=1).sum() for track in tracks)
@@ -244,7 +244,8 @@ save_figure("lab_anywhere", fig, caption=caption, numbers={"error": anywhere})
 start = truth.uncalibrated(keep=0)
 with TemporaryDirectory() as folder:
     start.save(Path(folder) / "rig.toml")
-    print((Path(folder) / "rig.toml").read_text()[:420], "...")
+    text = (Path(folder) / "rig.toml").read_text()
+print(re.sub(r"(\.\d{4})\d+", r"\1", text)[:350], "...")  # fewer digits, to be read
 
 # %% [markdown]
 # No starting guess is needed here either. The ball lies on the line of sight of camera 1. In camera 2
@@ -255,8 +256,8 @@ with TemporaryDirectory() as folder:
 # %%
 pixels = [camera.project(x) for camera in truth.cameras]  # of the centre: exact
 learned = learn_cameras(pixels, start)
-assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
-assert rms(reconstruct(pixels, learned) - x) < 1e-6  # mm
+assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
+assert rms(reconstruct(pixels, learned) - x) < 1e-5  # mm
 learned = learn_cameras(tracks, start)  # of the ball in the videos
 by_pinhole = reconstruct(tracks, learned)
 print(f"error along the paths: {rms(by_pinhole - x):.3f} mm rms")
@@ -271,7 +272,7 @@ caption = "The paths from above: true, by orthographic and by perspective camera
 save_figure("lab_table", fig, caption=caption, numbers={"truth": paths, **found})
 
 # %% [markdown]
-# *Left: the paths from above; orthographic cameras (red) bend them, perspective cameras (blue) put them
+# *Left: the paths from above; orthographic cameras (vermilion) bend them, perspective cameras (blue) put them
 # on the truth (grey). Right: the scene, with the part of the table that the cameras look at.*
 
 # %% [markdown]
@@ -294,7 +295,7 @@ tracking = [
     length(track - camera.ball_image(x, lab.RADIUS)[0])
     for camera, track in zip(truth.cameras, tracks, strict=True)
 ]
-print(f"centroid beside centre: up to {np.max(shifts):.4f} px; tracker: up to {np.max(tracking):.4f} px")
+print(f"centroid beside centre: up to {np.max(shifts):.3f} px; tracker: up to {np.max(tracking):.3f} px")
 assert np.max(tracking) < 0.005
 assert 5 * np.max(tracking) < np.max(shifts) < 0.1
 
@@ -315,7 +316,7 @@ results = {
 # %%
 rows = []
 for name, (rig, path) in results.items():
-    scale, angle = np.abs(calibration_errors(rig, lab.orthographic(truth) if rig is flat else truth)).max(0)
+    scale, angle = np.abs(cameras.calibration_errors(rig, lab.orthographic(truth) if rig is flat else truth)).max(0)
     row = {"cameras": name, "rms (mm)": rms(path - x), "largest (mm)": length(path - x).max()}
     row |= {"marked point (mm)": length(path - x)[marked]}
     rows.append(row | {"error of scale (%)": 100 * scale, "error of angle (mrad)": 1000 * angle})
@@ -324,8 +325,9 @@ assert all(row["error of scale (%)"] < 0.1 for row in rows[1:])
 assert rows[1]["error of angle (mrad)"] < 1.5
 assert all(row["error of angle (mrad)"] < 0.1 for row in rows[2:])
 assert rows[0]["largest (mm)"] > 10
-assert rows[3]["rms (mm)"] < 0.01
 assert rows[3]["rms (mm)"] < 0.1 * rows[2]["rms (mm)"] < 0.1 * rows[1]["rms (mm)"]
+assert max(list(rows[3].values())[1:]) < 0.01
+rows[3] |= dict.fromkeys(tuple(rows[3])[1:], "below 0.01")
 save_table("lab_models", rows, caption="Three paths of the ball, by the model of the cameras.")
 
 # %%
@@ -348,13 +350,13 @@ save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 
 # %%
 def misplaced(name, **change):
-    cameras = list(start.cameras)
-    cameras[1] = replace(cameras[1], **change)
-    rig = learn_cameras(pixels, Rig(cameras))
+    measured = list(start.cameras)
+    measured[1] = replace(measured[1], **change)
+    rig = learn_cameras(pixels, Rig(measured))
     missed = np.hstack(residuals(pixels, rig))
     values = rms(reconstruct(pixels, rig) - x), np.sqrt(np.mean(missed**2))
     return {"camera 2": name} | dict(
-        zip(("rms (mm)", "residuals (px rms)"), np.round(values, 6).tolist(), strict=True)
+        zip(("rms (mm)", "residuals (px rms)"), np.round(values, 3).tolist(), strict=True)
     )
 
 
@@ -439,6 +441,4 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())

@@ -36,9 +36,9 @@ profile: str = "full"  # full or quick
 seed: int = 0  # of the backgrounds in the videos
 
 # %%
-import io
 import json
-from contextlib import chdir, redirect_stderr
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -46,20 +46,21 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-# %%
-from vidsindy_lite import PolynomialSystem, discover_from_videos
-from vidsindy_lite.__main__ import main
-from vidsindy_lite.cameras import (
-    DISAGREEMENT,
+from vidsindy_lite import (
+    PolynomialSystem,
     Rig,
+    Scene,
     align,
-    disagreement,
+    cameras,
+    discover_from_videos,
     learn_cameras,
+    read_frame,
     rig_template,
+    vision,
+    write_video,
 )
-from vidsindy_lite.companion.artifacts import save_figure, save_table
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots, score
-from vidsindy_lite.vision import Scene, read_frame, render, video_info, write_video
 
 # %%
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -77,7 +78,7 @@ late, fps = 7, 30
 
 
 # %%
-def shoot(name, folder, suffix=".avi", codec="MJPG"):
+def shoot(name, folder, suffix=".avi", codec="MJPG", trial=0):
     truth = SYSTEMS[name].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(frames)
     rig = Rig.around(x)
@@ -85,7 +86,7 @@ def shoot(name, folder, suffix=".avi", codec="MJPG"):
     views = zip("abc", ("hills", "sea", "wood"), shown, rig.cameras, strict=True)
     for letter, background, rows, camera in views:
         scene = Scene(background=background, size=18)
-        images = render(camera.project(x)[rows], scene, seed)
+        images = vision.render(camera.project(x)[rows], scene, seed + trial)
         write_video(folder / f"{letter}{suffix}", images, fps, codec)
     rig.uncalibrated(keep=0).save(folder / "rig.toml")
     return truth, t, rig
@@ -100,7 +101,7 @@ shots = {name: shoot(name, folder) for name, folder in folders.items()}
 # %%
 for name, folder in folders.items():
     for path in sorted(folder.glob("*.avi")):
-        shot = video_info(path)
+        shot = vision.video_info(path)
         print(f"{name}, {path.name}: {shot.frames} frames, {shot.fps:g} a second, {shot.size}")
 
 # %% [markdown]
@@ -126,15 +127,16 @@ print(rig_template(cameras=2))
 
 # %%
 def discover(name, *options):
-    t = shots[name][1]
-    command = ["discover", "a.avi", "b.avi", "c.avi", "--rig", "rig.toml", "--fps", f"{1 / t[1]:.9g}"]
-    with chdir(folders[name]):
-        return main([*command, *options])
+    fps = f"{1 / shots[name][1][1]:.9g}"
+    command = ["discover", "a.avi", "b.avi", "c.avi", "--rig", "rig.toml", "--fps", fps, *options]
+    python = sys.executable, "-m", "vidsindy_lite"
+    return subprocess.run([*python, *command], cwd=folders[name], capture_output=True, text=True)
 
 
 for name in names:
-    print(f"\n{name}:")
-    assert discover(name) == 0  # no reason for doubt
+    done = discover(name)
+    print(f"{name}:\n{done.stdout}")
+    assert done.returncode == 0, done.stderr  # no reason for doubt
 
 # %% [markdown]
 # The report is a folder: a page to read, the same as data, and the cameras as they were learned. The page
@@ -143,7 +145,7 @@ for name in names:
 # %%
 shown = names[0]
 report = folders[shown] / "report"
-print({path.name: f"{path.stat().st_size // 1000} kB" for path in sorted(report.iterdir())})
+print(", ".join(path.name for path in sorted(report.iterdir())))
 page = (report / "report.html").read_text(encoding="utf-8")
 assert "http" not in page
 data = {n: json.loads((f / "report/result.json").read_text("utf-8")) for n, f in folders.items()}
@@ -173,30 +175,43 @@ for name in names:
 #
 # Most cameras and phones do not write one JPEG a frame: they write what has changed, and leave out the
 # smallest changes. A trace of the target then stays where it just was, so that the track trails behind
-# it, by hundredths of a pixel, but all the time. Here are the same scenes as mp4v, at the low bit rate
-# that OpenCV chooses, this time from Python.
+# it, by hundredths of a pixel, but all the time. Here are such scenes as mp4v at a low bit rate, this
+# time from Python: several trials, as one proves little.
+
 
 # %%
-rows = []
-for name in names:
+def compressed(name, trial):
     with TemporaryDirectory() as other:
-        truth, t, _ = shoot(name, Path(other), ".mp4", "mp4v")
+        truth, t, _ = shoot(name, Path(other), ".mp4", "mp4v", trial)
         files = sorted(Path(other).glob("*.mp4"))
         found = discover_from_videos(files, Rig.load(Path(other) / "rig.toml"), t)
         size = sum(path.stat().st_size for path in files)
     plain = sum(path.stat().st_size for path in folders[name].glob("*.avi"))
-    scored = score(found, truth)
+    return size / plain, score(found.discovery, truth), found.status
+
+
+trials = range(3 if full else 1)
+outcomes = {name: [compressed(name, trial) for trial in trials] for name in names}
+
+# %%
+rows = []
+for name, results in outcomes.items():
+    sizes, scores, verdicts = zip(*results, strict=True)
     rows.append({
-        "system": name, "size (% of motion JPEG)": 100 * size / plain, "l2": scored.l2,
-        "missing": scored.missing, "false": scored.false_positives, "verdict": found.status,
+        "system": name, "trials": len(results),
+        "size (% of motion JPEG)": round(100 * np.median(sizes)),
+        "l2, median": np.median([scored.l2 for scored in scores]),
+        "exact": sum(scored.exact for scored in scores),
+        "suspect": verdicts.count("suspect"),
     })  # fmt: skip
-    assert scored.exact or not full
+assert all(row["l2, median"] < 1e-3 for row in rows)
 save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rate.")
 
 # %% [markdown]
-# These laws are exact, as the solver allows for trails (`uncertainty.trailing_errors`); that does not
-# always go so well. The verdict may be "suspect": the errors of the tracks last for several frames, so
-# that they look like terms that were left out. Film at a high bit rate if you can.
+# The coefficients are still good to a thousandth, as the solver allows for trails
+# (`cameras.trailing_errors`). The terms need not be: the errors of the tracks last for several frames, so
+# that they look like terms that were left out, and the verdict may be "suspect". Film at a high bit rate
+# if you can.
 
 # %% [markdown]
 # ### The path
@@ -263,7 +278,7 @@ save_table("own_cameras", rows, caption="Lags and cameras as learned; the first 
 
 # %%
 missed = [np.array(part, dtype=float) for part in result["residuals"]]
-fig = plots.plot_residuals(t, missed, DISAGREEMENT)
+fig = plots.plot_residuals(t, missed, cameras.DISAGREEMENT)
 caption = "Residuals of the three cameras; above the dashed line, the rig is doubted."
 save_figure("own_residuals", fig, caption=caption, numbers=dict(zip("abc", missed, strict=True)))
 
@@ -288,14 +303,14 @@ save_figure("own_residuals", fig, caption=caption, numbers=dict(zip("abc", misse
 learned = Rig.load(report / "rig.toml")
 tried = np.unique(late + np.concatenate((np.arange(-17, 18), 0.1 * np.arange(-4, 5))))
 moved = [align(tracks, (0, lag - lags[1], 0)) for lag in tried]  # they are aligned already
-worst = np.array([max(disagreement(views, learned)) for views in moved])
+worst = np.array([max(cameras.disagreement(views, learned)) for views in moved])
 
 # %%
-fig = plots.plot_lags(tried, worst, DISAGREEMENT)
+fig = plots.plot_lags(tried, worst, cameras.DISAGREEMENT)
 caption = "Disagreement of the views for each lag of the second video."
 save_figure("own_lags", fig, caption=caption, numbers={"lag": tried, "pixels": worst})
 assert abs(tried[worst.argmin()] - late) < 0.11
-assert worst.min() < 0.3 * DISAGREEMENT
+assert worst.min() < 0.3 * cameras.DISAGREEMENT
 assert worst[tried == late - 1] > 3 * worst.min()
 
 # %% [markdown]
@@ -315,18 +330,17 @@ assert worst[tried == late - 1] > 3 * worst.min()
 
 # %%
 def complaint(*options):
-    with redirect_stderr(io.StringIO()) as told:
-        status = discover(shown, *options, "--out", "none")
-    assert status == 2
+    done = discover(shown, *options, "--out", "none")
+    assert done.returncode == 2
     assert not (folders[shown] / "none").exists()
-    return told.getvalue().splitlines()[-1]
+    return done.stderr.splitlines()[-1]
 
 
 print(wrong_lag := complaint("--lag", "0,0,0"))
 (folders[shown] / "c.avi").write_bytes(b"not a video")
 print(no_video := complaint())
 assert "(0, 7, 0) do" in wrong_lag
-assert "must be a video file that OpenCV can read" in no_video
+assert "must be a video file" in no_video
 home.cleanup()
 
 # %% [markdown]
@@ -348,8 +362,8 @@ start = shots[shown][2].uncalibrated(keep=0)  # what the rig file said
 first, second, third = start.cameras
 free = learn_cameras(tracks, Rig([first, second, replace(third, position=None)]))
 error = (free.cameras[2].offset - truth.cameras[2].offset) / truth.cameras[2].scale
-print(f"the offset of camera 3 is off by {np.linalg.norm(error):.3f} px")
-assert np.linalg.norm(error) < 0.5
+print(f"the offset of camera 3 is off by {np.linalg.norm(error):.2f} px")
+assert np.linalg.norm(error) < 0.1
 
 # %% [markdown]
 # Two cameras must keep theirs. With one, nothing would fix the scene in depth:
@@ -406,6 +420,4 @@ else:
 # would differ from run to run.
 
 # %%
-from vidsindy_lite.stamp import versions
-
 print(versions())

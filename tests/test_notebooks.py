@@ -1,5 +1,6 @@
 """Gates that keep the notebooks honest, each with a test in which it fails, and their quick run."""
 
+import ast
 import json
 import re
 
@@ -7,8 +8,10 @@ import jupytext
 import nbformat
 import pytest
 
-from vidsindy_lite.companion import artifacts, differences
 from vidsindy_lite.companion import run as runner
+from vidsindy_lite.companion.clean import clean
+from vidsindy_lite.companion.compare import differences
+from vidsindy_lite.companion.registry import check_folder
 from vidsindy_lite.stamp import PACKAGE
 
 ROOT = PACKAGE.parent
@@ -30,6 +33,11 @@ GLOBAL_RANDOM = re.compile(
     r"|^\s*(import|from) random\b|\btorch\.manual_seed\b",
     re.MULTILINE,
 )
+# Where a notebook may import from; the rooms come as names of the package.
+PLACES = {
+    "vidsindy_lite", "vidsindy_lite.study", "vidsindy_lite.study.plots",
+    "vidsindy_lite.companion.artifacts",
+}  # fmt: skip
 VOLATILE = re.compile(r"0x[0-9a-f]{6,}|/(tmp|home|root|Users)/|\\Users\\")
 
 
@@ -62,12 +70,20 @@ def freshness_problems(path):
     """Whether the executed half is that of this code, in the full profile and with its outputs."""
     executed = executed_half(path)
     problems = []
-    if executed.metadata.get("vidsindy_lite", {}).get("stamp") != runner.code_stamp(path, "full"):
+    made_by = executed.metadata.get("vidsindy_lite", {}).get("stamp")
+    if made_by != runner.notebook_stamp(path, "full"):
         problems.append("not executed with this code: " + RUN.format(path.stem))
     for index, cell in enumerate(executed.cells):
         if cell.cell_type == "code" and cell.execution_count is None:
             problems.append(f"cell {index} was not executed")
     return problems
+
+
+def count_lines(source):
+    """Lines that are not empty; an import is one, however many names it lists."""
+    imports = (node for node in ast.parse(source).body if isinstance(node, ast.ImportFrom))
+    names = sum(node.end_lineno - node.lineno for node in imports)
+    return sum(bool(line.strip()) for line in source.splitlines()) - names
 
 
 def anatomy_problems(path):
@@ -89,12 +105,24 @@ def anatomy_problems(path):
                 problems.append(f"parameters: not `name: type = value  # help`: {line}")
     for index, cell in enumerate(notebook.cells):
         if cell.cell_type == "code":
-            lines = [line for line in cell.source.splitlines() if line.strip()]
-            if len(lines) > LONGEST:
-                problems.append(f"cell {index} has {len(lines)} lines, at most {LONGEST}")
+            if (lines := count_lines(cell.source)) > LONGEST:
+                problems.append(f"cell {index} has {lines} lines, at most {LONGEST}")
             if found := GLOBAL_RANDOM.search(cell.source):
                 problems.append(f"cell {index} uses global random state: {found[0].strip()}")
     return problems
+
+
+def import_problems(path):
+    """Places in the package that a notebook imports from, beside the four that it may."""
+    code = "\n".join(cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code")
+    found = set()
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.ImportFrom):
+            found.add(node.module)
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    ours = {place for place in found if place.partition(".")[0] == PACKAGE.name}
+    return [f"imports from {place}" for place in sorted(ours - PLACES)]
 
 
 def story_problems(path):
@@ -166,7 +194,10 @@ def test_there_are_notebooks():
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 @pytest.mark.parametrize(
     "gate",
-    [anatomy_problems, story_problems, pair_problems, freshness_problems, output_problems],
+    [
+        anatomy_problems, import_problems, story_problems,
+        pair_problems, freshness_problems, output_problems,
+    ],
 )
 def test_notebook(path, gate):
     assert gate(path) == []
@@ -177,8 +208,8 @@ def test_every_executed_half_has_its_source():
 
 
 def test_figures_are_complete_and_of_this_code():
-    stamps = {path.stem: runner.code_stamp(path, "full") for path in NOTEBOOKS}
-    assert artifacts.check_folder(ROOT / "figures", stamps) == []
+    stamps = {path.stem: runner.notebook_stamp(path, "full") for path in NOTEBOOKS}
+    assert check_folder(ROOT / "figures", stamps) == []
 
 
 @pytest.fixture(scope="module")
@@ -203,11 +234,11 @@ def test_quick_run(path, quick):
 def pair(tiny):
     """A pair that passes every gate; its executed half was made without running it."""
     path = tiny.write("01_first", "x = 1", "x + 1")
-    stamp = runner.code_stamp(path, "full")
+    stamp = runner.notebook_stamp(path, "full")
     executed = jupytext.read(path)
     for count, cell in enumerate((c for c in executed.cells if c.cell_type == "code"), start=1):
         cell.execution_count = count
-    nbformat.write(runner.clean(executed, path, "full", stamp), path.with_suffix(".ipynb"))
+    nbformat.write(clean(executed, path, "full", stamp), path.with_suffix(".ipynb"))
     return path
 
 
@@ -218,7 +249,10 @@ def edit(path, old, new):
 
 
 def test_a_good_pair_passes(pair):
-    for gate in (anatomy_problems, pair_problems, freshness_problems, output_problems):
+    gates = (
+        anatomy_problems, import_problems, pair_problems, freshness_problems, output_problems
+    )  # fmt: skip
+    for gate in gates:
         assert gate(pair) == []
     assert orphan_problems(pair.parent) == []
 
@@ -253,8 +287,8 @@ def test_freshness_gate_fails_on_edited_code(pair):
 
 
 def test_freshness_gate_fails_on_a_quick_run(pair):
-    quick = runner.code_stamp(pair, "quick")
-    edit(pair.with_suffix(".ipynb"), runner.code_stamp(pair, "full"), quick)
+    quick = runner.notebook_stamp(pair, "quick")
+    edit(pair.with_suffix(".ipynb"), runner.notebook_stamp(pair, "full"), quick)
     assert freshness_problems(pair)
 
 
@@ -285,7 +319,27 @@ def test_anatomy_gate_fails(pair, old, new, problem):
 
 def test_anatomy_gate_accepts_a_generator_and_fifteen_lines(pair):
     edit(pair, "x = 1", "rng = np.random.default_rng(0)\n" * LONGEST)
+    edit(pair, "x + 1", "from math import (\n" + "    pi,\n" * LONGEST + ")")
     assert anatomy_problems(pair) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from vidsindy_lite.cameras import Rig",
+        "import vidsindy_lite.stamp",
+        "def late():\n    from vidsindy_lite.study.metrics import score",
+    ],
+)
+def test_import_gate_fails_on_a_fifth_place(pair, line):
+    edit(pair, "x = 1", line)
+    assert len(import_problems(pair)) == 1
+
+
+def test_import_gate_accepts_four_places(pair):
+    lines = (f"import {place}" for place in sorted(PLACES))
+    edit(pair, "x = 1", "\n".join(("import numpy as np", *lines)))
+    assert import_problems(pair) == []
 
 
 STORY = """\

@@ -22,8 +22,8 @@ def shot(tmp_path_factory):
 
 def test_exact_equations_from_video_files(shot):
     found = vl.discover_from_videos(shot.paths, shot.rig.uncalibrated(keep=0), shot.t)
-    assert study.score(found, shot.truth).exact
-    assert study.score(found, shot.truth).l2 < 5e-3
+    assert study.score(found.discovery, shot.truth).exact
+    assert study.score(found.discovery, shot.truth).l2 < 5e-3
     assert all(camera.is_calibrated for camera in found.rig.cameras)
     assert found.x.shape == (200, 3)
     assert [track.shape for track in found.tracks] == [(200, 2)] * 3
@@ -100,7 +100,7 @@ def test_videos_of_different_length_that_start_at_different_times(shot, late):
     paths = [shot.paths[0], late, shot.paths[2]]
     found = vl.discover_from_videos(paths, shot.rig.uncalibrated(), shot.t)
     np.testing.assert_allclose(found.lags.frames, (0, 7, 0), atol=0.01)
-    assert study.score(found, shot.truth).exact
+    assert study.score(found.discovery, shot.truth).exact
     assert np.isnan(found.tracks[1][:7]).all()
     np.testing.assert_allclose(found.tracks[1][7:180], shot.tracks[1][7:180], atol=0.1)
     assert len(found.x) == len(found.t) == 200

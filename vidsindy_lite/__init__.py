@@ -21,7 +21,7 @@ from .cameras import (
     rig_template,
 )
 from .dynamics import Discovery, PolynomialSystem, discover
-from .pipeline import VideoDiscovery, discover_from_videos
+from .pipeline import Observation, VideoDiscovery, discover_from_videos, observe, observe_tracks
 from .vision import (
     Scene,
     Track,
@@ -35,6 +35,9 @@ from .vision import (
 __all__ = [
     "discover_from_videos",
     "VideoDiscovery",
+    "observe",
+    "observe_tracks",
+    "Observation",
     "track",
     "Track",
     "read_video",

@@ -1,12 +1,18 @@
 """The command line, ``python -m vidsindy_lite COMMAND``; ``--help`` lists the commands."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .study import SYSTEMS
+
+if TYPE_CHECKING:
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 DISCOVER_DESCRIPTION = """\
 Find the equations of motion of one target in your own videos, and write a report.
@@ -81,142 +87,168 @@ def _parser() -> argparse.ArgumentParser:
         epilog="`python -m vidsindy_lite discover --help` says more, and so do the others.",
     )
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for add in (
+        _add_discover, _add_template, _add_run, _add_demo, _add_train, _add_site, _add_compare
+    ):
+        add(commands)
+    return parser
 
-    discover = commands.add_parser(
+
+def _add_discover(commands: Commands) -> None:
+    """Arguments of ``discover``."""
+    parser = commands.add_parser(
         "discover",
         help="from your own videos and a rig file to a report on the law",
         description=DISCOVER_DESCRIPTION,
         epilog=DISCOVER_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    discover.add_argument("videos", nargs="+", metavar="VIDEO", help="one per camera of the rig")
-    discover.add_argument("--rig", required=True, metavar="FILE", help="where the cameras stand")
-    discover.add_argument(
+    parser.add_argument("videos", nargs="+", metavar="VIDEO", help="one per camera of the rig")
+    parser.add_argument("--rig", required=True, metavar="FILE", help="where the cameras stand")
+    parser.add_argument(
         "--out", default="report", metavar="DIR", help="folder of the report (default: report)"
     )
-    discover.add_argument(
+    parser.add_argument(
         "--lag",
         type=_numbers,
         metavar="0,L2,L3",
         help="by how many frames of the first video each one starts later; the default is to learn "
         "it (a first number below zero needs the form --lag=-7,0,0)",
     )
-    discover.add_argument(
+    parser.add_argument(
         "--fps",
         type=float,
         metavar="RATE",
         help="frames of each video in one unit of time of the equations (default: as the files "
         "say, which makes it a second of video)",
     )
-    discover.add_argument(
+    parser.add_argument(
         "--degree", type=int, default=3, help="highest degree of the polynomials (default: 3)"
     )
-    discover.add_argument(
+    parser.add_argument(
         "--detector",
         default="auto",
         metavar="NAME",
         help="how to find the target: auto, background, learned, or the path of a YOLO-v8 ONNX "
         "file (default: auto)",
     )
-    discover.add_argument("--seed", type=int, default=0, help="of the search (default: 0)")
-    discover.set_defaults(command=_discover)
+    parser.add_argument("--seed", type=int, default=0, help="of the search (default: 0)")
+    parser.set_defaults(command=_discover)
 
-    template = commands.add_parser(
+
+def _add_template(commands: Commands) -> None:
+    """Arguments of ``rig-template``."""
+    parser = commands.add_parser(
         "rig-template", help="print a rig file to fill in", description=TEMPLATE_DESCRIPTION
     )
-    template.add_argument("--cameras", type=int, default=3, help="how many (default: 3)")
-    template.add_argument(
+    parser.add_argument("--cameras", type=int, default=3, help="how many (default: 3)")
+    parser.add_argument(
         "--model",
         choices=("orthographic", "perspective"),
         default="orthographic",
         help="orthographic for far cameras with long lenses (default), perspective for near ones",
     )
-    template.add_argument(
+    parser.add_argument(
         "--size",
         type=_size,
         default=(1920, 1080),
         metavar="WxH",
         help="of the videos in pixels (default: 1920x1080)",
     )
-    template.set_defaults(command=_rig_template)
+    parser.set_defaults(command=_rig_template)
 
-    run = commands.add_parser(
+
+def _add_run(commands: Commands) -> None:
+    """Arguments of ``run``."""
+    parser = commands.add_parser(
         "run",
         help="execute the notebooks, regenerate figures and tables",
         description=RUN_DESCRIPTION,
         epilog=RUN_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    run.add_argument(
+    parser.add_argument(
         "notebooks", nargs="*", metavar="NOTEBOOK", help="number, name or path (default: all)"
     )
-    run.add_argument(
+    parser.add_argument(
         "--profile", choices=("full", "quick"), default="full", help="size (default: full)"
     )
-    run.add_argument(
+    parser.add_argument(
         "--output",
         metavar="DIR",
         help="folder for notebooks/ and figures/ (default: the repository, or build/quick)",
     )
-    run.add_argument(
+    parser.add_argument(
         "--force",
         action="store_true",
         help="execute also what is up to date: same code, executed here, outputs in place",
     )
-    run.add_argument(
+    parser.add_argument(
         "--dask",
         metavar="ADDRESS",
         help="scheduler of a Dask cluster, e.g. tcp://10.0.0.1:8786, that the sweeps run on",
     )
-    run.set_defaults(command=_run)
+    parser.set_defaults(command=_run)
 
-    demo = commands.add_parser(
+
+def _add_demo(commands: Commands) -> None:
+    """Arguments of ``demo``."""
+    parser = commands.add_parser(
         "demo",
         help="from three videos to the first equation, in a minute",
         description=DEMO_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    demo.add_argument("--system", choices=SYSTEMS, default="Lorenz", help="default: Lorenz")
-    demo.add_argument("--frames", type=int, default=500, help="per camera (default: 500)")
-    demo.add_argument("--seed", type=int, default=0, help="of scenes and noise (default: 0)")
-    demo.set_defaults(command=_demo)
+    parser.add_argument("--system", choices=SYSTEMS, default="Lorenz", help="default: Lorenz")
+    parser.add_argument("--frames", type=int, default=500, help="per camera (default: 500)")
+    parser.add_argument("--seed", type=int, default=0, help="of scenes and noise (default: 0)")
+    parser.set_defaults(command=_demo)
 
-    train = commands.add_parser(
+
+def _add_train(commands: Commands) -> None:
+    """Arguments of ``train-detector``."""
+    parser = commands.add_parser(
         "train-detector",
         help="train the learned detector from scratch",
         description=TRAIN_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    train.add_argument("--seed", type=int, default=0, help="of weights and frames (default: 0)")
-    train.add_argument("--steps", type=int, help="batches of 16 frames (default: as shipped)")
-    train.add_argument("--output", metavar="FILE", help="weights (default: those of the package)")
-    train.set_defaults(command=_train)
-    site = commands.add_parser(
+    parser.add_argument("--seed", type=int, default=0, help="of weights and frames (default: 0)")
+    parser.add_argument("--steps", type=int, help="batches of 16 frames (default: as shipped)")
+    parser.add_argument("--output", metavar="FILE", help="weights (default: those of the package)")
+    parser.set_defaults(command=_train)
+
+
+def _add_site(commands: Commands) -> None:
+    """Arguments of ``site``."""
+    parser = commands.add_parser(
         "site",
         help="README, notebooks, figures and reference as web pages",
         description="Write README, notebooks, figures and reference as web pages for offline use.",
     )
-    site.add_argument(
+    parser.add_argument(
         "--output", metavar="DIR", default="build/site", help="folder (default: build/site)"
     )
-    site.set_defaults(command=_site)
+    parser.set_defaults(command=_site)
 
-    compare = commands.add_parser(
+
+def _add_compare(commands: Commands) -> None:
+    """Arguments of ``compare``."""
+    parser = commands.add_parser(
         "compare",
         help="two folders of figures, by their numbers",
         description="Compare the numbers of two folders of figures, and lay out what differs.",
         epilog="exit status: 0 if all numbers agree, 1 if not, 2 if there is nothing to compare.",
     )
-    compare.add_argument("committed", metavar="COMMITTED", help="a folder like figures/")
-    compare.add_argument("regenerated", metavar="REGENERATED", help="the same from another run")
-    compare.add_argument(
+    parser.add_argument("committed", metavar="COMMITTED", help="a folder like figures/")
+    parser.add_argument("regenerated", metavar="REGENERATED", help="the same from another run")
+    parser.add_argument(
         "--output",
         metavar="DIR",
         required=True,
         help="for both sides, with a page; an earlier comparison there is replaced",
     )
-    compare.set_defaults(command=_compare)
-    return parser
+    parser.set_defaults(command=_compare)
 
 
 def _numbers(text: str) -> list[float]:
@@ -243,7 +275,7 @@ def _discover(options: argparse.Namespace) -> int:
 
     from .cameras import Rig, list_lags
     from .checks import check_positive
-    from .companion import PAGE, check_folder_is_free, write_report
+    from .companion.report import PAGE, check_folder_is_free, write_report
     from .pipeline import discover_from_videos
     from .vision import check_detector, video_info
 
@@ -266,9 +298,13 @@ def _discover(options: argparse.Namespace) -> int:
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"detector": options.detector}
     told |= {"frames in a unit of time": options.fps} if options.fps is not None else {}
-    write_report(found, options.videos, options.out, told)
+    # First the law: if the report cannot be written, it is not lost.
     print(found)
-    print(f"status: {found.status}; lags of the videos: {list_lags(found.lags.frames)} frames")
+    print(
+        f"status: {found.status}; lags of the videos: {list_lags(found.lags.frames)} frames",
+        flush=True,
+    )
+    write_report(found, options.videos, options.out, told)
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
 
@@ -304,11 +340,12 @@ def _demo(options: argparse.Namespace) -> int:
         found = discover_from_videos(
             shot.paths, shot.rig.uncalibrated(keep=0), shot.t, seed=options.seed, progress=True
         )
+    law = found.discovery
     print("the law, in the frame of the cameras:")
     print(found)
-    print(f"the same around the origin ({', '.join(f'{value:.4f}' for value in found.offset)}):")
-    print(found.equations("native"))
-    print(f"against the truth: {score(found, shot.truth)}")
+    print(f"the same around the origin ({', '.join(f'{value:.4f}' for value in law.offset)}):")
+    print(law.equations("native"))
+    print(f"against the truth: {score(law, shot.truth)}")
     return 0
 
 
@@ -323,7 +360,7 @@ def _train(options: argparse.Namespace) -> int:
 
 
 def _site(options: argparse.Namespace) -> int:
-    from .companion import build_site
+    from .companion.site import build_site
 
     pages = build_site(options.output)
     print(f"{len(pages)} pages: open {options.output}/index.html")
@@ -331,7 +368,7 @@ def _site(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from .companion import side_by_side
+    from .companion.compare import side_by_side
 
     found = side_by_side(options.committed, options.regenerated, options.output)
     for name, place in found.items():

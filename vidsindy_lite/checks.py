@@ -6,12 +6,14 @@ Booleans are no numbers here, and text is none even where numpy would read it as
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from .arrays import Floats
 
 FARTHEST_PIXEL = 1e100
 """Largest coordinate of a track: the squares of larger ones are no numbers any more."""
@@ -30,6 +32,12 @@ def check_path(name: str, value: str | os.PathLike) -> Path:
     if not isinstance(value, str | os.PathLike):
         raise ValueError(f"{name}: must be the name of a file, got {value!r:.60}")
     return Path(value)
+
+
+def check_choice(name: str, value: str, known: Iterable[str]) -> None:
+    """One of the known names."""
+    if value not in known:
+        raise ValueError(f"{name}: must be one of {', '.join(known)}, got {value!r:.60}")
 
 
 def check_integer(name: str, value: int, least: int = 0) -> int:
@@ -53,7 +61,7 @@ def check_positive(name: str, value: float) -> float:
     return float(value)
 
 
-def check_array(name: str, values: ArrayLike) -> np.ndarray:
+def check_array(name: str, values: ArrayLike) -> Floats:
     """Real numbers as an array of floats, in which the masked entries of a masked array are NaN."""
     try:
         array = values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
@@ -64,7 +72,7 @@ def check_array(name: str, values: ArrayLike) -> np.ndarray:
         raise ValueError(f"{name}: must be an array of real numbers, got {values!r:.60}") from None
 
 
-def check_vector(name: str, values: ArrayLike, size: int) -> np.ndarray:
+def check_vector(name: str, values: ArrayLike, size: int) -> Floats:
     """So many finite numbers, shape (size,); a copy."""
     vector = check_array(name, values).copy()
     if vector.shape != (size,) or not np.isfinite(vector).all():
@@ -72,7 +80,7 @@ def check_vector(name: str, values: ArrayLike, size: int) -> np.ndarray:
     return vector
 
 
-def check_rows(name: str, values: ArrayLike, width: int) -> np.ndarray:
+def check_rows(name: str, values: ArrayLike, width: int) -> Floats:
     """Points or pixels row by row, shape (n, width); a row holding NaN is a missing one."""
     rows = check_array(name, values)
     if rows.ndim != 2 or rows.shape[1] != width:
@@ -84,7 +92,7 @@ def check_rows(name: str, values: ArrayLike, width: int) -> np.ndarray:
     return rows
 
 
-def check_tracks(tracks: Sequence[np.ndarray], cameras: int | None = None) -> list[np.ndarray]:
+def check_tracks(tracks: Sequence[ArrayLike], cameras: int | None = None) -> list[Floats]:
     """Pixels of the target in each camera, (n_i, 2) each; so many if given."""
     is_array = isinstance(tracks, np.ndarray) and tracks.ndim
     if not (is_array or isinstance(tracks, list | tuple)) or not len(tracks):
@@ -93,17 +101,17 @@ def check_tracks(tracks: Sequence[np.ndarray], cameras: int | None = None) -> li
         )
     if cameras is not None and len(tracks) != cameras:
         raise ValueError(f"tracks: must be one per camera, got {len(tracks)} for {cameras} cameras")
-    tracks = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
-    for i, track in enumerate(tracks):
+    checked = [check_rows(f"tracks[{i}]", track, 2) for i, track in enumerate(tracks)]
+    for i, track in enumerate(checked):
         largest = np.nanmax(np.abs(track), initial=0.0)
         if largest > FARTHEST_PIXEL:
             raise ValueError(
                 f"tracks[{i}]: must be pixels of at most {FARTHEST_PIXEL:g}, got {largest:g}"
             )
-    return tracks
+    return checked
 
 
-def check_times(t: np.ndarray) -> np.ndarray:
+def check_times(t: ArrayLike) -> Floats:
     """Finite, increasing times, at least one, shape (n,)."""
     t = check_array("t", t)
     if t.ndim != 1 or not len(t):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from tqdm import tqdm
 
+from .arrays import Floats
 from .cameras import (
     DISAGREEMENT,
     Lags,
@@ -25,21 +27,21 @@ from .cameras import (
     systematic_errors,
     trailing_errors,
 )
-from .checks import check_integer, check_path, check_times, check_vector
+from .checks import check_integer, check_path, check_times, check_tracks, check_vector
 from .dynamics import Discovery, discover
 from .vision import Track, VideoInfo, check_detector, track, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
-@dataclass(frozen=True)
-class VideoDiscovery(Discovery):
-    """A law discovered from videos, with what the pipeline found on the way.
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What the videos of one target tell before any law is asked for.
 
     Parameters
     ----------
     tracks : tuple of ndarray, shape (n, 2)
-        Pixels of the target in each video at these times; NaN where it was not seen.
+        Pixels of the target in each video at the instants ``t``; NaN where it was not seen.
     rig : Rig
         The cameras, all calibrated.
     lags : Lags
@@ -47,20 +49,49 @@ class VideoDiscovery(Discovery):
     t : ndarray, shape (n,)
         Time of each frame of the first video.
     x : ndarray, shape (n, 3)
-        Reconstructed trajectory in scene units; NaN where fewer than two cameras saw the target.
+        Reconstructed path in scene units; NaN where fewer than two cameras saw the target.
+    systematic : ndarray, shape (k, n, 3)
+        Errors of the path that all frames share: what k independent causes, each off by one
+        standard error, add to it, in scene units. See `discover`.
+    warnings : tuple of str
+        Why the result should not be trusted, with advice; empty if nothing was found.
     """
 
-    tracks: tuple[np.ndarray, ...]
+    tracks: tuple[Floats, ...]
     rig: Rig
     lags: Lags
-    t: np.ndarray
-    x: np.ndarray
+    t: Floats
+    x: Floats
+    systematic: Floats
+    warnings: tuple[str, ...]
+
+    @property
+    def status(self) -> str:
+        """``"ok"``, or ``"suspect"`` if there is a warning."""
+        return "suspect" if self.warnings else "ok"
+
+
+@dataclass(frozen=True, eq=False)
+class VideoDiscovery(Observation):
+    """An observation and the law that it obeys; its warnings are those of both.
+
+    Parameters
+    ----------
+    discovery : Discovery
+        The law in the frame of the rig and in its own, sparsest frame.
+    """
+
+    discovery: Discovery
+
+    def __str__(self) -> str:
+        warnings = (f"warning: {text}" for text in self.warnings)
+        return "\n".join([self.discovery.equations(), *warnings])
 
 
 def discover_from_videos(
     paths: Sequence[str | Path],
     rig: Rig,
-    t: np.ndarray | None = None,
+    t: ArrayLike | None = None,
     *,
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
@@ -69,6 +100,45 @@ def discover_from_videos(
     progress: bool = False,
 ) -> VideoDiscovery:
     """Discover the governing equations of a target filmed by several fixed cameras.
+
+    This is `observe`, then `discover` on the path that it reconstructs.
+
+    Parameters
+    ----------
+    paths, rig, t, lags, detector, progress
+        See `observe`. The unit of time is that of the equations.
+    degree, seed : int
+        See `discover`.
+
+    Returns
+    -------
+    VideoDiscovery
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        See `observe` and `discover`. What can be told before a video is tracked is.
+    """
+    check_integer("degree", degree, 1)
+    check_integer("seed", seed)
+    seen = observe(paths, rig, t, lags=lags, detector=detector, progress=progress)
+    found = discover(
+        seen.t, seen.x, degree=degree, seed=seed, progress=progress, systematic=seen.systematic
+    )
+    parts = vars(seen) | {"warnings": (*seen.warnings, *found.warnings)}
+    return VideoDiscovery(**parts, discovery=found)
+
+
+def observe(
+    paths: Sequence[str | Path],
+    rig: Rig,
+    t: ArrayLike | None = None,
+    *,
+    lags: Sequence[float] | None = None,
+    detector: str | os.PathLike = "auto",
+    progress: bool = False,
+) -> Observation:
+    """Track a target in the videos of several fixed cameras and reconstruct its path.
 
     The frames of the first video are the clock; the others may start earlier or later, differ in
     length, and in frame rate if their files state it.
@@ -81,21 +151,18 @@ def discover_from_videos(
         Positions and normals of all cameras, scale and angle of at least one.
     t : array_like, shape (n,), optional
         Time of each frame of the first video, increasing; all videos then have the same frame rate.
-        By default the frame number over the frame rate, in seconds. The unit of time is that of the
-        equations.
+        By default the frame number over the frame rate, in seconds.
     lags : array_like, shape (m,), optional
         By how many frames of the first video each one starts later; only differences count. By
         default they are learned, see `learn_lags`.
     detector : str or path
         See `track`.
-    degree, seed : int
-        See `discover`.
     progress : bool
         Show progress bars.
 
     Returns
     -------
-    VideoDiscovery
+    Observation
         Its first warnings are that the rig does not agree with the tracks, if it does not, and
         which backgrounds are not at rest.
 
@@ -103,26 +170,133 @@ def discover_from_videos(
     ------
     FileNotFoundError, ValueError
         If a file is missing, cut off or no video, if the numbers of files and cameras disagree, if
-        a target is not found, if the given lags are clearly wrong, or if cameras or law cannot be
-        learned (see `learn_cameras` and `discover`). What can be told before a video is tracked is.
+        a target is not found, if the given lags are clearly wrong, or if the cameras cannot be
+        learned (see `learn_cameras`). What can be told before a video is tracked is.
+    """
+    footage = _check_footage(paths, rig, t, lags, detector)
+    seen = _track_all(footage, detector, progress)
+    tracks = [track.pixels for track in seen]
+    doubts = [warning for track in seen for warning in track.warnings]
+    names = [path.name for path in footage.paths]
+    return _observed(tracks, rig, footage.t, footage.lags, footage.rates, names, doubts)
+
+
+def observe_tracks(
+    tracks: Sequence[ArrayLike], rig: Rig, t: ArrayLike, *, lags: Sequence[float] | None = None
+) -> Observation:
+    """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n_i, 2)
+        Pixels of the target, one track per camera of the rig, each from its own first frame; all
+        cameras have the same frame rate. NaN where it was not seen.
+    rig, lags
+        See `observe`.
+    t : array_like, shape (n_0,)
+        Time of each frame of the first track, increasing.
+
+    Returns
+    -------
+    Observation
+
+    Raises
+    ------
+    ValueError
+        If the numbers of tracks, cameras and times disagree, or as `observe` does.
     """
     check_learnable(rig)
-    check_integer("degree", degree, 1)
-    check_integer("seed", seed)
+    raw = check_tracks(tracks, len(rig.cameras))
+    t = check_times(t)
+    if t.shape != (len(raw[0]),):
+        raise ValueError(
+            f"t: must have shape ({len(raw[0])},), one per row of tracks[0], got {t.shape}"
+        )
+    given = None if lags is None else check_vector("lags", lags, len(raw))
+    if given is not None:
+        given -= given[0]
+    return _observed(raw, rig, t, given, None, [f"tracks[{i}]" for i in range(len(raw))])
+
+
+def _observed(
+    raw: Sequence[Floats],
+    rig: Rig,
+    t: Floats,
+    lags: Floats | None,
+    rates: Floats | None,
+    names: Sequence[str],
+    doubts: Sequence[str] = (),
+) -> Observation:
+    """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    learned_lags = learn_lags(raw, rig, rates, start=lags)
+    used_lags = learned_lags if lags is None else _given(lags, learned_lags)
+    tracks = align(raw, used_lags.frames, rates)
+    learned = learn_cameras(tracks, rig)
+    shared = systematic_errors(raw, rig, learned, used_lags), trailing_errors(tracks, learned)
+    return Observation(
+        tracks=tracks,
+        rig=learned,
+        lags=used_lags,
+        t=t,
+        x=reconstruct(tracks, learned),
+        systematic=np.concatenate(shared),
+        warnings=(
+            *_rig_warnings(tracks, learned, rig, names, learned_lags),
+            *learned.warnings,
+            *doubts,
+            *used_lags.warnings,
+        ),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Footage:
+    """Video files that fit a rig, their clock, and their lags if they are given."""
+
+    paths: list[Path]
+    shots: list[VideoInfo]
+    t: Floats
+    rates: Floats | None
+    lags: Floats | None
+
+
+def _check_footage(
+    paths: Sequence[str | Path],
+    rig: Rig,
+    t: ArrayLike | None,
+    lags: Sequence[float] | None,
+    detector: str | os.PathLike,
+) -> _Footage:
+    """All that can be told before a video is tracked."""
+    check_learnable(rig)
     check_detector(detector)
+    files = _check_paths(paths, rig)
+    given = None if lags is None else check_vector("lags", lags, len(files))
+    shots = _check_shots(files, rig)
+    times, rates = _clock(shots, t)
+    if given is not None:
+        given = given - given[0]
+        _check_overlap(given, rates, shots, files)
+    return _Footage(files, shots, times, rates, given)
+
+
+def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
+    """One file name per camera."""
     if isinstance(paths, str) or not isinstance(paths, Iterable):
         raise ValueError(f"paths: must be a list of files, one per camera, got {paths!r:.60}")
-    paths = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
-    if len(paths) != len(rig.cameras):
+    files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
+    if len(files) != len(rig.cameras):
         raise ValueError(
             f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
-            f"got {len(paths)}"
+            f"got {len(files)}"
         )
-    if lags is not None:
-        lags = check_vector("lags", lags, len(paths))
-        lags -= lags[0]
-    shots = [video_info(path) for path in paths]
-    for path, shot, camera in zip(paths, shots, rig.cameras, strict=True):
+    return files
+
+
+def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
+    """What each file is, if it is a video of the size that its camera has."""
+    shots = [video_info(path) for path in files]
+    for path, shot, camera in zip(files, shots, rig.cameras, strict=True):
         if shot.frames < 2:
             raise ValueError(f"paths: {path.name} must be a video, got a single frame")
         if shot.size != camera.image_size:
@@ -130,43 +304,19 @@ def discover_from_videos(
                 f"paths: {path.name} must have the image size of its camera in the rig, "
                 f"{camera.image_size}, got {shot.size}"
             )
-    t, rates = _clock(shots, t)
-    if lags is not None:
-        _check_overlap(lags, rates, shots, paths)
-    bar = tqdm(list(zip(paths, shots, strict=True)), desc="track", disable=not progress)
-    followed = [_track(path, shot.frames, detector) for path, shot in bar]
-    raw = [seen.pixels for seen in followed]
-    learned_lags = learn_lags(raw, rig, rates, start=lags)
-    synchrony = learned_lags if lags is None else _given(lags, learned_lags)
-    tracks = align(raw, synchrony.frames, rates)
-    learned = learn_cameras(tracks, rig)
-    x = reconstruct(tracks, learned)
-    shared = np.concatenate(
-        (systematic_errors(raw, rig, learned, synchrony), trailing_errors(tracks, learned))
-    )
-    found = discover(t, x, degree=degree, seed=seed, progress=progress, systematic=shared)
-    parts = {f.name: getattr(found, f.name) for f in fields(Discovery)}
-    parts["warnings"] = (
-        *_rig_doubts(tracks, learned, rig, paths, learned_lags),
-        *(warning for seen in followed for warning in seen.warnings),
-        *synchrony.warnings,
-        *found.warnings,
-    )
-    return VideoDiscovery(**parts, tracks=tracks, rig=learned, lags=synchrony, t=t, x=x)
+    return shots
 
 
-def _clock(
-    shots: Sequence[VideoInfo], t: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray | None]:
+def _clock(shots: Sequence[VideoInfo], t: ArrayLike | None) -> tuple[Floats, Floats | None]:
     """Time of each frame of the first video, and frames of each video in one frame of the first."""
     if t is not None:
-        t = check_times(t)
-        if t.shape != (shots[0].frames,):
+        times = check_times(t)
+        if times.shape != (shots[0].frames,):
             raise ValueError(
                 f"t: must have shape ({shots[0].frames},), one per frame of the first video, "
-                f"got {t.shape}"
+                f"got {times.shape}"
             )
-        return t, None
+        return times, None
     fps = np.array([shot.fps for shot in shots])
     if not (np.isfinite(fps) & (fps > 0)).all():
         raise ValueError(f"t: must be given if a file states no frame rate, got {fps.tolist()}")
@@ -174,19 +324,29 @@ def _clock(
 
 
 def _check_overlap(
-    lags: np.ndarray, rates: np.ndarray | None, shots: Sequence[VideoInfo], paths: Sequence[Path]
+    lags: Floats, rates: Floats | None, shots: Sequence[VideoInfo], paths: Sequence[Path]
 ) -> None:
-    """That every video runs, at its given lag, during some of the first."""
+    """That every video shares, at its given lag, half of the shorter one's time with the first."""
     rates = np.ones(len(lags)) if rates is None else rates
     for path, shot, lag, rate in zip(paths, shots, lags, rates, strict=True):
-        if not -shot.frames / rate < lag < shots[0].frames:
+        end = shot.frames / rate
+        common = min(lag + end, shots[0].frames) - max(lag, 0)
+        if common < min(end, shots[0].frames) / 2:
             raise ValueError(
-                f"lags: every video must overlap with the first ({shots[0].frames} frames), got "
-                f"{lag:g} for {path.name} ({shot.frames} frames)"
+                "lags: every video must have half of the shorter of the two in common with the "
+                f"first ({shots[0].frames} frames), got {lag:g} for {path.name} ({shot.frames} "
+                "frames)"
             )
 
 
-def _track(path: Path, frames: int, detector: str | os.PathLike) -> Track:
+def _track_all(footage: _Footage, detector: str | os.PathLike, progress: bool) -> list[Track]:
+    """The track of the target in each video."""
+    videos = list(zip(footage.paths, footage.shots, strict=True))
+    bar = tqdm(videos, desc="track", disable=not progress)
+    return [_track_one(path, shot.frames, detector) for path, shot in bar]
+
+
+def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     """Track a video that should have so many frames and one moving target."""
     found = track(path, detector)
     if len(found.pixels) != frames:
@@ -203,7 +363,7 @@ def _track(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     return found
 
 
-def _given(lags: np.ndarray, learned: Lags) -> Lags:
+def _given(lags: Floats, learned: Lags) -> Lags:
     """The lags that are given, unless others are clearly those of the tracks."""
     apart = np.abs(learned.frames - lags) > _WRONG_LAG + 5 * learned.errors
     if learned.agree and apart.any():
@@ -214,11 +374,11 @@ def _given(lags: np.ndarray, learned: Lags) -> Lags:
     return replace(learned, frames=lags, errors=0 * lags, warnings=())
 
 
-def _rig_doubts(
-    tracks: Sequence[np.ndarray],
+def _rig_warnings(
+    tracks: Sequence[Floats],
     learned: Rig,
     given: Rig,
-    paths: Sequence[Path],
+    names: Sequence[str],
     lags: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
@@ -236,12 +396,12 @@ def _rig_doubts(
             f"({list_lags(lags.frames)}) would explain it best"
         ]
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
-    others = [learn_normal(tracks, given, i) for i in range(len(paths))]
+    others = [learn_normal(tracks, given, i) for i in range(len(names))]
     left = [max(disagreement(tracks, other)) for other in others]
     i = int(np.argmin(left))
     normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
     advice = (
-        f"the normal ({normal}) of cameras[{i}] ({paths[i].name}) would explain it best"
+        f"the normal ({normal}) of cameras[{i}] ({names[i]}) would explain it best"
         if left[i] <= DISAGREEMENT
         else "no single wrong normal explains it; check the positions, the scales and angles that "
         "are given, and that at least half of the shortest video is in common with the others"

@@ -7,12 +7,12 @@ from helpers import trajectory
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras.synchronise import Lags
-from vidsindy_lite.cameras.unknowns import Unknowns
 from vidsindy_lite.cameras.uncertainty import (
     long_run_covariance,
     systematic_errors,
     trailing_errors,
 )
+from vidsindy_lite.cameras.unknowns import Unknowns
 
 NOISE = 0.05  # pixels
 

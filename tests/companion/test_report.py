@@ -5,7 +5,7 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import fields, replace
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -15,7 +15,7 @@ import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
 from vidsindy_lite.companion.report import FILES, check_folder_is_free, summary, write_report
-from vidsindy_lite.dynamics import Discovery
+from vidsindy_lite.pipeline import Observation
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +35,9 @@ def case(tmp_path_factory):
     tracks[2] = np.where(np.arange(150)[:, None] < 5, np.nan, tracks[2])
     x[:5] = np.nan
     law = vl.discover(t, x, degree=2)
-    parts = {field.name: getattr(law, field.name) for field in fields(Discovery)}
     lags = Lags(np.array([0, 3.5, 0]), np.ones(3), np.array([0, 0.01, np.inf]), 0.1)
-    return vl.VideoDiscovery(**parts, tracks=tuple(tracks), rig=rig, lags=lags, t=t, x=x), paths
+    seen = Observation(tuple(tracks), rig, lags, t, x, np.empty((0, *x.shape)), law.warnings)
+    return vl.VideoDiscovery(**vars(seen), discovery=law), paths
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_the_page_tells_law_verdict_and_cameras(page, case):
     found, _ = case
     text = page.read_text(encoding="utf-8")
     for frame in ("data", "native"):
-        assert found.equations(frame) in text
+        assert found.discovery.equations(frame) in text
     assert "No reason for doubt was found." in text
     assert "3.500 ± 0.01" in text
     assert "0.000 ± unknown" in text
@@ -107,12 +107,12 @@ def test_the_data_are_those_of_the_law(page, case):
 
     data = json.loads((page.parent / "result.json").read_text("utf-8"), parse_constant=refuse)
     assert data["status"] == found.status
-    assert data["law"]["native"]["equations"] == found.equations("native")
+    assert data["law"]["native"]["equations"] == found.discovery.equations("native")
     term = data["law"]["data"]["terms"][0]
-    row, column = found.terms.index(term["term"]), "xyz".index(term["equation"][1])
-    assert term["coefficient"] == found.coefficients[row, column]
-    assert term["standard_error"] == found.standard_errors[row, column]
-    assert len(data["law"]["data"]["terms"]) == found.system.support.sum()
+    row, column = found.discovery.terms.index(term["term"]), "xyz".index(term["equation"][1])
+    assert term["coefficient"] == found.discovery.coefficients[row, column]
+    assert term["standard_error"] == found.discovery.standard_errors[row, column]
+    assert len(data["law"]["data"]["terms"]) == found.discovery.system.support.sum()
     x = np.array(data["x"], dtype=float)
     np.testing.assert_array_equal(x, found.x)
     assert data["x"][0] == [None] * 3
@@ -166,7 +166,8 @@ InteractiveShell.instance()
 from vidsindy_lite.companion import report
 t = np.linspace(0, 1, 20)
 x = np.column_stack((t, t**2, t**3))
-figures = report._figures(SimpleNamespace(t=t, x=x, curve=lambda t: x), [])
+law = SimpleNamespace(curve=lambda t: x)
+figures = report._figures(SimpleNamespace(t=t, x=x, discovery=law), [])
 assert "<img" in next(figures)
 figures.close()
 print("interactive:", matplotlib.is_interactive())

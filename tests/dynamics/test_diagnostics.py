@@ -1,14 +1,18 @@
-"""The doubts, on fits whose support is set by hand."""
+"""The warnings, on fits whose support is set by hand."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.collocation import Collocation, Segment, State
-from vidsindy_lite.dynamics.diagnostics import doubts, frame_doubts, strays
+from vidsindy_lite.dynamics import search
+from vidsindy_lite.dynamics.collocation import Collocation, State, Status
+from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
+from vidsindy_lite.dynamics.grid import Segment
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.solver import term_charges
+from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.dynamics.splines import DEGREE
-from vidsindy_lite.dynamics.trajectories import check_records
+from vidsindy_lite.dynamics.trajectories import check_trajectories
 from vidsindy_lite.study import SYSTEMS, corruption
 
 NOISE = 0.03
@@ -25,10 +29,16 @@ def duffing():
 
 
 def fitted(duffing, dropped=None):
+    """The problem in units in which it is standard already, and a fit with the support given."""
     law, t, x = duffing
+    problem = replace(
+        pose([(t, x)], [np.empty((*x.shape, 0))], degree=3, seed=0),
+        trajectories=[(t, x)],
+        noise=np.full(2, NOISE),
+    )
     segment = Segment.even(t, x, 1 / 8, 0)
     weights = np.full(2, NOISE**-2)
-    problem = Collocation([segment], law.exponents, weights, np.full(2, 1e6))
+    collocation = Collocation.of([segment], law.exponents, weights, np.full(2, 1e6))
     nodes = np.linspace(t[0], t[-1], len(segment.breakpoints) + DEGREE - 1)
     curve = np.stack([np.interp(nodes, t, column) for column in x.T], axis=1)
     active = law.support.copy()
@@ -36,34 +46,36 @@ def fitted(duffing, dropped=None):
         active[law.terms.index(dropped), 1] = False
     origin, still = np.zeros(2), np.zeros(2, dtype=bool)
     state = State(curve, np.where(active, law.coefficients, 0.0), active, origin, still)
-    state = problem.solve(state, tolerance=1e-4, max_steps=100)
-    found = PolynomialSystem(law.names, law.exponents, state.coefficients)
-    return doubts(
-        found, state, problem, term_charges(law.exponents), [(t, x)], np.full(2, NOISE)
-    )
+    fit = search.fitted(collocation, state, tolerance=1e-4, max_steps=100)
+    return problem, fit, problem.law(fit.state), np.full(law.coefficients.size, np.inf)
+
+
+def told(duffing, dropped=None):
+    return diagnose(*fitted(duffing, dropped))
 
 
 def test_the_true_law_is_not_doubted(duffing):
-    assert fitted(duffing) == []
+    assert told(duffing) == ()
 
 
 def test_a_missing_term_is_noticed(duffing):
-    assert any("the terms left out explain more than chance" in d for d in fitted(duffing, "x^3"))
+    assert any("the terms left out explain more than chance" in d for d in told(duffing, "x^3"))
 
 
 def test_a_narrow_decision_in_the_frame_of_the_data_is_told(duffing):
-    law = duffing[0]
+    problem, fit, law, _ = fitted(duffing)
     margins = np.full(law.coefficients.size, 100.0)
-    assert frame_doubts(law, margins) == []
+    assert diagnose(problem, fit, law, margins) == ()
     margins[[law.terms.index("1"), len(law.terms) + law.terms.index("x^3")]] = 3.0, 1.5
-    (doubt,) = frame_doubts(law, margins)
-    assert "with 1 in dx/dt, without x^3 in dy/dt (criterion +1.5)" in doubt
+    (warning,) = diagnose(problem, fit, law, margins)
+    assert "with 1 in dx/dt, without x^3 in dy/dt (criterion +1.5)" in warning
 
 
 def test_a_coordinate_that_lost_its_law_is_told(duffing):
+    problem, fit, _, _ = fitted(duffing)
     law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
-    (doubt,) = frame_doubts(law, np.full(law.coefficients.size, 100.0))
-    assert "no term was found for dy/dt" in doubt
+    (warning,) = diagnose(problem, fit, law, np.full(law.coefficients.size, 100.0))
+    assert "no term was found for dy/dt" in warning
 
 
 @pytest.mark.parametrize("size", [1e3, -1e6])
@@ -72,12 +84,12 @@ def test_a_single_sample_far_off_is_named(duffing, size):
     x = x.copy()
     x[200:220] = np.nan
     x[300, 1] = size
-    (doubt,) = strays(check_records(t, x))
-    assert f"a sample lies far from those before and after it: t = {t[300]:g}, x = (" in doubt
-    assert f", {size:g})" in doubt
+    (warning,) = outliers(check_trajectories(t, x))
+    assert f"a sample lies far from those before and after it: t = {t[300]:g}, x = (" in warning
+    assert f", {size:g})" in warning
     x[[310, 320, 330, 340], 0] = size
-    (doubt,) = strays(check_records(t, x))
-    assert "and 2 more" in doubt
+    (warning,) = outliers(check_trajectories(t, x))
+    assert "and 2 more" in warning
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -86,8 +98,8 @@ def test_outliers_at_the_ends_and_in_a_row_are_named(duffing, rows, sign):
     _, t, x = duffing
     x = x.copy()
     x[rows, 1] = 1e3 * sign ** np.arange(len(rows))
-    (doubt,) = strays(check_records(t, x))
-    places = doubt.split("after it: ")[1].split(": no motion")[0].split("; ")
+    (warning,) = outliers(check_trajectories(t, x))
+    places = warning.split("after it: ")[1].split(": no motion")[0].split("; ")
     assert [float(place.split(",")[0].removeprefix("t = ")) for place in places] == pytest.approx(
         t[rows], rel=1e-4
     )
@@ -98,7 +110,7 @@ def test_a_motion_that_comes_to_rest_is_no_stray(rate):
     k = np.arange(3000)
     x = np.exp(-rate * k)[:, None] * np.column_stack((np.cos(0.2 * k), np.sin(0.2 * k)))
     for states in (x, x[::-1], np.exp(-rate * k)[:, None]):
-        assert strays(check_records(k, states)) == []
+        assert outliers(check_trajectories(k, states)) == []
 
 
 @pytest.mark.slow
@@ -115,4 +127,16 @@ def test_noise_and_gaps_are_no_strays(law):
         parts = (slice(None), slice(0, 100), slice(1400, 1500), slice(0, 400), *uneven)
         for x in (clean, *noisy, *hidden):
             for part in parts:
-                assert strays(check_records(t[part], x[part])) == []
+                assert outliers(check_trajectories(t[part], x[part])) == []
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [(Status.MAX_STEPS, "use cleaner samples"), (Status.STALLED, "may be indistinguishable")],
+)
+def test_a_fit_that_did_not_converge_is_named_with_advice(duffing, status, words):
+    problem, fit, law, margins = fitted(duffing)
+    assert fit.status is Status.CONVERGED
+    (warning,) = diagnose(problem, replace(fit, status=status), law, margins)
+    assert warning.startswith(f"the last fit did not converge ({status.value})")
+    assert words in warning

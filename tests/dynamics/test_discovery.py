@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.discovery import Units, _pruned
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem, monomial_exponents
+from vidsindy_lite.dynamics.discovery import _pruned
+from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.problem import Units
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import add_noise
 
@@ -80,4 +82,4 @@ def test_text_holds_the_warnings():
     t = np.linspace(0, 2, 200)
     x = np.stack([np.sin(t), np.cos(t)], axis=1)
     short = discover(t, add_noise(x, 0.05, np.random.default_rng(0)))
-    assert "warning: the record covers only" in str(short)
+    assert "warning: the trajectory covers only" in str(short)

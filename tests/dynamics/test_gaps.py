@@ -11,14 +11,14 @@ CIRCLE = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
 
 
 def pieces():
-    """A circle seen from 0 to 2 and 3 to 6, and a second record."""
+    """A circle seen from 0 to 2 and 3 to 6, and a second trajectory."""
     t = np.linspace(0, 6, 121)
     x = np.stack([np.sin(t), np.cos(t)], axis=1)
-    records = [(t, x), (t, x)]
+    trajectories = [(t, x), (t, x)]
     cuts = [(0, t <= 2), (0, t >= 3), (1, t >= 0)]
-    segments = [Segment.even(t[s], x[s], 0.2, record) for record, s in cuts]
+    segments = [Segment.even(t[s], x[s], 0.2, trajectory) for trajectory, s in cuts]
     splines = [make_interp_spline(s.t, s.x, 3) for s in segments]
-    return records, segments, splines
+    return trajectories, segments, splines
 
 
 def test_gaps_are_within_one_record():
@@ -27,9 +27,9 @@ def test_gaps_are_within_one_record():
 
 
 def test_a_law_carries_the_curve_across_the_gap():
-    records, segments, splines = pieces()
-    joined, curves = join(segments, splines, [(0, 2.0)], records, CIRCLE, 0.2)
-    assert [segment.record for segment in joined] == [0, 1]
+    trajectories, segments, splines = pieces()
+    joined, curves = join(segments, splines, [(0, 2.0)], trajectories, CIRCLE, 0.2)
+    assert [segment.trajectory for segment in joined] == [0, 1]
     assert len(joined[0].t) == 121  # samples inside the gap, if any, come back
     t = np.linspace(2, 3, 40)
     exact = np.stack([np.sin(t), np.cos(t)], axis=1)
@@ -37,15 +37,15 @@ def test_a_law_carries_the_curve_across_the_gap():
 
 
 def test_gaps_that_are_not_named_stay_open():
-    records, segments, splines = pieces()
-    joined, curves = join(segments, splines, [], records, CIRCLE, 0.2)
+    trajectories, segments, splines = pieces()
+    joined, curves = join(segments, splines, [], trajectories, CIRCLE, 0.2)
     assert joined == segments
     assert curves == splines
 
 
 def test_a_law_that_blows_up_in_a_gap_leaves_the_curve_finite():
-    records, segments, splines = pieces()
+    trajectories, segments, splines = pieces()
     wild = PolynomialSystem.from_terms({"x": {"x^3": 1e3}, "y": {"x": -1}})
-    _, curves = join(segments, splines, [(0, 2.0)], records, wild, 0.2)
+    _, curves = join(segments, splines, [(0, 2.0)], trajectories, wild, 0.2)
     t = np.linspace(2.1, 2.9, 40)
     assert np.isfinite(curves[0](t)).all()

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from scipy.optimize import check_grad
 
-from vidsindy_lite.dynamics.origin import FrameAlgebra, sparse_origins
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem, closure_mask, monomial_exponents
+from vidsindy_lite.dynamics.library import closure_mask, monomial_exponents
+from vidsindy_lite.dynamics.origin import ShiftedLaw, sparse_origins
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.study import SYSTEMS
 
 
 def algebra(law, relative_error):
     size = law.coefficients.size
-    return FrameAlgebra(law.exponents, law.coefficients, np.eye(size) / relative_error**2)
+    return ShiftedLaw(law.exponents, law.coefficients, np.eye(size) / relative_error**2)
 
 
 def test_coefficients_in_another_frame_are_those_of_the_shift():
@@ -25,9 +26,9 @@ def test_information_in_another_frame_keeps_the_quadratic_form():
     rng = np.random.default_rng(0)
     exponents = monomial_exponents(2, 2)
     factor = rng.normal(size=(12, 12))
-    frames = FrameAlgebra(exponents, rng.normal(size=(6, 2)), factor.T @ factor)
+    frames = ShiftedLaw(exponents, rng.normal(size=(6, 2)), factor.T @ factor)
     delta = rng.normal(size=(6, 2))
-    moved = FrameAlgebra(exponents, frames.coefficients + delta, frames.information)
+    moved = ShiftedLaw(exponents, frames.coefficients + delta, frames.information)
     origin = np.array([0.3, -1.2])
     difference = (moved.at(origin)[0] - frames.at(origin)[0]).T.ravel()
     expected = delta.T.ravel() @ frames.information @ delta.T.ravel()

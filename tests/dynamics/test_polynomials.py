@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vidsindy_lite.dynamics.polynomials import (
-    PolynomialSystem,
+from vidsindy_lite.dynamics.library import (
     closure,
     closure_mask,
     divides,
@@ -16,6 +15,7 @@ from vidsindy_lite.dynamics.polynomials import (
     shift_matrix,
     variable_names,
 )
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 
 LORENZ = {
     "x": {"x": -10, "y": 10},

@@ -11,20 +11,22 @@ from vidsindy_lite.dynamics.selection import (
     _Quadratic,
     _Tableau,
     closest_rival,
+    equilibrated,
+    inverse,
     subset_search,
 )
 
 
-def objective(information, pull, charge, support):
+def objective(information, pull, penalty, support):
     """Lowest value on a support, from the definition."""
     inside = np.flatnonzero(support)
     solution = np.linalg.solve(information[np.ix_(inside, inside)], pull[inside])
-    return charge[inside].sum() - pull[inside] @ solution
+    return penalty[inside].sum() - pull[inside] @ solution
 
 
-def brute_force(information, pull, charge):
+def brute_force(information, pull, penalty):
     supports = [np.array(s, dtype=bool) for s in product([False, True], repeat=len(pull))]
-    values = [objective(information, pull, charge, s) for s in supports]
+    values = [objective(information, pull, penalty, s) for s in supports]
     best = int(np.argmin(values))
     return supports[best], values[best]
 
@@ -42,12 +44,12 @@ def test_without_correlation_the_search_finds_the_global_minimum(seed, m, price,
     rng = np.random.default_rng(seed)
     information = np.diag(10.0 ** rng.uniform(-3, 3, m))
     pull = rng.standard_normal(m) * np.sqrt(np.diag(information))
-    charge = price * rng.uniform(0.1, 1, m)
-    support, solution, value = subset_search(information, pull, 0 * pull, charge, np.full(m, full))
-    expected, lowest = brute_force(information, pull, charge)
+    penalty = price * rng.uniform(0.1, 1, m)
+    support, solution, value = subset_search(information, pull, 0 * pull, penalty, np.full(m, full))
+    expected, lowest = brute_force(information, pull, penalty)
     # Every term decides for itself: no local minimum. Ties are a matter of rounding.
     worth = pull**2 / np.diag(information)
-    assume((np.abs(worth - charge) > 1e-6).all())
+    assume((np.abs(worth - penalty) > 1e-6).all())
     assert (support == expected).all()
     assert value == pytest.approx(lowest, abs=1e-8)
     np.testing.assert_allclose(solution, np.where(expected, pull / np.diag(information), 0.0))
@@ -56,11 +58,11 @@ def test_without_correlation_the_search_finds_the_global_minimum(seed, m, price,
 @given(st.integers(0, 2**32 - 1), st.integers(2, 3), st.floats(0.01, 10))
 def test_with_three_columns_the_search_from_everything_is_rarely_off(seed, m, price):
     information, pull, _ = random_problem(seed, m)
-    charge = np.full(m, price)
-    _, _, value = subset_search(information, pull, 0 * pull, charge, np.ones(m, dtype=bool))
-    _, lowest = brute_force(information, pull, charge)
+    penalty = np.full(m, price)
+    _, _, value = subset_search(information, pull, 0 * pull, penalty, np.ones(m, dtype=bool))
+    _, lowest = brute_force(information, pull, penalty)
     others = [
-        subset_search(information, pull, 0 * pull, charge, np.array(s, dtype=bool))[2]
+        subset_search(information, pull, 0 * pull, penalty, np.array(s, dtype=bool))[2]
         for s in product([False, True], repeat=m)
     ]
     # One of the starts is the minimum itself, where the search has to stay.
@@ -71,21 +73,21 @@ def test_with_three_columns_the_search_from_everything_is_rarely_off(seed, m, pr
 @given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.floats(0.01, 10))
 def test_no_single_move_improves_the_result(seed, m, price):
     information, pull, rng = random_problem(seed, m)
-    charge = price * rng.uniform(0.5, 1.5, m)
+    penalty = price * rng.uniform(0.5, 1.5, m)
     start = rng.random(m) < 0.5
-    support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
+    support, solution, value = subset_search(information, pull, 0 * pull, penalty, start)
     tolerance = 1e-6 * (1 + abs(value))
     assert (np.flatnonzero(solution) == np.flatnonzero(support)).all()
-    assert value == pytest.approx(objective(information, pull, charge, support), abs=tolerance)
-    assert value <= objective(information, pull, charge, start) + tolerance
+    assert value == pytest.approx(objective(information, pull, penalty, support), abs=tolerance)
+    assert value <= objective(information, pull, penalty, start) + tolerance
     for i in range(m):
         flipped = support.copy()
         flipped[i] = not flipped[i]
-        assert value <= objective(information, pull, charge, flipped) + tolerance
+        assert value <= objective(information, pull, penalty, flipped) + tolerance
         for k in np.flatnonzero(support != support[i]):
             swapped = support.copy()
             swapped[[i, k]] = swapped[[k, i]]
-            assert value <= objective(information, pull, charge, swapped) + tolerance
+            assert value <= objective(information, pull, penalty, swapped) + tolerance
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -96,11 +98,11 @@ def test_with_clear_data_the_true_support_is_found_from_everything_and_from_noth
     truth[rng.choice(10, 3, replace=False)] = rng.choice([-1, 1], 3) * [1.0, 10.0, 100.0]
     target = matrix @ truth + 0.01 * rng.standard_normal(200)
     information, pull = matrix.T @ matrix, matrix.T @ target
-    charge = np.full(10, 0.01)
+    penalty = np.full(10, 0.01)
     for start in (np.ones(10, dtype=bool), np.zeros(10, dtype=bool)):
-        support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
+        support, solution, value = subset_search(information, pull, 0 * pull, penalty, start)
         assert (support == (truth != 0)).all()
-        assert value == pytest.approx(brute_force(information, pull, charge)[1])
+        assert value == pytest.approx(brute_force(information, pull, penalty)[1])
         np.testing.assert_allclose(solution[support], truth[support], atol=0.01)
 
 
@@ -111,11 +113,11 @@ def test_a_swap_leaves_a_support_that_drops_and_adds_cannot():
     matrix[:, 0] = matrix[:, 2] + 0.05 * rng.standard_normal(100)
     pull, information = matrix.T @ matrix[:, 2], matrix.T @ matrix
     start = np.array([True, False, False])
-    charge = np.full(3, 1.0)
-    wrong = objective(information, pull, charge, start)
-    assert objective(information, pull, charge, [False, False, False]) > wrong
-    assert objective(information, pull, charge, [True, False, True]) > wrong
-    support, solution, _ = subset_search(information, pull, 0 * pull, charge, start)
+    penalty = np.full(3, 1.0)
+    wrong = objective(information, pull, penalty, start)
+    assert objective(information, pull, penalty, [False, False, False]) > wrong
+    assert objective(information, pull, penalty, [True, False, True]) > wrong
+    support, solution, _ = subset_search(information, pull, 0 * pull, penalty, start)
     assert list(support) == [False, False, True]
     np.testing.assert_allclose(solution, [0, 0, 1], atol=1e-6)
 
@@ -140,13 +142,13 @@ def test_a_conserved_quantity_does_not_trap_the_search():
 def test_the_closest_rival_is_priced_as_it_is():
     information, pull = circle()
     support = np.array([True, False, False, False, True])
-    charge = np.full(5, 10.0)
-    cost, dropped, added = closest_rival(information, pull, 0 * pull, charge, support)
+    penalty = np.full(5, 10.0)
+    cost, dropped, added = closest_rival(information, pull, 0 * pull, penalty, support)
     changed = support.copy()
     changed[dropped], changed[added] = False, True
-    price = objective(information, pull, charge, changed)
+    price = objective(information, pull, penalty, changed)
     assert cost == pytest.approx(
-        price - objective(information, pull, charge, support), rel=1e-3, abs=1e-2
+        price - objective(information, pull, penalty, support), rel=1e-3, abs=1e-2
     )
     assert cost > 9
 
@@ -174,9 +176,9 @@ def test_the_update_for_a_newcomer_is_a_fit_with_it(seed, m):
 
 def test_a_charge_of_minus_infinity_keeps_a_worthless_column():
     information, pull = np.eye(3), np.array([5.0, 0.0, 0.1])
-    charge = np.array([1.0, -np.inf, 1.0])
+    penalty = np.array([1.0, -np.inf, 1.0])
     support, solution, value = subset_search(
-        information, pull, 0 * pull, charge, np.ones(3, dtype=bool)
+        information, pull, 0 * pull, penalty, np.ones(3, dtype=bool)
     )
     assert list(support) == [True, True, False]
     np.testing.assert_allclose(solution, [5, 0, 0])
@@ -193,12 +195,40 @@ def test_the_start_is_left_as_it_is():
 def test_scaling_a_column_scales_its_coefficient_and_changes_nothing_else(seed):
     information, pull, rng = random_problem(seed, 5)
     scale = 10.0 ** rng.uniform(-3, 3, 5)
-    charge, start = np.ones(5), np.ones(5, dtype=bool)
-    support, solution, value = subset_search(information, pull, 0 * pull, charge, start)
+    penalty, start = np.ones(5), np.ones(5, dtype=bool)
+    support, solution, value = subset_search(information, pull, 0 * pull, penalty, start)
     scaled = subset_search(
-        information * scale[:, None] * scale, pull * scale, 0 * pull, charge, start
+        information * scale[:, None] * scale, pull * scale, 0 * pull, penalty, start
     )
     assert (scaled[0] == support).all()
     np.testing.assert_allclose(scaled[1] * scale, solution, rtol=1e-5, atol=1e-8)
     assert scaled[2] == pytest.approx(value, rel=1e-6)
 
+
+# -- information matrices ---
+
+
+def test_inverse_of_badly_scaled_information():
+    scale = np.diag([1e-8, 1.0, 1e8])
+    core = np.array([[2, 1, 0], [1, 2, 1], [0, 1, 2.0]])
+    back = scale @ inverse(scale @ core @ scale) @ scale
+    np.testing.assert_allclose(back, np.linalg.inv(core), atol=1e-11)
+
+
+def test_equilibrated_has_a_unit_diagonal_and_scales_back():
+    information = np.array([[4.0, 1.0], [1.0, 9e8]])
+    matrix, scale = equilibrated(information, ridge=0.0)
+    np.testing.assert_allclose(np.diag(matrix), 1)
+    np.testing.assert_allclose(matrix / scale[:, None] / scale, information)
+
+
+def test_what_cannot_be_told_is_uncertain_not_certain():
+    dependent = np.array([[1.0, 1.0], [1.0, 1.0]])
+    assert np.diag(inverse(dependent)).min() > 1e6
+
+
+def test_no_information_is_a_huge_variance_not_an_overflow():
+    with np.errstate(all="raise"):
+        variance = np.diag(inverse(np.diag([4.0, 0.0])))
+    assert variance[0] == pytest.approx(0.25)
+    assert 1e200 < variance[1] < np.inf

@@ -1,11 +1,14 @@
-"""Discovery: exact recovery, its uncertainty, its doubts, bad input."""
+"""Discovery: exact recovery, its uncertainty, its warnings, bad input."""
 
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem, monomial_exponents
-from vidsindy_lite.dynamics.solver import discover, term_charges
+from vidsindy_lite.dynamics import solver
+from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.problem import term_penalties
+from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
 
 
@@ -74,7 +77,7 @@ def test_other_dimensions_and_uneven_times(name):
     assert score(found, truth).exact
 
 
-TIED = {  # what is conserved ties the candidates together along the record
+TIED = {  # what is conserved ties the candidates together along the trajectory
     "oscillator": ({"x": {"y": 1}, "y": {"x": -1}}, (10, 10), (11, 10), 20, 3),
     "rigid body": (
         {"x": {"yz": 1}, "y": {"xz": -2}, "z": {"xy": 0.6}},
@@ -196,7 +199,7 @@ def test_history_tells_the_fit(lorenz):
     assert all(a.seconds <= b.seconds for a, b in zip(history, history[1:], strict=False))
 
 
-# -- doubts --------------------------------------------------------------------------------------
+# -- warnings --------------------------------------------------------------------------------------
 
 
 def test_a_law_outside_the_library_is_doubted():
@@ -239,6 +242,16 @@ def test_pure_noise_gives_no_law_without_doubt():
     assert found.status == "suspect"
 
 
+def test_a_last_fit_that_did_not_converge_is_told(monkeypatch):
+    terms, x0, duration = PLANAR["growth"]
+    t = np.linspace(0, duration, 300)
+    x = PolynomialSystem.from_terms(terms).simulate(t, x0)
+    x = add_noise(x, 0.02, np.random.default_rng(0))
+    assert discover(t, x).status == "ok"
+    monkeypatch.setattr(solver, "EXACT", -1.0)  # which no step can promise
+    assert any("the last fit did not converge" in text for text in discover(t, x).warnings)
+
+
 # -- input ---------------------------------------------------------------------------------------
 
 
@@ -277,7 +290,7 @@ def test_bad_degrees_are_refused(degree):
 
 
 def test_charges_rise_with_the_number_of_rivals():
-    charges = term_charges(monomial_exponents(3, 3))
-    by_degree = [np.unique(charges[monomial_exponents(3, 3).sum(axis=1) == k]) for k in range(4)]
+    penalties = term_penalties(monomial_exponents(3, 3))
+    by_degree = [np.unique(penalties[monomial_exponents(3, 3).sum(axis=1) == k]) for k in range(4)]
     assert all(len(values) == 1 for values in by_degree)
     assert np.diff(np.concatenate(by_degree)).min() > 0

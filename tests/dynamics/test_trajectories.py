@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.trajectories import check_record, check_records, cut, typical_step
+from vidsindy_lite.dynamics.trajectories import (
+    check_trajectories,
+    check_trajectory,
+    cut,
+    typical_step,
+)
 
 T, X = np.arange(5.0), np.ones((5, 2))
 
@@ -33,11 +38,11 @@ def with_value(row, value):
 )
 def test_bad_input_is_named(t, x, message):
     with pytest.raises(ValueError, match=message):
-        check_record(t, x)
+        check_trajectory(t, x)
 
 
 def test_missing_rows_are_left_out():
-    t, x = check_record(T, with_value(2, np.nan))
+    t, x = check_trajectory(T, with_value(2, np.nan))
     assert t.tolist() == [0, 1, 3, 4]
     assert x.shape == (4, 2)
 
@@ -45,26 +50,26 @@ def test_missing_rows_are_left_out():
 def test_masked_rows_are_missing():
     mask = np.zeros(X.shape, dtype=bool)
     mask[2, 1] = True
-    t, x = check_record(T, np.ma.masked_array(with_value(2, 1e9), mask))
+    t, x = check_trajectory(T, np.ma.masked_array(with_value(2, 1e9), mask))
     assert t.tolist() == [0, 1, 3, 4]
     assert x.max() == 1
 
 
 def test_one_or_several_records():
-    assert [len(t) for t, _ in check_records(T, X)] == [5]
-    assert [len(t) for t, _ in check_records([(T, X), [T[:3], X[:3]]])] == [5, 3]
+    assert [len(t) for t, _ in check_trajectories(T, X)] == [5]
+    assert [len(t) for t, _ in check_trajectories([(T, X), [T[:3], X[:3]]])] == [5, 3]
 
 
 @pytest.mark.parametrize("t", [[1, 2], T, (T, X), [(T, X, X)], {"t": X}, None, [T, X]])
 def test_what_is_no_list_of_records(t):
     with pytest.raises(ValueError, match=r"x: must be given, unless t is a list of pairs \(t, x\)"):
-        check_records(t)
+        check_trajectories(t)
 
 
 @pytest.mark.parametrize("pairs", [[], [(T, X), (T, X[:, :1])]])
 def test_records_of_one_system(pairs):
     with pytest.raises(ValueError, match="t: a list of trajectories must hold at least one, all"):
-        check_records(pairs)
+        check_trajectories(pairs)
 
 
 def test_cut_at_long_steps_and_nowhere_else():

@@ -78,7 +78,7 @@ def test_learn_from_ball_finds_its_centre(x):
 @pytest.mark.slow
 def test_film(tmp_path):
     rig, paths = lab.cameras(), lab.paths(30)[:1]
-    tracks = lab.film(rig, paths, tmp_path)
+    tracks = lab.film_ball(rig, paths, tmp_path)
     assert len(list(tmp_path.glob("path_1_camera_?.mov"))) == 3
     for track, camera in zip(tracks, rig.cameras, strict=True):
         expected, _ = camera.ball_image(paths[0], lab.RADIUS)

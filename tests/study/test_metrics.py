@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vidsindy_lite.dynamics import PolynomialSystem
-from vidsindy_lite.study.metrics import pulls, score, summary, term_errors, trajectory_error
+from vidsindy_lite.study.metrics import pulls, score, term_errors, trajectory_error
 from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
 
 TRUTH = PolynomialSystem.from_terms({"x": {"x": 3}, "y": {"xy": -4, "1": 1}})
@@ -133,21 +133,6 @@ def test_what_is_no_law_is_refused():
 def test_swapped_arguments_are_told():
     with pytest.raises(ValueError, match="truth: must be a Poly.*what was found comes first, the"):
         score(TRUTH, SimpleNamespace(system=TRUTH))
-
-
-def test_summary_is_means_in_the_papers_units():
-    right = score(TRUTH, TRUTH)
-    wrong = score(PolynomialSystem.from_terms({"x": {"x": 3, "y": 2}, "y": {"xy": -4}}), TRUTH)
-    row = summary([right, wrong])
-    l2 = 100 * np.sqrt(5 / 26)
-    assert row == {
-        "terms found": "1 of 2",
-        "false positives": 0.5,
-        "l2 (e-2)": pytest.approx(l2 / 2),
-        "spread of l2 (e-2)": pytest.approx(l2 / 2),
-        "precision (%)": pytest.approx(100 * (1 + 2 / 3) / 2),
-        "recall (%)": pytest.approx(100 * (1 + 2 / 3) / 2),
-    }
 
 
 def test_terms_that_are_missing_or_false_by_name():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.cameras import Rig
-from vidsindy_lite.study.realistic import START, SceneTask, View, film, run
+from vidsindy_lite.study.realistic import START, SceneTask, View, film_scene, run_scene
 from vidsindy_lite.study.systems import REFERENCE_OFFSET
 from vidsindy_lite.vision import Track
 
@@ -16,7 +16,7 @@ films = pytest.mark.slow  # films a scene and tracks it
 
 @pytest.fixture(scope="module")
 def result():
-    return run(SceneTask(trial=1, frames=200, image_size=SIZE))
+    return run_scene(SceneTask(trial=1, frames=200, image_size=SIZE))
 
 
 @films
@@ -47,7 +47,7 @@ def test_nothing_is_invented_behind_the_tree_and_the_target_is_found_again(resul
 @films
 def test_a_seed_is_a_scene(result):
     x, rig = result.x[:8], Rig.around(result.x, SIZE)
-    again, other = film(rig, x, seed=1), film(rig, x, seed=2)
+    again, other = film_scene(rig, x, seed=1), film_scene(rig, x, seed=2)
     assert [view.scene for view in again] == [view.scene for view in result.views]
     assert [view.scene for view in other] != [view.scene for view in result.views]
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from vidsindy_lite import stamp as repository
 from vidsindy_lite.__main__ import main
+from vidsindy_lite.stamp import PACKAGE
 from vidsindy_lite.study.sweeps import remember, sweep
 from vidsindy_lite.vision import Scene, video_info
 
@@ -31,6 +31,8 @@ import cv2
 import numpy as np
 from threadpoolctl import threadpool_info
 
+from .powers import square as power
+
 
 @dataclass(frozen=True)
 class Task:
@@ -45,7 +47,7 @@ def square(task):
     time.sleep(task.pause)
     if task.number < 0:
         raise ArithmeticError("below zero")
-    return task.number**2, np.random.default_rng(task.number).normal(size=3).tolist()
+    return power(task.number), np.random.default_rng(task.number).normal(size=3).tolist()
 
 
 def end(task):
@@ -81,10 +83,14 @@ class Clone:
         (root / "notebooks").mkdir()
         (root / "requirements.txt").write_text("numpy==2.4.6\n")
         (root / "sweep.py").write_text(SWEEP)
-        (self.package / "__init__.py").touch()
+        (self.package / "study").mkdir()
+        for front_door in (self.package, self.package / "study"):
+            (front_door / "__init__.py").touch()
         (self.package / "toy.py").write_text(TOY)
-        for module in ("repository.py", "sweeps.py"):
-            (self.package / module).write_bytes((repository.PACKAGE / module).read_bytes())
+        (self.package / "powers.py").write_text("def square(number):\n    return number**2\n")
+        (self.package / "unrelated.py").write_text("LINE_WIDTH = 1\n")
+        for module in ("stamp.py", "study/sweeps.py"):
+            (self.package / module).write_bytes((PACKAGE / module).read_bytes())
 
     def start(self, tasks, function="square", **environment):
         """A process that sweeps over tasks, each a list of a number and a pause in seconds."""
@@ -194,8 +200,10 @@ def test_a_process_has_one_thread(clone):
 @pytest.mark.parametrize(
     ("file", "old", "new", "computed"),
     [
-        ("vidsindy_lite/toy.py", "task.number**2", "task.number * task.number", [1, 2]),
-        ("vidsindy_lite/sweeps.py", "if jobs < 1", "if jobs <= 0", [1, 2]),
+        ("vidsindy_lite/toy.py", "power(task.number)", "1 * power(task.number)", [1, 2]),
+        ("vidsindy_lite/powers.py", "number**2", "number * number", [1, 2]),
+        ("vidsindy_lite/unrelated.py", "1", "2", []),
+        ("vidsindy_lite/study/sweeps.py", "if jobs < 1", "if jobs <= 0", []),
         ("requirements.txt", "2.4.6", "2.4.7", [1, 2]),
         ("vidsindy_lite/toy.py", "A result with", "Numbers with", []),
     ],
@@ -305,7 +313,7 @@ def test_cluster_with_other_code_is_refused(clone, cluster):
     elsewhere = clone.root / "elsewhere"
     elsewhere.mkdir()
     other = Clone(elsewhere)
-    (other.package / "toy.py").write_text(TOY.replace("**2", "**3"))
+    (other.package / "toy.py").write_text(TOY.replace("power(task", "2 * power(task"))
     error = other.fail([[1, 0.0]], VIDSINDY_DASK=cluster)
     assert "all workers must have this very code of vidsindy_lite, got other code on tcp" in error
     assert other.called() == []

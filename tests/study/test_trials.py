@@ -7,21 +7,15 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import discover
+from vidsindy_lite.pipeline import Observation
 from vidsindy_lite.study import baselines, score
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.baselines import BASELINES
 from vidsindy_lite.study.corruption import add_noise, drop_blocks, drop_fibers
+from vidsindy_lite.study.films import FilmResult, FilmTask, run_film
 from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
-from vidsindy_lite.study.trials import (
-    FilmTask,
-    Recording,
-    Trial,
-    by_level,
-    grid,
-    record,
-    run_trial,
-    select,
-)
+from vidsindy_lite.study.tables import by_condition, rate, significant, summary, tabulate
+from vidsindy_lite.study.trials import Trial, grid, run_trial, source_path
 
 pytestmark = pytest.mark.slow  # films and discovers
 
@@ -33,49 +27,75 @@ def simulated(task):
     """A recording without videos: the true path, pixels from nowhere."""
     truth = SYSTEMS[task.system].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(task.frames)
-    return Recording(task, truth, (), None, t, x, (0.0,) * 3, np.zeros(3), 0.0)
+    seen = Observation((), None, None, t, x, np.zeros((0, *x.shape)), ())
+    return FilmResult(
+        **vars(seen),
+        task=task,
+        truth=truth,
+        pixel_error=(0.0,) * 3,
+        path_error=np.zeros(3),
+        seconds=0.0,
+    )
 
 
 @pytest.fixture
 def no_videos(monkeypatch):
-    monkeypatch.setattr(experiments, "recording", simulated)
+    monkeypatch.setattr(experiments, "film_result", simulated)
 
 
 @pytest.fixture(scope="module")
-def recorded():
-    return record(FilmTask("SprottE", 1, 200))
+def filmed():
+    return run_film(FilmTask("SprottE", 1, 200))
 
 
 # ------------------------------------------------------------------------------------------ films
 
 
-def test_recording_reports_every_error(recorded):
-    assert recorded.x.shape == (200, 3)
-    assert max(recorded.pixel_error) < 0.1
-    truth = recorded.path("truth")
-    np.testing.assert_array_equal(truth, recorded.truth.trajectory(200)[1])
-    np.testing.assert_allclose(
-        recorded.path_error, np.sqrt(np.mean((recorded.x - truth) ** 2, axis=0))
+def test_film_result_reports_every_error(filmed):
+    assert filmed.x.shape == (200, 3)
+    assert max(filmed.pixel_error) < 0.1
+    truth = source_path(filmed, "truth")[0]
+    np.testing.assert_array_equal(truth, filmed.truth.trajectory(200)[1])
+    np.testing.assert_allclose(filmed.path_error, np.sqrt(np.mean((filmed.x - truth) ** 2, axis=0)))
+    assert (filmed.path_error < 0.01 * truth.std(axis=0)).all()
+    assert all(camera.is_calibrated for camera in filmed.rig.cameras)
+
+
+def test_whole_pixels_are_coarser_but_near(filmed):
+    truth = source_path(filmed, "truth")[0]
+    fine, coarse = (
+        np.abs(source_path(filmed, s)[0] - truth).max() for s in ("videos", "whole pixels")
     )
-    assert (recorded.path_error < 0.01 * truth.std(axis=0)).all()
-    assert all(camera.is_calibrated for camera in recorded.rig.cameras)
-
-
-def test_whole_pixels_are_coarser_but_near(recorded):
-    truth = recorded.path("truth")
-    fine, coarse = (np.abs(recorded.path(s) - truth).max() for s in ("videos", "whole pixels"))
-    pixel = max(camera.scale for camera in recorded.rig.cameras)
+    pixel = max(camera.scale for camera in filmed.rig.cameras)
     assert fine < 0.2 * coarse
     assert coarse < 2 * pixel
 
 
-def test_unknown_source_is_named(recorded):
+def test_ours_is_told_the_systematic_errors_of_what_cameras_reconstructed(filmed, monkeypatch):
+    told = {}
+
+    def watch(t, x, systematic=None):
+        told[source] = systematic
+        return SYSTEMS["SprottE"]
+
+    monkeypatch.setattr(experiments, "film_result", lambda task: filmed)
+    monkeypatch.setattr(experiments, "discover", watch)
+    for source in experiments.SOURCES:
+        run_trial(Trial("SprottE", "blocks", 0.2, 1, source=source, frames=200))
+    assert told["truth"] is None
+    np.testing.assert_array_equal(told["videos"], filmed.systematic)
+    assert told["whole pixels"].shape == filmed.systematic.shape
+    rms = {source: np.sqrt((told[source] ** 2).mean()) for source in ("videos", "whole pixels")}
+    assert 0 < 10 * rms["videos"] < rms["whole pixels"]
+
+
+def test_unknown_source_is_named(filmed):
     with pytest.raises(ValueError, match="source: must be one of videos, .* got 'memory'"):
-        recorded.path("memory")
+        source_path(filmed, "memory")
 
 
-def test_recording_is_small_enough_to_store(recorded):
-    assert len(pickle.dumps(recorded)) < 200_000
+def test_film_result_is_small_enough_to_store(filmed):
+    assert len(pickle.dumps(filmed)) < 200_000
 
 
 # ----------------------------------------------------------------------------------- what is random
@@ -111,11 +131,15 @@ def test_noise_of_two_levels_is_not_the_same_noise_scaled():
 def test_every_method_gets_the_same_data(condition, level, no_videos, monkeypatch):
     seen = {}
     for method in experiments.METHODS:
-        def watch(t, x, seed=None, method=method):
+
+        def watch(t, x, seed=None, systematic=None, method=method):
             seen[method] = (t, x)
             return SYSTEMS["Lorenz"]
 
-        monkeypatch.setitem(experiments.METHODS, method, watch)
+        if method == "ours":
+            monkeypatch.setattr(experiments, "discover", watch)
+        else:
+            monkeypatch.setitem(BASELINES, method, watch)
         run_trial(Trial("Lorenz", condition, level, 1, method, frames=FRAMES))
     t, x = seen["ours"]
     assert set(seen) == set(experiments.METHODS)
@@ -195,17 +219,63 @@ def test_grid_is_every_combination_once_and_zero_is_clean():
     }
 
 
-def test_results_are_found_by_their_fields(no_videos, monkeypatch):
-    monkeypatch.setitem(experiments.METHODS, "ours", lambda t, x: SYSTEMS["Lorenz"])
+@pytest.fixture
+def trials(no_videos, monkeypatch):
+    """Twelve trials as a table; those of level .2 and number 1 have another law."""
+
+    def found(t, x, systematic=None):
+        wrong = np.isclose((x - x[0]).std(), odd)
+        return SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET if not wrong else (0, 0, 0))
+
+    x = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET).trajectory(FRAMES)[1]
+    path = Trial("Lorenz", "noise", 0.2, 1, frames=FRAMES).corrupt(x)
+    odd = (path - path[0]).std()
+    monkeypatch.setattr(experiments, "discover", found)
     levels = {"noise": (0, 0.2, 0.1), "blocks": (0.3,)}
-    results = [run_trial(trial) for trial in grid(["Lorenz"], levels, range(2), frames=FRAMES)]
-    assert len(select(results, condition="noise")) == 4
-    assert len(select(results, condition="noise", trial=1, level=0.1)) == 1
-    assert select(results, system="SprottF") == []
-    noise = by_level(results, "noise", method="ours")
-    assert list(noise) == [0.0, 0.1, 0.2]
-    assert all(len(group) == 2 for group in noise.values())
-    assert list(by_level(results, "blocks")) == [0.0, 0.3]
+    return tabulate(run_trial(t) for t in grid(["Lorenz"], levels, range(3), frames=FRAMES))
+
+
+def test_a_row_a_trial(trials):
+    assert len(trials) == 12
+    assert list(trials.condition[:4]) == ["clean", "noise", "noise", "blocks"]
+    assert list(trials.level[:4]) == [0, 0.2, 0.1, 0.3]
+    (wrong,) = trials[~trials.exact].itertuples()
+    assert (wrong.condition, wrong.level, wrong.trial) == ("noise", 0.2, 1)
+    assert wrong.wrong_terms == wrong.missing + wrong.false_positives > 0
+    assert wrong.l2 > 0.5
+    assert (trials.l2[trials.exact] == 0).all()
+
+
+def test_clean_trials_stand_in_every_condition(trials):
+    levelled = by_condition(trials)
+    counts = levelled.groupby(["condition", "level"], sort=False).size().to_dict()
+    assert list(counts.items()) == [
+        (("noise", 0.0), 3), (("noise", 0.1), 3), (("noise", 0.2), 3),
+        (("blocks", 0.0), 3), (("blocks", 0.3), 3),
+    ]  # fmt: skip
+    assert by_condition(trials[trials.condition == "clean"]).empty
+
+
+def test_summary_is_rates_and_medians_in_the_papers_units(trials):
+    rows = summary(trials, ["condition", "level"])
+    assert list(rows.level) == [0, 0.2, 0.1, 0.3]
+    row = rows.iloc[1]
+    assert (row["terms found"], row["exact"]) == ("2 of 3", "2 of 3")
+    assert row["false positives"] == row["l2 (e-2)"] == 0  # one trial of three moves no median
+    assert row["precision (%)"] == row["recall (%)"] == 100
+    one = summary(trials[~trials.exact], "system").iloc[0]
+    truth, found = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET), SYSTEMS["Lorenz"]
+    direct = score(found, truth)
+    assert one["l2 (e-2)"] == float(f"{100 * direct.l2:.1e}")
+    assert one["precision (%)"] == pytest.approx(100 * direct.precision, abs=0.005)
+    assert one["recall (%)"] == pytest.approx(100 * direct.recall, abs=0.005)
+
+
+def test_digits_that_are_printed(trials):
+    assert rate(trials.exact) == "11 of 12"
+    assert significant(0.00123456) == 0.0012
+    assert significant(-98765.4, 3) == -98800
+    assert significant(0.0) == 0
 
 
 @pytest.mark.parametrize(

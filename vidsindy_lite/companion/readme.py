@@ -5,6 +5,7 @@ name of the figures' registry. All else is written by hand.
 """
 
 import json
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from ..stamp import write_file
-from .artifacts import Table, load_run_times, load_table
+from .artifacts import Table, load_table
+from .registry import load_run_times
 
 __all__ = ["fill", "write_readme"]
 
@@ -118,15 +120,20 @@ def _cell(l2: float, false: float, found: str = "") -> str:
 # ------------------------------------------------------------------------------------- headlines
 
 
+def _below(value: float) -> str:
+    """A bound with a margin: what others get of a number that is nearly nothing."""
+    return f"below {10 ** math.ceil(math.log10(2 * max(value, 1e-16))):.0e}"
+
+
 def _tour(table: Table) -> str:
     (row,) = table.rows
     found = row["true terms"] - row["missing"]
-    return f"{found} of {row['true terms']} terms, {row['false']} false, l2 {row['l2']:.0e}"
+    return f"{found} of {row['true terms']} terms, {row['false']} false, l2 {_below(row['l2'])}"
 
 
 def _projection(table: Table) -> str:
     right, text = (row["shift of the image"] for row in table.rows)
-    return f"the plane's D moves the image by {right:.0e}; with the text's rotation by {text:.2g}"
+    return f"shift of the image by the plane's D: {right}; with the text's rotation: {text}"
 
 
 def _tracker(table: Table) -> str:
@@ -150,7 +157,7 @@ def _systems(table: Table) -> str:
     exact = [list(map(int, row["exact"].split(" of "))) for row in table.rows]
     hits, trials = np.sum(exact, axis=0)
     worst = max(row["l2 (e-2)"] for row in table.rows)
-    return f"{hits} of {trials} trials exact, l2 at most {worst / 100:.0e}"
+    return f"{hits} of {trials} trials exact, l2 {_below(worst / 100)}"
 
 
 def _ablation(table: Table) -> str:
@@ -162,12 +169,12 @@ def _ablation(table: Table) -> str:
 def _scene(table: Table) -> str:
     exact = sum(row["exact terms"] for row in table.rows)
     worst = max(row["l2 (e-2)"] for row in table.rows)
-    return f"{exact} of {len(table.rows)} trials exact, l2 at most {worst / 100:.0e}"
+    return f"{exact} of {len(table.rows)} trials exact, l2 {_below(worst / 100)}"
 
 
 def _own(table: Table) -> str:
     late = [row["lag (frames)"] for row in table.rows]
-    return f"a video that starts {max(late):.3f} frames late, the law exact"
+    return f"a video that starts {max(late):.1f} frames late, the law exact"
 
 
 def _lab(table: Table) -> str:

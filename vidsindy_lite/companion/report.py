@@ -24,7 +24,7 @@ from ..checks import check_path
 from ..pipeline import VideoDiscovery
 from ..study.plots import plot_path, plot_residuals, plot_rig, plot_views
 from ..vision import read_video, video_info
-from .artifacts import as_json
+from .records import as_json
 
 PAGE, DATA, RIG = FILES = ("report.html", "result.json", "rig.toml")
 
@@ -136,19 +136,20 @@ def summary(
             "residual_rms": np.sqrt(np.mean(length**2)) if len(length) else np.nan,
             "residual_of_nine_in_ten": np.quantile(length, 0.9) if len(length) else np.nan,
         })  # fmt: skip
+    law = found.discovery
     content = {
         "status": found.status,
         "warnings": list(found.warnings),
         "law": {
-            "data": _law(found, "data", np.zeros(3), np.zeros(3)),
-            "native": _law(found, "native", found.offset, found.offset_errors),
+            "data": _law(law, "data", np.zeros(3), np.zeros(3)),
+            "native": _law(law, "native", law.offset, law.offset_errors),
         },
-        "noise": found.noise,
+        "noise": law.noise,
         "cameras": cameras,
         "options": dict(options or {}),
         "t": found.t,
         "x": found.x,
-        "curve": found.curve(found.t),
+        "curve": law.curve(found.t),
         "tracks": list(found.tracks),
         "residuals": missed,
     }
@@ -206,8 +207,8 @@ def _page(found, paths, content):
         "doubted.</p>",
         "<h2>How it was found</h2>",
         f"<p>{html.escape(options) or 'Default options'}. Estimated noise of the path: "
-        f"{', '.join(f'{value:.2g}' for value in found.noise)} scene units in x, y, z. All numbers "
-        f"are in {DATA}; the learned cameras are also in {RIG}.</p>",
+        f"{', '.join(f'{value:.2g}' for value in content['noise'])} scene units in x, y, z. All "
+        f"numbers are in {DATA}; the learned cameras are also in {RIG}.</p>",
     ]
     body = "\n".join(parts)
     return (
@@ -274,7 +275,7 @@ def _figures(found, paths):
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
         yield _figure(
-            plot_path(found.t, found.x, found.curve(found.t)),
+            plot_path(found.t, found.x, found.discovery.curve(found.t)),
             "The reconstructed path (grey) and the curve that obeys the law (blue), over time and "
             "in space. Where they part, the law does not hold.",
         )

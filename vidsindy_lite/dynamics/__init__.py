@@ -1,34 +1,32 @@
 """A trajectory goes in, its law comes out."""
 
-from .collocation import Collocation, Segment, State
+from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao
-from .discovery import Discovery, Units
-from .origin import FrameAlgebra
-from .polynomials import (
-    PolynomialSystem,
-    monomial_exponents,
-    monomial_gradients,
-    monomials,
-    runge_kutta_4,
-    variable_names,
-)
+from .discovery import Discovery
+from .grid import Segment
+from .integrate import runge_kutta_4
+from .library import monomial_exponents, monomial_gradients, monomials, variable_names
+from .origin import ShiftedLaw
+from .polynomials import PolynomialSystem
+from .problem import Units, term_penalties
 from .selection import closest_rival, subset_search
 from .smoothing import smooth
-from .solver import discover, term_charges
+from .solver import discover
 from .splines import DEGREE, clamped_knots, design_matrix, local_basis
-from .trajectories import Record, check_record, cut, typical_step
+from .trajectories import Trajectory, check_trajectory, cut, typical_step
 
 __all__ = [
     "Collocation",
     "DEGREE",
     "Discovery",
-    "FrameAlgebra",
+    "ShiftedLaw",
     "PolynomialSystem",
-    "Record",
+    "Trajectory",
     "Segment",
     "State",
+    "Status",
     "Units",
-    "check_record",
+    "check_trajectory",
     "clamped_knots",
     "closest_rival",
     "cramer_rao",
@@ -42,7 +40,7 @@ __all__ = [
     "smooth",
     "runge_kutta_4",
     "subset_search",
-    "term_charges",
+    "term_penalties",
     "typical_step",
     "variable_names",
 ]

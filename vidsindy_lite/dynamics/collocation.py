@@ -10,51 +10,23 @@ not, with the curve already eliminated.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
-from .information import RIDGE, equilibrated
-from .polynomials import monomials, shift_generators
-from .splines import DEGREE, clamped_knots, local_basis
+from ..arrays import Bools, Floats, Ints
+from .grid import WIDTH, Grid, Segment, normal_band, rows_from
+from .library import monomials, shift_generators
+from .selection import RIDGE, equilibrated
 
-WIDTH = DEGREE + 1
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
-
-
-@dataclass(frozen=True)
-class Segment:
-    """A stretch of one record of data, with the breakpoints of its spline.
-
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-    x : ndarray, shape (n, d)
-    breakpoints : ndarray, shape (m + 1,)
-        Ends of the knot spans.
-    record : int
-        Which record the stretch is cut from.
-    """
-
-    t: np.ndarray
-    x: np.ndarray
-    breakpoints: np.ndarray
-    record: int = 0
-
-    @classmethod
-    def even(cls, t: np.ndarray, x: np.ndarray, spacing: float, record: int) -> Segment:
-        """A segment with knots at even distances of at most ``spacing``."""
-        spans = max(1, int(np.ceil((t[-1] - t[0]) / spacing)))
-        return cls(t, x, np.linspace(t[0], t[-1], spans + 1), record)
-
-    def refined(self) -> Segment:
-        """The same stretch with every knot span halved."""
-        b = self.breakpoints
-        return replace(self, breakpoints=np.sort(np.concatenate([b, (b[1:] + b[:-1]) / 2])))
+STRONGEST_DAMPING = 1e2
+"""Relative Levenberg-Marquardt damping at which a fit that still finds no lower point stops."""
 
 
 @dataclass(frozen=True)
@@ -75,19 +47,51 @@ class State:
         Coordinates of the offset that are free.
     """
 
-    control_points: np.ndarray
-    coefficients: np.ndarray
-    active: np.ndarray
-    offset: np.ndarray
-    moving: np.ndarray
+    control_points: Floats
+    coefficients: Floats
+    active: Bools
+    offset: Floats
+    moving: Bools
 
-    def flat(self) -> np.ndarray:
+    def flat(self) -> Floats:
         """Coefficients, equation by equation, then the offset."""
         return np.concatenate([self.coefficients.T.ravel(), self.offset])
 
-    def free(self) -> np.ndarray:
+    def free(self) -> Bools:
         """Which entries of `flat` are unknowns."""
         return np.concatenate([self.active.T.ravel(), self.moving])
+
+    def moved(self, control_points: Floats, flat: Floats) -> State:
+        """The same terms with another curve and other entries of `flat`."""
+        l, d = self.coefficients.shape
+        coefficients, offset = flat[: l * d].reshape(d, l).T, flat[l * d :]
+        return replace(
+            self, control_points=control_points, coefficients=coefficients, offset=offset
+        )
+
+
+class Status(Enum):
+    """How a fit ended."""
+
+    CONVERGED = "converged"
+    MAX_STEPS = "steps were left over to do"
+    STALLED = "no step lowered the objective"
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The end of a fit.
+
+    Parameters
+    ----------
+    state : State
+        The lowest point found.
+    status : Status
+        Whether it is a minimum.
+    """
+
+    state: State
+    status: Status
 
 
 @dataclass(frozen=True)
@@ -101,13 +105,13 @@ class Linearisation:
 
     objective: float
     fall: float
-    columns: np.ndarray
-    information: np.ndarray
-    gradient: np.ndarray
-    curve_step: np.ndarray
-    curve_response: np.ndarray
+    columns: Ints
+    information: Floats
+    gradient: Floats
+    curve_step: Floats
+    curve_response: Floats
 
-    def newton(self, damping: float = 0.0) -> tuple[np.ndarray, float]:
+    def newton(self, damping: float = 0.0) -> tuple[Floats, float]:
         """The best step in the columns, and by how much it promises to lower the objective."""
         if not len(self.columns):
             return self.gradient, self.fall
@@ -115,105 +119,116 @@ class Linearisation:
         step = scale * np.linalg.solve(matrix, scale * self.gradient)
         return step, float(self.fall + self.gradient @ step)
 
+    def along(self, state: State, step: Floats, fraction: float) -> State:
+        """The state after a fraction of a step, with the curve that goes with it."""
+        flat = state.flat()
+        flat[self.columns] += fraction * step
+        control = state.control_points + fraction * (self.curve_step + self.curve_response @ step)
+        return state.moved(control, flat)
 
+
+@dataclass(frozen=True, eq=False)
 class Collocation:
     """Data and physics loss on cubic splines, one per segment, sharing one law.
 
-    The collocation nodes are the midpoints of the knot spans and both ends of each segment: one
-    equation per control point but for the initial condition. So the law can hold exactly, and the
-    physics weight can be raised without limit.
+    There is one equation per control point but for the initial condition (see `Grid`). So the law
+    can hold exactly, and the physics weight can be raised without limit.
 
     Parameters
     ----------
-    segments : sequence of Segment
-        The data.
+    grid : Grid
+        Data, knots and nodes; `Collocation.of` makes it from segments.
     exponents : ndarray of int, shape (l, d)
         The library.
     data_weights : ndarray, shape (d,)
         1 / variance of the measurement noise.
     physics_weights : ndarray, shape (d,)
         Weight of the mean-square residual of each equation per sample.
-    systematic : ndarray, shape (n, d, k), optional
+    systematic : ndarray, shape (n, d, k)
         Errors that all samples share: they are the curve plus noise plus a sum of these, each
         times an unknown number of mean 0 and variance 1.
     """
 
-    def __init__(
-        self,
+    grid: Grid
+    exponents: Ints
+    data_weights: Floats
+    physics_weights: Floats
+    systematic: Floats
+
+    @classmethod
+    def of(
+        cls,
         segments: Sequence[Segment],
-        exponents: np.ndarray,
-        data_weights: np.ndarray,
-        physics_weights: np.ndarray,
-        systematic: np.ndarray | None = None,
-    ) -> None:
-        self.exponents = exponents
-        self.generators = shift_generators(exponents)
-        self.d = exponents.shape[1]
-        self.segments = list(segments)
-        self.knots = [clamped_knots(segment.breakpoints) for segment in self.segments]
-        self.starts = np.cumsum([0] + [len(k) - WIDTH for k in self.knots])
-        self.r = int(self.starts[-1])
-        self.x = np.concatenate([segment.x for segment in self.segments])
-        self.systematic = np.empty((*self.x.shape, 0)) if systematic is None else systematic
-        self.samples = self._basis([s.t for s in self.segments])
-        ends = [segment.breakpoints for segment in self.segments]
-        nodes = [np.concatenate([b[:1], (b[1:] + b[:-1]) / 2, b[-1:]]) for b in ends]
-        spans = [np.diff(b) for b in ends]
-        width = np.concatenate([np.concatenate([w[:1] / 2, w, w[-1:] / 2]) for w in spans])
-        self.nodes, self.slopes = self._basis(nodes), self._basis(nodes, order=1)
-        self.node_weights = width / width.sum() * len(self.x)
-        self._sample_band = _normal_band(self.samples)
-        self._weigh(data_weights, physics_weights)
+        exponents: Ints,
+        data_weights: Floats,
+        physics_weights: Floats,
+        systematic: Floats | None = None,
+    ) -> Collocation:
+        """The problem of these segments, by default without systematic errors."""
+        grid = Grid.of(segments)
+        shared = np.empty((*grid.x.shape, 0)) if systematic is None else systematic
+        data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
+        return cls(grid, exponents, data, physics, shared)
 
-    def weighted(self, data_weights: np.ndarray, physics_weights: np.ndarray) -> Collocation:
-        """The same with other weights; what hangs on the knots alone is shared."""
-        other = copy(self)
-        other._weigh(data_weights, physics_weights)
-        return other
+    def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
+        """The same with other weights."""
+        return replace(self, data_weights=data_weights, physics_weights=physics_weights)
 
-    def _weigh(self, data_weights: np.ndarray, physics_weights: np.ndarray) -> None:
-        self.data_weights = np.asarray(data_weights, dtype=float)
-        self.physics_weights = np.asarray(physics_weights, dtype=float)
-        self._data_band = np.zeros((WIDTH * self.d, self.r * self.d))
-        self._data_band[:: self.d] = np.kron(self._sample_band, self.data_weights)
-        self._shared = self.data_weights[:, None] * self.systematic
-        self._shared_information = np.einsum("nik,nil->kl", self._shared, self.systematic)
-        self._shared_information += np.eye(self.systematic.shape[-1])
+    @property
+    def d(self) -> int:
+        """Dimension of the state."""
+        return self.exponents.shape[1]
 
-    def _basis(self, times: list[np.ndarray], order: int = 0) -> sparse.csr_array:
-        """Basis functions of all segments at the given times of each, shape (times, r)."""
-        parts = [local_basis(knots, t, order) for knots, t in zip(self.knots, times, strict=True)]
-        first = np.concatenate(
-            [first + start for (first, _), start in zip(parts, self.starts[:-1], strict=True)]
-        )
-        values = np.concatenate([values for _, values in parts])
-        return _rows_from(first, values, self.r)
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """The stretches of data."""
+        return self.grid.segments
 
-    def splines(self, control_points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    @cached_property
+    def _generators(self) -> Floats:
+        return shift_generators(self.exponents)
+
+    @cached_property
+    def _data_band(self) -> Floats:
+        """Normal matrix of the data loss in the control points, in lower banded storage."""
+        band = np.zeros((WIDTH * self.d, self.grid.r * self.d))
+        band[:: self.d] = np.kron(self.grid.sample_band, self.data_weights)
+        return band
+
+    @cached_property
+    def _shared(self) -> tuple[Floats, Floats]:
+        """Weighted systematic errors, and the normal matrix of their sizes."""
+        weighted = self.data_weights[:, None] * self.systematic
+        information = np.einsum("nik,nil->kl", weighted, self.systematic)
+        information += np.eye(self.systematic.shape[-1])
+        return weighted, information
+
+    def splines(self, control_points: Floats) -> list[tuple[Floats, Floats]]:
         """Knots and control points of every segment."""
-        return list(zip(self.knots, np.split(control_points, self.starts[1:-1]), strict=True))
+        parts = np.split(control_points, self.grid.starts[1:-1])
+        return list(zip(self.grid.knots, parts, strict=True))
 
-    def curve(self, control_points: np.ndarray) -> np.ndarray:
+    def curve(self, control_points: Floats) -> Floats:
         """The curve at the samples, shape (n, d)."""
-        return self.samples @ control_points
+        return self.grid.samples @ control_points
 
-    def node_states(self, control_points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def node_states(self, control_points: Floats) -> tuple[Floats, Floats]:
         """The curve and its slope at the collocation nodes, each of shape (k, d)."""
-        return self.nodes @ control_points, self.slopes @ control_points
+        return self.grid.nodes @ control_points, self.grid.slopes @ control_points
 
-    def data_residual(self, control_points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def data_residual(self, control_points: Floats) -> tuple[Floats, Floats]:
         """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,)."""
-        residual = self.curve(control_points) - self.x
-        pull = np.einsum("nik,ni->k", self._shared, residual)
-        sizes = -np.linalg.solve(self._shared_information, pull)
+        residual = self.curve(control_points) - self.grid.x
+        weighted, information = self._shared
+        sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
         return residual + self.systematic @ sizes, sizes
 
-    def data_loss(self, control_points: np.ndarray) -> float:
+    def data_loss(self, control_points: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
         residual, sizes = self.data_residual(control_points)
         return float((residual**2).sum(axis=0) @ self.data_weights + sizes @ sizes)
 
-    def physics_residual(self, state: State) -> np.ndarray:
+    def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
         x, slope = self.node_states(state.control_points)
         rows = state.active.any(axis=1)
@@ -222,10 +237,10 @@ class Collocation:
 
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
-        physics = (self.node_weights @ self.physics_residual(state) ** 2) @ self.physics_weights
-        return self.data_loss(state.control_points) + float(physics)
+        squares = self.grid.node_weights @ self.physics_residual(state) ** 2
+        return self.data_loss(state.control_points) + float(squares @ self.physics_weights)
 
-    def linearise(self, state: State, columns: np.ndarray, damping: float = 0.0) -> Linearisation:
+    def linearise(self, state: State, columns: Ints, damping: float = 0.0) -> Linearisation:
         """Linearise around a state and eliminate the control points.
 
         Parameters
@@ -242,62 +257,24 @@ class Collocation:
         scipy.linalg.LinAlgError
             If the banded normal matrix is not positive definite.
         """
-        d, r, l = self.d, self.r, len(self.exponents)
-        x, slope = self.node_states(state.control_points)
-        offset_columns = columns[columns >= d * l] - d * l
-        term_columns = columns[columns < d * l]
-        terms = monomials(x - state.offset, self.exponents)
-        root = np.sqrt(self.node_weights[:, None] * self.physics_weights)
-        residual = root * (slope - terms @ state.coefficients)
-        # (nodes, equation, coordinate): how the law changes with the state.
-        jacobian = root[:, :, None] * (terms @ (self.generators @ state.coefficients)).transpose(
-            1, 2, 0
-        )
-        physics = self._physics_rows(root, jacobian)
-        band = self._data_band + _normal_band(physics)
-        band[0] += damping * band[0] + 1e-12 * band[0].max()
-
-        # The same in the unknowns of the law: minus the terms in their own equation, and the
-        # rates of the law for the offset; the residual comes first.
-        size, count = len(columns), len(term_columns)
-        shared = slice(1 + size, 1 + size + self.systematic.shape[-1])
-        unknowns = np.zeros((len(residual), d, shared.stop))
-        unknowns[:, :, 0] = residual
-        for j in range(d):
-            here = np.flatnonzero(term_columns // l == j)
-            unknowns[:, j, 1 + here] = -root[:, j, None] * terms[:, term_columns[here] % l]
-        unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
-        unknowns = unknowns.reshape(-1, shared.stop)
+        physics, unknowns = self._derivatives(state, columns)
         data_residual, sizes = self.data_residual(state.control_points)
-        right = physics.T @ unknowns
-        right[:, 0] += (self.samples.T @ (data_residual * self.data_weights)).ravel()
-        pull = self.samples.T @ self._shared.reshape(len(self.x), -1)
-        right[:, shared] = pull.reshape(r * d, -1)
-
+        band = self._data_band + normal_band(physics)
+        band[0] += damping * band[0] + 1e-12 * band[0].max()
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+
+        right = physics.T @ unknowns
+        right[:, 0] += (self.grid.samples.T @ (data_residual * self.data_weights)).ravel()
+        pull = self.grid.samples.T @ self._shared[0].reshape(len(self.grid.x), -1)
+        right[:, 1 + len(columns) :] = pull.reshape(len(right), -1)
         solved = cho_solve_banded((factor, True), right, check_finite=False)
         solved = np.ascontiguousarray(solved)
 
-        # What the curve cannot follow. Its Gram matrix is the Schur complement, without the
-        # cancellation between two large matrices that a large physics weight would bring.
-        left = unknowns - physics @ solved
-        gram = left.T @ left
-        solved = solved.reshape(r, d, shared.stop)
-        follow = -(self.samples @ solved.reshape(r, -1)).reshape(-1, d, shared.stop)
-        follow[:, :, 0] += data_residual
-        follow[:, :, shared] += self.systematic
-        follow *= np.sqrt(self.data_weights)[:, None]
-        follow = follow.reshape(-1, shared.stop)
-        gram += follow.T @ follow
-        gram[shared, shared] += np.eye(len(sizes))
-        gram[0, 0] += sizes @ sizes
-        gram[0, shared] += sizes
-        gram[shared, 0] += sizes
-        # The systematic errors go with the law as is best for the fit, as the curve does.
-        response = np.linalg.solve(gram[shared, shared], gram[shared])
-        gram = (gram - gram[:, shared] @ response)[: 1 + size, : 1 + size]
-        solved = (solved - solved[:, :, shared] @ response)[:, :, : 1 + size]
-        objective = float((data_residual**2).sum(axis=0) @ self.data_weights + (residual**2).sum())
+        gram = self._gram(unknowns - physics @ solved, solved, data_residual, sizes)
+        solved = solved.reshape(-1, self.d, solved.shape[1])
+        gram, solved = _without_systematic(gram, solved, 1 + len(columns))
+        objective = float((data_residual**2).sum(axis=0) @ self.data_weights)
+        objective += float((unknowns[:, 0] ** 2).sum())
         objective += float(sizes @ sizes)
         return Linearisation(
             objective=objective,
@@ -309,22 +286,78 @@ class Collocation:
             curve_response=-solved[:, :, 1:],
         )
 
-    def _physics_rows(self, root: np.ndarray, jacobian: np.ndarray) -> sparse.csr_array:
+    def _derivatives(self, state: State, columns: Ints) -> tuple[sparse.csr_array, Floats]:
+        """The weighted physics residual around a state.
+
+        Its Jacobian in the control points, (k d, r d); and, side by side, (k d, 1 + m + s), the
+        residual itself, its derivatives in the columns, and zeros for the systematic errors.
+        """
+        d, l = self.d, len(self.exponents)
+        x, slope = self.node_states(state.control_points)
+        terms = monomials(x - state.offset, self.exponents)
+        root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
+        residual = root * (slope - terms @ state.coefficients)
+        # (nodes, equation, coordinate): how the law changes with the state.
+        rates = (terms @ (self._generators @ state.coefficients)).transpose(1, 2, 0)
+        jacobian = root[:, :, None] * rates
+        # Minus the terms in their own equation, and the rates of the law for the offset.
+        offset_columns = columns[columns >= d * l] - d * l
+        term_columns = columns[columns < d * l]
+        size, count = len(columns), len(term_columns)
+        unknowns = np.zeros((len(residual), d, 1 + size + self.systematic.shape[-1]))
+        unknowns[:, :, 0] = residual
+        for j in range(d):
+            here = np.flatnonzero(term_columns // l == j)
+            unknowns[:, j, 1 + here] = -root[:, j, None] * terms[:, term_columns[here] % l]
+        unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
+        return self._physics_rows(root, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
+
+    def _physics_rows(self, root: Floats, jacobian: Floats) -> sparse.csr_array:
         """Jacobian of the weighted physics residual in the control points, (k d, r d)."""
-        d = self.d
-        values, slopes = (basis.data.reshape(-1, WIDTH) for basis in (self.nodes, self.slopes))
+        d, grid = self.d, self.grid
+        values, slopes = (basis.data.reshape(-1, WIDTH) for basis in (grid.nodes, grid.slopes))
         local = -jacobian[:, :, None, :] * values[:, None, :, None]
         for i in range(d):
             local[:, i, :, i] += root[:, i, None] * slopes
-        first = self.nodes.indices.reshape(-1, WIDTH)[:, 0] * d
-        return _rows_from(np.repeat(first, d), local.reshape(-1, WIDTH * d), self.r * d)
+        first = grid.nodes.indices.reshape(-1, WIDTH)[:, 0] * d
+        return rows_from(np.repeat(first, d), local.reshape(-1, WIDTH * d), grid.r * d)
+
+    def _gram(self, left: Floats, solved: Floats, data_residual: Floats, sizes: Floats) -> Floats:
+        """Gram matrix of what the curve cannot follow, in physics (``left``) and data.
+
+        It is the Schur complement, without the cancellation between two large matrices that a
+        large physics weight would bring.
+        """
+        shared = slice(left.shape[1] - len(sizes), left.shape[1])
+        gram = left.T @ left
+        curve = self.grid.samples @ solved.reshape(self.grid.r, -1)
+        follow = -curve.reshape(-1, self.d, left.shape[1])
+        follow[:, :, 0] += data_residual
+        follow[:, :, shared] += self.systematic
+        follow *= np.sqrt(self.data_weights)[:, None]
+        follow = follow.reshape(-1, left.shape[1])
+        gram += follow.T @ follow
+        gram[shared, shared] += np.eye(len(sizes))
+        gram[0, 0] += sizes @ sizes
+        gram[0, shared] += sizes
+        gram[shared, 0] += sizes
+        return gram
 
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
-    def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> State:
+    def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> Solution:
         """Minimise the objective over the curve and the free coefficients and offsets.
 
-        Gauss-Newton with step halving, and Levenberg-Marquardt damping where that fails; stops
-        when a step promises to lower the objective by less than ``tolerance`` (chi-square units).
+        Gauss-Newton with step halving, and Levenberg-Marquardt damping where that fails.
+
+        Parameters
+        ----------
+        state : State
+            Where to start; what is not free stays.
+        tolerance : float
+            The fit has converged when a step promises to lower the objective by less (in
+            chi-square units: the square of a step over its standard error).
+        max_steps : int
+            After so many steps it ends anyway.
         """
         columns = np.flatnonzero(state.free())
         value = self.objective(state)
@@ -337,51 +370,27 @@ class Collocation:
                 continue
             step, promise = model.newton(damping)
             if damping == 0.0 and promise < tolerance:
-                last = _moved(state, model, step, 1.0)
-                return last if self.objective(last) < value else state
+                last = model.along(state, step, 1.0)
+                lower = self.objective(last) < value
+                return Solution(last if lower else state, Status.CONVERGED)
             for fraction in (1.0, 0.3, 0.1):
-                trial = _moved(state, model, step, fraction)
+                trial = model.along(state, step, fraction)
                 trial_value = self.objective(trial)
                 if trial_value < value:
                     break
             else:
                 damping = max(10 * damping, 1e-6)
-                if damping > 1e2:
-                    break
+                if damping > STRONGEST_DAMPING:
+                    return Solution(state, Status.STALLED)
                 continue
             state, value = trial, trial_value
             damping = damping / 10 if damping > 1e-8 else 0.0
-        return state
+        return Solution(state, Status.MAX_STEPS)
 
 
-def _rows_from(first: np.ndarray, values: np.ndarray, size: int) -> sparse.csr_array:
-    """Sparse rows that each hold consecutive values from a first column on."""
-    n, width = values.shape
-    columns = first[:, None] + np.arange(width)
-    starts = np.arange(0, n * width + 1, width)
-    return sparse.csr_array((values.ravel(), columns.ravel(), starts), shape=(n, size))
-
-
-def _normal_band(rows: sparse.csr_array) -> np.ndarray:
-    """Lower banded storage of ``rows' rows``, for rows as `_rows_from` makes them."""
-    n, size = rows.shape
-    values, columns = rows.data.reshape(n, -1), rows.indices.reshape(n, -1)
-    width = values.shape[1]
-    band = np.empty((width, size))
-    for lag in range(width):
-        products = values[:, lag:] * values[:, : width - lag]
-        band[lag] = np.bincount(columns[:, : width - lag].ravel(), products.ravel(), minlength=size)
-    return band
-
-
-def _moved(state: State, model: Linearisation, step: np.ndarray, fraction: float) -> State:
-    flat = state.flat()
-    flat[model.columns] += fraction * step
-    l, d = state.coefficients.shape
-    return replace(
-        state,
-        control_points=state.control_points
-        + fraction * (model.curve_step + model.curve_response @ step),
-        coefficients=flat[: l * d].reshape(d, l).T,
-        offset=flat[l * d :],
-    )
+def _without_systematic(gram: Floats, solved: Floats, size: int) -> tuple[Floats, Floats]:
+    """Eliminate the sizes of the systematic errors, which go with the law as the curve does."""
+    shared = slice(size, gram.shape[0])
+    response = np.linalg.solve(gram[shared, shared], gram[shared])
+    left = (gram - gram[:, shared] @ response)[:size, :size]
+    return left, (solved - solved[:, :, shared] @ response)[:, :, :size]

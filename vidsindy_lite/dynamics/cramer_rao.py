@@ -41,7 +41,7 @@ def cramer_rao(
 
     A square-root Kalman filter along the true trajectory, without process noise: between two
     measurements the covariance of state and coefficients is carried over by the sensitivities of
-    one time step, at a measurement it shrinks. Sensitivities over the whole record would not do:
+    one time step, at a measurement it shrinks. Sensitivities over the whole time would not do:
     in a chaotic flow they grow beyond the digits that a computer has.
 
     Parameters

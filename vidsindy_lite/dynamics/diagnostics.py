@@ -1,6 +1,6 @@
-"""Whether a discovered law should be trusted: each doubt in words, with advice.
+"""Whether a discovered law should be trusted: each warning in words, with advice.
 
-A doubt is a necessary sign of trouble, not a sufficient one; a law without any may still be wrong.
+A warning is a necessary sign of trouble, not a sufficient one: a law without one may be wrong.
 """
 
 from __future__ import annotations
@@ -10,23 +10,26 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from .collocation import CLEANEST, Collocation, Linearisation, State
-from .information import equilibrated
+from ..arrays import Floats
+from .collocation import CLEANEST, Linearisation, State, Status
+from .library import variable_names
 from .polynomials import PolynomialSystem
-from .selection import closest_rival
-from .trajectories import Record, typical_step
+from .problem import Problem
+from .search import Fit
+from .selection import closest_rival, equilibrated
+from .trajectories import Trajectory, typical_step
 
 MISFIT = 1.5
 """Residual over estimated noise beyond which the law does not fit."""
 NEAR_TIE = 4.0
 """Two laws whose criteria differ by less than this (a likelihood ratio of 7) are not told apart."""
 TURNS = 1.5
-"""Turns of the motion that a record should cover."""
+"""Turns of the motion that a trajectory should cover."""
 COARSE = 1.0
 """Longest typical time step, in time scales of the motion (about 6 to a turn)."""
 RESOLVED = 1e-3
 """Residual, relative to the spread of the data, below which a misfit does not matter."""
-STRAY = 30.0
+OUTLIER = 30.0
 """Distance of a sample from those around it, over how far nine samples in ten are from the median,
 and over the typical distance of those around it, that no motion explains. Noise of 50 % makes 6."""
 GUARD, REACH = 2, 8
@@ -36,49 +39,48 @@ CHANCE = 1e-4
 """Probability below which what the left-out terms explain together is no chance."""
 UNMET = 1e-2
 """Root mean square residual of the law along the curve, relative to the speed."""
+ADVICE = {
+    Status.MAX_STEPS: "its coefficients may be off by more than their errors; use cleaner samples, "
+    "or a lower degree",
+    Status.STALLED: "terms may be indistinguishable on these data; record longer, or lower the "
+    "degree",
+}
+"""What to do about a fit that ended so."""
 
 
-def doubts(
-    law: PolynomialSystem,
-    state: State,
-    problem: Collocation,
-    charges: np.ndarray,
-    records: Sequence[Record],
-    noise: np.ndarray,
-) -> list[str]:
+def diagnose(problem: Problem, fit: Fit, law: PolynomialSystem, margins: Floats) -> tuple[str, ...]:
     """Reasons not to trust a law.
 
     Parameters
     ----------
+    problem : Problem
+        The data, and the noise as it was estimated before any law was known.
+    fit : Fit
+        The final fit, its noise re-estimated from the residual.
     law : PolynomialSystem
-        The law, for its names.
-    state, problem
-        The final fit in standard units, the noise re-estimated from its residual.
-    charges : ndarray, shape (l,)
-        Price of each term.
-    records : sequence of Record
-        The data in standard units.
-    noise : ndarray, shape (d,)
-        Noise as the smoothing estimated it, before any law was known.
-
-    Returns
-    -------
-    list of str
+        The law in the frame of the data.
+    margins : ndarray, shape (l d,)
+        By how much the criterion rises if a term of this law is taken out or put back, equation
+        by equation.
     """
-    return [
-        *_misfit(law, problem, noise),
-        *_unmet(state, problem),
-        *_selection(law, state, problem, charges),
-        *_sampling(records),
-    ]
+    return (
+        *outliers(problem.measured),
+        *_misfit(problem, fit),
+        *_unfinished(fit),
+        *_unmet(fit),
+        *_selection(problem, fit),
+        *_sampling(problem.trajectories),
+        *_standstill(law),
+        *_narrow(law, margins),
+    )
 
 
-def strays(records: Sequence[Record]) -> list[str]:
+def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
     """Samples so far from those around them that they must be errors.
 
     Parameters
     ----------
-    records : sequence of Record
+    trajectories : sequence of Trajectory
         The data in the user's units.
 
     Returns
@@ -86,10 +88,10 @@ def strays(records: Sequence[Record]) -> list[str]:
     list of str
     """
     found = []
-    for t, x in records:
+    for t, x in trajectories:
         away = np.abs(x - np.median(x, axis=0))
         spread = np.quantile(away, 0.9, axis=0)
-        rows, columns = np.nonzero((away > STRAY * spread) & (spread > 0))
+        rows, columns = np.nonzero((away > OUTLIER * spread) & (spread > 0))
         far = {row for row, j in zip(rows, columns, strict=True) if _leaps(x[:, j], row)}
         found += [
             f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in sorted(far)
@@ -103,29 +105,35 @@ def strays(records: Sequence[Record]) -> list[str]:
     ]
 
 
-def _leaps(values: np.ndarray, row: int) -> bool:
+def _leaps(values: Floats, row: int) -> bool:
     """Whether a sample is far from those around it, too, and not part of a motion far away."""
     before, after = values[max(row - REACH, 0) : max(row - GUARD, 0)], values[row + GUARD + 1 :]
     beside = np.concatenate((before, after[: REACH - GUARD]))
     middle = np.median(beside)
-    return bool(abs(values[row] - middle) > STRAY * np.median(np.abs(beside - middle)))
+    return bool(abs(values[row] - middle) > OUTLIER * np.median(np.abs(beside - middle)))
 
 
-def _misfit(law: PolynomialSystem, problem: Collocation, noise: np.ndarray) -> list[str]:
-    residual = problem.data_weights**-0.5
-    ratio = np.where(residual > RESOLVED, residual / noise, 0.0)
+def _misfit(problem: Problem, fit: Fit) -> list[str]:
+    residual = fit.collocation.data_weights**-0.5
+    ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
     j = int(ratio.argmax())
     if ratio[j] < MISFIT:
         return []
     return [
-        f"the curve misses the data of {law.names[j]} by {ratio[j]:.1f} times the noise estimated "
-        "beforehand: the law may lie outside the library (raise the degree), or the motion may "
-        "not be autonomous"
+        f"the curve misses the data of {variable_names(problem.d)[j]} by {ratio[j]:.1f} times the "
+        "noise estimated beforehand: the law may lie outside the library (raise the degree), or "
+        "the motion may not be autonomous"
     ]
 
 
-def _unmet(state: State, problem: Collocation) -> list[str]:
-    residual = float(np.sqrt((problem.physics_residual(state) ** 2).mean()))
+def _unfinished(fit: Fit) -> list[str]:
+    if fit.status is Status.CONVERGED:
+        return []
+    return [f"the last fit did not converge ({fit.status.value}): {ADVICE[fit.status]}"]
+
+
+def _unmet(fit: Fit) -> list[str]:
+    residual = float(np.sqrt((fit.collocation.physics_residual(fit.state) ** 2).mean()))
     if residual < UNMET:
         return []
     return [
@@ -134,14 +142,12 @@ def _unmet(state: State, problem: Collocation) -> list[str]:
     ]
 
 
-def _selection(
-    law: PolynomialSystem, state: State, problem: Collocation, charges: np.ndarray
-) -> list[str]:
-    if (problem.data_weights**-0.5 <= CLEANEST).all():
+def _selection(problem: Problem, fit: Fit) -> list[str]:
+    if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return []  # what is left is the error of the splines, not noise: it settles nothing
     # The offset stays where it is: with it free, the same law in another frame would count.
-    model = problem.linearise(state, np.arange(law.coefficients.size))
-    return [*_left_over(model, state), *_near_tie(model, law, state, charges)]
+    model = fit.collocation.linearise(fit.state, np.arange(problem.exponents.size))
+    return [*_left_over(model, fit.state), *_near_tie(problem, fit.state, model)]
 
 
 def _left_over(model: Linearisation, state: State) -> list[str]:
@@ -158,14 +164,13 @@ def _left_over(model: Linearisation, state: State) -> list[str]:
     ]
 
 
-def _near_tie(
-    model: Linearisation, law: PolynomialSystem, state: State, charges: np.ndarray
-) -> list[str]:
+def _near_tie(problem: Problem, state: State, model: Linearisation) -> list[str]:
+    law = problem.law(state)
     cost, dropped, added = closest_rival(
         model.information,
         model.gradient,
         state.coefficients.T.ravel(),
-        np.tile(charges, law.d),
+        np.tile(problem.penalties, law.d),
         state.active.T.ravel(),
     )
     if cost > NEAR_TIE:
@@ -177,25 +182,8 @@ def _near_tie(
     frame = "in its own frame, " if state.moving.any() else ""
     return [
         f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
-        "do not settle it: use a longer or cleaner record"
+        "do not settle it: use a longer or cleaner trajectory"
     ]
-
-
-def frame_doubts(law: PolynomialSystem, margins: np.ndarray) -> list[str]:
-    """Reasons not to trust what a law became in the frame of the data.
-
-    Parameters
-    ----------
-    law : PolynomialSystem
-        The law in that frame.
-    margins : ndarray, shape (l d,)
-        By how much the criterion rises if a term is taken out or put back, equation by equation.
-
-    Returns
-    -------
-    list of str
-    """
-    return [*_standstill(law), *_narrow(law, margins)]
 
 
 def _standstill(law: PolynomialSystem) -> list[str]:
@@ -206,7 +194,7 @@ def _standstill(law: PolynomialSystem) -> list[str]:
     ]
 
 
-def _narrow(law: PolynomialSystem, margins: np.ndarray) -> list[str]:
+def _narrow(law: PolynomialSystem, margins: Floats) -> list[str]:
     close = np.flatnonzero(margins < NEAR_TIE)
     if not len(close):
         return []
@@ -224,15 +212,15 @@ def _place(law: PolynomialSystem, entry: int) -> str:
     return f"{law.terms[term]} in d{law.names[equation]}/dt"
 
 
-def _sampling(records: Sequence[Record]) -> list[str]:
+def _sampling(trajectories: Sequence[Trajectory]) -> list[str]:
     found = []
-    turns = sum(t[-1] - t[0] for t, _ in records) / (2 * np.pi)
-    if turns < TURNS and records[0][1].shape[1] > 1:  # on a line nothing turns
+    turns = sum(t[-1] - t[0] for t, _ in trajectories) / (2 * np.pi)
+    if turns < TURNS and trajectories[0][1].shape[1] > 1:  # on a line nothing turns
         found.append(
-            f"the record covers only {turns:.1f} turns of the motion: terms may be "
+            f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "
             "indistinguishable on it; record longer"
         )
-    step = typical_step(records)
+    step = typical_step(trajectories)
     if step > COARSE:
         found.append(f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster")
     return found

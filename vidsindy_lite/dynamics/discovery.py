@@ -1,76 +1,21 @@
 """The result of a discovery: the law in two frames, its uncertainty, and whether to trust it."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
 
+from ..arrays import Floats, Ints
 from ..checks import check_array
-from .collocation import Collocation, State
-from .diagnostics import frame_doubts
-from .information import inverse
-from .polynomials import PolynomialSystem, shift_generators, shift_matrix, variable_names
-
-
-@dataclass(frozen=True)
-class Units:
-    """Standard units of a fit: every coordinate with mean 0 and variance 1, time in time scales.
-
-    Parameters
-    ----------
-    centre, scale : ndarray, shape (d,)
-        Mean and standard deviation of the data.
-    time : float
-        Length of a standard time unit.
-    """
-
-    centre: np.ndarray
-    scale: np.ndarray
-    time: float
-
-    def standard(self, point: np.ndarray) -> np.ndarray:
-        """A point of the data's frame in standard units."""
-        return (point - self.centre) / self.scale
-
-    def point(self, standard: np.ndarray) -> np.ndarray:
-        """A standard point in the data's frame and units."""
-        return standard * self.scale + self.centre
-
-    def factors(self, exponents: np.ndarray) -> np.ndarray:
-        """What turns standard coefficients into those of the data's units, shape (l, d)."""
-        return self.scale / np.prod(self.scale**exponents, axis=1)[:, None] / self.time
-
-
-@dataclass(frozen=True)
-class Step:
-    """One line of the history of a discovery.
-
-    Parameters
-    ----------
-    stage : str
-        What was done.
-    seconds : float
-        Time since the start.
-    physics_weight : float
-        Relative weight of the physics loss.
-    data_loss : float
-        Mean square residual of the data over the noise variance.
-    physics_loss : float
-        Mean square residual of the law in standard units.
-    terms : int
-        Number of active terms.
-    offset : ndarray, shape (d,)
-        Origin of the law in the data's frame.
-    """
-
-    stage: str
-    seconds: float
-    physics_weight: float
-    data_loss: float
-    physics_loss: float
-    terms: int
-    offset: np.ndarray
+from .diagnostics import diagnose
+from .library import shift_generators, shift_matrix, variable_names
+from .polynomials import PolynomialSystem
+from .problem import Problem, Units
+from .search import Fit, History, Step
+from .selection import inverse
+from .splines import DEGREE
 
 
 @dataclass(frozen=True)
@@ -103,11 +48,11 @@ class Discovery:
 
     system: PolynomialSystem
     native: PolynomialSystem
-    offset: np.ndarray
-    covariance: np.ndarray
-    native_covariance: np.ndarray
-    offset_errors: np.ndarray
-    noise: np.ndarray
+    offset: Floats
+    covariance: Floats
+    native_covariance: Floats
+    offset_errors: Floats
+    noise: Floats
     warnings: tuple[str, ...]
     history: tuple[Step, ...]
     curves: tuple[BSpline, ...]
@@ -118,7 +63,7 @@ class Discovery:
         return "suspect" if self.warnings else "ok"
 
     @property
-    def coefficients(self) -> np.ndarray:
+    def coefficients(self) -> Floats:
         """``Lambda`` in the frame of the data, shape (l, d)."""
         return self.system.coefficients
 
@@ -128,12 +73,12 @@ class Discovery:
         return self.system.terms
 
     @property
-    def standard_errors(self) -> np.ndarray:
+    def standard_errors(self) -> Floats:
         """Standard errors of `coefficients`, shape (l, d)."""
         return _errors(self.covariance, self.system)
 
     @property
-    def native_standard_errors(self) -> np.ndarray:
+    def native_standard_errors(self) -> Floats:
         """Standard errors of the coefficients of `native`, shape (l, d)."""
         return _errors(self.native_covariance, self.native)
 
@@ -160,7 +105,7 @@ class Discovery:
             lines.append(f"d{name}/dt = {text}")
         return "\n".join(lines)
 
-    def curve(self, t: np.ndarray) -> np.ndarray:
+    def curve(self, t: Floats) -> Floats:
         """The fitted curve, shape (n, d), in the frame of the data; NaN outside the stretches."""
         t = check_array("t", t)
         values = np.full((*t.shape, self.system.d), np.nan)
@@ -175,65 +120,62 @@ class Discovery:
         return "\n".join([self.equations(), *(f"warning: {text}" for text in self.warnings)])
 
 
-def report(
-    state: State,
-    problem: Collocation,
-    units: Units,
-    charges: np.ndarray,
-    warnings: Sequence[str],
-    history: Sequence[Step],
-) -> Discovery:
-    """Turn the last state of a fit into a `Discovery` in the units of the data.
+def conclude(problem: Problem, fit: Fit, history: History) -> Discovery:
+    """Turn the last fit into a `Discovery` in the units of the data.
 
     Parameters
     ----------
-    state, problem
-        The fit, at a physics weight at which the law holds exactly.
-    units : Units
-        Standard units of the fit.
-    charges : ndarray, shape (l,)
-        Price of each term: a coefficient whose squared score is lower cannot be told from zero.
-    warnings, history
+    problem : Problem
+        The data and the prices: a coefficient whose squared score is lower than its price cannot
+        be told from zero.
+    fit : Fit
+        At a physics weight at which the law holds exactly.
+    history : History
         Passed on.
     """
+    units, state, collocation = problem.units, fit.state, fit.collocation
     exponents, (l, d) = problem.exponents, state.coefficients.shape
     names = variable_names(d)
-    columns = np.flatnonzero(state.free())
-    covariance = np.zeros((l * d + d, l * d + d))
-    information = problem.linearise(state, columns).information
-    covariance[np.ix_(columns, columns)] = inverse(information)
-    unit = np.concatenate([units.factors(exponents).T.ravel(), units.scale])
-    covariance *= unit[:, None] * unit
+    covariance = _covariance(units, fit)
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
-
-    native_covariance = covariance[: l * d, : l * d]
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
-    moved, moved_covariance, margins = _pruned(moved, moved_covariance, charges)
-    law = PolynomialSystem(names, exponents, moved)
+    moved, moved_covariance, margins = _pruned(moved, moved_covariance, problem.penalties)
     if not state.moving.any():
         margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
-    splines = (
-        BSpline(knots * units.time, control * units.scale + units.centre, 3)
-        for knots, control in problem.splines(state.control_points)
-    )
+    law = PolynomialSystem(names, exponents, moved)
     return Discovery(
         system=law,
         native=PolynomialSystem(names, exponents, coefficients),
         offset=offset,
         covariance=moved_covariance,
-        native_covariance=native_covariance,
+        native_covariance=covariance[: l * d, : l * d],
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
-        noise=problem.data_weights**-0.5 * units.scale,
-        warnings=(*warnings, *frame_doubts(law, margins)),
-        history=tuple(history),
-        curves=tuple(splines),
+        noise=collocation.data_weights**-0.5 * units.scale,
+        warnings=diagnose(problem, fit, law, margins),
+        history=tuple(history.steps),
+        curves=tuple(
+            BSpline(knots * units.time, control * units.scale + units.centre, DEGREE)
+            for knots, control in collocation.splines(state.control_points)
+        ),
     )
 
 
+def _covariance(units: Units, fit: Fit) -> Floats:
+    """Covariance of coefficients and offset in units of the data; zero where nothing is free."""
+    columns = np.flatnonzero(fit.state.free())
+    size = len(fit.state.flat())
+    covariance = np.zeros((size, size))
+    information = fit.collocation.linearise(fit.state, columns).information
+    covariance[np.ix_(columns, columns)] = inverse(information)
+    factors = units.factors(fit.collocation.exponents)
+    unit = np.concatenate([factors.T.ravel(), units.scale])
+    return covariance * (unit[:, None] * unit)
+
+
 def _shifted(
-    exponents: np.ndarray, coefficients: np.ndarray, offset: np.ndarray, covariance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+    exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats
+) -> tuple[Floats, Floats]:
     """Law in the data's frame, with the covariance of coefficients and offset carried along."""
     l, d = exponents.shape
     matrix = shift_matrix(exponents, offset)
@@ -246,8 +188,8 @@ def _shifted(
 
 
 def _pruned(
-    coefficients: np.ndarray, covariance: np.ndarray, charges: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    coefficients: Floats, covariance: Floats, penalties: Floats
+) -> tuple[Floats, Floats, Floats]:
     """Set what cannot be told from zero to zero, one by one, and correct the others for it.
 
     Shifting a law by an estimated offset leaves remainders where the exact shift cancels. The
@@ -258,7 +200,7 @@ def _pruned(
     flat = coefficients.T.ravel().copy()
     covariance = covariance.copy()
     original = np.diag(covariance).copy()
-    charge = np.tile(charges, shape[0])
+    penalty = np.tile(penalties, shape[0])
     margins = np.full(len(flat), np.inf)
     while True:
         variance = np.diag(covariance)
@@ -270,13 +212,13 @@ def _pruned(
         if len(gone):
             flat[gone] = 0.0
             continue
-        weakness = score / charge[live]
+        weakness = score / penalty[live]
         if not len(live) or weakness.min() >= 1:
-            margins[live] = score - charge[live]
+            margins[live] = score - penalty[live]
             break
         weakest = weakness.argmin()
         k = live[weakest]
-        margins[k] = charge[k] - score[weakest]
+        margins[k] = penalty[k] - score[weakest]
         gain = covariance[:, k] / covariance[k, k]
         flat -= gain * flat[k]
         covariance -= np.outer(gain, covariance[k])
@@ -287,7 +229,7 @@ def _pruned(
     return flat.reshape(shape).T, covariance, margins
 
 
-def _errors(covariance: np.ndarray, law: PolynomialSystem) -> np.ndarray:
+def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:
     variance = np.maximum(np.diag(covariance), 0.0)
     return np.sqrt(variance).reshape(law.coefficients.shape[::-1]).T
 

@@ -11,20 +11,22 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
-from .collocation import Segment
-from .polynomials import PolynomialSystem, runge_kutta_4
-from .trajectories import Record
+from ..arrays import Floats
+from .grid import Segment
+from .integrate import runge_kutta_4
+from .polynomials import PolynomialSystem
+from .trajectories import Trajectory
 
 Gap = tuple[int, float]
-"""A gap is named by its record and the time of the last sample before it."""
+"""A gap is named by its trajectory and the time of the last sample before it."""
 
 
 def gaps(segments: Sequence[Segment]) -> list[Gap]:
-    """The gaps between segments of the same record, shortest first."""
+    """The gaps between segments of the same trajectory, shortest first."""
     lengths = {
-        (left.record, left.t[-1]): right.t[0] - left.t[-1]
+        (left.trajectory, left.t[-1]): right.t[0] - left.t[-1]
         for left, right in zip(segments[:-1], segments[1:], strict=True)
-        if left.record == right.record
+        if left.trajectory == right.trajectory
     }
     return sorted(lengths, key=lengths.__getitem__)
 
@@ -45,7 +47,7 @@ class Joined:
         self.splines = splines
         self.law = law
 
-    def __call__(self, t: np.ndarray) -> np.ndarray:
+    def __call__(self, t: Floats) -> Floats:
         """Evaluate at increasing times, shape (n, d)."""
         values = np.empty((len(t), self.law.d))
         ends = [(spline.t[0], spline.t[-1]) for spline in self.splines]
@@ -62,7 +64,7 @@ class Joined:
         return values
 
     def _crossings(
-        self, crossed: np.ndarray, steps: int
+        self, crossed: Floats, steps: int
     ) -> tuple[list[CubicHermiteSpline], list[CubicHermiteSpline]]:
         """Each gap from its left and from its right end, as functions of the share covered."""
         x0 = np.array(
@@ -90,7 +92,7 @@ def join(
     segments: Sequence[Segment],
     splines: Sequence[BSpline],
     bridged: Sequence[Gap],
-    records: Sequence[Record],
+    trajectories: Sequence[Trajectory],
     law: PolynomialSystem,
     spacing: float,
 ) -> tuple[list[Segment], list[BSpline | Joined]]:
@@ -102,10 +104,10 @@ def join(
         The present pieces and their fitted curves.
     bridged : sequence of Gap
         Which gaps to cross.
-    records : sequence of Record
+    trajectories : sequence of Trajectory
         All data, including samples that were too few to make a segment of their own.
     law : PolynomialSystem
-        The law, in the frame of the records.
+        The law, in the frame of the trajectories.
     spacing : float
         Length of a knot span.
 
@@ -118,7 +120,7 @@ def join(
     groups: list[list[int]] = []
     for i, segment in enumerate(segments):
         left = segments[i - 1]
-        if i and left.record == segment.record and (left.record, left.t[-1]) in bridged:
+        if i and left.trajectory == segment.trajectory and (left.trajectory, left.t[-1]) in bridged:
             groups[-1].append(i)
         else:
             groups.append([i])
@@ -129,8 +131,8 @@ def join(
             joined.append(first)
             curves.append(splines[group[0]])
             continue
-        t, x = records[first.record]
+        t, x = trajectories[first.trajectory]
         inside = (t >= first.t[0]) & (t <= last.t[-1])
-        joined.append(Segment.even(t[inside], x[inside], spacing, first.record))
+        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory))
         curves.append(Joined([splines[i] for i in group], law))
     return joined, curves

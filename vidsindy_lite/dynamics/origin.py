@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
-from .information import inverse
-from .polynomials import divides, shift_generators, shift_matrix
+from .library import divides, shift_generators, shift_matrix
+from .selection import inverse
 
 DRAWS = 200
 """Random sets of coefficients that an origin is asked to make vanish."""
 
 
-class FrameAlgebra:
+class ShiftedLaw:
     """Coefficients and information of an estimated law in shifted frames, exactly.
 
     Parameters
@@ -76,18 +76,18 @@ class FrameAlgebra:
         return estimate, covariance, estimate**2 / variance
 
     def smooth_count(
-        self, origin: np.ndarray, active: np.ndarray, charge: float
+        self, origin: np.ndarray, active: np.ndarray, penalty: float
     ) -> tuple[float, np.ndarray]:
         """Smoothed number of significant terms at an origin, and its gradient.
 
         Each active term with score ``z`` (estimate over standard error) counts
-        ``z^2 / (z^2 + charge)``.
+        ``z^2 / (z^2 + penalty)``.
         """
         estimate, covariance, score = self._scores(origin)
         variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300)
         mask = active.T
-        value = (score / (score + charge))[mask].sum()
-        weight = charge / (score + charge) ** 2
+        value = (score / (score + penalty))[mask].sum()
+        weight = penalty / (score + penalty) ** 2
         gradient = np.empty(self.d)
         for i, generator in enumerate(self.generators):
             estimate_rate = estimate @ generator.T
@@ -98,11 +98,11 @@ class FrameAlgebra:
 
 
 def sparse_origins(
-    algebra: FrameAlgebra,
+    algebra: ShiftedLaw,
     active: np.ndarray,
     home: np.ndarray,
     box: tuple[np.ndarray, np.ndarray],
-    charge: float,
+    penalty: float,
     keep: int,
     rng: np.random.Generator,
 ) -> list[np.ndarray]:
@@ -114,7 +114,7 @@ def sparse_origins(
 
     Parameters
     ----------
-    algebra : FrameAlgebra
+    algebra : ShiftedLaw
         The estimated law.
     active : ndarray of bool, shape (l, d)
         Terms that count.
@@ -122,7 +122,7 @@ def sparse_origins(
         The origin of the data's frame, where an offset costs nothing.
     box : pair of ndarray, shape (d,)
         Lower and upper bounds of the search.
-    charge : float
+    penalty : float
         Square of the score at which a term counts one half.
     keep : int
         How many to return at most.
@@ -144,13 +144,13 @@ def sparse_origins(
         origin = algebra.vanish(origin, droppable[rng.permutation(len(droppable))[:size]])
         if np.isfinite(origin).all():
             starts.append(np.clip(origin, low, high))
-    counts = [algebra.smooth_count(start, active, charge)[0] for start in starts]
+    counts = [algebra.smooth_count(start, active, penalty)[0] for start in starts]
     found: list[tuple[float, np.ndarray]] = []
     for index in np.argsort(counts)[: 4 * keep]:
         if any(np.abs(starts[index] - origin).max() < 1e-3 for _, origin in found):
             continue
         result = minimize(
-            algebra.smooth_count, starts[index], args=(active, charge), jac=True,
+            algebra.smooth_count, starts[index], args=(active, penalty), jac=True,
             method="L-BFGS-B", bounds=list(zip(low, high, strict=True)), options={"maxiter": 40},
         )  # fmt: skip
         found.append((float(result.fun), result.x))

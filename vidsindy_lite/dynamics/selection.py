@@ -7,22 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .information import equilibrated
-
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 PLATEAU = 1e-6
 """Changes of the function below this are taken for rounding."""
+NOTHING = 1e-250
+"""Least information; its inverse, even over the ridge, is still a number."""
+RIDGE = 1e-12
+"""Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance."""
 
 
 def subset_search(
     information: np.ndarray,
     gradient: np.ndarray,
     present: np.ndarray,
-    charge: np.ndarray,
+    penalty: np.ndarray,
     start: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Minimise a quadratic function of ``c`` plus charges of its non-zero entries, by local search.
+    """Minimise a quadratic function of ``c`` plus a penalty per non-zero entry, by local search.
 
     The function is ``(c - p)' S (c - p) - 2 g' (c - p)``: what Gauss-Newton knows around ``p``.
     Takes the best of all single drops, adds and swaps until none helps, once from the given
@@ -39,7 +41,7 @@ def subset_search(
         ``g``.
     present : ndarray, shape (m,)
         ``p``; zeros for a plain regression.
-    charge : ndarray, shape (m,)
+    penalty : ndarray, shape (m,)
         Price of each non-zero entry, in the units of the objective; minus infinity keeps it in.
     start : ndarray of bool, shape (m,)
         First support.
@@ -50,14 +52,14 @@ def subset_search(
     solution : ndarray, shape (m,)
         Minimiser on the support, zero elsewhere.
     value : float
-        The function with charges.
+        The function with penalties.
     """
-    model = _Quadratic(information, gradient, present, charge)
-    starts = (start, np.isneginf(charge))
+    model = _Quadratic(information, gradient, present, penalty)
+    starts = (start, np.isneginf(penalty))
     best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
     while (deeper := _through_newcomer(model, best)) is not None:
         best = deeper
-    solution = np.zeros(len(charge))
+    solution = np.zeros(len(penalty))
     solution[best.inside] = best.fitted * model.scale[best.inside]
     return best.support, solution, best.value
 
@@ -66,14 +68,14 @@ def closest_rival(
     information: np.ndarray,
     gradient: np.ndarray,
     present: np.ndarray,
-    charge: np.ndarray,
+    penalty: np.ndarray,
     support: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """The single change of a support that costs least.
 
     Parameters
     ----------
-    information, gradient, present, charge
+    information, gradient, present, penalty
         See `subset_search`.
     support : ndarray of bool, shape (m,)
         A support at which `subset_search` has stopped.
@@ -81,11 +83,11 @@ def closest_rival(
     Returns
     -------
     cost : float
-        By how much the function with charges rises.
+        By how much the function with penalties rises.
     dropped, added : ndarray of int
         The entries that leave and enter, at most one each.
     """
-    model = _Quadratic(information, gradient, present, charge)
+    model = _Quadratic(information, gradient, present, penalty)
     fit = model.fit(support)
     rivals = []
     for cost, dropped, added in _single_changes(model, _Tableau.of(model, fit)):
@@ -108,16 +110,16 @@ class _Fit:
 
 
 class _Quadratic:
-    """A quadratic function with charges, its entries scaled to a unit diagonal.
+    """A quadratic function with penalties, its entries scaled to a unit diagonal.
 
     Everything is reckoned from the present point: with data that are nearly exact the function
     itself has more digits than a computer, its changes do not.
     """
 
-    def __init__(self, information, gradient, present, charge) -> None:
+    def __init__(self, information, gradient, present, penalty) -> None:
         self.matrix, self.scale = equilibrated(information)
         self.gradient, self.present = gradient * self.scale, present / self.scale
-        self.charge = charge
+        self.penalty = penalty
 
     def fit(self, support: np.ndarray) -> _Fit:
         inside = np.flatnonzero(support)
@@ -130,7 +132,7 @@ class _Quadratic:
         moved += inverse @ (target - block @ moved)
         step[inside] = moved
         left = self.gradient - self.matrix @ step
-        paid = self.charge[inside[np.isfinite(self.charge[inside])]].sum()
+        paid = self.penalty[inside[np.isfinite(self.penalty[inside])]].sum()
         value = float(paid - step @ (left + self.gradient))
         return _Fit(support, inside, inverse, self.present[inside] + moved, left, value)
 
@@ -161,10 +163,10 @@ def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
             if not min(cost for cost, _, _ in changes) < -PLATEAU:
                 continue
         forced = copy(model)
-        forced.charge = model.charge.copy()
-        forced.charge[entry] = -np.inf
+        forced.penalty = model.penalty.copy()
+        forced.penalty[entry] = -np.inf
         trial = _descend(forced, _changed(best.support, none, entry))
-        if trial.value + model.charge[entry] < best.value - PLATEAU:
+        if trial.value + model.penalty[entry] < best.value - PLATEAU:
             return _descend(model, trial.support)
     return None
 
@@ -225,13 +227,16 @@ def _single_changes(
 ) -> list[tuple[float, np.ndarray, np.ndarray]]:
     """Best drop, add and swap: change of the function, entries dropped, entries added."""
     inside, outside, fitted, spread = (
-        tableau.inside, tableau.outside, tableau.fitted, tableau.spread
+        tableau.inside,
+        tableau.outside,
+        tableau.fitted,
+        tableau.spread,
     )
     response, left, room = tableau.response, tableau.left, tableau.room
     none = np.array([], dtype=int)
-    charge = model.charge
-    loss = fitted**2 / spread - charge[inside]
-    cost = charge[outside] - _gain(left, room)
+    penalty = model.penalty
+    loss = fitted**2 / spread - penalty[inside]
+    cost = penalty[outside] - _gain(left, room)
     changes = [(np.inf, none, none)]
     if len(inside):
         changes.append((loss.min(), inside[[loss.argmin()]], none))
@@ -241,7 +246,7 @@ def _single_changes(
         # A drop changes what the others leave over, and the room a newcomer has, by rank one.
         swapped_left = left[:, None] + response * (fitted / spread)
         swapped_room = room[:, None] + response**2 / spread
-        swap = loss + charge[outside][:, None] - _gain(swapped_left, swapped_room)
+        swap = loss + penalty[outside][:, None] - _gain(swapped_left, swapped_room)
         add, drop = np.unravel_index(swap.argmin(), swap.shape)
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
     return changes
@@ -250,3 +255,31 @@ def _single_changes(
 def _gain(left: np.ndarray, room: np.ndarray) -> np.ndarray:
     """What a newcomer explains; nothing if it is a combination of those that are in."""
     return np.where(room > COLLINEAR, left**2 / np.maximum(room, COLLINEAR), -np.inf)
+
+
+def equilibrated(information: np.ndarray, ridge: float = RIDGE) -> tuple[np.ndarray, np.ndarray]:
+    """Scale a symmetric matrix to a unit diagonal, and add a ridge.
+
+    Parameters
+    ----------
+    information : ndarray, shape (m, m)
+        Symmetric, positive semi-definite.
+    ridge : float
+        Added to the unit diagonal.
+
+    Returns
+    -------
+    matrix : ndarray, shape (m, m)
+        ``scale[:, None] * information * scale``, plus the ridge.
+    scale : ndarray, shape (m,)
+    """
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), NOTHING))
+    matrix = information * scale[:, None] * scale
+    matrix[np.diag_indices_from(matrix)] += ridge
+    return matrix, scale
+
+
+def inverse(information: np.ndarray) -> np.ndarray:
+    """The covariance that belongs to an information matrix, shape (m, m)."""
+    matrix, scale = equilibrated(information)
+    return np.linalg.inv(matrix) * scale[:, None] * scale

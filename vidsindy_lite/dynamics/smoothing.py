@@ -21,7 +21,7 @@ PENALTIES = 10.0 ** np.arange(-4, 11.6, 0.5)
 
 @dataclass(frozen=True)
 class Smooth:
-    """Smoothed stretches of one record.
+    """Smoothed stretches of one trajectory.
 
     Parameters
     ----------

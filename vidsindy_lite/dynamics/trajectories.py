@@ -8,11 +8,11 @@ import numpy as np
 
 from ..checks import check_array, check_times
 
-Record = tuple[np.ndarray, np.ndarray]
+Trajectory = tuple[np.ndarray, np.ndarray]
 """Times (n,) and states (n, d) without missing rows."""
 
 
-def check_record(t: np.ndarray, x: np.ndarray) -> Record:
+def check_trajectory(t: np.ndarray, x: np.ndarray) -> Trajectory:
     """Check one trajectory and leave out its missing rows.
 
     Parameters
@@ -49,46 +49,44 @@ def check_record(t: np.ndarray, x: np.ndarray) -> Record:
     return t[seen], x[seen]
 
 
-def check_records(
+def check_trajectories(
     t: np.ndarray | Sequence[tuple[np.ndarray, np.ndarray]], x: np.ndarray | None = None
-) -> list[Record]:
+) -> list[Trajectory]:
     """Check one trajectory ``t, x``, or a list of several pairs ``(t, x)`` of one dimension.
 
     Raises
     ------
     ValueError
-        If ``t`` is neither, or a trajectory is malformed; see `check_record`.
+        If ``t`` is neither, or a trajectory is malformed; see `check_trajectory`.
     """
     pairs = t if x is None else [(t, x)]
     if not isinstance(pairs, list | tuple) or not all(
         isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs
     ):
-        raise ValueError(
-            f"x: must be given, unless t is a list of pairs (t, x), got t = {t!r:.60}"
-        )
-    records = [check_record(*pair) for pair in pairs]
-    if len({values.shape[1] for _, values in records}) != 1:
+        raise ValueError(f"x: must be given, unless t is a list of pairs (t, x), got t = {t!r:.60}")
+    trajectories = [check_trajectory(*pair) for pair in pairs]
+    if len({values.shape[1] for _, values in trajectories}) != 1:
         raise ValueError(
             "t: a list of trajectories must hold at least one, all of the same dimension, "
-            f"got shapes {[values.shape for _, values in records]}"
+            f"got shapes {[values.shape for _, values in trajectories]}"
         )
-    return records
+    return trajectories
 
 
 def check_systematic(
     systematic: np.ndarray | Sequence[np.ndarray] | None,
     times: Sequence[np.ndarray],
-    records: Sequence[Record],
+    trajectories: Sequence[Trajectory],
 ) -> list[np.ndarray]:
-    """Systematic errors of records, as `discover` takes them, at the samples that are not missing.
+    """Systematic errors as `discover` takes them, at the samples that are not missing.
 
     Parameters
     ----------
     systematic : array_like, shape (k, n, d), or list of such, or None
-        For one record, or for each.
+        For one trajectory, or for each.
     times : sequence of array_like, shape (n,)
-        Of all samples of each record, missing or not.
-    records : sequence of Record
+        Of all samples of each trajectory, missing or not.
+    trajectories : sequence of Trajectory
 
     Returns
     -------
@@ -100,14 +98,14 @@ def check_systematic(
         If shapes disagree, or a value at a sample is not finite.
     """
     if systematic is None:
-        return [np.empty((*x.shape, 0)) for _, x in records]
-    parts = [systematic] if len(records) == 1 and np.ndim(systematic) == 3 else systematic
-    if len(parts) != len(records):
+        return [np.empty((*x.shape, 0)) for _, x in trajectories]
+    parts = [systematic] if len(trajectories) == 1 and np.ndim(systematic) == 3 else systematic
+    if len(parts) != len(trajectories):
         raise ValueError(
-            f"systematic: must be one array per trajectory ({len(records)}), got {len(parts)}"
+            f"systematic: must be one array per trajectory ({len(trajectories)}), got {len(parts)}"
         )
     checked = []
-    for part, t, (seen, x) in zip(parts, times, records, strict=True):
+    for part, t, (seen, x) in zip(parts, times, trajectories, strict=True):
         part = check_array("systematic", part)
         if part.ndim != 3 or part.shape[1:] != (len(t), x.shape[1]):
             raise ValueError(
@@ -125,13 +123,13 @@ def check_systematic(
     return checked
 
 
-def cut(record: Record, longest_step: float) -> list[Record]:
-    """Cut a record wherever two samples are further apart than ``longest_step``."""
-    t, x = record
+def cut(trajectory: Trajectory, longest_step: float) -> list[Trajectory]:
+    """Cut a trajectory wherever two samples are further apart than ``longest_step``."""
+    t, x = trajectory
     ends = np.flatnonzero(np.diff(t) > longest_step) + 1
     return list(zip(np.split(t, ends), np.split(x, ends), strict=True))
 
 
-def typical_step(records: Sequence[Record]) -> float:
-    """Median time between two samples of the records."""
-    return float(np.median(np.concatenate([np.diff(t) for t, _ in records])))
+def typical_step(trajectories: Sequence[Trajectory]) -> float:
+    """Median time between two samples of the trajectories."""
+    return float(np.median(np.concatenate([np.diff(t) for t, _ in trajectories])))

@@ -1,60 +1,72 @@
-"""The paper's world: systems, films, trials, baselines, scores."""
+"""The paper's world: its systems, what was filmed of them, who found which law, and how well.
 
-from .baselines import BASELINES, ensemble, stlsq
-from .corruption import add_noise, drop_fibers
-from .metrics import Score, pulls, score, summary, term_errors, trajectory_error
-from .paper_ado import discover_paper, stridge
+    systems ----> films -------> trials -----------> tables
+    Table S1      three videos,  noise or gaps,      one row a trial,
+                  observed       one method's law    rows of the paper's tables
+
+* `systems`, `corruption`: the seven benchmarks, and noise and gaps as the paper names them.
+* `films`, `realistic`, `lab`: what is filmed: benchmarks, a scene with trees, a ball on a table.
+* `trials`, `baselines`, `paper_ado`: who finds the law: `discover`, the methods of the paper's
+  tables, the paper's own optimiser.
+* `metrics`, `tables`: how good a law is, and many of them side by side.
+* `published`, `audit`: the paper's numbers, and whether they agree with each other.
+* `sweeps`: many tasks in parallel, each computed once.
+* `plots`: a figure a function.
+
+The names below are at hand at once. Modules that need large libraries are imported by name, as in
+``from vidsindy_lite.study import baselines, plots``: `baselines` needs pysindy, `paper_ado` torch,
+`plots` matplotlib and seaborn.
+"""
+
+from .corruption import add_noise, drop_blocks, drop_fibers
+from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
+from .metrics import Score, pulls, score, term_errors, trajectory_error
 from .published import ABLATION, DATASETS_CLAIMED, LAB, LAWS, SCORES, SYSTEMS_S1
-from .realistic import DISTURBANCES, START, SceneTask, run
+from .realistic import DISTURBANCES, START, SceneTask, run_scene
 from .sweeps import sweep
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
-from .trials import (
-    METHODS,
-    SAMPLES_PER_PERIOD,
-    FilmTask,
-    by_level,
-    film,
-    grid,
-    record,
-    run_trial,
-    select,
-)
+from .tables import by_condition, rate, significant, summary, tabulate
+from .trials import METHODS, Trial, grid, run_trial
 
 __all__ = [
-    "ABLATION",
-    "BASELINES",
+    # systems and what is done to their paths
+    "SYSTEMS",
+    "REFERENCE_OFFSET",
     "Benchmark",
-    "DATASETS_CLAIMED",
-    "DISTURBANCES",
+    "add_noise",
+    "drop_blocks",
+    "drop_fibers",
+    # what is filmed
+    "SAMPLES_PER_PERIOD",
     "FilmTask",
+    "film",
+    "run_film",
+    "DISTURBANCES",
+    "START",
+    "SceneTask",
+    "run_scene",
+    # who finds the law
+    "METHODS",
+    "Trial",
+    "grid",
+    "run_trial",
+    "sweep",
+    # how good it is
+    "Score",
+    "score",
+    "term_errors",
+    "pulls",
+    "trajectory_error",
+    "tabulate",
+    "by_condition",
+    "summary",
+    "rate",
+    "significant",
+    # what the paper prints
+    "ABLATION",
+    "DATASETS_CLAIMED",
     "LAB",
     "LAWS",
-    "METHODS",
-    "REFERENCE_OFFSET",
-    "SAMPLES_PER_PERIOD",
     "SCORES",
-    "START",
-    "SYSTEMS",
     "SYSTEMS_S1",
-    "SceneTask",
-    "Score",
-    "add_noise",
-    "by_level",
-    "discover_paper",
-    "drop_fibers",
-    "ensemble",
-    "film",
-    "grid",
-    "pulls",
-    "record",
-    "run",
-    "run_trial",
-    "score",
-    "select",
-    "stlsq",
-    "summary",
-    "stridge",
-    "sweep",
-    "term_errors",
-    "trajectory_error",
 ]

@@ -28,8 +28,8 @@ from sklearn import config_context
 from ..checks import check_integer
 from ..dynamics import (
     PolynomialSystem,
-    Record,
-    check_record,
+    Trajectory,
+    check_trajectory,
     cut,
     smooth,
     typical_step,
@@ -65,9 +65,7 @@ Rows = tuple[np.ndarray, np.ndarray]
 """Values of the candidate terms (k, l) and of the derivatives (k, d): a linear regression."""
 
 
-def stlsq(
-    t: np.ndarray, x: np.ndarray, degree: int = 3, ridge: float = RIDGE
-) -> PolynomialSystem:
+def stlsq(t: np.ndarray, x: np.ndarray, degree: int = 3, ridge: float = RIDGE) -> PolynomialSystem:
     """PySINDy: central differences, then sequentially thresholded least squares.
 
     Parameters
@@ -89,7 +87,7 @@ def stlsq(
     Raises
     ------
     ValueError
-        If the input is malformed (see `records.check_record`) or there are too few samples
+        If the input is malformed (see `dynamics.check_trajectory`) or there are too few samples
         between gaps.
 
     References
@@ -143,7 +141,7 @@ def weak(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> Polyno
     D. A. Messenger, D. M. Bortz, Multiscale Model. Simul. 19, 1474 (2021).
     """
     library = pysindy.PolynomialLibrary(degree=degree)
-    t, x = check_record(t, x)
+    t, x = check_trajectory(t, x)
     half_width = WEAK_WIDTH / 2 * (t[-1] - t[0])
     with _numpy_seed(seed):
         return _discover(
@@ -167,7 +165,7 @@ def model_a(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> Pol
     library = pysindy.PolynomialLibrary(degree=degree)
     seed = check_integer("seed", seed)
 
-    def rows(segments: Sequence[Record]) -> Rows:
+    def rows(segments: Sequence[Trajectory]) -> Rows:
         splines = smooth(segments, np.random.default_rng(seed)).splines
         curves = [spline(times) for spline, (times, _) in zip(splines, segments, strict=True)]
         slopes = [spline(times, 1) for spline, (times, _) in zip(splines, segments, strict=True)]
@@ -189,25 +187,23 @@ def _discover(
     t: np.ndarray,
     x: np.ndarray,
     library: pysindy.PolynomialLibrary,
-    rows: Callable[[Sequence[Record]], Rows],
+    rows: Callable[[Sequence[Trajectory]], Rows],
     optimizer: Callable[[float], BaseOptimizer],
 ) -> PolynomialSystem:
     """Choose a threshold on the last part of the record and fit all of it."""
-    record = check_record(t, x)
+    record = check_trajectory(t, x)
     library.fit(record[1])
     split = int(TRAINING * len(record[0]))
     first, last = tuple(part[:split] for part in record), tuple(part[split:] for part in record)
     step = LONGEST_STEP * typical_step([record])
-    everything, training, held_out = (
-        rows(_segments(part, step)) for part in (record, first, last)
-    )
+    everything, training, held_out = (rows(_segments(part, step)) for part in (record, first, last))
     errors = np.array([_error(_fit(optimizer(h), training), held_out) for h in THRESHOLDS])
     chosen = THRESHOLDS[np.flatnonzero(errors <= TOLERANCE * errors.min())[-1]]
     coefficients = _fit(optimizer(chosen), everything)
     return PolynomialSystem(variable_names(record[1].shape[1]), library.powers_, coefficients)
 
 
-def _segments(record: Record, longest_step: float) -> list[Record]:
+def _segments(record: Trajectory, longest_step: float) -> list[Trajectory]:
     """The stretches between gaps that are long enough to be differentiated."""
     segments = [s for s in cut(record, longest_step) if len(s[0]) >= SHORTEST_SEGMENT]
     if not segments:
@@ -244,14 +240,17 @@ def _terms(library: pysindy.PolynomialLibrary, x: np.ndarray) -> np.ndarray:
     return np.asarray(library.transform(x))
 
 
-def _difference_rows(segments: Sequence[Record], library: pysindy.PolynomialLibrary) -> Rows:
+def _difference_rows(segments: Sequence[Trajectory], library: pysindy.PolynomialLibrary) -> Rows:
     differences = pysindy.FiniteDifference()
     slopes = [differences(x, t) for t, x in segments]
     return _terms(library, np.concatenate([x for _, x in segments])), np.concatenate(slopes)
 
 
 def _weak_rows(
-    segments: Sequence[Record], library: pysindy.PolynomialLibrary, half_width: float, total: int
+    segments: Sequence[Trajectory],
+    library: pysindy.PolynomialLibrary,
+    half_width: float,
+    total: int,
 ) -> Rows:
     """The weak form of every segment: pysindy's takes one grid, so each has a library.
 

@@ -186,7 +186,7 @@ def orthographic_error(rig, flat, x):
     return np.hstack(views) @ np.linalg.pinv(np.vstack(rows)).T
 
 
-def film(rig, x, folder, seed=0):
+def film_ball(rig, x, folder, seed=0):
     """Film each path with every camera and track the ball.
 
     The ball is drawn as the ellipse that a perspective image of a ball is, in one colour: no

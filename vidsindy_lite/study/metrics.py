@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Floats
 from ..checks import check_array
 from ..dynamics import Discovery, PolynomialSystem
 
@@ -40,7 +40,7 @@ class Score:
     l2: float
     precision: float
     recall: float
-    coefficient_errors: np.ndarray
+    coefficient_errors: Floats
 
     @property
     def exact(self) -> bool:
@@ -61,13 +61,13 @@ class Score:
         )
 
 
-def score(found, truth: PolynomialSystem) -> Score:
+def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score:
     """Compare a discovered law with the truth in the same frame (paper: evaluation metrics).
 
     Parameters
     ----------
-    found : PolynomialSystem or any result that has one as its ``system``
-        The discovered law.
+    found : PolynomialSystem or Discovery
+        The discovered law; anything else that has one as its ``system`` will do as well.
     truth : PolynomialSystem
         The true law. Libraries may differ in size and order: terms are matched by monomial,
         variables by position.
@@ -113,30 +113,6 @@ def score(found, truth: PolynomialSystem) -> Score:
     )
 
 
-def summary(scores: Sequence[Score]) -> dict[str, object]:
-    """Repeated trials as a row of the paper's tables, in its units: means, and one spread.
-
-    Parameters
-    ----------
-    scores : sequence of Score
-
-    Returns
-    -------
-    dict
-        In how many trials all true terms were found; means of false positives, relative l2 error
-        (with its standard deviation over the trials), precision and recall.
-    """
-    errors = np.array([100 * s.l2 for s in scores])
-    return {
-        "terms found": f"{sum(s.terms_found for s in scores)} of {len(scores)}",
-        "false positives": float(np.mean([s.false_positives for s in scores])),
-        "l2 (e-2)": float(errors.mean()),
-        "spread of l2 (e-2)": float(errors.std()),
-        "precision (%)": float(np.mean([100 * s.precision for s in scores])),
-        "recall (%)": float(np.mean([100 * s.recall for s in scores])),
-    }
-
-
 def term_errors(found: PolynomialSystem, truth: PolynomialSystem) -> tuple[list[str], list[str]]:
     """Names of the true terms that are missing and of the false ones, e.g. "x in dy/dt"."""
 
@@ -151,7 +127,7 @@ def term_errors(found: PolynomialSystem, truth: PolynomialSystem) -> tuple[list[
     return missing, [name for place, name in guess.items() if place not in true]
 
 
-def pulls(found: Discovery, truth: PolynomialSystem) -> np.ndarray:
+def pulls(found: Discovery, truth: PolynomialSystem) -> Floats:
     """Errors of the true terms that were found, in units of their standard errors.
 
     Parameters
@@ -175,7 +151,7 @@ def pulls(found: Discovery, truth: PolynomialSystem) -> np.ndarray:
     return (values - truth.coefficients)[seen] / errors[seen]
 
 
-def coefficients_in(system: PolynomialSystem, library: np.ndarray) -> np.ndarray:
+def coefficients_in(system: PolynomialSystem, library: Floats) -> Floats:
     """Coefficients of a system in another library.
 
     Parameters
@@ -212,11 +188,11 @@ class TrajectoryError:
         axis that does not move.
     """
 
-    rmse: np.ndarray
-    relative: np.ndarray
+    rmse: Floats
+    relative: Floats
 
 
-def trajectory_error(x: np.ndarray, truth: np.ndarray) -> TrajectoryError:
+def trajectory_error(x: Floats, truth: Floats) -> TrajectoryError:
     """Root mean square error of a reconstructed trajectory, axis by axis.
 
     It separates the error of tracking and cameras from that of the regression.

@@ -35,7 +35,7 @@ from ..dynamics import (
     DEGREE,
     PolynomialSystem,
     Units,
-    check_record,
+    check_trajectory,
     clamped_knots,
     local_basis,
     monomial_exponents,
@@ -133,10 +133,10 @@ def discover_paper(
     Raises
     ------
     ValueError
-        If the input is malformed (see `records.check_record`), a coordinate does not move, or
+        If the input is malformed (see `dynamics.check_trajectory`), a coordinate does not move, or
         there are fewer samples than candidate terms, or a hyperparameter is too small.
     """
-    t, x = check_record(t, x)
+    t, x = check_trajectory(t, x)
     exponents = monomial_exponents(x.shape[1], degree)
     if len(t) < len(exponents):
         raise ValueError(f"x: must hold at least {len(exponents)} samples, got {len(t)}")

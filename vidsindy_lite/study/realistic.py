@@ -5,7 +5,7 @@ once: a target of irregular shape, random self-rotation, a size that changes as 
 and receded, image noise of variance 0.01, and a tree in front of each camera, behind which the
 target vanishes.
 
-    runs = sweep(run, [SceneTask(trial) for trial in range(5)])
+    runs = sweep(run_scene, [SceneTask(trial) for trial in range(5)])
 
 Paper: section "Simulating Realistic Scenarios", Fig. 4.
 """
@@ -13,19 +13,22 @@ Paper: section "Simulating Realistic Scenarios", Fig. 4.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from ..cameras import Rig, learn_cameras, reconstruct
+from ..arrays import Bools, Floats, Image, Ints
+from ..cameras import Camera, Rig
 from ..checks import check_integer
 from ..dynamics import Discovery, discover
+from ..pipeline import observe_tracks
 from ..vision import Scene, Track, read_frame, render_labelled, track, write_video
+from .films import SAMPLES_PER_PERIOD, TOGETHER
 from .metrics import Score, score
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
-from .trials import SAMPLES_PER_PERIOD
 
 START = (-1.17, -1.1, 1.0)
 """Where the motion begins, in the native frame."""
@@ -82,23 +85,23 @@ class View:
 
     scene: Scene
     shown: int
-    image: np.ndarray
+    image: Image
     track: Track
-    truth: np.ndarray
-    visible: np.ndarray
+    truth: Floats
+    visible: Floats
 
     @property
-    def errors(self) -> np.ndarray:
+    def errors(self) -> Floats:
         """Distance of tracked and true pixels, (n,); NaN where the target was not found."""
         return np.linalg.norm(self.track.pixels - self.truth, axis=1)
 
     @property
-    def hidden(self) -> np.ndarray:
+    def hidden(self) -> Bools:
         """Frames in which nothing of the target can be seen, (n,) bool."""
         return self.visible == 0
 
     @property
-    def delays(self) -> np.ndarray:
+    def delays(self) -> Ints:
         """Whole views after each time that it was hidden, until it is found again, (k,) int."""
         whole, found = self.visible > _WHOLE, np.isfinite(self.errors)
         ends = np.flatnonzero(self.hidden[:-1] & ~self.hidden[1:]) + 1
@@ -107,7 +110,7 @@ class View:
 
 
 @dataclass(frozen=True, eq=False)
-class SceneRun:
+class SceneResult:
     """From the videos of the realistic scene to the equations.
 
     Parameters
@@ -132,29 +135,29 @@ class SceneRun:
     task: SceneTask
     truth: Benchmark
     views: tuple[View, ...]
-    t: np.ndarray
-    x: np.ndarray
-    path: np.ndarray
+    t: Floats
+    x: Floats
+    path: Floats
     found: Discovery
     score: Score
     seconds: float
 
 
-def run(task: SceneTask) -> SceneRun:
+def run_scene(task: SceneTask) -> SceneResult:
     """Film the scene, track it, learn cameras 2 and 3, reconstruct and discover."""
     truth = replace(SYSTEMS["SprottF"], x0=START).shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(task.frames, SAMPLES_PER_PERIOD)
     rig = Rig.around(x, task.image_size)
-    views = film(rig, x, task.trial)
+    views = film_scene(rig, x, task.trial)
     tracks = [view.track.pixels for view in views]
-    path = reconstruct(tracks, learn_cameras(tracks, rig.uncalibrated(keep=0)))
+    seen = observe_tracks(tracks, rig.uncalibrated(keep=0), t, lags=TOGETHER)
     began = time.perf_counter()
-    found = discover(t, path, seed=task.trial)
+    found = discover(t, seen.x, seed=task.trial, systematic=seen.systematic)
     seconds = time.perf_counter() - began
-    return SceneRun(task, truth, views, t, x, path, found, score(found, truth), seconds)
+    return SceneResult(task, truth, views, t, x, seen.x, found, score(found, truth), seconds)
 
 
-def film(rig: Rig, x: np.ndarray, seed: int = 0) -> tuple[View, ...]:
+def film_scene(rig: Rig, x: Floats, seed: int = 0) -> tuple[View, ...]:
     """Film a path with each camera of a rig and track it; the videos are removed.
 
     Parameters
@@ -179,7 +182,7 @@ def film(rig: Rig, x: np.ndarray, seed: int = 0) -> tuple[View, ...]:
     return tuple(views)
 
 
-def _tree_before(camera, rng):
+def _tree_before(camera: Camera, rng: np.random.Generator) -> tuple[int, int, int, int]:
     """A tree that stands on the lower border, somewhere near the middle."""
     width, height = camera.image_size
     across, up = round(_TREE[0] * width), round(_TREE[1] * height)
@@ -187,10 +190,11 @@ def _tree_before(camera, rng):
     return left, height - up, across, up
 
 
-def _view(pixels, scene, seed):
-    visible = []
+def _view(pixels: Floats, scene: Scene, seed: int) -> View:
+    """Film pixels before a scene and track them."""
+    visible: list[float] = []
 
-    def frames():
+    def frames() -> Iterator[Image]:
         for drawn in render_labelled(pixels, scene, seed):
             visible.append(drawn.visible)
             yield drawn.frame

@@ -7,8 +7,8 @@ done with it is a function of this package:
 
 Each result goes to a file as soon as it is there, build/cache/<stamp>/<function>/<task>.pkl in the
 repository, or in place of build/cache the folder that the environment variable VIDSINDY_CACHE
-names. The stamp is that of the package's code and requirements: other code finds no results. A
-package installed outside a clone of its repository stores nothing.
+names. The stamp is that of the code which the function reaches, and of the libraries' pins: other
+code finds no results. A package installed outside a clone of its repository stores nothing.
 
 The tasks run in processes of this machine, or on a Dask cluster of any size. Two sweeps of this
 machine that share tasks may run at the same time: who comes second waits for the first one's
@@ -26,12 +26,10 @@ from pathlib import Path
 from typing import TypeVar
 from uuid import uuid4
 
-import cv2
 from filelock import FileLock
-from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
-from ..stamp import PACKAGE, package_stamp, repository_root, write_file
+from ..stamp import PACKAGE, code_stamp, repository_root, write_file
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -169,6 +167,9 @@ def _here(
     function: Callable, todo: dict[int, object], jobs: int, files: dict[int, Path]
 ) -> Iterator[tuple[int, object]]:
     """Numbers and results of the tasks as they come, from processes of this machine."""
+    import cv2
+    from joblib import Parallel, delayed, parallel_config
+
     one_thread = {
         "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
         "initializer": cv2.setNumThreads,
@@ -200,8 +201,8 @@ def _on_cluster(
         ) from None
     with Client(address) as client:
         client.wait_for_workers(1, timeout=60)
-        theirs = client.run(package_stamp)
-        differing = [worker for worker, stamp in theirs.items() if stamp != package_stamp()]
+        ours, theirs = code_stamp(function), client.run(code_stamp, function)
+        differing = [worker for worker, stamp in theirs.items() if stamp != ours]
         if differing:
             raise RuntimeError(
                 f"dask: all workers must have this very code of {PACKAGE.name}, "
@@ -228,7 +229,7 @@ def _files(function: Callable, tasks: list) -> dict[int, Path]:
     named = os.environ.get("VIDSINDY_CACHE")
     cache = Path(named) if named else root / "build" / "cache"
     module = function.__module__.removeprefix(f"{PACKAGE.name}.")
-    folder = cache / package_stamp(root) / f"{module}.{function.__name__}"
+    folder = cache / code_stamp(function, root) / f"{module}.{function.__name__}"
     names = [hashlib.sha256(repr(task).encode()).hexdigest()[:32] for task in tasks]
     return {number: folder / f"{name}.pkl" for number, name in enumerate(names)}
 

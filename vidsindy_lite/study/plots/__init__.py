@@ -1,4 +1,8 @@
-"""Figures of the notebooks and of the report, one function each."""
+"""Figures of the notebooks and of the report, a function each.
+
+Every function takes what is plotted and returns a matplotlib Figure. The look is that of
+``vidsindy.mplstyle``; colours are its cycle, C0 to C6.
+"""
 
 from .animation import (
     draw_tour,
@@ -9,45 +13,40 @@ from .audit import (
     plot_recomputed,
     plot_what_l2_sees,
 )
+from .cameras import (
+    plot_calibration_errors,
+    plot_in_plane,
+    plot_independence,
+    plot_lags,
+    plot_reconstruction,
+    plot_residuals,
+    plot_rig,
+    plot_rotation_accuracy,
+    plot_scale_error,
+    plot_tracks,
+    plot_view_plane,
+)
 from .lab import (
     plot_anywhere,
     plot_model_errors,
     plot_orthographic_error,
     plot_table,
 )
-from .pipeline import (
+from .paths import (
     plot_attractors,
-    plot_calibration_errors,
     plot_coefficients,
-    plot_confidence,
     plot_divergence,
-    plot_frames,
     plot_gaps,
-    plot_in_plane,
-    plot_independence,
-    plot_loss,
-    plot_methods,
-    plot_pulls,
-    plot_reconstruction,
-    plot_rig,
-    plot_rotation_accuracy,
-    plot_sampling,
-    plot_scale_error,
-    plot_track_errors,
-    plot_tracker_steps,
-    plot_tracks,
-    plot_view_plane,
-)
-from .report import (
-    plot_lags,
     plot_path,
-    plot_residuals,
-    plot_views,
+    plot_sampling,
 )
 from .robustness import (
+    plot_methods,
     plot_pull_distribution,
+    plot_pulls,
     plot_robustness,
     plot_shares,
+    plot_verdicts,
 )
 from .solver import (
     plot_basis,
@@ -57,8 +56,15 @@ from .solver import (
     plot_normal_matrix,
     plot_origin_map,
     plot_ranks,
-    plot_verdicts,
     plot_windows,
+)
+from .videos import (
+    plot_confidence,
+    plot_frames,
+    plot_loss,
+    plot_track_errors,
+    plot_tracker_steps,
+    plot_views,
 )
 
 __all__ = [

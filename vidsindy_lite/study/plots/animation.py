@@ -1,11 +1,18 @@
 """The animation of the tour: videos, tracks, path in space, law, in one moving picture."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from mpl_toolkits.mplot3d.art3d import Line3D
+
+from ...arrays import Floats, Image
 
 
 def draw_tour(
@@ -54,7 +61,9 @@ def draw_tour(
     return pictures
 
 
-def _panels(figure, films, tracks):
+def _panels(
+    figure: Figure, films: Sequence[Sequence[Image]], tracks: Sequence[Floats]
+) -> tuple[list[AxesImage], list[Line2D]]:
     """An image and a track for each camera, side by side."""
     images, lines = [], []
     for i, (film, track) in enumerate(zip(films, tracks, strict=True)):
@@ -65,7 +74,7 @@ def _panels(figure, films, tracks):
     return images, lines
 
 
-def _space(figure, x):
+def _space(figure: Figure, x: Floats) -> Line3D:
     """The path in space, in axes that hold all of it."""
     axes = figure.add_axes((0.715, 0.25, 0.28, 0.75), projection="3d")
     path = axes.plot(*x.T, color="C0", lw=1.4)[0]
@@ -75,6 +84,6 @@ def _space(figure, x):
     return path
 
 
-def _picture(canvas):
+def _picture(canvas: FigureCanvasAgg) -> Image:
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()

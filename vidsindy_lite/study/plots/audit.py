@@ -1,14 +1,19 @@
-"""Figures of the notebook on the paper's own numbers, one function each.
+"""Figures on the paper's own numbers."""
 
-Every function takes what is plotted and returns a matplotlib Figure. The look is that of
-``vidsindy.mplstyle``; colours are its cycle, C0 to C6.
-"""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
+
+from ...arrays import Floats
 
 
-def plot_paths(paths, names, columns=(0, 1)):
+def plot_paths(
+    paths: Mapping[str, Floats], names: Sequence[str], columns: tuple[int, int] = (0, 1)
+) -> Figure:
     """Two coordinates of several paths, the first drawn as a broad line.
 
     Parameters
@@ -33,7 +38,7 @@ def plot_paths(paths, names, columns=(0, 1)):
     return figure
 
 
-def plot_recomputed(differences):
+def plot_recomputed(differences: Mapping[str, float]) -> Figure:
     """How far printed l2 errors are from those of the printed equations, in units of rounding.
 
     Parameters
@@ -57,7 +62,7 @@ def plot_recomputed(differences):
     return figure
 
 
-def plot_ratios(ratios):
+def plot_ratios(ratios: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figure:
     """Coefficients over the true ones, term by term, one panel a system.
 
     Parameters
@@ -89,7 +94,7 @@ def plot_ratios(ratios):
     return figure
 
 
-def plot_what_l2_sees(shares):
+def plot_what_l2_sees(shares: Mapping[str, Mapping[str, float]]) -> Figure:
     """What part of the squared norm of each true law its constants make up.
 
     Parameters

@@ -1,15 +1,21 @@
-"""Figures of the notebook on the lab experiment, one function each.
+"""Figures of the lab experiment. All lengths are in millimetres."""
 
-Every function takes what is plotted and returns a matplotlib Figure. The look is that of
-``vidsindy.mplstyle``; colours are its cycle, C0 to C6. All lengths are in millimetres.
-"""
+from __future__ import annotations
+
+from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
+from ...arrays import Floats
+from ...cameras import Rig
 
-def plot_table(rig, x, found, marked):
+
+def plot_table(
+    rig: Rig, x: Floats, found: Mapping[str, Floats], marked: Mapping[str, Floats]
+) -> Figure:
     """Paths from above with what was reconstructed, and the scene in space.
 
     Parameters
@@ -57,7 +63,9 @@ def plot_table(rig, x, found, marked):
     return figure
 
 
-def plot_orthographic_error(t, measured, predicted, ratio, by_distance):
+def plot_orthographic_error(
+    t: Floats, measured: Floats, predicted: Floats, ratio: Floats, by_distance: Mapping[str, Floats]
+) -> Figure:
     """Error of the orthographic model along the paths, and as the cameras move away.
 
     Parameters
@@ -90,7 +98,7 @@ def plot_orthographic_error(t, measured, predicted, ratio, by_distance):
     return figure
 
 
-def plot_anywhere(errors, published):
+def plot_anywhere(errors: Floats, published: float) -> Figure:
     """Distribution of the error at one point over many rigs, and the published error.
 
     Parameters
@@ -106,7 +114,7 @@ def plot_anywhere(errors, published):
     return figure
 
 
-def plot_model_errors(errors):
+def plot_model_errors(errors: Mapping[str, Floats]) -> Figure:
     """Distribution of the error in space by the model of the camera.
 
     Parameters

@@ -1,52 +1,63 @@
-"""Figures of the notebook on robustness, one function each.
+"""Figures of many trials: errors and wrong terms by method, level, system; error bars; verdicts."""
 
-Every function takes what is plotted and returns a matplotlib Figure. The look is that of
-``vidsindy.mplstyle``; colours are its cycle, C0 to C6.
-"""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
+import seaborn as sns
+from matplotlib.figure import Figure
+from pandas import DataFrame
 from scipy.stats import halfnorm
 
-_STYLES = {
-    "ours": ("C0", "o"), "PySINDy": ("C1", "s"), "E-SINDy": ("C2", "^"),
-    "WeakSINDy": ("C3", "v"), "Model-A": ("C4", "D"),
-}  # fmt: skip
+from ...arrays import Floats
+
+_COLOURS = {"ours": "C0", "PySINDy": "C1", "E-SINDy": "C2", "WeakSINDy": "C3", "Model-A": "C4"}
+_MARKERS = {"ours": "o", "PySINDy": "s", "E-SINDy": "^", "WeakSINDy": "v", "Model-A": "D"}
 _TITLES = {"noise": "noise", "blocks": "random blocks missing", "fibers": "fibers missing"}
 
+VERDICTS = {
+    "exact, ok": ("C0", ""),
+    "exact, suspect": ("C5", ""),
+    "wrong, suspect": ("C4", "//"),
+    "wrong, ok": ("C1", "xx"),
+}
+"""Colour and hatch of each outcome: is the law exact, and what did the solver say of it."""
 
-def plot_robustness(curves, published=None):
+
+def plot_robustness(
+    trials: DataFrame, published: Mapping[str, Mapping[float, float]] | None = None
+) -> Figure:
     """Relative error and number of wrong terms against noise and missing data (Fig. 3, S4-S10).
 
     Parameters
     ----------
-    curves : dict of str to dict of str to dict of float to sequence of TrialResult
-        Repeated trials by level, by method, by condition: one column of panels a condition. Lines
-        join the means over the trials, bars reach from the lowest to the highest.
+    trials : DataFrame
+        Of `by_condition`: one column of panels a condition. Lines join the medians of repeated
+        trials, bars hold the middle half of them.
     published : dict of str to dict of float to float, optional
         The paper's relative errors by level, by condition.
     """
-    widths = [1 + max(map(len, methods.values())) for methods in curves.values()]
+    conditions = trials.condition.unique()
+    widths = [1 + n for n in trials.groupby("condition", sort=False)["level"].nunique()]
     figure, grid = plt.subplots(
-        2, len(curves), figsize=(9 if len(curves) > 1 else 6.5, 5), sharex="col", sharey="row",
-        squeeze=False, width_ratios=widths,
+        2, len(conditions), figsize=(9 if len(conditions) > 1 else 6.5, 5), sharex="col",
+        sharey="row", squeeze=False, width_ratios=widths,
     )  # fmt: skip
-    for column, (condition, methods) in zip(grid.T, curves.items(), strict=True):
-        for k, (method, by_level) in enumerate(methods.items()):
-            colour, marker = _STYLES[method]
-            levels = 100 * np.array(list(by_level))
-            beside = 0.006 * np.ptp(levels) * (k - (len(methods) - 1) / 2)
-            errors = [[100 * r.score.l2 for r in results] for results in by_level.values()]
-            wrong = [[r.wrong_terms for r in results] for results in by_level.values()]
-            for axes, values in zip(column, (errors, wrong), strict=True):
-                means = np.array([np.mean(v) for v in values])
-                reach = np.abs([[np.min(v), np.max(v)] for v in values] - means[:, None]).T
-                style = {"color": colour, "marker": marker, "lw": 1.4, "label": method}
-                bars = {"ecolor": (colour, 0.45), "elinewidth": 1, "capsize": 2}
-                axes.errorbar(levels + beside, means, reach, **style, **bars)
+    for column, condition in zip(grid.T, conditions, strict=True):
+        chosen = _beside(trials[trials.condition == condition])
+        for axes, value in zip(column, ("l2 (%)", "wrong_terms"), strict=True):
+            sns.lineplot(
+                chosen, x="place", y=value, hue="method", style="method", palette=_COLOURS,
+                markers=_MARKERS, dashes=False, estimator="median", errorbar=("pi", 50),
+                err_style="bars", err_kws={"capsize": 2, "elinewidth": 1}, lw=1.4, legend="full",
+                markeredgewidth=0, ax=axes,
+            )  # fmt: skip
+            axes.get_legend().remove()
         if published:
             known = 100 * np.array(list(published[condition].items()))
-            column[0].errorbar(*known.T, fmt="*k", ms=10, label="paper (Table 2)")
+            column[0].plot(*known.T, "*k", ms=10, label="paper (Table 2)")
         column[0].set_title(_TITLES[condition])
         column[1].set_xlabel("level (%)" if condition == "noise" else "rate (%)")
     grid[0, 0].set(yscale="log", ylabel=r"relative $\ell_2$ error (%)")
@@ -56,37 +67,91 @@ def plot_robustness(curves, published=None):
     return figure
 
 
-def plot_shares(shares):
+def _beside(trials: DataFrame) -> DataFrame:
+    """Trials with l2 in percent and a place on the axis, the methods of one level side by side."""
+    rank = trials.method.map({name: k for k, name in enumerate(trials.method.unique())})
+    level = 100 * trials.level
+    shift = 0.006 * np.ptp(level) * (rank - rank.max() / 2)
+    return trials.assign(**{"l2 (%)": 100 * trials.l2, "place": level + shift})
+
+
+def plot_shares(shares: DataFrame) -> Figure:
     """Share of trials whose terms are all right, in every condition and system.
 
     Parameters
     ----------
-    shares : dict of str to dict of str to dict of float to float
-        Shares by level, by system, by condition: one panel a condition.
+    shares : DataFrame
+        From 0 to 1; a row a system, and columns by condition and level: one panel a condition.
     """
-    widths = [len(next(iter(systems.values()))) for systems in shares.values()]
+    conditions = shares.columns.unique("condition")
     figure, panels = plt.subplots(
-        1, len(shares), figsize=(9.5, 3.4), sharey=True, squeeze=False, width_ratios=widths
-    )
-    for axes, (condition, systems) in zip(panels[0], shares.items(), strict=True):
-        values = np.array([[100 * v for v in by_level.values()] for by_level in systems.values()])
-        levels = [f"{100 * level:.0f}" for level in next(iter(systems.values()))]
-        axes.pcolormesh(values, vmin=0, vmax=100, cmap="Blues", edgecolors="white", lw=1.5)
-        for (row, column), value in np.ndenumerate(values):
-            style = {"color": "white" if value > 60 else "black", "size": 9}
-            axes.text(column + 0.5, row + 0.5, f"{value:.0f}", ha="center", va="center", **style)
-        axes.set_xticks(np.arange(len(levels)) + 0.5, levels)
-        axes.set_title(_TITLES[condition])
+        1, len(conditions), figsize=(9.5, 3.4), sharey=True, squeeze=False,
+        width_ratios=[shares[condition].shape[1] for condition in conditions],
+    )  # fmt: skip
+    for axes, condition in zip(panels[0], conditions, strict=True):
+        percent = 100 * shares[condition]
+        percent.columns = [f"{100 * level:.0f}" for level in percent.columns]
+        sns.heatmap(
+            percent, vmin=0, vmax=100, cmap="Blues", annot=True, fmt=".0f", cbar=False,
+            linewidths=1.5, annot_kws={"size": 9}, ax=axes,
+        )  # fmt: skip
+        axes.set(title=_TITLES[condition], ylabel="")
         axes.set_xlabel("level (%)" if condition == "noise" else "rate (%)")
-        axes.grid(visible=False)
-        axes.tick_params(length=0)
-        axes.spines[:].set_visible(False)
-    panels[0, 0].set_yticks(np.arange(len(systems)) + 0.5, systems)
-    panels[0, 0].invert_yaxis()
+        axes.tick_params(length=0, rotation=0)
     return figure
 
 
-def plot_pull_distribution(pulls):
+def plot_methods(trials: DataFrame) -> Figure:
+    """Relative error of several methods on several systems; open where the terms are wrong.
+
+    Parameters
+    ----------
+    trials : DataFrame
+        One trial of each system, method and source (see `tabulate`); one panel a source.
+    """
+    sources, methods, systems = (trials[name].unique() for name in ("source", "method", "system"))
+    figure, panels = plt.subplots(1, len(sources), figsize=(10.5, 4.4), sharey=True)
+    for axes, source in zip(np.atleast_1d(panels), sources, strict=True):
+        for k, method in enumerate(methods):
+            chosen = trials[(trials.source == source) & (trials.method == method)]
+            place = np.arange(len(chosen)) + 0.13 * (k - (len(methods) - 1) / 2)
+            style = {"marker": _MARKERS[method], "color": _COLOURS[method], "ms": 8, "mew": 1.5}
+            for exact, face in ((True, _COLOURS[method]), (False, "white")):
+                at = (chosen.exact == exact).to_numpy()
+                axes.plot(place[at], 100 * chosen.l2[at], ls="", mfc=face, **style)
+            axes.plot([], [], ls="", label=method, **style)
+        axes.set(title=source, yscale="log")
+        axes.set_xticks(range(len(systems)), systems, rotation=35, ha="right")
+        axes.grid(axis="x", visible=False)
+    first = np.atleast_1d(panels)[0]
+    first.plot([], [], "o", ms=8, color="0.4", mfc="white", mew=1.5, label="open: wrong terms")
+    first.set_ylabel(r"relative $\ell_2$ error (%)")
+    handles, labels = first.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return figure
+
+
+def plot_pulls(pulls: Mapping[str, Floats]) -> Figure:
+    """Errors of the coefficients in units of their standard errors, one column a system.
+
+    Parameters
+    ----------
+    pulls : dict of str to ndarray
+        ``(found - true) / standard error`` of all coefficients, by system.
+    """
+    figure, axes = plt.subplots(figsize=(8, 3.8))
+    axes.axhspan(-2, 2, color="0.92")
+    axes.axhline(0, color="k", lw=0.8)
+    for column, values in enumerate(pulls.values()):
+        spread = np.linspace(-0.25, 0.25, len(values))
+        axes.plot(column + spread, values, "oC0", ms=4)
+    axes.set_xticks(range(len(pulls)), list(pulls), rotation=20)
+    axes.set_ylabel("error / standard error")
+    axes.grid(axis="x", visible=False)
+    return figure
+
+
+def plot_pull_distribution(pulls: Mapping[str, Floats]) -> Figure:
     """How many coefficients are within so many standard errors of the truth.
 
     Parameters
@@ -99,10 +164,37 @@ def plot_pull_distribution(pulls):
     axes.plot(reach, 100 * halfnorm.cdf(reach), color="0.8", lw=7, label="if they are right")
     colours = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(pulls)))
     for (name, values), colour in zip(pulls.items(), colours, strict=True):
-        ordered = np.sort(np.abs(values))
-        share = 100 * np.arange(1, len(ordered) + 1) / len(ordered)
-        axes.step(ordered, share, where="post", color=colour, lw=1.4, label=name)
+        sns.ecdfplot(x=abs(values), stat="percent", color=colour, lw=1.4, label=name, ax=axes)
     axes.set(xlim=(0, 4), ylim=(0, 102), xlabel="|error| / standard error")
     axes.set_ylabel("coefficients below (%)")
     axes.legend(loc="lower right")
+    return figure
+
+
+def plot_verdicts(sweeps: Mapping[str, Mapping[str, Sequence[str]]]) -> Figure:
+    """How often a law is exact, and whether the solver said so, in several sweeps.
+
+    Parameters
+    ----------
+    sweeps : dict of str to dict of str to sequence of str
+        Outcomes of the trials, each a key of `VERDICTS`, by value of the setting, by the label of
+        the setting.
+    """
+    widths = [len(sweep) + 1 for sweep in sweeps.values()]
+    figure, panels = plt.subplots(
+        1, len(sweeps), figsize=(9, 3.3), sharey=True, width_ratios=widths
+    )
+    for axes, (label, sweep) in zip(panels, sweeps.items(), strict=True):
+        bottom = np.zeros(len(sweep))
+        for verdict, (colour, hatch) in VERDICTS.items():
+            share = np.array([100 * list(o).count(verdict) / len(o) for o in sweep.values()])
+            axes.bar(
+                list(sweep), share, bottom=bottom, color=colour, hatch=hatch, edgecolor="white",
+                label=verdict,
+            )  # fmt: skip
+            bottom += share
+        axes.set_xlabel(label)
+        axes.grid(visible=False)
+    panels[0].set_ylabel("trials (%)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure

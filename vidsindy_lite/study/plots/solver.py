@@ -1,18 +1,25 @@
-"""Figures of the notebook on the solver, one function each.
+"""Figures of the solver: curve, matrix, selection, origin, error bars."""
 
-Every function takes what is plotted and returns a matplotlib Figure. The look is that of
-``vidsindy.mplstyle``; colours are its cycle, C0 to C6.
-"""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from numpy.typing import ArrayLike
+
+from ...arrays import Bools, Floats
+
+Pair = tuple[Floats, Floats]
+
 
 # ------------------------------------------------------------------------- the curve and its matrix
 
 
-def plot_basis(t, basis, point, breakpoints):
+def plot_basis(t: Floats, basis: Floats, point: float, breakpoints: Floats) -> Figure:
     """B-spline basis functions, those that are not zero at one time, and their sum.
 
     Parameters
@@ -40,7 +47,7 @@ def plot_basis(t, basis, point, breakpoints):
     return figure
 
 
-def plot_normal_matrix(matrix, curve, coefficients):
+def plot_normal_matrix(matrix: Floats, curve: int, coefficients: int) -> Figure:
     """Where the normal matrix of curve, coefficients and offset is not zero.
 
     Parameters
@@ -72,7 +79,9 @@ def plot_normal_matrix(matrix, curve, coefficients):
     return figure
 
 
-def plot_collocation(t, data, first, final, nodes, residual):
+def plot_collocation(
+    t: Floats, data: Floats, first: Pair, final: Pair, nodes: Pair, residual: Pair
+) -> Figure:
     """A window of data and curves, and how well the law is met on the curve.
 
     Parameters
@@ -103,7 +112,9 @@ def plot_collocation(t, data, first, final, nodes, residual):
 # ------------------------------------------------------------------------------------ optimisation
 
 
-def plot_histories(histories, true_terms):
+def plot_histories(
+    histories: Mapping[str, Mapping[str, Sequence[float]]], true_terms: Mapping[str, int]
+) -> Figure:
     """Data loss, physics loss and number of terms over wall time, several optimisers.
 
     Parameters
@@ -141,7 +152,7 @@ def plot_histories(histories, true_terms):
 # ---------------------------------------------------------------------------------------- selection
 
 
-def plot_ranks(panels, true):
+def plot_ranks(panels: Mapping[str, tuple[Floats, float | None]], true: Bools) -> Figure:
     """Terms in order of size, the true ones marked, one panel for each measure of size.
 
     Parameters
@@ -163,7 +174,7 @@ def plot_ranks(panels, true):
         axes.plot(rank[hit], values[order][hit], "oC0", ms=7, label="true term")
         axes.plot(rank[~hit], values[order][~hit], "xC1", ms=7, mew=2, label="false term")
         if threshold is not None:
-            axes.axhline(threshold, color="k", ls="--", lw=1, label="charge of a linear term")
+            axes.axhline(threshold, color="k", ls="--", lw=1, label="penalty of a linear term")
         axes.set(yscale="log", xlabel="rank", title=name, xlim=(0, len(values) + 1))
     handles = {}
     for axes in grid:
@@ -172,7 +183,7 @@ def plot_ranks(panels, true):
     return figure
 
 
-def plot_windows(thresholds, exact):
+def plot_windows(thresholds: Floats, exact: Mapping[str, Bools]) -> Figure:
     """Which magnitude thresholds leave exactly the true terms, system by system.
 
     Parameters
@@ -198,7 +209,9 @@ def plot_windows(thresholds, exact):
     return figure
 
 
-def plot_origin_map(x_axis, y_axis, count, data, best, truth):
+def plot_origin_map(
+    x_axis: Floats, y_axis: Floats, count: Floats, data: Floats, best: ArrayLike, truth: ArrayLike
+) -> Figure:
     """Smoothed number of significant terms against the origin of the law's frame.
 
     Parameters
@@ -229,7 +242,7 @@ def plot_origin_map(x_axis, y_axis, count, data, best, truth):
 # ----------------------------------------------------------------------------- error bars, failures
 
 
-def plot_errors_and_bound(labels, deviations, errors):
+def plot_errors_and_bound(labels: Sequence[str], deviations: Floats, errors: Floats) -> Figure:
     """Estimates of repeated trials with error bars, in units of the Cramer-Rao bound.
 
     Parameters
@@ -258,41 +271,4 @@ def plot_errors_and_bound(labels, deviations, errors):
     axes.set_ylabel("(estimate - truth) / bound")
     axes.grid(axis="x", visible=False)
     figure.legend(loc="outside upper center", ncols=3)
-    return figure
-
-
-VERDICTS = {
-    "exact, ok": ("C0", ""),
-    "exact, suspect": ("C5", ""),
-    "wrong, suspect": ("C4", "//"),
-    "wrong, ok": ("C1", "xx"),
-}
-"""Colour and hatch of each outcome: is the law exact, and what did the solver say of it."""
-
-
-def plot_verdicts(sweeps):
-    """How often a law is exact, and whether the solver said so, in several sweeps.
-
-    Parameters
-    ----------
-    sweeps : dict of str to dict of str to sequence of str
-        Outcomes of the trials, each a key of `VERDICTS`, by value of the setting, by the label of
-        the setting.
-    """
-    widths = [len(sweep) + 1 for sweep in sweeps.values()]
-    figure, panels = plt.subplots(
-        1, len(sweeps), figsize=(9, 3.3), sharey=True, width_ratios=widths
-    )
-    for axes, (label, sweep) in zip(panels, sweeps.items(), strict=True):
-        bottom = np.zeros(len(sweep))
-        for verdict, (colour, hatch) in VERDICTS.items():
-            share = [100 * np.mean([o == verdict for o in outcomes]) for outcomes in sweep.values()]
-            style = {"color": colour, "hatch": hatch, "edgecolor": "white", "label": verdict}
-            axes.bar(range(len(sweep)), share, bottom=bottom, **style)
-            bottom += share
-        axes.set_xticks(range(len(sweep)), sweep)
-        axes.set_xlabel(label)
-        axes.grid(visible=False)
-    panels[0].set_ylabel("trials (%)")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure

@@ -1,0 +1,128 @@
+"""The library: monomials of the state, and what a shift of the origin does to them (paper: Eq. 10).
+
+A library that holds all divisors of its monomials is closed under a shift of the origin.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import combinations_with_replacement
+
+import numpy as np
+from scipy.special import comb as binomial
+
+from ..arrays import Bools, Floats, Ints
+from ..checks import check_integer
+
+
+def variable_names(d: int) -> tuple[str, ...]:
+    """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
+    return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
+
+
+def monomial_exponents(d: int, degree: int) -> Ints:
+    """Exponents of all monomials of ``d`` variables up to ``degree``, in graded order.
+
+    Parameters
+    ----------
+    d : int
+        Number of variables, at least 1.
+    degree : int
+        Highest total degree, at least 0.
+
+    Returns
+    -------
+    ndarray of int, shape (l, d)
+        For d = 2, degree = 2: 1, x, y, x^2, xy, y^2.
+    """
+    d, degree = check_integer("d", d, 1), check_integer("degree", degree)
+    rows = [
+        [picked.count(i) for i in range(d)]
+        for total in range(degree + 1)
+        for picked in combinations_with_replacement(range(d), total)
+    ]
+    return np.array(rows, dtype=int).reshape(-1, d)
+
+
+def monomials(x: Floats, exponents: Ints) -> Floats:
+    """Evaluate monomials.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n, d)
+        Points.
+    exponents : ndarray of int, shape (l, d)
+        One row a monomial.
+
+    Returns
+    -------
+    ndarray, shape (n, l)
+        ``phi(x)``, one row a point.
+    """
+    # By products, one monomial a row: ten times faster than powers, one point a row.
+    powers = np.ones((exponents.max(initial=0) + 1, *x.T.shape))
+    for k in range(1, len(powers)):
+        np.multiply(powers[k - 1], x.T, out=powers[k])
+    values = powers[exponents[:, 0], 0]
+    for i in range(1, exponents.shape[1]):
+        values *= powers[exponents[:, i], i]
+    return values.T
+
+
+def monomial_gradients(x: Floats, exponents: Ints) -> Floats:
+    """Derivatives of monomials, shape (n, l, d); see `monomials`."""
+    gradients = []
+    for i in range(x.shape[1]):
+        lowered = exponents.copy()
+        lowered[:, i] = np.maximum(lowered[:, i] - 1, 0)
+        gradients.append(exponents[:, i] * monomials(x, lowered))
+    return np.stack(gradients, axis=-1)
+
+
+def shift_matrix(exponents: Ints, offset: Floats) -> Floats:
+    """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l).
+
+    The library has to be closed: with every monomial it holds all its divisors.
+    """
+    factors, lowered = _binomials(exponents.tobytes(), *exponents.shape)
+    return (factors * (-np.asarray(offset, dtype=float)) ** lowered).prod(axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _binomials(exponents: bytes, l: int, d: int) -> tuple[Floats, Ints]:
+    powers = np.frombuffer(exponents, dtype=int).reshape(l, d)
+    lowered = powers[None, :, :] - powers[:, None, :]
+    factors = np.where(lowered >= 0, binomial(powers[None, :, :], powers[:, None, :]), 0.0)
+    return factors, np.maximum(lowered, 0)
+
+
+def closure(exponents: Ints) -> Ints:
+    """Exponents of all divisors of the given monomials, in graded order, shape (l, d)."""
+    divisors = {divisor for powers in exponents for divisor in np.ndindex(*(powers + 1))}
+    ordered = sorted(divisors, key=lambda e: (sum(e), tuple(-p for p in e)))
+    return np.array(ordered, dtype=int).reshape(-1, exponents.shape[1])
+
+
+def divides(exponents: Ints) -> Bools:
+    """Which monomial (row) divides which (column), itself included; shape (l, l)."""
+    return np.all(exponents[:, None, :] <= exponents[None, :, :], axis=-1)
+
+
+def closure_mask(exponents: Ints, support: Bools) -> Bools:
+    """Widen a support (l, d) to all divisors of its terms: what any shift of it may contain."""
+    return divides(exponents) @ support
+
+
+def shift_generators(exponents: Ints) -> Floats:
+    """Matrices ``N_i`` with ``d phi / d x_i = phi N_i``, shape (d, l, l).
+
+    ``-N_i`` is the rate of change of `shift_matrix` with the offset along axis i.
+    """
+    d = exponents.shape[1]
+    lowered = exponents[None, :, :] - exponents[:, None, :]
+    return np.stack(
+        [
+            np.where((lowered == axis).all(axis=-1), exponents[None, :, i], 0.0)
+            for i, axis in enumerate(np.eye(d, dtype=int))
+        ]
+    )

@@ -1,0 +1,255 @@
+"""The problem that a discovery solves: the data in standard units, and what is known before a law.
+
+In standard units every coordinate has mean 0 and variance 1, and time runs so that the
+root-mean-square speed is 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import BSpline, make_lsq_spline
+from scipy.stats import chi2
+
+from ..arrays import Floats, Ints
+from .collocation import CLEANEST, Collocation, State
+from .grid import Segment
+from .library import monomial_exponents, monomials, variable_names
+from .polynomials import PolynomialSystem
+from .smoothing import smooth
+from .splines import DEGREE, clamped_knots
+from .trajectories import Trajectory, cut, typical_step
+
+FALSE_ALARM = 0.004
+"""Chance of a false term in a law, if all candidates were independent."""
+OFFSET_PENALTY = 0.95
+"""Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
+GAP = 0.4
+"""A pause longer than this fraction of the time scale of the motion is a gap."""
+SHORTEST_STRETCH = 4
+"""Stretches of fewer samples tell less than their initial conditions cost."""
+NOISY, WIDE, NARROW = 0.02, 1 / 5, 1 / 16
+"""Knot spacing in time scales: wide where the noise is above this, narrow elsewhere."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Standard units of a fit: every coordinate with mean 0 and variance 1, time in time scales.
+
+    Parameters
+    ----------
+    centre, scale : ndarray, shape (d,)
+        Mean and standard deviation of the data.
+    time : float
+        Length of a standard time unit.
+    """
+
+    centre: Floats
+    scale: Floats
+    time: float
+
+    def standard(self, point: Floats) -> Floats:
+        """A point of the data's frame in standard units."""
+        return (point - self.centre) / self.scale
+
+    def point(self, standard: Floats) -> Floats:
+        """A standard point in the data's frame and units."""
+        return standard * self.scale + self.centre
+
+    def factors(self, exponents: Ints) -> Floats:
+        """What turns standard coefficients into those of the data's units, shape (l, d)."""
+        return self.scale / np.prod(self.scale**exponents, axis=1)[:, None] / self.time
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One discovery's data and prices; all but ``measured`` in standard units.
+
+    Parameters
+    ----------
+    measured : list of Trajectory
+        The data in the user's units.
+    trajectories : list of Trajectory
+        The same in standard units.
+    systematic : list of ndarray, shape (n, d, k)
+        Errors that all samples share, for each trajectory.
+    stretches : list of (int, Trajectory)
+        The data between gaps, each with the number of its trajectory.
+    curves : list of BSpline
+        Each stretch smoothed, without a law.
+    units : Units
+    noise : ndarray, shape (d,)
+        Noise of the data as the smoothing estimates it.
+    exponents : ndarray of int, shape (l, d)
+        The library.
+    penalties : ndarray, shape (l,)
+        Price of a term; see `term_penalties`.
+    slack : ndarray, shape (d,)
+        Misfit of a plain regression on the smoothed curves: the scale of physics weights.
+    """
+
+    measured: list[Trajectory]
+    trajectories: list[Trajectory]
+    systematic: list[Floats]
+    stretches: list[tuple[int, Trajectory]]
+    curves: list[BSpline]
+    units: Units
+    noise: Floats
+    exponents: Ints
+    penalties: Floats
+    slack: Floats
+
+    @property
+    def d(self) -> int:
+        """Dimension of the state."""
+        return self.exponents.shape[1]
+
+    @property
+    def home(self) -> Floats:
+        """The origin of the data's frame, shape (d,)."""
+        return self.units.standard(np.zeros(self.d))
+
+    @property
+    def axis_penalty(self) -> float:
+        """Price of an axis along which the law's origin is not at home."""
+        return float(OFFSET_PENALTY * self.penalties[0])
+
+    @property
+    def spacing(self) -> float:
+        """Length of a knot span."""
+        return WIDE if self.noise.max() > NOISY else NARROW
+
+    def segments(self) -> list[Segment]:
+        """The stretches with their first knots."""
+        return [Segment.even(t, x, self.spacing, i) for i, (t, x) in self.stretches]
+
+    def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
+        """Data and physics loss on segments; by default for the noise of the smoothing."""
+        shared = np.concatenate([self._shared(segment) for segment in segments])
+        weights = (self.noise if noise is None else noise) ** -2
+        return Collocation.of(segments, self.exponents, weights, np.ones(self.d), shared)
+
+    def _shared(self, segment: Segment) -> Floats:
+        """Systematic errors at the samples of a segment, shape (n, d, k)."""
+        t, _ = self.trajectories[segment.trajectory]
+        return self.systematic[segment.trajectory][np.searchsorted(t, segment.t)]
+
+    def weighted(self, collocation: Collocation, weight: float) -> Collocation:
+        """The same with another physics weight, relative to the slack."""
+        return collocation.weighted(collocation.data_weights, weight / self.slack**2)
+
+    def criterion(self, collocation: Collocation, state: State) -> float:
+        """What a discovery minimises: the objective and the penalties of terms and axes."""
+        terms = self.penalties @ state.active.sum(axis=1)
+        return collocation.objective(state) + terms + self.axis_penalty * state.moving.sum()
+
+    def law(self, state: State) -> PolynomialSystem:
+        """The law of a state in its own frame."""
+        return PolynomialSystem(variable_names(self.d), self.exponents, state.coefficients)
+
+
+def pose(measured: list[Trajectory], systematic: list[Floats], degree: int, seed: int) -> Problem:
+    """Pose the problem of a discovery: standard units, gaps, noise, prices.
+
+    Raises
+    ------
+    ValueError
+        If a coordinate does not move, or there are fewer samples than unknowns.
+    """
+    x = np.concatenate([values for _, values in measured])
+    exponents = monomial_exponents(x.shape[1], degree)
+    unknowns = len(exponents) + 1
+    if len(x) < unknowns:
+        raise ValueError(
+            f"x: must hold at least as many samples as unknowns per equation "
+            f"({unknowns} for degree {degree} and d = {x.shape[1]}), got {len(x)} samples"
+        )
+    centre, scale = x.mean(axis=0), x.std(axis=0)
+    if not (scale > 1e-12 * np.abs(centre)).all():
+        still = int(np.argmin(scale))
+        raise ValueError(f"x: every coordinate must move, got a constant column {still}")
+    step = typical_step(measured)
+    trajectories = [(t / step, (values - centre) / scale) for t, values in measured]
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
+    stretches, curves, noise = _smoothed(trajectories, rng)
+    speed = _rms_speed(curves)
+    curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]
+    problem = Problem(
+        measured=measured,
+        trajectories=[(t * speed, values) for t, values in trajectories],
+        systematic=[modes / scale[:, None] for modes in systematic],
+        stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
+        curves=curves,
+        units=Units(centre, scale, step / speed),
+        noise=np.maximum(noise, CLEANEST),
+        exponents=exponents,
+        penalties=term_penalties(exponents),
+        slack=np.ones(x.shape[1]),
+    )
+    return replace(problem, slack=_slack(problem))
+
+
+def _smoothed(
+    trajectories: Sequence[Trajectory], rng: np.random.Generator
+) -> tuple[list[tuple[int, Trajectory]], Sequence[BSpline], Floats]:
+    """Stretches between gaps, their smoothing splines and the noise; time in typical steps.
+
+    Where the data pause is a gap or not depending on how fast the target moves, which a first
+    smoothing tells; if there are other gaps, a second one respects them.
+    """
+    first = _stretches(trajectories, 5.0)
+    smoothed = smooth([piece for _, piece in first], rng)
+    stretches = _stretches(trajectories, max(2.5, GAP / _rms_speed(smoothed.splines)))
+    if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:
+        smoothed = smooth([piece for _, piece in stretches], rng)
+    return stretches, smoothed.splines, smoothed.noise
+
+
+def _stretches(
+    trajectories: Sequence[Trajectory], longest_step: float
+) -> list[tuple[int, Trajectory]]:
+    pieces = [
+        (i, piece) for i, whole in enumerate(trajectories) for piece in cut(whole, longest_step)
+    ]
+    longest = max(len(t) for _, (t, _) in pieces)
+    return [piece for piece in pieces if len(piece[1][0]) >= min(SHORTEST_STRETCH, longest)]
+
+
+def _rms_speed(splines: Sequence[BSpline]) -> float:
+    slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in splines]
+    return float(np.sqrt((np.concatenate(slopes) ** 2).mean()))
+
+
+def _slack(problem: Problem) -> Floats:
+    collocation = problem.collocation(problem.segments())
+    x, slope = collocation.node_states(fit_curves(collocation, problem.curves))
+    terms = monomials(x, problem.exponents)
+    misfit = slope - terms @ np.linalg.lstsq(terms, slope, rcond=None)[0]
+    return np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
+
+
+def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Floats]]) -> Floats:
+    """Control points, (r, d), of the splines closest to the given curves, one a segment."""
+    control = []
+    for segment, curve in zip(collocation.segments, curves, strict=True):
+        b = segment.breakpoints
+        dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
+        control.append(
+            make_lsq_spline(dense, curve(dense), clamped_knots(b), DEGREE, method="norm-eq").c
+        )
+    return np.concatenate(control)
+
+
+def term_penalties(exponents: Ints) -> Floats:
+    """Price of a term of each kind: how much of the chi-square it has to explain, shape (l,).
+
+    Half of `FALSE_ALARM` goes to the constants, half of the rest to the linear terms, and so on;
+    the terms of one degree in all equations share evenly (Bonferroni). So a term has to be
+    significant among all that could have been, and of two laws that fit alike the one of lower
+    degree wins.
+    """
+    d, degrees = exponents.shape[1], exponents.sum(axis=1)
+    rivals = d * np.bincount(degrees)[degrees] * 2.0 ** (degrees + 1)
+    return chi2.isf(FALSE_ALARM / rivals, df=1)

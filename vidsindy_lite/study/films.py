@@ -1,0 +1,194 @@
+"""Films of the benchmark systems, and what `observe` makes of them.
+
+A benchmark is simulated in the reference frame and filmed by three cameras around it; its path is
+then recovered from the video files as a user's would be, with only the first camera calibrated:
+
+    films = sweep(run_film, [FilmTask("Lorenz", trial) for trial in range(5)])
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..cameras import Rig
+from ..checks import check_choice, check_integer
+from ..pipeline import Observation, observe
+from ..vision import Scene, render_video
+from .metrics import trajectory_error
+from .sweeps import remember
+from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
+
+SAMPLES_PER_PERIOD = 100
+"""Frames in one characteristic period of a system: playback speed differs per system."""
+TOGETHER = (0.0, 0.0, 0.0)
+"""The three videos of a film start at the same time, and whoever filmed them knows."""
+
+_SAME_TARGET = ("shape", "colour", "size", "shape_seed", "turns")  # fields of Scene
+
+
+@dataclass(frozen=True)
+class Film:
+    """Three video files of one benchmark, and the truth behind them.
+
+    Parameters
+    ----------
+    paths : tuple of Path
+        One video per camera.
+    rig : Rig
+        The true cameras, all calibrated.
+    truth : Benchmark
+        The system in the reference frame.
+    t : ndarray, shape (n,)
+        Time of each frame, in time units of the system.
+    x : ndarray, shape (n, 3)
+        True positions in the reference frame.
+    scenes : tuple of Scene
+        What each camera sees.
+    """
+
+    paths: tuple[Path, ...]
+    rig: Rig
+    truth: Benchmark
+    t: Floats
+    x: Floats
+    scenes: tuple[Scene, ...]
+
+    @property
+    def tracks(self) -> list[Floats]:
+        """True pixels of the target in each video, (n, 2) each."""
+        return [camera.project(self.x) for camera in self.rig.cameras]
+
+
+def film(
+    name: str, folder: str | Path, frames: int = 1500, seed: int = 0, **disturbances: Any
+) -> Film:
+    """Film a benchmark with three cameras against random backgrounds.
+
+    Parameters
+    ----------
+    name : str
+        A key of `SYSTEMS`.
+    folder : path
+        Where the video files go.
+    frames : int
+        Frames per camera.
+    seed : int
+        Of the scenes: one target (shape, colour, size) before three backgrounds.
+    **disturbances
+        Fields of `Scene` common to all cameras, e.g. ``noise_variance=0.01``.
+
+    Returns
+    -------
+    Film
+
+    Raises
+    ------
+    ValueError
+        If the name or a disturbance is unknown, or a number is out of its range.
+    """
+    check_choice("name", name, SYSTEMS)
+    seed = check_integer("seed", seed)
+    truth = SYSTEMS[name].shift(REFERENCE_OFFSET)
+    t, x = truth.trajectory(frames, SAMPLES_PER_PERIOD)
+    rig = Rig.around(x)
+    target, *views = np.random.SeedSequence(seed).spawn(1 + len(rig.cameras))
+    drawn = Scene.random(np.random.default_rng(target))
+    common = {key: getattr(drawn, key) for key in _SAME_TARGET} | disturbances
+    paths, scenes = [], []
+    for number, (camera, view) in enumerate(zip(rig.cameras, views, strict=True), start=1):
+        draw, disturb = view.spawn(2)
+        disturbance_seed = int(disturb.generate_state(1)[0])
+        scene = Scene.random(np.random.default_rng(draw), **common)
+        path = Path(folder) / f"{name}_{number}.mov"
+        render_video(path, camera.project(x), scene, seed=disturbance_seed)
+        paths.append(path)
+        scenes.append(scene)
+    return Film(tuple(paths), rig, truth, t, x, tuple(scenes))
+
+
+@dataclass(frozen=True)
+class FilmTask:
+    """One film to be made and observed.
+
+    Parameters
+    ----------
+    system : str
+        A key of `SYSTEMS`.
+    trial : int
+        Seed of the scenes.
+    frames : int
+        Per camera.
+    """
+
+    system: str
+    trial: int = 0
+    frames: int = 1500
+
+
+@dataclass(frozen=True, eq=False)
+class FilmResult(Observation):
+    """What the videos of one film gave, and how far that is from the truth.
+
+    Parameters
+    ----------
+    task : FilmTask
+    truth : Benchmark
+        The system in the reference frame.
+    pixel_error : tuple of float
+        Root mean square distance of tracked and true pixels, per camera.
+    path_error : ndarray, shape (3,)
+        Root mean square error of the path along each axis, in scene units.
+    seconds : float
+        From video files to path.
+    """
+
+    task: FilmTask
+    truth: Benchmark
+    pixel_error: tuple[float, ...]
+    path_error: Floats
+    seconds: float
+
+
+def run_film(task: FilmTask) -> FilmResult:
+    """Film a benchmark and observe it, with all calibrations but the first forgotten.
+
+    Parameters
+    ----------
+    task : FilmTask
+
+    Returns
+    -------
+    FilmResult
+        The videos are removed.
+    """
+    with TemporaryDirectory() as folder:
+        shot = film(task.system, folder, task.frames, task.trial)
+        began = time.perf_counter()
+        seen = observe(shot.paths, shot.rig.uncalibrated(keep=0), shot.t, lags=TOGETHER)
+        seconds = time.perf_counter() - began
+    pixel_error = tuple(
+        float(np.sqrt(np.nanmean(((track - true) ** 2).sum(axis=1))))
+        for track, true in zip(seen.tracks, shot.tracks, strict=True)
+    )
+    return FilmResult(
+        **vars(seen),
+        task=task,
+        truth=shot.truth,
+        pixel_error=pixel_error,
+        path_error=trajectory_error(seen.x, shot.x).rmse,
+        seconds=seconds,
+    )
+
+
+@lru_cache(maxsize=64)
+def film_result(task: FilmTask) -> FilmResult:
+    """The result of a film: in memory, stored by an earlier sweep, or made now."""
+    return remember(run_film, task)

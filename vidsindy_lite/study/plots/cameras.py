@@ -1,0 +1,270 @@
+"""Figures of view planes, rigs, calibration and reconstruction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
+
+from ...arrays import Floats
+from ...cameras import Camera, Rig
+from .common import finish_space, space_axes
+
+
+def plot_view_plane(camera: Camera, x: Floats) -> Figure:
+    """A curve in space, its projection on one view plane, and the plane's axes (Fig. S1).
+
+    Parameters
+    ----------
+    camera : Camera
+        Calibrated.
+    x : ndarray, shape (n, 3)
+        Curve, scene units.
+    """
+    figure, axes = space_axes((7.5, 5.2))
+    flat = _on_plane(camera, camera.project(x))
+    axes.plot(*x.T, lw=1, label="3D trajectory")
+    axes.plot(*flat.T, lw=1, label="its projection on the view plane")
+    for start, end in zip(x[:: len(x) // 12], flat[:: len(x) // 12], strict=True):
+        axes.plot(*np.transpose([start, end]), color="0.6", lw=0.6, ls=":")
+    _draw_plane(axes, camera, "C1")
+    axes.scatter(*camera.position, color="k", s=15)
+    halo = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
+    reach = 180 * camera.scale
+    for axis, name in zip((*camera.rows, camera.normal), ("X'", "Y'", "Z'"), strict=True):
+        axes.quiver(*camera.position, *(reach * axis), color="k", lw=1.2, arrow_length_ratio=0.15)
+        axes.text(
+            *(camera.position + 1.2 * reach * axis), name, ha="center", va="center", bbox=halo
+        )
+    axes.text(*(camera.position - 0.35 * reach * camera.rows[1]), "$C_1$", ha="center", bbox=halo)
+    finish_space(axes, azimuth=-40, elevation=8)
+    figure.legend(loc="outside upper center", ncols=2)
+    return figure
+
+
+def plot_rotation_accuracy(tilt: Floats, errors: Mapping[str, Floats]) -> Figure:
+    """Error |R n - e_z| of several ways to compute R, for normals near the z axis.
+
+    Parameters
+    ----------
+    tilt : ndarray, shape (n,)
+        Angle between normal and e_z, rad.
+    errors : dict of str to ndarray, shape (n,)
+    """
+    figure, axes = plt.subplots()
+    for (name, error), marker in zip(errors.items(), "osv^", strict=False):
+        axes.loglog(tilt, np.maximum(error, 1e-17), marker, label=name)
+    axes.set(xlabel="angle between normal and z axis (rad)", ylabel=r"$\|R\,n - e_z\|$")
+    axes.legend()
+    return figure
+
+
+def plot_independence(d: Floats, turned: Mapping[str, Floats]) -> Figure:
+    """The three coordinates of R x_p as the plane moves along its normal, one panel per R.
+
+    Parameters
+    ----------
+    d : ndarray, shape (n,)
+        Constant of the plane's equation, scene units.
+    turned : dict of str to ndarray, shape (n, 3)
+        R x_p for each d, by the name of the rotation.
+    """
+    figure, panels = plt.subplots(1, len(turned), figsize=(9, 3.6), sharey=True)
+    names = ("$x_{rp}$", "$y_{rp}$", "$z_{rp}$")
+    for axes, (title, values) in zip(panels, turned.items(), strict=True):
+        for value, name, style in zip(values.T, names, ("-", "--", ":"), strict=True):
+            axes.plot(d, value, style, label=name)
+        axes.set(title=title, xlabel="D (scene units)")
+    panels[0].set_ylabel("coordinate (scene units)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
+    return figure
+
+
+def plot_in_plane(curves: Mapping[str, Floats]) -> Figure:
+    """Curves in a view plane, several to compare.
+
+    Parameters
+    ----------
+    curves : dict of str to ndarray, shape (n, 2)
+        In-plane coordinates by name, the first drawn as a broad line.
+    """
+    figure, axes = plt.subplots(figsize=(7, 4.8))
+    broad = {"lw": 5, "color": "0.8"}
+    for index, (name, curve) in enumerate(curves.items()):
+        style = broad if index == 0 else {"lw": 1.2, "color": f"C{index - 1}"}
+        axes.plot(*curve.T, label=name, **style)
+    axes.set(xlabel="X' (scene units)", ylabel="Y' (scene units)", aspect="equal")
+    figure.legend(loc="outside upper center")
+    return figure
+
+
+def plot_rig(rig: Rig, x: Floats) -> Figure:
+    """The cameras of a rig around a trajectory, each with its image in its view plane.
+
+    Parameters
+    ----------
+    rig : Rig
+        Calibrated.
+    x : ndarray, shape (n, 3)
+        Trajectory, scene units.
+    """
+    figure, axes = space_axes((7.5, 5.5))
+    axes.plot(*x.T, color="k", lw=0.8)
+    for i, camera in enumerate(rig.cameras):
+        seen = _on_plane(camera, camera.project(x))
+        axes.plot(*seen.T, color=f"C{i}", lw=0.8, label=f"camera {i + 1}")
+        _draw_plane(axes, camera, f"C{i}")
+    finish_space(axes, azimuth=-40, elevation=22)
+    figure.legend(loc="outside upper center", ncols=len(rig.cameras))
+    return figure
+
+
+def plot_tracks(tracks: Sequence[Floats], rig: Rig) -> Figure:
+    """The pixel track of each camera in the frame of its image.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n, 2)
+    rig : Rig
+    """
+    figure, panels = plt.subplots(1, len(tracks), figsize=(3.2 * len(tracks), 3.6))
+    for i, (axes, track, camera) in enumerate(zip(panels, tracks, rig.cameras, strict=True)):
+        width, height = camera.image_size
+        axes.plot(*track.T, color=f"C{i}", lw=0.8)
+        axes.set(title=f"camera {i + 1}", xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
+        axes.set(aspect="equal", xlabel="u (px)", xticks=(0, width // 2, width))
+        axes.set(yticks=(0, height // 2, height))
+        axes.spines[["top", "right"]].set_visible(True)
+    panels[0].set_ylabel("v (px)")
+    return figure
+
+
+def plot_calibration_errors(errors: Mapping[str, Floats]) -> Figure:
+    """Errors of scale and angle in repeated trials, one panel per learned camera.
+
+    Parameters
+    ----------
+    errors : dict of str to ndarray, shape (trials, cameras, 2)
+        As of `calibration_errors`, by method; learned cameras only.
+    """
+    cameras = next(iter(errors.values())).shape[1]
+    figure, panels = plt.subplots(1, cameras, figsize=(9, 4.2), sharex=True, sharey=True)
+    for i, axes in enumerate(panels):
+        axes.axhline(0, color="k", lw=0.6)
+        axes.axvline(0, color="k", lw=0.6)
+        for (name, error), marker in zip(errors.items(), "sov", strict=False):
+            scale, angle = error[:, i].T
+            axes.plot(100 * scale, 1e3 * angle, marker, ms=4, alpha=0.7, mec="none", label=name)
+        axes.set(title=f"camera {i + 2}", xlabel="error of scale (%)")
+    panels[0].set_ylabel("error of angle (mrad)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    return figure
+
+
+def plot_scale_error(noise: Floats, errors: Mapping[str, Floats]) -> Figure:
+    """Spread and bias of the learned scales as the pixel noise grows.
+
+    Parameters
+    ----------
+    noise : ndarray, shape (k,)
+        Standard deviation, px.
+    errors : dict of str to ndarray, shape (k, trials)
+        Relative errors of the scale, by method.
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
+    for (name, error), marker in zip(errors.items(), "sov", strict=False):
+        left.loglog(noise, 100 * np.sqrt(np.mean(error**2, axis=1)), f"{marker}-", label=name)
+        spread = error.std(axis=1) / np.sqrt(error.shape[1])
+        mean = 100 * error.mean(axis=1)
+        right.errorbar(noise, mean, 200 * spread, fmt=f"{marker}-", label=name)
+    right.axhline(0, color="k", lw=0.6)
+    left.set(title="rms error", ylabel="rms error of scale (%)")
+    right.set(title="bias", ylabel="mean error of scale (%)", xscale="log")
+    for axes in (left, right):
+        axes.set_xlabel("noise per pixel coordinate (px)")
+        axes.set_xticks(noise, [f"{value:g}" for value in noise])
+        axes.minorticks_off()
+    right.legend(loc="lower left")
+    return figure
+
+
+def plot_reconstruction(t: Floats, truth: Floats, found: Floats, pixel: float) -> Figure:
+    """Reconstructed and true coordinates over time, and their difference in pixels.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+    truth, found : ndarray, shape (n, 3)
+        Scene units.
+    pixel : float
+        Scene units per pixel.
+    """
+    figure, (above, below) = plt.subplots(2, 1, figsize=(8, 5.5), sharex=True)
+    for i, (name, style) in enumerate(zip("xyz", "ov^", strict=True)):
+        above.plot(t, truth[:, i], color="0.7", lw=4)
+        above.plot(t, found[:, i], f"C{i}", lw=1, label=name)
+        below.plot(t, (found - truth)[:, i] / pixel, f"C{i}{style}", ms=2)
+    above.set(ylabel="coordinate (scene units)")
+    below.set(ylabel="error (px)", xlabel="time (time units)")
+    figure.legend(loc="outside upper center", ncols=3)
+    return figure
+
+
+def plot_residuals(t: Floats, residuals: Sequence[Floats], limit: float) -> Figure:
+    """By how many pixels the reconstructed target misses each track, over time.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Time units.
+    residuals : sequence of ndarray, shape (n, 2)
+        Pixels, one per camera; NaN where there is none.
+    limit : float
+        Pixels that tracking can be blamed for.
+    """
+    shared = {"sharex": True, "sharey": True, "squeeze": False}
+    height = 1.4 * len(residuals) + 0.8
+    figure, panels = plt.subplots(len(residuals), 1, figsize=(9, height), **shared)
+    for i, (axes, residual) in enumerate(zip(panels[:, 0], residuals, strict=True)):
+        axes.semilogy(t, np.maximum(np.hypot(*residual.T), 1e-6), f".C{i}", ms=3)
+        axes.axhline(limit, color="0.4", lw=1, ls="--")
+        axes.set_title(f"camera {i + 1}")
+    figure.supylabel("residual (px)", fontsize=11)
+    panels[-1, 0].set_xlabel("time (units of the equations)")
+    return figure
+
+
+def plot_lags(lags: Floats, missed: Floats, limit: float) -> Figure:
+    """How well the views agree at each lag of one video.
+
+    Parameters
+    ----------
+    lags : ndarray, shape (k,)
+        Frames.
+    missed : ndarray, shape (k,)
+        Disagreement, pixels.
+    limit : float
+        Pixels that tracking can be blamed for.
+    """
+    figure, axes = plt.subplots(figsize=(7.5, 3.8))
+    axes.semilogy(lags, missed, "o-", ms=4, lw=1)
+    axes.axhline(limit, color="0.4", lw=1, ls="--")
+    axes.set(xlabel="lag of the second video (frames)", ylabel="disagreement (px)")
+    return figure
+
+
+def _on_plane(camera: Camera, pixels: Floats) -> Floats:
+    """The points of the view plane that are the pixels' places in space."""
+    in_plane = camera.plane_coordinates(pixels) - camera.offset
+    return camera.position + in_plane @ camera.rows
+
+
+def _draw_plane(axes: Axes3D, camera: Camera, color: str) -> None:
+    width, height = camera.image_size
+    corners = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]]) - 0.5
+    edge = _on_plane(camera, corners)
+    axes.plot(*edge.T, color=color, lw=1)
+    axes.plot_trisurf(*edge[:4].T, triangles=[[0, 1, 2], [0, 2, 3]], color=color, alpha=0.12)

@@ -1,0 +1,184 @@
+"""Figures of motions over time and in space, and of the laws behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...arrays import Bools, Floats
+from ...dynamics import Discovery, PolynomialSystem
+from .common import STYLES, finish_space
+
+
+def plot_sampling(t: Floats, x: Floats, samples: Mapping[str, tuple[Floats, Floats]]) -> Figure:
+    """One coordinate over time, and the frames that a camera takes of it.
+
+    Parameters
+    ----------
+    t, x : ndarray, shape (n,)
+        The motion, finely resolved: time units and scene units.
+    samples : dict of str to pair of ndarray
+        Times and values of the frames, by what the frame rate is.
+    """
+    figure, panels = plt.subplots(len(samples), 1, figsize=(8, 4.2), sharex=True, sharey=True)
+    for axes, (name, (times, values)) in zip(panels, samples.items(), strict=True):
+        axes.plot(t, x, color="0.7", lw=1.5)
+        axes.plot(times, values, "oC0", ms=3)
+        axes.set_title(name)
+        axes.set_ylabel("x (scene units)")
+    panels[-1].set_xlabel("time (time units)")
+    return figure
+
+
+def plot_divergence(periods: Floats, differences: Mapping[str, Floats]) -> Figure:
+    """How two solutions of the same equations drift apart, in several systems.
+
+    Parameters
+    ----------
+    periods : ndarray, shape (n,)
+        Time in characteristic periods.
+    differences : dict of str to ndarray, shape (n,)
+        Distance over the spread of the motion, by system; at most seven.
+    """
+    figure, axes = plt.subplots(figsize=(8, 4.2))
+    for (name, difference), style in zip(differences.items(), STYLES, strict=False):
+        axes.semilogy(periods, np.maximum(difference, 1e-14), ls=style, label=name)
+    axes.set(xlabel="time (characteristic periods)", ylabel="distance / spread of the motion")
+    figure.legend(loc="outside right center")
+    return figure
+
+
+def plot_gaps(t: Floats, x: Floats, truth: Floats) -> Figure:
+    """A trajectory with missing stretches, shaded over time and left out in space (Fig. S3).
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Time units.
+    x : ndarray, shape (n, 3)
+        Reconstructed positions, scene units; NaN where missing.
+    truth : ndarray, shape (n, 3)
+    """
+    curves = {
+        "truth": (truth, {"color": "0.4", "ls": "--", "lw": 0.8}),
+        "reconstructed": (x, {"color": "C0", "lw": 1.4}),
+    }
+    return _over_time_and_in_space(t, curves, np.isnan(x).any(axis=1), "hidden", "time units")
+
+
+def plot_path(t: Floats, x: Floats, curve: Floats) -> Figure:
+    """A reconstructed path and the curve that obeys the law, over time and in space.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Time units.
+    x : ndarray, shape (n, 3)
+        Reconstructed positions, scene units; NaN where missing.
+    curve : ndarray, shape (n, 3)
+        The fitted curve; NaN outside its stretches.
+    """
+    curves = {
+        "reconstructed": (x, {"color": "0.75", "lw": 4}),
+        "curve that obeys the law": (curve, {"color": "C0", "lw": 1}),
+    }
+    missing, unit = np.isnan(x).any(axis=1), "units of the equations"
+    return _over_time_and_in_space(t, curves, missing, "not seen", unit)
+
+
+def plot_attractors(curves: Mapping[str, tuple[Floats, Floats]], columns: int = 4) -> Figure:
+    """True motions and those of the discovered laws, one panel a system (Fig. 2).
+
+    Parameters
+    ----------
+    curves : dict of str to pair of ndarray, shape (n, 3)
+        True and simulated states by system, scene units.
+    columns : int
+    """
+    columns = min(columns, len(curves))
+    rows = -(-len(curves) // columns)
+    size = (3.1 * columns, 3.3 * rows + 0.5) if columns > 1 else (6.5, 5)
+    space = {"projection": "3d", "proj_type": "ortho"}
+    figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False, subplot_kw=space)
+    for axes, (name, (truth, found)) in zip(grid.flat, curves.items(), strict=False):
+        axes.plot(*truth.T, color="0.75", lw=3, label="truth")
+        axes.plot(*found.T, color="C0", lw=0.8, label="discovered law")
+        axes.set_title(name, loc="center")
+        finish_space(axes, azimuth=-60, elevation=20, zoom=0.9)
+        if columns > 1:  # small panels: cubes with few numbers, and the unit goes to the legend
+            axes.set_box_aspect((1, 1, 1), zoom=0.9)
+            axes.locator_params(nbins=4)
+            axes.tick_params(labelsize=8, pad=-2)
+            for letter in "xyz":
+                axes.set(**{f"{letter}label": letter})
+                getattr(axes, f"{letter}axis").labelpad = -4
+    for axes in grid.flat[len(curves) :]:
+        axes.remove()
+    unit = "x, y, z in scene units" if columns > 1 else None
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2, title=unit)
+    return figure
+
+
+def plot_coefficients(found: Discovery, truth: PolynomialSystem) -> Figure:
+    """How far each coefficient is from the truth, with its standard error.
+
+    Parameters
+    ----------
+    found : Discovery
+    truth : PolynomialSystem
+        In the frame of the data.
+    """
+    labels, values, errors, true = [], [], [], []
+    for equation, row in np.argwhere(truth.support.T):
+        index = found.terms.index(truth.terms[row])
+        labels.append(f"{truth.terms[row]} in d{truth.names[equation]}/dt")
+        values.append(found.coefficients[index, equation])
+        errors.append(found.standard_errors[index, equation])
+        true.append(truth.coefficients[row, equation])
+    values, errors, true = np.array([values, errors, true])
+    figure, axes = plt.subplots(figsize=(7.5, 0.32 * len(labels) + 1.2))
+    place = -np.arange(len(labels))
+    axes.axvline(0, color="k", lw=0.8)
+    scale = 1e6 / np.abs(true)
+    axes.errorbar((values - true) * scale, place, xerr=errors * scale, fmt="o")
+    axes.set_yticks(place, labels)
+    axes.set_xlabel("distance from the truth (millionths of the true coefficient)")
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
+def _over_time_and_in_space(
+    t: Floats,
+    curves: Mapping[str, tuple[Floats, dict[str, Any]]],
+    missing: Bools,
+    word: str,
+    unit: str,
+) -> Figure:
+    """Curves by coordinate and in space, by label with their style; what is missing is shaded."""
+    figure = plt.figure(figsize=(10.5, 4.7))
+    panels = figure.subplot_mosaic(
+        [["x", "space"], ["y", "space"], ["z", "space"]],
+        per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}, width_ratios=(1.1, 1),
+    )  # fmt: skip
+    space = panels["space"]
+    for i, name in enumerate("xyz"):
+        axes = panels[name]
+        axes.fill_between(
+            t, 0, 1, where=missing, color="0.85", step="mid", transform=axes.get_xaxis_transform()
+        )
+        for curve, style in curves.values():
+            axes.plot(t, curve[:, i], **style)
+        axes.set_ylabel(name)
+        axes.label_outer()
+    panels["z"].set_xlabel(f"time ({unit}); x, y, z in scene units")
+    for label, (curve, style) in curves.items():
+        space.plot(*curve.T, label=label, **style)
+    space.plot([], [], color="0.85", lw=8, label=word)
+    finish_space(space, azimuth=-60, elevation=25, zoom=0.85)
+    figure.legend(*space.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return figure

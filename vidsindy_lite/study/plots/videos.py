@@ -1,0 +1,208 @@
+"""Figures of video frames and of what the tracker made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from ...arrays import Floats, Image
+from .common import STYLES
+
+
+def plot_frames(
+    images: Sequence[Image],
+    titles: Sequence[str],
+    tracks: Sequence[Floats] | None = None,
+    index: int | Sequence[int] = 0,
+    columns: int = 3,
+) -> Figure:
+    """Video frames side by side, with the tracks over them and the target magnified.
+
+    Parameters
+    ----------
+    images : sequence of ndarray, shape (height, width, 3), uint8
+        Blue-green-red, as a video reader gives them.
+    titles : sequence of str
+    tracks : sequence of ndarray, shape (n, 2), optional
+        Pixels of the target in all frames of each video.
+    index : int or sequence of int
+        Frame number of the images: where the target is on its track, if it is seen there.
+    columns : int
+    """
+    indices = np.broadcast_to(index, len(images))
+    rows = -(-len(images) // columns)
+    size = (2.7 * columns + 0.6, 3.0 * rows + 0.5)
+    shared = {"sharex": True, "sharey": True, "squeeze": False}
+    figure, grid = plt.subplots(rows, columns, figsize=size, layout="compressed", **shared)
+    for k, (axes, image, title) in enumerate(zip(grid.flat, images, titles, strict=True)):
+        height, width = image.shape[:2]
+        _show(axes, image)
+        axes.set_title(title, fontsize=11)
+        axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
+        axes.set(xticks=(0, 200, 400), yticks=(0, 200, 400))
+        if tracks is not None:
+            halo = withStroke(linewidth=2.4, foreground="white")
+            axes.plot(*tracks[k].T, color="C0", lw=1.0, path_effects=[halo])
+            if np.isfinite(tracks[k][indices[k]]).all():
+                _magnify(axes, image, tracks[k], indices[k])
+    for axes in grid[-1]:
+        axes.set_xlabel("u (px)")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("v (px)")
+    return figure
+
+
+def plot_views(
+    images: Sequence[Image], titles: Sequence[str], tracks: Sequence[Floats], index: int
+) -> Figure:
+    """One frame of each video, the whole track over it, and a ring where the target is.
+
+    Parameters
+    ----------
+    images : sequence of ndarray, shape (height, width, 3), uint8
+        Blue-green-red, as a video reader gives them; sizes may differ.
+    titles : sequence of str
+    tracks : sequence of ndarray, shape (n, 2)
+        Pixels of the target in all frames of each video.
+    index : int
+        Where on the tracks the images were taken.
+    """
+    columns = min(len(images), 3)
+    rows = -(-len(images) // columns)
+    size = (3.5 * columns, 3.2 * rows)
+    figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False)
+    halo = [withStroke(linewidth=3.5, foreground="white")]
+    for axes, image, title, track in zip(grid.flat, images, titles, tracks, strict=False):
+        height, width = image.shape[:2]
+        _show(axes, image)
+        axes.plot(*track.T, color="white", lw=0.7)
+        axes.plot(*track[index], "o", ms=22, mfc="none", mec="C0", mew=2, path_effects=halo)
+        axes.set_title(title, fontsize=11)
+        axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
+        axes.set(xticks=(0, width // 2, width), yticks=(0, height // 2, height))
+        axes.set(xlabel="u (px)", ylabel="v (px)")
+    for axes in grid.flat[len(images) :]:
+        axes.remove()
+    return figure
+
+
+def plot_tracker_steps(
+    frame: Image, background: Image, coverage: Floats, corner: Sequence[int], centroid: Floats
+) -> Figure:
+    """How one position comes about: frame, background, difference, coverage with its centroid.
+
+    Parameters
+    ----------
+    frame, background : ndarray, shape (h, w, 3)
+        The part of the image around the target, blue-green-red, 0 to 255.
+    coverage : ndarray, shape (h, w)
+        Share of each pixel that the target covers.
+    corner : array_like of int, shape (2,)
+        Column and row of the first pixel in the whole image.
+    centroid : array_like, shape (2,)
+        Pixels in the whole image.
+    """
+    figure, panels = plt.subplots(1, 4, figsize=(10.5, 3.2), sharex=True, sharey=True)
+    (left, top), (height, width) = corner, coverage.shape
+    extent = (left - 0.5, left + width - 0.5, top + height - 0.5, top - 0.5)
+    _show(panels[0], frame, extent=extent)
+    _show(panels[1], background, extent=extent)
+    distance = np.linalg.norm(frame.astype(float) - background, axis=-1)
+    for axes, values in ((panels[2], distance), (panels[3], coverage)):
+        shown = axes.imshow(values, extent=extent, cmap="gray", interpolation="nearest", vmin=0)
+        axes.grid(False)
+        figure.colorbar(shown, ax=axes, shrink=0.72, pad=0.03)
+    for axes, title in zip(panels, ("frame", "background", "difference", "coverage"), strict=True):
+        axes.set_title(title)
+    panels[3].plot(*centroid, "+", color="C1", ms=16, mew=2)
+    for axes in panels:
+        axes.set_xlabel("u (px)")
+    panels[0].set_ylabel("v (px)")
+    return figure
+
+
+def plot_track_errors(errors: Mapping[str, Floats]) -> Figure:
+    """Distribution of the distance between tracked and true positions.
+
+    Parameters
+    ----------
+    errors : dict of str to ndarray, shape (n,)
+        Pixels, by the kind of video; NaN (not seen) is left out.
+    """
+    figure, axes = plt.subplots(figsize=(7.5, 4))
+    for (name, error), style in zip(errors.items(), STYLES, strict=False):
+        axes.ecdf(error[np.isfinite(error)], ls=style, label=name)
+    axes.set(xscale="log", xlabel="distance from the truth (px)", ylabel="share of frames below")
+    axes.legend(loc="upper left")
+    return figure
+
+
+def plot_confidence(visible: Sequence[Floats], confidence: Sequence[Floats]) -> Figure:
+    """How much of the target can be seen in each frame, and how sure the tracker is of it.
+
+    Parameters
+    ----------
+    visible, confidence : sequence of ndarray, shape (n,)
+        In [0, 1], by camera.
+    """
+    figure, panels = plt.subplots(len(visible), 1, figsize=(9, 4.6), sharex=True, sharey=True)
+    for i, (axes, share, sure) in enumerate(zip(panels, visible, confidence, strict=True)):
+        axes.fill_between(
+            np.arange(len(share)), share, color="0.85", step="mid", label="visible share"
+        )
+        axes.plot(sure, color="C0", lw=1, label="confidence of the tracker")
+        axes.set(ylabel=f"camera {i + 1}", ylim=(0, 1.05))
+    panels[-1].set(xlabel="frame", xlim=(0, len(visible[0]) - 1))
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    return figure
+
+
+def plot_loss(loss: Sequence[float], steps: int) -> Figure:
+    """The loss of a training over its steps.
+
+    Parameters
+    ----------
+    loss : sequence of float
+        Means over blocks of steps.
+    steps : int
+        Length of a block.
+    """
+    figure, axes = plt.subplots()
+    axes.plot(steps * (np.arange(len(loss)) + 1), loss)
+    axes.set(xlabel="step", ylabel="loss", ylim=(0, None))
+    return figure
+
+
+def _show(
+    axes: Axes, image: Image, extent: tuple[float, float, float, float] | None = None
+) -> None:
+    """An image as a video reader gives it (blue-green-red)."""
+    axes.imshow(image[..., ::-1].astype(np.uint8), extent=extent, interpolation="nearest")
+    axes.grid(False)
+    axes.spines[:].set_visible(False)
+
+
+def _magnify(axes: Axes, image: Image, track: Floats, index: int, reach: int = 24) -> None:
+    """The surroundings of the target, three times as large, in the corner with the least track."""
+    corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])  # right, bottom
+    size = np.array(image.shape[1::-1])
+    part = 6 * reach / size
+    seen = track[np.isfinite(track).all(axis=1)] / size
+    inside = [np.all(np.abs(seen - corner) < 1.1 * part, axis=1).sum() for corner in corners]
+    right, bottom = corners[int(np.argmin(inside))]
+    place = (right * (1 - part[0]), (1 - bottom) * (1 - part[1]), *part)
+    centre = track[index]
+    near = {"xlim": (centre[0] - reach, centre[0] + reach)}
+    near |= {"ylim": (centre[1] + reach, centre[1] - reach), "xticks": (), "yticks": ()}
+    inset = axes.inset_axes(place, **near)
+    _show(inset, image)
+    inset.set(**near)
+    inset.spines[:].set(visible=True, color="white", linewidth=1.5)
+    box = axes.indicate_inset_zoom(inset, edgecolor="white", alpha=1, linewidth=1.5)
+    for line in box.connectors:
+        line.set_visible(False)

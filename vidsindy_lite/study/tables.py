@@ -1,0 +1,123 @@
+"""Trials as pandas frames: one row a trial, and from these the rows of the paper's tables.
+
+A mean over five trials hangs on the worst of them, and which trial of a baseline is bad depends on
+the processor. So tables show medians and rates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from .trials import CORRUPTIONS, TrialResult
+
+if TYPE_CHECKING:  # pandas is imported where a frame is made
+    from pandas import DataFrame, Series
+
+
+def tabulate(results: Iterable[TrialResult]) -> DataFrame:
+    """Results of trials as a frame.
+
+    Parameters
+    ----------
+    results : iterable of TrialResult
+
+    Returns
+    -------
+    DataFrame
+        One row a trial, in the given order. Its columns are the fields of `Trial`, the fields and
+        properties of `Score` but for the array, and those of `TrialResult` that are not among
+        them: wrong_terms, verdict, law, pulls and so on.
+    """
+    import pandas
+
+    return pandas.DataFrame([_row(result) for result in results])
+
+
+def _row(result: TrialResult) -> dict[str, object]:
+    scored = result.score
+    return asdict(result.trial) | {
+        "exact": scored.exact,
+        "terms_found": scored.terms_found,
+        "false_positives": scored.false_positives,
+        "missing": scored.missing,
+        "wrong_terms": result.wrong_terms,
+        "l2": scored.l2,
+        "precision": scored.precision,
+        "recall": scored.recall,
+        "max_coefficient_error": scored.max_coefficient_error,
+        "native_exact": result.native_exact,
+        "status": result.status,
+        "verdict": result.verdict,
+        "warnings": result.warnings,
+        "promised_l2": result.promised_l2,
+        "pulls": result.pulls,
+        "law": result.law,
+        "seconds": result.seconds,
+    }
+
+
+def by_condition(trials: DataFrame) -> DataFrame:
+    """The trials condition by condition, each beginning with level 0: its clean trials.
+
+    Parameters
+    ----------
+    trials : DataFrame
+        See `tabulate`.
+
+    Returns
+    -------
+    DataFrame
+        The clean trials stand in it once for each other condition that there is, by its name.
+    """
+    import pandas
+
+    clean = trials[trials.condition == "clean"]
+    parts = [
+        pandas.concat([clean.assign(condition=name), trials[trials.condition == name]])
+        for name in CORRUPTIONS
+        if (trials.condition == name).any()
+    ]
+    ordered = (part.sort_values("level", kind="stable") for part in parts)
+    return pandas.concat(ordered, ignore_index=True) if parts else trials[:0]
+
+
+def summary(trials: DataFrame, by: str | Sequence[str]) -> DataFrame:
+    """Repeated trials as rows of the paper's tables, in its units.
+
+    Parameters
+    ----------
+    trials : DataFrame
+        See `tabulate`.
+    by : str or sequence of str
+        Columns whose values tell the groups; they are the first columns of the result.
+
+    Returns
+    -------
+    DataFrame
+        One row a group, in the order of their first trials: in how many trials all true terms were
+        found, and in how many these and no others; medians of false positives, relative l2 error,
+        precision and recall. Errors have two significant digits: the rest is rounding noise.
+    """
+    rows = trials.groupby(by, sort=False).agg(
+        **{
+            "terms found": ("terms_found", rate),
+            "exact": ("exact", rate),
+            "false positives": ("false_positives", "median"),
+            "l2 (e-2)": ("l2", lambda values: significant(100 * values.median())),
+            "precision (%)": ("precision", lambda values: round(100 * values.median(), 2)),
+            "recall (%)": ("recall", lambda values: round(100 * values.median(), 2)),
+        }
+    )
+    return rows.reset_index()
+
+
+def rate(happened: Series) -> str:
+    """How often something happened, as text: "4 of 5"."""
+    return f"{int(happened.sum())} of {len(happened)}"
+
+
+def significant(value: float, digits: int = 2) -> float:
+    """A number rounded to so many significant digits."""
+    return float(f"{value:.{digits - 1}e}")
