@@ -10,10 +10,14 @@ All lengths are in millimetres.
 Paper: Appendix "Lab Experiment on Trajectory Extraction".
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ..arrays import Floats
 from ..cameras import (
     OrthographicCamera,
     PerspectiveCamera,
@@ -24,10 +28,11 @@ from ..cameras import (
     rotation_to_z,
 )
 from ..vision import Scene, render_video, track
+from .published import LAB
 
-MARKED = np.array([180.0, 300.0, 26.25])  # where the paper compares
-IDENTIFIED = np.array([182.92, 291.81, 24.50])  # what it finds there
-RADIUS = MARKED[2]  # a ball on the table has its centre there
+MARKED = np.array(LAB.truth)  # where the paper compares
+IDENTIFIED = np.array(LAB.found)  # what it finds there
+RADIUS = float(MARKED[2])  # a ball on the table has its centre there
 MIDDLE = np.array([350.0, 350.0, 0.0])  # of the part of the table that the cameras look at
 FPS = 25
 
@@ -41,7 +46,7 @@ _PATHS = (
 _SLOWING = 60.0  # mm/s^2: rolling resistance of 0.6 % of the ball's weight
 
 
-def paths(frames=50):
+def paths(frames: int = 50) -> Floats:
     """Centre of the ball on three straight paths, on which it rolls and slows down.
 
     Parameters
@@ -62,7 +67,7 @@ def paths(frames=50):
     return x
 
 
-def cameras(distance=1.0):
+def cameras(distance: float = 1.0) -> Rig:
     """Three perspective cameras around the table, all calibrated: the truth.
 
     Parameters
@@ -85,7 +90,7 @@ def cameras(distance=1.0):
     )
 
 
-def random_cameras(rng):
+def random_cameras(rng: np.random.Generator) -> Rig:
     """Three cameras as someone else might have put them around the same table.
 
     Distances of 1.2 to 3 m, 20 to 50 degrees above the table, at least 60 degrees apart around it,
@@ -111,7 +116,9 @@ def random_cameras(rng):
     )
 
 
-def _camera(azimuth, elevation, reach, focal, roll):
+def _camera(
+    azimuth: float, elevation: float, reach: float, focal: float, roll: float
+) -> PerspectiveCamera:
     """A camera that looks at the middle, seen from there in the given direction (degrees)."""
     a, e, roll = np.deg2rad([azimuth, elevation, roll])
     normal = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
@@ -124,7 +131,7 @@ def _camera(azimuth, elevation, reach, focal, roll):
     )
 
 
-def orthographic(rig):
+def orthographic(rig: Rig) -> Rig:
     """The same rig as the paper's model has it: one pixel measures the same at every distance.
 
     Each camera is calibrated at the middle of the table.
@@ -151,7 +158,7 @@ def orthographic(rig):
     )
 
 
-def orthographic_error(rig, flat, x):
+def orthographic_error(rig: Rig, flat: Rig, x: Floats) -> Floats:
     """First-order error of a path that orthographic cameras reconstruct from perspective images.
 
     A point that lies by delta nearer to the camera than the middle, at the distance D, is drawn
@@ -186,7 +193,7 @@ def orthographic_error(rig, flat, x):
     return np.hstack(views) @ np.linalg.pinv(np.vstack(rows)).T
 
 
-def film_ball(rig, x, folder, seed=0):
+def film_ball(rig: Rig, x: Floats, folder: str | Path, seed: int = 0) -> list[Floats]:
     """Film each path with every camera and track the ball.
 
     The ball is drawn as the ellipse that a perspective image of a ball is, in one colour: no
@@ -223,7 +230,9 @@ def film_ball(rig, x, folder, seed=0):
     return tracks
 
 
-def learn_from_ball(tracks, rig, radius=RADIUS, rounds=3):
+def learn_from_ball(
+    tracks: Sequence[Floats], rig: Rig, radius: float = RADIUS, rounds: int = 3
+) -> tuple[Rig, Floats]:
     """Learn the cameras from centroids of a ball's images, which are not images of its centre.
 
     How far the two differ follows from the ball's radius and place (`ball_image`). So: learn and

@@ -30,6 +30,7 @@ import numpy as np
 import torch
 from scipy.linalg import solveh_banded
 
+from ..arrays import Floats
 from ..checks import check_integer
 from ..dynamics import (
     DEGREE,
@@ -68,13 +69,13 @@ class PaperDiscovery:
 
     system: PolynomialSystem
     native: PolynomialSystem
-    offset: np.ndarray
+    offset: Floats
     history: tuple[dict[str, float], ...]
 
 
 def discover_paper(
-    t: np.ndarray,
-    x: np.ndarray,
+    t: Floats,
+    x: Floats,
     degree: int = 3,
     seed: int = 0,
     knots_per_sample: float = 1.0,
@@ -202,16 +203,16 @@ class _Fit:
         curve, slope = self.collocation()
         self.restart(np.linalg.lstsq(monomials(curve, exponents), slope, rcond=None)[0])
 
-    def _tensor(self, array: np.ndarray) -> torch.Tensor:
+    def _tensor(self, array: Floats) -> torch.Tensor:
         return torch.tensor(array, dtype=torch.float64, device=self.device)
 
-    def restart(self, coefficients: np.ndarray) -> None:
+    def restart(self, coefficients: Floats) -> None:
         """Set the coefficients; from now on only those that are not zero are learned."""
         self.active = coefficients != 0
         self.mask = self._tensor(self.active)
         self.coefficients = self._tensor(coefficients).requires_grad_()
 
-    def collocation(self) -> tuple[np.ndarray, np.ndarray]:
+    def collocation(self) -> tuple[Floats, Floats]:
         """Curve without offset and its slope at the collocation times, each (k, d)."""
         with torch.no_grad():
             control = self.control_points
@@ -274,7 +275,7 @@ def _curve(basis: torch.Tensor, control_points: torch.Tensor) -> torch.Tensor:
     return (basis @ windows).reshape(-1, control_points.shape[1])
 
 
-def _monomials(x: torch.Tensor, exponents: np.ndarray) -> torch.Tensor:
+def _monomials(x: torch.Tensor, exponents: Floats) -> torch.Tensor:
     """Monomials of points (n, d), shape (n, l): as `polynomials.monomials`, for autograd."""
     columns = []
     for powers in exponents:
@@ -286,7 +287,7 @@ def _monomials(x: torch.Tensor, exponents: np.ndarray) -> torch.Tensor:
     return torch.stack(columns, dim=1) if columns else x.new_zeros((len(x), 0))
 
 
-def _first_curve(first: np.ndarray, values: np.ndarray, x: np.ndarray, r: int) -> np.ndarray:
+def _first_curve(first: Floats, values: Floats, x: Floats, r: int) -> Floats:
     """Control points (r, d) of a spline through the data, smooth where there are none."""
     band = np.zeros((DEGREE + 1, r))
     right = np.zeros((r, x.shape[1]))
@@ -302,14 +303,14 @@ def _first_curve(first: np.ndarray, values: np.ndarray, x: np.ndarray, r: int) -
 
 
 def stridge(
-    library: np.ndarray,
-    derivative: np.ndarray,
+    library: Floats,
+    derivative: Floats,
     rng: np.random.Generator,
     ridge: float = 1e-6,
     sparsity_weight: float = 5e-3,
     step: float = 1e-2,
     trials: int = 100,
-) -> np.ndarray:
+) -> Floats:
     """Sequentially thresholded ridge regression with an adaptive threshold (paper: Eq. S8).
 
     Ridge regression, columns below a threshold cut, again until none is cut. The threshold is
@@ -372,13 +373,13 @@ def stridge(
     return np.stack(columns, axis=1) * speed / size[:, None]
 
 
-def _root_mean_square(columns: np.ndarray) -> np.ndarray:
+def _root_mean_square(columns: Floats) -> Floats:
     """Scale of each column; 1 for a column of zeros."""
     scale = np.sqrt((columns**2).mean(axis=0))
     return np.where(scale > 0, scale, 1.0)
 
 
-def _stridge_column(scaled, target, training, held_out, ridge, price, step, trials) -> np.ndarray:
+def _stridge_column(scaled, target, training, held_out, ridge, price, step, trials) -> Floats:
     gram = scaled[training].T @ scaled[training] / len(training)
     pull = scaled[training].T @ target[training] / len(training)
 
@@ -404,7 +405,7 @@ def _stridge_column(scaled, target, training, held_out, ridge, price, step, tria
     return refit
 
 
-def _thresholded(gram, pull, ridge, threshold) -> np.ndarray:
+def _thresholded(gram, pull, ridge, threshold) -> Floats:
     support = np.ones(len(pull), dtype=bool)
     coefficients = np.zeros(len(pull))
     while support.any():

@@ -20,7 +20,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -164,7 +164,7 @@ def _call(
 
 
 def _here(
-    function: Callable, todo: dict[int, object], jobs: int, files: dict[int, Path]
+    function: Callable, todo: Mapping[int, object], jobs: int, files: dict[int, Path]
 ) -> Iterator[tuple[int, object]]:
     """Numbers and results of the tasks as they come, from processes of this machine."""
     import cv2
@@ -185,7 +185,7 @@ def _here(
 
 
 def _on_cluster(
-    function: Callable, todo: dict[int, object], address: str, files: dict[int, Path]
+    function: Callable, todo: Mapping[int, object], address: str, files: dict[int, Path]
 ) -> Iterator[tuple[int, object]]:
     """Numbers and results of the tasks as they come, from the workers of a Dask cluster.
 

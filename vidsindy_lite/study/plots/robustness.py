@@ -89,7 +89,7 @@ def plot_shares(shares: DataFrame) -> Figure:
         width_ratios=[shares[condition].shape[1] for condition in conditions],
     )  # fmt: skip
     for axes, condition in zip(panels[0], conditions, strict=True):
-        percent = 100 * shares[condition]
+        percent: DataFrame = 100 * shares.xs(condition, axis=1, level="condition")
         percent.columns = [f"{100 * level:.0f}" for level in percent.columns]
         sns.heatmap(
             percent, vmin=0, vmax=100, cmap="Blues", annot=True, fmt=".0f", cbar=False,
