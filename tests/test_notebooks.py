@@ -8,8 +8,10 @@ import jupytext
 import nbformat
 import pytest
 
-from vidsindy_lite.companion import artifacts, differences
 from vidsindy_lite.companion import run as runner
+from vidsindy_lite.companion.clean import clean
+from vidsindy_lite.companion.compare import differences
+from vidsindy_lite.companion.registry import check_folder
 from vidsindy_lite.stamp import PACKAGE
 
 ROOT = PACKAGE.parent
@@ -207,7 +209,7 @@ def test_every_executed_half_has_its_source():
 
 def test_figures_are_complete_and_of_this_code():
     stamps = {path.stem: runner.notebook_stamp(path, "full") for path in NOTEBOOKS}
-    assert artifacts.check_folder(ROOT / "figures", stamps) == []
+    assert check_folder(ROOT / "figures", stamps) == []
 
 
 @pytest.fixture(scope="module")
@@ -236,7 +238,7 @@ def pair(tiny):
     executed = jupytext.read(path)
     for count, cell in enumerate((c for c in executed.cells if c.cell_type == "code"), start=1):
         cell.execution_count = count
-    nbformat.write(runner.clean(executed, path, "full", stamp), path.with_suffix(".ipynb"))
+    nbformat.write(clean(executed, path, "full", stamp), path.with_suffix(".ipynb"))
     return path
 
 

@@ -275,7 +275,7 @@ def _discover(options: argparse.Namespace) -> int:
 
     from .cameras import Rig, list_lags
     from .checks import check_positive
-    from .companion import PAGE, check_folder_is_free, write_report
+    from .companion.report import PAGE, check_folder_is_free, write_report
     from .pipeline import discover_from_videos
     from .vision import check_detector, video_info
 
@@ -360,7 +360,7 @@ def _train(options: argparse.Namespace) -> int:
 
 
 def _site(options: argparse.Namespace) -> int:
-    from .companion import build_site
+    from .companion.site import build_site
 
     pages = build_site(options.output)
     print(f"{len(pages)} pages: open {options.output}/index.html")
@@ -368,7 +368,7 @@ def _site(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from .companion import side_by_side
+    from .companion.compare import side_by_side
 
     found = side_by_side(options.committed, options.regenerated, options.output)
     for name, place in found.items():

@@ -27,7 +27,9 @@ LIBRARIES = (
     "matplotlib",
 )  # fmt: skip
 
-BY_DEFINITION = (f"{NAME}.study.plots", f"{NAME}.companion.artifacts")
+BY_DEFINITION = (
+    f"{NAME}.study.plots", f"{NAME}.companion.artifacts", f"{NAME}.companion.records"
+)  # fmt: skip
 WITHOUT_RESULTS = (f"{NAME}.companion", f"{NAME}.stamp")  # but for those above
 NO_DATA = {".py", ".pyc", ".checkpoint"}  # suffixes
 

@@ -7,15 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vidsindy_lite.companion import artifacts
-from vidsindy_lite.companion.artifacts import (
-    check_folder,
-    load_run_times,
-    load_table,
-    save_animation,
-    save_figure,
-    save_table,
-)
+from vidsindy_lite.companion import registry
+from vidsindy_lite.companion.artifacts import load_table, save_animation, save_figure, save_table
+from vidsindy_lite.companion.records import RUN_TIMES
+from vidsindy_lite.companion.registry import check_folder, load_run_times
 
 ROWS = [
     {"system": "Lorenz", "terms": 12, "l2": 0.00123456789, "exact": True, "seconds": 2.345},
@@ -35,11 +30,10 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def figure():
-    """A figure with a line, text, an image and a clipped marker: all that gets an id in an SVG."""
+    """A figure with a line, text and a clipped marker: all that gets an id in an SVG."""
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
         figure, axes = plt.subplots()
         axes.plot([0, 1, 2], [0, 1, 4], "o-", label="square")
-        axes.imshow(np.eye(3), extent=(0, 1, 0, 1))
         axes.legend()
     yield figure
     plt.close(figure)
@@ -72,6 +66,24 @@ def test_figure_is_the_same_bytes_twice(folder, figure):
     assert b"dc:date" not in first["fig_2.svg"]
 
 
+def test_a_figure_with_pixels_or_very_many_points_has_no_svg(folder, figure):
+    save_figure("fig_2", figure, caption="A square.", numbers={})
+    assert (folder / "fig_2.svg").exists()
+    figure.axes[0].imshow(np.eye(3), extent=(0, 1, 0, 1))
+    save_figure("fig_2", figure, caption="A square.", numbers={})
+    assert set(contents(folder)) == {"fig_2.png", "fig_2.json"}
+    registry.write_index(folder)
+    assert check_folder(folder) == []
+    assert "SVG" not in (folder / "README.md").read_text()
+    figure.axes[0].images[0].remove()
+    rng = np.random.default_rng(0)
+    figure.axes[0].plot(*rng.normal(size=(2, 20_000)), ".")
+    save_figure("fig_2", figure, caption="A square.", numbers={})
+    assert not (folder / "fig_2.svg").exists()
+    with Image.open(folder / "fig_2.png") as image:
+        assert image.mode == "P"
+
+
 def test_animation_is_written_registered_and_the_same_bytes_twice(folder):
     stripes = np.broadcast_to(np.arange(0, 240, 8, np.uint8)[:, None], (20, 30, 3))
     pictures = [np.roll(stripes, step, axis=1) for step in range(3)]
@@ -82,7 +94,7 @@ def test_animation_is_written_registered_and_the_same_bytes_twice(folder):
         assert (image.n_frames, image.size) == (3, (30, 20))
     save_animation("tour", pictures, caption="Stripes.", numbers={"step": [0, 1, 2]})
     assert contents(folder) == first
-    artifacts.write_index(folder)
+    registry.write_index(folder)
     assert "![tour](tour.gif)\n\nStripes." in (folder / "README.md").read_text()
     assert check_folder(folder, {"01_first": "stamp-1"}) == []
 
@@ -157,12 +169,16 @@ def test_two_notebooks_cannot_write_one_id(folder, monkeypatch):
         save_table("table_1", ROWS, caption="Two systems.")
 
 
-def test_without_a_run_results_go_to_the_repository(tiny, monkeypatch):
+def test_without_a_run_results_go_to_a_folder_of_their_own(tiny, monkeypatch, capsys):
     for name in ("VIDSINDY_FIGURES", "VIDSINDY_NOTEBOOK", "VIDSINDY_STAMP"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.chdir(tiny.notebooks)
-    save_table("table_1", ROWS, caption="Two systems.")
-    assert load_table("table_1", tiny.root / "figures").notebook == "interactive"
+    for _ in range(2):
+        save_table("table_1", ROWS, caption="Two systems.")
+    own = tiny.root / "build" / "interactive" / "figures"
+    assert load_table("table_1", own).notebook == "interactive"
+    assert not (tiny.root / "figures").exists()
+    assert capsys.readouterr().out.count(str(own)) == 1
 
 
 # ------------------------------------------------------------------------------------- wall times
@@ -180,12 +196,12 @@ def test_wall_times_are_those_of_the_first_run_of_the_code(folder, monkeypatch):
 
 
 def test_run_time_is_that_of_the_first_run_of_the_code(folder):
-    artifacts.record_run_time(folder, "01_first", "stamp-1", 123.4)
-    artifacts.record_run_time(folder, "01_first", "stamp-1", 9.0)
-    times = folder / artifacts.RUN_TIMES
+    registry.record_run_time(folder, "01_first", "stamp-1", 123.4)
+    registry.record_run_time(folder, "01_first", "stamp-1", 9.0)
+    times = folder / RUN_TIMES
     assert json.loads(times.read_text()) == {"01_first": {"seconds": 120, "stamp": "stamp-1"}}
     assert load_run_times(folder) == {"01_first": 120}
-    artifacts.record_run_time(folder, "01_first", "stamp-2", 9.0)
+    registry.record_run_time(folder, "01_first", "stamp-2", 9.0)
     assert json.loads(times.read_text())["01_first"]["seconds"] == 9
 
 
@@ -198,8 +214,8 @@ def complete(folder, figure):
     save_table("table_S10", ROWS, caption="Ten.")
     save_table("table_S2", ROWS, caption="Two.")
     save_figure("fig_2", figure, caption="A square.", numbers={})
-    artifacts.record_run_time(folder, "01_first", "stamp-1", 12.3)
-    artifacts.write_index(folder)
+    registry.record_run_time(folder, "01_first", "stamp-1", 12.3)
+    registry.write_index(folder)
     return folder
 
 
@@ -211,7 +227,7 @@ def test_index_shows_everything_in_order_and_is_the_same_bytes_twice(complete):
     assert "| [01_first](../notebooks/01_first.ipynb) | about 12 s | [fig_2](#fig_2)" in page
     assert "| Lorenz | 12 | 0.001235 | yes | 2.3 |" in page
     before = contents(complete)
-    artifacts.write_index(complete)
+    registry.write_index(complete)
     assert contents(complete) == before
 
 
@@ -244,13 +260,41 @@ def test_check_reports_what_is_missing_and_what_is_stray(complete):
 )
 def test_prune_removes_what_the_check_reports(complete, stamps, problem):
     assert problem in check_folder(complete, stamps)
-    artifacts.prune(complete, stamps)
-    artifacts.write_index(complete)
+    registry.prune(complete, stamps)
+    registry.write_index(complete)
     assert check_folder(complete, stamps) == []
     assert not list(complete.glob("*.png"))
 
 
 def test_prune_keeps_what_is_current(complete):
     before = contents(complete)
-    artifacts.prune(complete, {"01_first": "stamp-1", "02_second": None})
+    registry.prune(complete, {"01_first": "stamp-1", "02_second": None})
     assert contents(complete) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("fig_2.png", b" " * 600_001, "fig_2.png: 600001 bytes, at most 600000"),
+        ("fig_2.svg", b"<svg><image/></svg>", "fig_2.svg: holds a picture of pixels"),
+    ],
+)
+def test_check_reports_what_would_swell_the_history(complete, name, content, problem):
+    (complete / name).write_bytes(content)
+    assert check_folder(complete) == [problem]
+
+
+def test_check_reports_a_folder_that_is_too_large(complete, monkeypatch):
+    total = sum(len(content) for content in contents(complete).values())
+    monkeypatch.setattr(registry, "LARGEST_FOLDER", total)
+    assert check_folder(complete) == []
+    monkeypatch.setattr(registry, "LARGEST_FOLDER", total - 1)
+    assert check_folder(complete) == [f"all files: {total} bytes, at most {total - 1}"]
+
+
+@pytest.mark.parametrize("content", ["", "{", "[1]", '{"id": 3}'])
+def test_a_damaged_record_is_a_stray_file(complete, content):
+    (complete / "fig_2.json").write_text(content)
+    assert [line.partition(":")[2] for line in check_folder(complete)] == [
+        " nothing registers it"
+    ] * 3

@@ -1,23 +1,29 @@
 """The runner on tiny notebooks: what it makes of a good one, how each bad one is seen to fail."""
 
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 
 import nbformat
+import psutil
 import pytest
 from helpers import TinyRepository
 
 from vidsindy_lite import stamp as repository
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.companion import artifacts
+from vidsindy_lite.companion import ledger, registry
 from vidsindy_lite.companion import run as runner
-from vidsindy_lite.companion.run import NotebookError
+from vidsindy_lite.companion.artifacts import INDEX
+from vidsindy_lite.companion.execute import NotebookError, execute
+from vidsindy_lite.companion.records import RUN_TIMES
 
 pytestmark = pytest.mark.slow  # starts kernels
 
-LEDGER = runner.LEDGER.as_posix()
+LEDGER = ledger.LEDGER.as_posix()
 
 PLOT = (
     "import matplotlib.pyplot as plt\n\nfigure, axes = plt.subplots()\naxes.plot([0, 1], [0, 1]);"
@@ -109,10 +115,10 @@ def test_executed_notebook_is_clean(executed_once):
 
 def test_index_has_the_run_times(executed_once):
     figures = executed_once.root / "figures"
-    times = json.loads((figures / artifacts.RUN_TIMES).read_text())
+    times = json.loads((figures / RUN_TIMES).read_text())
     stamp = runner.notebook_stamp(executed_once.notebooks / "01_first.py", "full")
     assert times["01_first"]["stamp"] == stamp
-    assert "01_first.ipynb) | about " in (figures / artifacts.INDEX).read_text()
+    assert "01_first.ipynb) | about " in (figures / INDEX).read_text()
 
 
 def test_notebook_that_writes_less_than_before_leaves_nothing_behind(good):
@@ -123,13 +129,16 @@ def test_notebook_that_writes_less_than_before_leaves_nothing_behind(good):
 
 
 def test_memory_of_the_largest_process_is_reported(tiny):
-    tiny.write("01_large", """\
+    tiny.write(
+        "01_large",
+        """\
 from joblib import Parallel, delayed
 
 def fill(size):
     return len(b"x" * size)
 
-Parallel(2)(delayed(fill)(size) for size in (400_000_000, 100_000_000))""")
+Parallel(2)(delayed(fill)(size) for size in (400_000_000, 100_000_000))""",
+    )
     report = runner.run(root=tiny.root)
     assert 0.4 < report.memory < 4
     assert f"largest process: {report.memory:.2f} GB" in str(report)
@@ -182,7 +191,8 @@ def test_other_package_or_requirements_are_a_change(good, tmp_path, monkeypatch)
     shutil.copytree(repository.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(repository, "PACKAGE", package)
     assert executed(runner.run(root=good.root)) == []
-    (package / "systems.py").write_text("x = 1\n" + (package / "systems.py").read_text())
+    module = package / "companion" / "artifacts.py"
+    module.write_text(module.read_text().replace("DIGITS = 6", "DIGITS = 5"))
     assert executed(runner.run(root=good.root)) == ["01_first"]
 
 
@@ -217,24 +227,27 @@ def test_profiles_and_folders_have_their_own_ledgers(good, tmp_path):
     assert executed(runner.run(root=good.root)) == []
 
 
-def test_notebook_that_reads_tables_of_another_is_always_executed(good):
-    read = "from vidsindy_lite.companion import artifacts\nartifacts.load_table('table_systems')"
-    good.write("02_second", read)
-    for _ in range(2):
-        assert executed(runner.run(root=good.root)) == ["02_second"]
-
-
-def test_longest_notebook_begins_first_and_what_reads_tables_last(good, capsys):
+def test_longest_notebook_begins_first(good, capsys):
     good.write("02_long", "print(2)")
-    read = "from vidsindy_lite.companion import artifacts\nartifacts.load_table('table_systems')"
-    good.write("03_reads", read)
-    figures = good.root / "figures"
-    for name, seconds in {"01_first": 1, "02_long": 100, "03_reads": 1000}.items():
-        artifacts.record_run_time(figures, name, "of an earlier run", seconds)
+    for name, seconds in {"01_first": 1, "02_long": 100}.items():
+        registry.record_run_time(good.root / "figures", name, "of an earlier run", seconds)
     report = runner.run(root=good.root, force=True)
     begun = [line.split()[1] for line in capsys.readouterr().out.splitlines() if ": " not in line]
-    assert begun == ["02_long", "01_first", "03_reads"]
-    assert executed(report) == ["01_first", "02_long", "03_reads"]
+    assert begun == ["02_long", "01_first"]
+    assert executed(report) == ["01_first", "02_long"]
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    ["", "{", "[]", "3", '{"01_first": 1}', '{"01_first": {}}', '{"01_first": {"seconds": "x"}}'],
+)
+def test_a_damaged_ledger_or_table_of_times_is_made_again(good, damaged):
+    before = files(good.root)
+    for name in (LEDGER, f"figures/{RUN_TIMES}"):
+        (good.root / name).write_text(damaged)
+    assert executed(runner.run(root=good.root)) == ["01_first"]
+    assert files(good.root).keys() == before.keys()
+    assert executed(runner.run(root=good.root)) == []
 
 
 def test_failed_notebook_is_not_up_to_date(good):
@@ -277,13 +290,73 @@ def test_early_exit_is_a_failure_though_papermill_accepts_it(tiny):
         "01_exit", "import sys\nsys.exit(0)", "raise ArithmeticError('never reached')"
     )
     with pytest.raises(NotebookError, match=r"01_exit, cell In \[3\](?s:.*)before the end"):
-        runner.execute(path, {"profile": "quick"})
+        execute(path, {"profile": "quick"})
 
 
 def test_dead_kernel_is_a_failure(tiny):
     path = tiny.write("01_dead", "import os\nos._exit(0)")
     with pytest.raises(NotebookError, match="01_dead: .*died"):
-        runner.execute(path, {"profile": "quick"})
+        execute(path, {"profile": "quick"})
+
+
+def test_a_process_that_dies_takes_no_other_notebook_along(tiny, capsys):
+    tiny.write("01_bad", "import os, signal\nos.kill(os.getppid(), signal.SIGKILL)")
+    tiny.write("02_good", PLOT, SAVE)
+    report = runner.run(root=tiny.root)
+    bad, good = report.outcomes
+    assert bad.error == "01_bad: the process that ran it died (exit code -9)"
+    assert good.error is None
+    assert bad.error in capsys.readouterr().out
+    assert report.problems == ()
+    assert "fig_1" in (tiny.root / "figures" / INDEX).read_text()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_run_that_is_ended_leaves_no_process_behind(tiny, number):
+    busy = "[os.getpid(), *(process.pid for process in psutil.Process().children())]"
+    tiny.write(
+        "01_long",
+        "import os, psutil, subprocess, sys, time",
+        "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])",
+        f"open('started', 'w').write(' '.join(map(str, {busy})))\ntime.sleep(600)",
+    )
+    command = [sys.executable, "-m", "vidsindy_lite", "run"]
+    here = os.environ | {"PYTHONPATH": str(repository.PACKAGE.parent)}
+    run = subprocess.Popen(command, cwd=tiny.notebooks, env=here, start_new_session=True)
+    started = tiny.notebooks / "started"
+    wait_for(lambda: started.exists() and started.read_text())
+    below = psutil.Process(run.pid).children(recursive=True)
+    assert {int(pid) for pid in started.read_text().split()} <= {each.pid for each in below}
+    run.send_signal(number)
+    assert run.wait(60) != 0
+    wait_for(lambda: not any(each.is_running() for each in below))
+
+
+def wait_for(condition):
+    """Poll until a condition holds; fail after a minute."""
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+
+
+PAPERMILL = """\
+import papermill, sys
+papermill.execute_notebook("notebooks/01_first.ipynb", sys.argv[1], {"profile": "quick"})"""
+
+
+def test_a_notebook_executed_by_others_leaves_the_committed_figures(good):
+    before = files(good.root)
+    here = os.environ | {"PYTHONPATH": str(repository.PACKAGE.parent)}
+    for name in ("VIDSINDY_FIGURES", "VIDSINDY_NOTEBOOK", "VIDSINDY_STAMP"):
+        here.pop(name, None)
+    command = [sys.executable, "-c", PAPERMILL, "build/out.ipynb"]
+    subprocess.run(command, cwd=good.root, env=here, check=True)
+    after = files(good.root)
+    made = {name for name in after if after[name] != before.get(name)}
+    assert made > {"build/interactive/figures/fig_1.png"}
+    assert all(name.startswith("build/") for name in made)
+    assert after["build/out.ipynb"].count(b"build/interactive/figures;") == 1
 
 
 def test_kernel_that_dies_at_start_is_a_failure(tiny, tmp_path):
@@ -293,7 +366,7 @@ def test_kernel_that_dies_at_start_is_a_failure(tiny, tmp_path):
     for command in (sys.executable, str(tmp_path / "no_python")):
         kernel.write_text(json.dumps({"argv": [command, "-c", "exit(1)"], "display_name": "x"}))
         with pytest.raises(NotebookError, match="01_first: the kernel python3 did not start: .*"):
-            runner.execute(
+            execute(
                 path, {"profile": "quick"}, environment={"JUPYTER_PATH": str(tmp_path / "jupyter")}
             )
 
@@ -310,20 +383,20 @@ async def answer_slowly(*arguments):
     time.sleep(1)
 
 handlers["kernel_info_request"] = answer_slowly"""
-    runner.execute(tiny.write("01_slow", slow), {"profile": "quick"})
+    execute(tiny.write("01_slow", slow), {"profile": "quick"})
     assert capfd.readouterr().err == ""
 
 
 def test_endless_cell_is_a_failure(tiny):
     path = tiny.write("01_endless", "while True:\n    pass")
     with pytest.raises(NotebookError, match="01_endless: .*timed out"):
-        runner.execute(path, {"profile": "quick"}, timeout=2)
+        execute(path, {"profile": "quick"}, timeout=2)
 
 
 def test_unknown_parameter_is_found_before_anything_runs(tiny):
     path = tiny.write("01_first", "x = 1")
     with pytest.raises(ValueError, match="notebook 01_first has profile .* got 'colour'"):
-        runner.execute(path, {"profile": "quick", "colour": "red"})
+        execute(path, {"profile": "quick", "colour": "red"})
     bare = tiny.write("02_bare", "x = 1")
     bare.write_text(bare.read_text().replace("profile: str", "size: str"))
     with pytest.raises(ValueError, match="notebook 02_bare has size .* got 'profile'"):
@@ -386,15 +459,6 @@ def test_stamp_follows_code_profile_and_requirements(tiny):
     (tiny.root / "requirements.txt").write_text("numpy==1.0\n")
     stamps.append(runner.notebook_stamp(path, "full"))
     assert len(set(stamps)) == 4
-
-
-def test_stamp_follows_the_package(tiny, tmp_path, monkeypatch):
-    path = tiny.write("01_first", "x = 1")
-    before = runner.notebook_stamp(path, "full")
-    package = tmp_path / "package"
-    package.mkdir()
-    monkeypatch.setattr(repository, "PACKAGE", package)
-    assert runner.notebook_stamp(path, "full") != before
 
 
 def test_stamp_does_not_follow_the_prose_of_a_notebook(tiny):

@@ -1,14 +1,5 @@
-"""What turns notebooks into a book: run, artifacts, report, site."""
+"""What turns notebooks into a book: each command of it is a module.
 
-from .compare import differences, side_by_side
-from .report import PAGE, check_folder_is_free, write_report
-from .site import build_site
-
-__all__ = [
-    "PAGE",
-    "build_site",
-    "check_folder_is_free",
-    "differences",
-    "side_by_side",
-    "write_report",
-]
+`run` executes the notebooks, whose cells hand their results to `artifacts`; `registry` keeps the
+folder of figures, `readme` the README's tables. `compare`, `report` and `site` write pages.
+"""

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..checks import check_path
-from .artifacts import RUN_TIMES, SECONDS
+from .artifacts import SECONDS
+from .records import RUN_TIMES
 
 __all__ = ["differences", "side_by_side"]
 
@@ -143,9 +144,7 @@ def _content(name: str, path: Path) -> object:
         ) from None
 
 
-def _unlike(
-    one: object, other: object, place: str, size: float, tolerance: float
-) -> Iterator[str]:
+def _unlike(one: object, other: object, place: str, size: float, tolerance: float) -> Iterator[str]:
     """Where two contents differ; `size` is that of the largest number beside this one."""
     if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
         for key in one:

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from ..stamp import write_file
-from .artifacts import Table, load_run_times, load_table
+from .artifacts import Table, load_table
+from .registry import load_run_times
 
 __all__ = ["fill", "write_readme"]
 

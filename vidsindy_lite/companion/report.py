@@ -24,7 +24,7 @@ from ..checks import check_path
 from ..pipeline import VideoDiscovery
 from ..study.plots import plot_path, plot_residuals, plot_rig, plot_views
 from ..vision import read_video, video_info
-from .artifacts import as_json
+from .records import as_json
 
 PAGE, DATA, RIG = FILES = ("report.html", "result.json", "rig.toml")
 

@@ -1,0 +1,174 @@
+"""The folder of figures as a whole: its index page, run times, and a check that it adds up."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..stamp import write_file
+from .artifacts import INDEX, as_table
+from .records import RUN_TIMES, json_bytes, read_json, read_records
+
+__all__ = [
+    "check_folder",
+    "files_of",
+    "load_run_times",
+    "prune",
+    "record_run_time",
+    "write_index",
+]
+
+# So that a regeneration adds little to the history, in bytes.
+LARGEST_FILE, LARGEST_FOLDER = 600_000, 10_000_000
+
+
+def files_of(folder: str | os.PathLike, notebook: str) -> list[str]:
+    """Names of the files that a notebook's figures and tables consist of."""
+    records = [r for r in read_records(Path(folder)).values() if r["notebook"] == notebook]
+    return [name for record in records for name in (f"{record['id']}.json", *record["files"])]
+
+
+def load_run_times(folder: str | os.PathLike) -> dict[str, float]:
+    """Seconds that each notebook ran, two digits: what `record_run_time` has recorded."""
+    return {name: entry["seconds"] for name, entry in _run_times(Path(folder)).items()}
+
+
+def record_run_time(folder: str | os.PathLike, notebook: str, stamp: str, seconds: float) -> None:
+    """Record how long a notebook ran, unless a run of the same code (stamp) already did."""
+    path = Path(folder) / RUN_TIMES
+    times = _run_times(path.parent)
+    if times.get(notebook, {}).get("stamp") != stamp:
+        times[notebook] = {"seconds": float(f"{seconds:.2g}"), "stamp": stamp}
+        write_file(path, json_bytes(dict(sorted(times.items()))))
+
+
+def write_index(folder: str | os.PathLike) -> Path:
+    """Write the folder's index page (README.md, which code hosts show) from the registry."""
+    folder = Path(folder)
+    records, times = read_records(folder), _run_times(folder)
+    notebooks = sorted({record["notebook"] for record in records.values()} | set(times))
+    page = [
+        "# Figures and tables",
+        "Written by the notebooks (`make figures`); do not edit. Beside each image and table lie "
+        "its numbers. Run times are those of the first run of this code.",
+        "| notebook | run time | figures and tables |\n|---|---:|---|\n"
+        + "\n".join(_contents_line(notebook, records, times) for notebook in notebooks),
+    ]
+    for notebook in notebooks:
+        mine = [record for record in records.values() if record["notebook"] == notebook]
+        if mine:
+            page.append(f"## {_notebook_link(notebook)}")
+        for record in mine:
+            page += [f"### {record['id']}", _exhibit(record)]
+    write_file(folder / INDEX, ("\n\n".join(page) + "\n").encode())
+    return folder / INDEX
+
+
+def check_folder(
+    folder: str | os.PathLike, stamps: Mapping[str, str | None] | None = None
+) -> list[str]:
+    """What is wrong with a folder of figures; an empty list means nothing.
+
+    Parameters
+    ----------
+    folder : path
+    stamps : mapping of notebook to stamp, optional
+        The notebooks there are, each with the stamp that its figures and tables must carry; None
+        accepts any. Without the mapping, origins are not checked.
+
+    Returns
+    -------
+    list of str
+        One line per registered file that is missing, file that nothing registers, record of a
+        notebook that is not there, record made by other code than the stamp's, file that is too
+        large, and SVG that holds a picture of pixels.
+    """
+    folder = Path(folder)
+    records = read_records(folder)
+    expected = {INDEX} | ({RUN_TIMES} if (folder / RUN_TIMES).exists() else set())
+    for record in records.values():
+        expected |= {f"{record['id']}.json", *record["files"]}
+    present = {path.name for path in folder.glob("*") if not path.name.startswith(".")}
+    problems = [f"{name}: registered, but missing" for name in sorted(expected - present)]
+    problems += [f"{name}: nothing registers it" for name in sorted(present - expected)]
+    for record in records.values() if stamps is not None else ():
+        if record["notebook"] not in stamps:
+            problems.append(f"{record['id']}: no notebook {record['notebook']!r} to make it")
+        elif stamps[record["notebook"]] not in (None, record["stamp"]):
+            problems.append(f"{record['id']}: {record['notebook']} has changed since it was made")
+    return problems + _too_large(folder)
+
+
+def prune(folder: str | os.PathLike, stamps: Mapping[str, str | None]) -> None:
+    """Remove the figures and tables that no notebook writes any longer, and their run times.
+
+    Parameters
+    ----------
+    folder : path
+    stamps : mapping of notebook to stamp
+        As in `check_folder`: what it would report as made by nobody, or by other code, goes.
+    """
+    folder = Path(folder)
+    for record in read_records(folder).values():
+        notebook = record["notebook"]
+        if notebook not in stamps or stamps[notebook] not in (None, record["stamp"]):
+            for name in (f"{record['id']}.json", *record["files"]):
+                (folder / name).unlink(missing_ok=True)
+    times = _run_times(folder)
+    if times.keys() - stamps.keys():
+        write_file(folder / RUN_TIMES, json_bytes({n: t for n, t in times.items() if n in stamps}))
+
+
+# ------------------------------------------------------------------------------------------ details
+
+
+def _run_times(folder: Path) -> dict[str, dict]:
+    """Seconds and stamp by notebook; what is damaged counts as never recorded."""
+    entries = read_json(folder / RUN_TIMES).items()
+    return {
+        notebook: entry
+        for notebook, entry in entries
+        if isinstance(entry, dict) and isinstance(entry.get("seconds"), int | float)
+    }
+
+
+def _too_large(folder: Path) -> list[str]:
+    """What would swell the history."""
+    sizes = {path: path.stat().st_size for path in sorted(folder.glob("*")) if path.is_file()}
+    problems = [
+        f"{path.name}: {size} bytes, at most {LARGEST_FILE}"
+        for path, size in sizes.items()
+        if size > LARGEST_FILE
+    ]
+    problems += [
+        f"{path.name}: holds a picture of pixels"
+        for path in sizes
+        if path.suffix == ".svg" and b"<image" in path.read_bytes()
+    ]
+    if (total := sum(sizes.values())) > LARGEST_FOLDER:
+        problems.append(f"all files: {total} bytes, at most {LARGEST_FOLDER}")
+    return problems
+
+
+def _notebook_link(notebook: str) -> str:
+    return f"[{notebook}](../notebooks/{notebook}.ipynb)"
+
+
+def _contents_line(notebook: str, records: dict, times: dict) -> str:
+    seconds = times.get(notebook, {}).get("seconds")
+    duration = "" if seconds is None else f"about {seconds:.0f} s" if seconds > 1 else "about 1 s"
+    ids = [r["id"] for r in records.values() if r["notebook"] == notebook]
+    links = ", ".join(f"[{artifact_id}](#{artifact_id.lower()})" for artifact_id in ids)
+    return f"| {_notebook_link(notebook)} | {duration} | {links} |"
+
+
+def _exhibit(record: dict) -> str:
+    artifact_id = record["id"]
+    if record["kind"] == "animation":
+        body = f"![{artifact_id}]({artifact_id}.gif)\n\n{record['caption']}"
+        return f"{body}\n\n[numbers]({artifact_id}.json)"
+    if record["kind"] == "figure":
+        body = f"![{artifact_id}]({artifact_id}.png)\n\n{record['caption']}"
+        drawing = f"[SVG]({artifact_id}.svg) · " if f"{artifact_id}.svg" in record["files"] else ""
+        return f"{body}\n\n{drawing}[numbers]({artifact_id}.json)"
+    links = f"[CSV]({artifact_id}.csv) · [numbers]({artifact_id}.json)"
+    return f"{as_table(record)._repr_markdown_()}\n{links}"
