@@ -62,7 +62,8 @@ def paths(frames: int = 50) -> Floats:
     """
     t = (np.arange(frames)[:, None] - frames // 2) / FPS
     x = np.full((len(_PATHS), frames, 3), RADIUS)
-    for path, (middle, velocity) in zip(x, _PATHS, strict=True):
+    for path, middle_and_velocity in zip(x, _PATHS, strict=True):
+        middle, velocity = np.array(middle_and_velocity)
         path[:, :2] = middle + (t - t**2 * _SLOWING / (2 * np.linalg.norm(velocity))) * velocity
     return x
 
@@ -81,11 +82,13 @@ def cameras(distance: float = 1.0) -> Rig:
     Rig
     """
     return Rig(
-        _camera(azimuth, elevation, distance * reach, distance * focal, roll)
-        for azimuth, elevation, reach, focal, roll in (
-            (-80.0, 35.0, 1900.0, 1100.0, 3.0),
-            (40.0, 30.0, 2200.0, 1250.0, -5.0),
-            (160.0, 40.0, 2000.0, 1150.0, 8.0),
+        tuple(
+            _camera(azimuth, elevation, distance * reach, distance * focal, roll)
+            for azimuth, elevation, reach, focal, roll in (
+                (-80.0, 35.0, 1900.0, 1100.0, 3.0),
+                (40.0, 30.0, 2200.0, 1250.0, -5.0),
+                (160.0, 40.0, 2000.0, 1150.0, 8.0),
+            )
         )
     )
 
@@ -109,9 +112,11 @@ def random_cameras(rng: np.random.Generator) -> Rig:
         if np.diff(azimuths, append=azimuths[0] + 360).min() >= 60:
             break
     return Rig(
-        _camera(azimuth, rng.uniform(20, 50), reach, 0.575 * reach, rng.uniform(-10, 10))
-        for azimuth, reach in zip(
-            rng.permutation(azimuths), rng.uniform(1200, 3000, 3), strict=True
+        tuple(
+            _camera(azimuth, rng.uniform(20, 50), reach, 0.575 * reach, rng.uniform(-10, 10))
+            for azimuth, reach in zip(
+                rng.permutation(azimuths), rng.uniform(1200, 3000, 3), strict=True
+            )
         )
     )
 
@@ -147,14 +152,16 @@ def orthographic(rig: Rig) -> Rig:
         Of orthographic cameras.
     """
     return Rig(
-        OrthographicCamera(
-            position=c.position,
-            normal=c.normal,
-            scale=c.scale * (c.normal @ (c.position - MIDDLE)),
-            angle=c.angle,
-            image_size=c.image_size,
+        tuple(
+            OrthographicCamera(
+                position=c.position,
+                normal=c.normal,
+                scale=c.scale * (c.normal @ (c.position - MIDDLE)),
+                angle=c.angle,
+                image_size=c.image_size,
+            )
+            for c in rig.cameras
         )
-        for c in rig.cameras
     )
 
 
@@ -186,7 +193,7 @@ def orthographic_error(rig: Rig, flat: Rig, x: Floats) -> Floats:
     for camera, (growth, turn) in zip(rig.cameras, wrong, strict=True):
         away = camera.normal @ (camera.position - MIDDLE)
         growth = growth + (x - MIDDLE) @ camera.normal / away
-        across = (x - camera.position) @ camera.rows.T
+        across = (x - np.asarray(camera.position)) @ camera.rows.T
         pixel = camera.scale * away
         rows.append(camera.rows / pixel)
         views.append((growth[:, None] * across + turn * across[:, ::-1] * (1, -1)) / pixel)
@@ -216,7 +223,7 @@ def film_ball(rig: Rig, x: Floats, folder: str | Path, seed: int = 0) -> list[Fl
         A track per camera, of one path after the other.
     """
     tracks = []
-    for i, camera in enumerate(rig.cameras):
+    for i, camera in enumerate(_perspective(rig)):
         scene = Scene(background="plain", image_size=camera.image_size)
         parts = []
         for k, path in enumerate(x):
@@ -260,6 +267,11 @@ def learn_from_ball(
         x = reconstruct(corrected, learned)
         corrected = [
             pixels - camera.ball_image(x, radius)[0] + camera.project(x)
-            for pixels, camera in zip(tracks, learned.cameras, strict=True)
+            for pixels, camera in zip(tracks, _perspective(learned), strict=True)
         ]
     return learned, x
+
+
+def _perspective(rig: Rig) -> list[PerspectiveCamera]:
+    """The cameras of a rig that has only such ones."""
+    return [camera for camera in rig.cameras if isinstance(camera, PerspectiveCamera)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -83,7 +84,7 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
     >>> score(truth, truth).exact
     True
     """
-    law = found if isinstance(found, PolynomialSystem) else getattr(found, "system", found)
+    law: Any = getattr(found, "system", found)  # of which type, is checked now
     for name, one in (("found", law), ("truth", truth)):
         if not isinstance(one, PolynomialSystem):
             raise ValueError(

@@ -54,7 +54,7 @@ class Benchmark(PolynomialSystem):
     def times(self, n: int = 1500, samples_per_period: float = 100) -> Floats:
         """Times of ``n`` video frames, shape (n,), starting at 0."""
         step = self.period / check_positive("samples_per_period", samples_per_period)
-        return np.arange(check_integer("n", n, 1)) * step
+        return step * np.arange(check_integer("n", n, 1), dtype=float)
 
     def trajectory(self, n: int = 1500, samples_per_period: float = 100) -> tuple[Floats, Floats]:
         """Times (n,) and states (n, d) of the motion from ``x0``, one row a video frame."""
