@@ -13,7 +13,6 @@ import io
 import json
 import tempfile
 from collections.abc import Mapping, Sequence
-from itertools import islice
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -23,7 +22,7 @@ from ..cameras import DISAGREEMENT, residuals
 from ..checks import check_path
 from ..pipeline import VideoDiscovery
 from ..study.plots import plot_path, plot_residuals, plot_rig, plot_views
-from ..vision import read_video, video_info
+from ..vision import read_frame, video_info
 from .records import as_json
 
 PAGE, DATA, RIG = FILES = ("report.html", "result.json", "rig.toml")
@@ -301,7 +300,7 @@ def _figures(found, paths):
 def _first_look(found, paths, instant):
     """The frames of all videos at one instant of the first."""
     places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
-    images = [next(islice(read_video(path), frame, None)) for path, frame in places]
+    images = [read_frame(path, frame) for path, frame in places]
     titles = [f"{path.name}, frame {frame}" for path, frame in places]
     return plot_views(images, titles, found.tracks, instant)
 
