@@ -421,7 +421,9 @@ save_table("detector_restless", rows, caption="Background model and learned dete
 for row in rows[1:]:
     assert row["auto"] == "learned"
     assert row["learned: rms error (px)"] < 1
-    assert row["background: within 1 px (%)"] < row["learned: within 1 px (%)"]
+    assert row["learned: within 1 px (%)"] > 90
+for row in (rows[1], rows[3]):  # where the camera trembles
+    assert row["background: within 1 px (%)"] < 60
 assert rows[0]["auto"] == "background"
 assert rows[0]["background: rms error (px)"] < rows[0]["learned: rms error (px)"]
 

@@ -643,8 +643,8 @@ rows = [
     {
         "setting": setting.replace("_", " "), "value": value,
         "exact": sum(r["verdict"].startswith("exact") for r in results), "of": len(results),
-        "false (mean)": np.mean([r["false"] for r in results]),
-        "missing (mean)": np.mean([r["missing"] for r in results]),
+        "false (median)": np.median([r["false"] for r in results]),
+        "missing (median)": np.median([r["missing"] for r in results]),
         "suspect": sum(r["verdict"].endswith("suspect") for r in results),
         "wrong without warning": sum(r["verdict"] == "wrong, ok" for r in results),
     }

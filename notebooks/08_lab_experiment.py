@@ -38,6 +38,7 @@ profile: str = "full"  # full or quick
 seed: int = 0  # of the cloth in the videos, and of the rigs put up at random
 
 # %%
+import re
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -243,7 +244,8 @@ save_figure("lab_anywhere", fig, caption=caption, numbers={"error": anywhere})
 start = truth.uncalibrated(keep=0)
 with TemporaryDirectory() as folder:
     start.save(Path(folder) / "rig.toml")
-    print((Path(folder) / "rig.toml").read_text()[:420], "...")
+    text = (Path(folder) / "rig.toml").read_text()
+print(re.sub(r"(\.\d{4})\d+", r"\1", text)[:350], "...")  # fewer digits, to be read
 
 # %% [markdown]
 # No starting guess is needed here either. The ball lies on the line of sight of camera 1. In camera 2
@@ -323,8 +325,9 @@ assert all(row["error of scale (%)"] < 0.1 for row in rows[1:])
 assert rows[1]["error of angle (mrad)"] < 1.5
 assert all(row["error of angle (mrad)"] < 0.1 for row in rows[2:])
 assert rows[0]["largest (mm)"] > 10
-assert rows[3]["rms (mm)"] < 0.01
 assert rows[3]["rms (mm)"] < 0.1 * rows[2]["rms (mm)"] < 0.1 * rows[1]["rms (mm)"]
+assert max(list(rows[3].values())[1:]) < 0.01
+rows[3] |= dict.fromkeys(tuple(rows[3])[1:], "below 0.01")
 save_table("lab_models", rows, caption="Three paths of the ball, by the model of the cameras.")
 
 # %%

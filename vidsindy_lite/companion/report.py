@@ -13,7 +13,6 @@ import json
 import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice
 from pathlib import Path
 
 import jinja2
@@ -27,7 +26,7 @@ from ..checks import check_path
 from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
 from ..study.plots import plot_path, plot_residuals, plot_rig, plot_views
-from ..vision import read_video, video_info
+from ..vision import read_frame, video_info
 from .records import as_json
 
 PAGE, DATA, RIG = FILES = ("report.html", "result.json", "rig.toml")
@@ -219,7 +218,7 @@ def _figures(found: VideoDiscovery, paths: Sequence[str | Path]) -> Iterator[tup
 def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:
     """The frames of all videos at one instant of the first."""
     places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
-    images = [next(islice(read_video(path), frame, None)) for path, frame in places]
+    images = [read_frame(path, frame) for path, frame in places]
     # A dollar sign would begin a formula.
     titles = [f"{path.name}, frame {frame}".replace("$", r"\$") for path, frame in places]
     return plot_views(images, titles, found.tracks, instant)
