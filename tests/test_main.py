@@ -79,7 +79,7 @@ def empty(folder):
     ("spoil", "message"),
     [
         (lambda folder: None, "no such video file, got 'bad.avi'"),
-        (corrupt, "must be a video file that OpenCV can read, got 'bad.avi'"),
+        (corrupt, "must be a video file that PyAV can read, got 'bad.avi'"),
         (cut_off, "bad.avi must hold the 210 frames that its header states, got"),
         (one_frame, "bad.avi must be a video, got a single frame"),
         (empty, "must be a video file, got the empty file 'bad.avi'"),

@@ -156,7 +156,7 @@ def test_the_closest_rival_is_priced_as_it_is():
 @given(st.integers(0, 2**32 - 1), st.integers(2, 8))
 def test_the_update_for_a_newcomer_is_a_fit_with_it(seed, m):
     information, pull, rng = random_problem(seed, m)
-    model = _Quadratic(information, pull, rng.standard_normal(m), np.ones(m))
+    model = _Quadratic.of(information, pull, rng.standard_normal(m), np.ones(m))
     support = rng.random(m) < 0.5
     assume(not support.all())
     before = _Tableau.of(model, model.fit(support))

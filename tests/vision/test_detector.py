@@ -25,7 +25,9 @@ from vidsindy_lite.vision.detector import (
     as_input,
     detections,
 )
-from vidsindy_lite.vision.video import BACKGROUNDS, SHAPES, Scene, render
+from vidsindy_lite.vision.rendering import render
+from vidsindy_lite.vision.scenery import BACKGROUNDS
+from vidsindy_lite.vision.scenes import SHAPES, Scene
 
 RECORD = json.loads(WEIGHTS.with_suffix(".json").read_text())
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Bools, Floats, Ints
 from .polynomials import PolynomialSystem
 
 SUBSTEPS = 8
@@ -26,16 +28,16 @@ class Bound:
         Of the origin of the law; zero along axes that are known.
     """
 
-    coefficients: np.ndarray
-    offset: np.ndarray
+    coefficients: Floats
+    offset: Floats
 
 
 def cramer_rao(
     system: PolynomialSystem,
-    t: np.ndarray,
-    x0: np.ndarray,
-    sigma: np.ndarray,
-    moving: np.ndarray | None = None,
+    t: Floats,
+    x0: Floats,
+    sigma: Floats,
+    moving: Bools | None = None,
 ) -> Bound:
     """Cramer-Rao bound of the coefficients, with unknown initial condition and offset.
 
@@ -87,19 +89,20 @@ def cramer_rao(
     return Bound(coefficients, offset)
 
 
-def _measured(root: np.ndarray, observe: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+def _measured(root: Floats, observe: Floats, sigma: Floats) -> Floats:
     """Square root of the covariance after a measurement (the array form of the Kalman update)."""
     m, free = observe.shape
     array = np.zeros((m + free, m + free))
     array[:m, :m] = np.diag(sigma)
     array[:m, m:] = observe @ root
     array[m:, m:] = root
-    return np.linalg.qr(array.T, mode="r").T[m:, m:]
+    lower = np.asarray(np.linalg.qr(array.T, mode="r")).T
+    return lower[m:, m:]
 
 
 def _sensitivities(
-    system: PolynomialSystem, t: np.ndarray, x: np.ndarray, equations: np.ndarray, terms: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+    system: PolynomialSystem, t: Floats, x: Floats, equations: Ints, terms: Ints
+) -> tuple[Floats, Floats]:
     """Derivatives of each next state with respect to the state (d, d) and coefficients (d, p)."""
     d, count = system.d, len(terms)
     state = x[:-1]
@@ -107,12 +110,12 @@ def _sensitivities(
     sensitivity[:, :, :d] = np.eye(d)
     width = np.diff(t)[:, None] / SUBSTEPS
 
-    def rates(state, sensitivity):
+    def rates(state: Floats, sensitivity: Floats) -> tuple[Floats, Floats]:
         growth = system.gradient(state) @ sensitivity
         growth[:, equations, d + np.arange(count)] += system.library(state)[:, terms]
         return system(state), growth
 
-    def moved(rate, share):
+    def moved(rate: Sequence[Floats], share: float) -> tuple[Floats, Floats]:
         return state + share * width * rate[0], sensitivity + share * width[:, :, None] * rate[1]
 
     for _ in range(SUBSTEPS):

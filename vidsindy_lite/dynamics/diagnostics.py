@@ -92,7 +92,7 @@ def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
         away = np.abs(x - np.median(x, axis=0))
         spread = np.quantile(away, 0.9, axis=0)
         rows, columns = np.nonzero((away > OUTLIER * spread) & (spread > 0))
-        far = {row for row, j in zip(rows, columns, strict=True) if _leaps(x[:, j], row)}
+        far = {row for row, j in zip(rows.tolist(), columns, strict=True) if _leaps(x[:, j], row)}
         found += [
             f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in sorted(far)
         ]
@@ -189,14 +189,14 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> list[str]
 def _standstill(law: PolynomialSystem) -> list[str]:
     return [
         f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
-        for name, moves in zip(law.names, law.support.any(axis=0), strict=True)
+        for name, moves in zip(law.names, np.any(law.support, axis=0).tolist(), strict=True)
         if not moves
     ]
 
 
 def _narrow(law: PolynomialSystem, margins: Floats) -> list[str]:
-    close = np.flatnonzero(margins < NEAR_TIE)
-    if not len(close):
+    close = np.flatnonzero(margins < NEAR_TIE).tolist()
+    if not close:
         return []
     kept = law.support.T.ravel()
     changes = ", ".join(f"{'without' if kept[k] else 'with'} {_place(law, k)}" for k in close)

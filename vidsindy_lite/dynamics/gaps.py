@@ -14,6 +14,7 @@ from scipy.interpolate import BSpline, CubicHermiteSpline
 from ..arrays import Floats
 from .grid import Segment
 from .integrate import runge_kutta_4
+from .library import monomials
 from .polynomials import PolynomialSystem
 from .trajectories import Trajectory
 
@@ -75,8 +76,8 @@ class Joined:
         pace = np.concatenate([length, -length])
         share = np.linspace(0, 1, steps + 1)
 
-        def rate(x):
-            return pace * self.law(x)
+        def rate(x: Floats) -> Floats:
+            return pace * (monomials(x, self.law.exponents) @ self.law.coefficients)
 
         with np.errstate(over="ignore", invalid="ignore"):
             paths = runge_kutta_4(rate, share, x0, substeps=1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
+from ..arrays import Bools, Floats, Ints
 from .library import divides, shift_generators, shift_matrix
 from .selection import inverse
 
@@ -29,9 +30,7 @@ class ShiftedLaw:
         Its information matrix, equation by equation.
     """
 
-    def __init__(
-        self, exponents: np.ndarray, coefficients: np.ndarray, information: np.ndarray
-    ) -> None:
+    def __init__(self, exponents: Ints, coefficients: Floats, information: Floats) -> None:
         self.exponents = exponents
         self.l, self.d = exponents.shape
         self.coefficients = coefficients
@@ -40,13 +39,13 @@ class ShiftedLaw:
         self.covariances = np.stack([blocks[j, :, j, :] for j in range(self.d)])
         self.generators = shift_generators(exponents)
 
-    def at(self, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, origin: Floats) -> tuple[Floats, Floats]:
         """Coefficients (l, d) and information (l d, l d) in monomials of ``x - origin``."""
         forth = shift_matrix(self.exponents, -origin)
         back = np.kron(np.eye(self.d), shift_matrix(self.exponents, origin))
         return forth @ self.coefficients, back.T @ self.information @ back
 
-    def vanish(self, origin: np.ndarray, entries: np.ndarray) -> np.ndarray:
+    def vanish(self, origin: Floats, entries: Ints) -> Floats:
         """Move an origin as little as possible so that the given coefficients vanish.
 
         Parameters
@@ -68,16 +67,14 @@ class ShiftedLaw:
                 break
         return origin
 
-    def _scores(self, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _scores(self, origin: Floats) -> tuple[Floats, Floats, Floats]:
         forth = shift_matrix(self.exponents, -origin)
         estimate = (forth @ self.coefficients).T
         covariance = forth @ self.covariances @ forth.T
         variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300)
         return estimate, covariance, estimate**2 / variance
 
-    def smooth_count(
-        self, origin: np.ndarray, active: np.ndarray, penalty: float
-    ) -> tuple[float, np.ndarray]:
+    def smooth_count(self, origin: Floats, active: Bools, penalty: float) -> tuple[float, Floats]:
         """Smoothed number of significant terms at an origin, and its gradient.
 
         Each active term with score ``z`` (estimate over standard error) counts
@@ -99,13 +96,13 @@ class ShiftedLaw:
 
 def sparse_origins(
     algebra: ShiftedLaw,
-    active: np.ndarray,
-    home: np.ndarray,
-    box: tuple[np.ndarray, np.ndarray],
+    active: Bools,
+    home: Floats,
+    box: tuple[Floats, Floats],
     penalty: float,
     keep: int,
     rng: np.random.Generator,
-) -> list[np.ndarray]:
+) -> list[Floats]:
     """Distinct origins with the smallest smoothed number of significant terms.
 
     On clean data the count is flat but for needle-thin wells, which lie where coefficients
@@ -145,7 +142,7 @@ def sparse_origins(
         if np.isfinite(origin).all():
             starts.append(np.clip(origin, low, high))
     counts = [algebra.smooth_count(start, active, penalty)[0] for start in starts]
-    found: list[tuple[float, np.ndarray]] = []
+    found: list[tuple[float, Floats]] = []
     for index in np.argsort(counts)[: 4 * keep]:
         if any(np.abs(starts[index] - origin).max() < 1e-3 for _, origin in found):
             continue
@@ -155,7 +152,7 @@ def sparse_origins(
         )  # fmt: skip
         found.append((float(result.fun), result.x))
     found.sort(key=lambda item: item[0])
-    distinct: list[np.ndarray] = []
+    distinct: list[Floats] = []
     for _, origin in found:
         if all(np.abs(origin - other).max() > 0.02 for other in distinct):
             distinct.append(origin)

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats, Ints
 from ..checks import check_array, check_integer, check_number, check_times, check_vector
 from .integrate import integrate
 from .library import closure, monomial_exponents, monomial_gradients, monomials, shift_matrix
@@ -41,8 +41,8 @@ class PolynomialSystem:
     """
 
     names: tuple[str, ...]
-    exponents: np.ndarray
-    coefficients: np.ndarray
+    exponents: Ints
+    coefficients: Floats
 
     def __post_init__(self) -> None:
         names = tuple(self.names) if isinstance(self.names, Iterable) else ()
@@ -134,20 +134,20 @@ class PolynomialSystem:
         return tuple(_term_text(e, self.names) for e in self.exponents)
 
     @property
-    def support(self) -> np.ndarray:
+    def support(self) -> Bools:
         """Where a coefficient is not zero, bool, shape (l, d)."""
         return self.coefficients != 0
 
-    def library(self, x: np.ndarray) -> np.ndarray:
+    def library(self, x: Floats) -> Floats:
         """Candidate terms ``phi(x)``: (n, d) points to (n, l) values."""
         return monomials(self._points(x), self.exponents)
 
-    def __call__(self, x: np.ndarray) -> np.ndarray:
+    def __call__(self, x: Floats) -> Floats:
         """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
         x = check_array("x", x)
         return (self.library(np.atleast_2d(x)) @ self.coefficients).reshape(x.shape)
 
-    def gradient(self, x: np.ndarray) -> np.ndarray:
+    def gradient(self, x: Floats) -> Floats:
         """Jacobian of the right-hand side.
 
         Parameters
@@ -187,7 +187,7 @@ class PolynomialSystem:
         shifted[np.abs(shifted) <= 1e-13 * (np.abs(matrix) @ np.abs(closed))] = 0.0
         return replace(self, exponents=exponents, coefficients=shifted)
 
-    def simulate(self, t: np.ndarray, x0: np.ndarray) -> np.ndarray:
+    def simulate(self, t: Floats, x0: Floats) -> Floats:
         """Integrate from ``x0`` at ``t[0]`` with an adaptive 8th-order Runge-Kutta method.
 
         The path is the same to the last digit on every machine; see `integrate`.
@@ -241,7 +241,7 @@ class PolynomialSystem:
     def _repr_latex_(self) -> str:
         return f"${self.latex()}$"
 
-    def _points(self, x: np.ndarray) -> np.ndarray:
+    def _points(self, x: Floats) -> Floats:
         x = check_array("x", x)
         if x.ndim != 2 or x.shape[1] != self.d:
             raise ValueError(f"x: must have shape (n, {self.d}), got {x.shape}")
@@ -264,7 +264,7 @@ def _parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(exponents.values())
 
 
-def _term_text(exponents: np.ndarray, names: tuple[str, ...]) -> str:
+def _term_text(exponents: Ints, names: tuple[str, ...]) -> str:
     factors = [
         name if power == 1 else f"{name}^{power}"
         for name, power in zip(names, exponents, strict=True)
@@ -278,7 +278,7 @@ def _name_latex(name: str) -> str:
     return name if letters == name else f"{letters}_{{{name[len(letters) :]}}}"
 
 
-def _term_latex(exponents: np.ndarray, names: tuple[str, ...]) -> str:
+def _term_latex(exponents: Ints, names: tuple[str, ...]) -> str:
     return (
         " ".join(
             _name_latex(name) + (f"^{{{power}}}" if power > 1 else "")
@@ -289,10 +289,10 @@ def _term_latex(exponents: np.ndarray, names: tuple[str, ...]) -> str:
     )
 
 
-def _sum_text(coefficients: np.ndarray, terms: Sequence[str], digits: int, times: str = " ") -> str:
+def _sum_text(coefficients: Floats, terms: Sequence[str], digits: int, times: str = " ") -> str:
     text = ""
     # The highest monomials last, the constant first in the library: print it the way it is read.
-    for row in sorted(np.flatnonzero(coefficients), key=lambda r: terms[r] == "1"):
+    for row in sorted(np.flatnonzero(coefficients).tolist(), key=lambda r: terms[r] == "1"):
         value, term = coefficients[row], terms[row]
         number = f"{abs(value):.{digits}g}"
         size = number if term == "1" else term if number == "1" else f"{number}{times}{term}"

@@ -1,12 +1,19 @@
-"""Sparse regression in small algebra: the paper's STRidge and our subset search."""
+"""Sparse regression in small algebra: which terms a quadratic model of the fit needs.
+
+Coefficients of a law differ in size by factors of thousands, and so do the rows of its information
+matrix: all matrices are scaled to a unit diagonal before they are solved or inverted.
+"""
 
 from __future__ import annotations
 
-from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays import Bools, Floats, Ints
+
+Change = tuple[float, Ints, Ints]
+"""Change of the function, entries dropped, entries added."""
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 PLATEAU = 1e-6
@@ -18,12 +25,12 @@ RIDGE = 1e-12
 
 
 def subset_search(
-    information: np.ndarray,
-    gradient: np.ndarray,
-    present: np.ndarray,
-    penalty: np.ndarray,
-    start: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, float]:
+    information: Floats,
+    gradient: Floats,
+    present: Floats,
+    penalty: Floats,
+    start: Bools,
+) -> tuple[Bools, Floats, float]:
     """Minimise a quadratic function of ``c`` plus a penalty per non-zero entry, by local search.
 
     The function is ``(c - p)' S (c - p) - 2 g' (c - p)``: what Gauss-Newton knows around ``p``.
@@ -54,7 +61,7 @@ def subset_search(
     value : float
         The function with penalties.
     """
-    model = _Quadratic(information, gradient, present, penalty)
+    model = _Quadratic.of(information, gradient, present, penalty)
     starts = (start, np.isneginf(penalty))
     best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
     while (deeper := _through_newcomer(model, best)) is not None:
@@ -65,12 +72,12 @@ def subset_search(
 
 
 def closest_rival(
-    information: np.ndarray,
-    gradient: np.ndarray,
-    present: np.ndarray,
-    penalty: np.ndarray,
-    support: np.ndarray,
-) -> tuple[float, np.ndarray, np.ndarray]:
+    information: Floats,
+    gradient: Floats,
+    present: Floats,
+    penalty: Floats,
+    support: Bools,
+) -> Change:
     """The single change of a support that costs least.
 
     Parameters
@@ -87,7 +94,7 @@ def closest_rival(
     dropped, added : ndarray of int
         The entries that leave and enter, at most one each.
     """
-    model = _Quadratic(information, gradient, present, penalty)
+    model = _Quadratic.of(information, gradient, present, penalty)
     fit = model.fit(support)
     rivals = []
     for cost, dropped, added in _single_changes(model, _Tableau.of(model, fit)):
@@ -101,14 +108,15 @@ def closest_rival(
 class _Fit:
     """A quadratic function at its minimum on a support, all in scaled entries."""
 
-    support: np.ndarray
-    inside: np.ndarray
-    inverse: np.ndarray
-    fitted: np.ndarray
-    left: np.ndarray
+    support: Bools
+    inside: Ints
+    inverse: Floats
+    fitted: Floats
+    left: Floats
     value: float
 
 
+@dataclass(frozen=True)
 class _Quadratic:
     """A quadratic function with penalties, its entries scaled to a unit diagonal.
 
@@ -116,15 +124,30 @@ class _Quadratic:
     itself has more digits than a computer, its changes do not.
     """
 
-    def __init__(self, information, gradient, present, penalty) -> None:
-        self.matrix, self.scale = equilibrated(information)
-        self.gradient, self.present = gradient * self.scale, present / self.scale
-        self.penalty = penalty
+    matrix: Floats
+    scale: Floats
+    gradient: Floats
+    present: Floats
+    penalty: Floats
 
-    def fit(self, support: np.ndarray) -> _Fit:
+    @classmethod
+    def of(
+        cls, information: Floats, gradient: Floats, present: Floats, penalty: Floats
+    ) -> _Quadratic:
+        """Scale the function."""
+        matrix, scale = equilibrated(information)
+        return cls(matrix, scale, gradient * scale, present / scale, penalty)
+
+    def forced(self, entry: int) -> _Quadratic:
+        """The same with an entry that has to stay in."""
+        penalty = self.penalty.copy()
+        penalty[entry] = -np.inf
+        return replace(self, penalty=penalty)
+
+    def fit(self, support: Bools) -> _Fit:
         inside = np.flatnonzero(support)
         block = self.matrix[inside[:, None], inside]
-        inverse = np.linalg.inv(block)
+        inverse = np.asarray(np.linalg.inv(block), dtype=float)
         step = -self.present
         step[inside] = 0.0
         target = (self.gradient - self.matrix @ step)[inside]
@@ -137,7 +160,7 @@ class _Quadratic:
         return _Fit(support, inside, inverse, self.present[inside] + moved, left, value)
 
 
-def _descend(model: _Quadratic, start: np.ndarray) -> _Fit:
+def _descend(model: _Quadratic, start: Bools) -> _Fit:
     """Take the best of all drops, adds and swaps until none helps."""
     best = model.fit(start)
     while True:
@@ -162,16 +185,13 @@ def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
             changes = _single_changes(model, tableau.joined(model, i))
             if not min(cost for cost, _, _ in changes) < -PLATEAU:
                 continue
-        forced = copy(model)
-        forced.penalty = model.penalty.copy()
-        forced.penalty[entry] = -np.inf
-        trial = _descend(forced, _changed(best.support, none, entry))
+        trial = _descend(model.forced(entry), _changed(best.support, none, entry))
         if trial.value + model.penalty[entry] < best.value - PLATEAU:
             return _descend(model, trial.support)
     return None
 
 
-def _changed(support: np.ndarray, dropped: np.ndarray, added: np.ndarray) -> np.ndarray:
+def _changed(support: Bools, dropped: Ints, added: Ints) -> Bools:
     changed = support.copy()
     changed[dropped] = False
     changed[added] = True
@@ -187,13 +207,13 @@ class _Tableau:
     combination of those inside.
     """
 
-    inside: np.ndarray
-    outside: np.ndarray
-    fitted: np.ndarray
-    spread: np.ndarray
-    response: np.ndarray
-    left: np.ndarray
-    room: np.ndarray
+    inside: Ints
+    outside: Ints
+    fitted: Floats
+    spread: Floats
+    response: Floats
+    left: Floats
+    room: Floats
 
     @classmethod
     def of(cls, model: _Quadratic, fit: _Fit) -> _Tableau:
@@ -222,10 +242,8 @@ class _Tableau:
         )
 
 
-def _single_changes(
-    model: _Quadratic, tableau: _Tableau
-) -> list[tuple[float, np.ndarray, np.ndarray]]:
-    """Best drop, add and swap: change of the function, entries dropped, entries added."""
+def _single_changes(model: _Quadratic, tableau: _Tableau) -> list[Change]:
+    """Best drop, add and swap."""
     inside, outside, fitted, spread = (
         tableau.inside,
         tableau.outside,
@@ -252,12 +270,12 @@ def _single_changes(
     return changes
 
 
-def _gain(left: np.ndarray, room: np.ndarray) -> np.ndarray:
+def _gain(left: Floats, room: Floats) -> Floats:
     """What a newcomer explains; nothing if it is a combination of those that are in."""
     return np.where(room > COLLINEAR, left**2 / np.maximum(room, COLLINEAR), -np.inf)
 
 
-def equilibrated(information: np.ndarray, ridge: float = RIDGE) -> tuple[np.ndarray, np.ndarray]:
+def equilibrated(information: Floats, ridge: float = RIDGE) -> tuple[Floats, Floats]:
     """Scale a symmetric matrix to a unit diagonal, and add a ridge.
 
     Parameters
@@ -279,7 +297,7 @@ def equilibrated(information: np.ndarray, ridge: float = RIDGE) -> tuple[np.ndar
     return matrix, scale
 
 
-def inverse(information: np.ndarray) -> np.ndarray:
+def inverse(information: Floats) -> Floats:
     """The covariance that belongs to an information matrix, shape (m, m)."""
     matrix, scale = equilibrated(information)
     return np.linalg.inv(matrix) * scale[:, None] * scale

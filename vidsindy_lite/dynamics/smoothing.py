@@ -8,20 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from .splines import DEGREE, clamped_knots, local_basis
+from ..arrays import Floats
+from .grid import Grid, Segment, normal_band, rows_from
+from .splines import DEGREE, local_basis
+from .trajectories import Trajectory
 
 PROBES = 24
+"""Random vectors with which the trace of the influence matrix is estimated."""
 PENALTIES = 10.0 ** np.arange(-4, 11.6, 0.5)
+"""Of the squared second derivative, in units of the median time step."""
 
 
 @dataclass(frozen=True)
 class Smooth:
-    """Smoothed stretches of one trajectory.
+    """Smoothed stretches of data.
 
     Parameters
     ----------
@@ -32,10 +38,10 @@ class Smooth:
     """
 
     splines: tuple[BSpline, ...]
-    noise: np.ndarray
+    noise: Floats
 
 
-def smooth(stretches: Sequence[tuple[np.ndarray, np.ndarray]], rng: np.random.Generator) -> Smooth:
+def smooth(stretches: Sequence[Trajectory], rng: np.random.Generator) -> Smooth:
     """Smooth stretches of data by generalised cross-validation.
 
     Minimises ``|G P - x|^2 + penalty |second derivative|^2`` with a knot at every sample; the
@@ -49,64 +55,46 @@ def smooth(stretches: Sequence[tuple[np.ndarray, np.ndarray]], rng: np.random.Ge
     rng : numpy.random.Generator
         For the probes.
     """
-    knots = [clamped_knots(t) for t, _ in stretches]
-    starts = np.cumsum([0] + [len(k) - DEGREE - 1 for k in knots])
-    r, n = starts[-1], sum(len(t) for t, _ in stretches)
-    x = np.concatenate([values for _, values in stretches])
-    step = np.median(np.concatenate([np.diff(t) for t, _ in stretches]))
-    gram, roughness = np.zeros((DEGREE + 1, r)), np.zeros((DEGREE + 1, r))
-    firsts, values = [], []
-    for k, start, (t, _) in zip(knots, starts[:-1], stretches, strict=True):
-        first, basis = local_basis(k, t)
-        firsts.append(first + start)
-        values.append(basis)
-        # The second derivative is linear in a span: two Gauss points integrate its square.
-        for node in (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)):
-            span = np.diff(t)
-            at, bend = local_basis(k, t[:-1] + node * span, order=2)
-            _accumulate(roughness, at + start, bend * np.sqrt(span / 2)[:, None])
-    first, basis = np.concatenate(firsts), np.concatenate(values)
-    _accumulate(gram, first, basis)
-    roughness *= step**3
-
-    def transpose(v):
-        total = np.zeros((r, v.shape[1]))
-        for a in range(DEGREE + 1):
-            np.add.at(total, first + a, basis[:, a, None] * v)
-        return total
-
-    def evaluate(p):
-        return sum(basis[:, a, None] * p[first + a] for a in range(DEGREE + 1))
-
+    grid = Grid.of([Segment(t, x, t) for t, x in stretches])
+    (n, d), roughness = grid.x.shape, _roughness(stretches, grid)
     # Combs of random signs: exact where the influence of a sample dies out within a comb's pitch.
     probes = np.zeros((n, PROBES))
     probes[np.arange(n), np.arange(n) % PROBES] = rng.choice([-1.0, 1.0], size=n)
-    right = np.concatenate([transpose(x), transpose(probes)], axis=1)
-    d = x.shape[1]
+    right = grid.samples.T @ np.concatenate([grid.x, probes], axis=1)
     best = np.full(d, np.inf)
-    control, noise = np.zeros((r, d)), np.zeros(d)
+    control, noise = np.zeros((grid.r, d)), np.zeros(d)
     for penalty in PENALTIES:
-        band = gram + penalty * roughness
+        band = grid.sample_band + penalty * roughness
         band[0] += 1e-12 * band[0].max()
         solved = cho_solve_banded((cholesky_banded(band, lower=True), True), right)
-        fitted = evaluate(solved)
+        fitted = grid.samples @ solved
         trace = (probes * fitted[:, d:]).sum()
         free = max(n - trace, 1e-9 * n)
-        squares = ((x - fitted[:, :d]) ** 2).sum(axis=0)
+        squares = ((grid.x - fitted[:, :d]) ** 2).sum(axis=0)
         score = n * squares / free**2
         better = score < best
         best[better] = score[better]
         control[:, better] = solved[:, :d][:, better]
         # E |K e|^2 = variance tr(K K'), K = I - influence: holds where hardly anything is smoothed.
         noise[better] = np.sqrt(squares[better] / ((probes - fitted[:, d:]) ** 2).sum())
-    splines = tuple(
-        BSpline(k, control[start : start + len(k) - DEGREE - 1], DEGREE)
-        for k, start in zip(knots, starts[:-1], strict=True)
-    )
-    return Smooth(splines, noise)
+    parts = np.split(control, grid.starts[1:-1])
+    return Smooth(tuple(map(BSpline, grid.knots, parts, repeat(DEGREE))), noise)
 
 
-def _accumulate(band: np.ndarray, first: np.ndarray, rows: np.ndarray) -> None:
-    for a in range(DEGREE + 1):
-        for b in range(a + 1):
-            np.add.at(band[a - b], first + b, rows[:, a] * rows[:, b])
+def _roughness(stretches: Sequence[Trajectory], grid: Grid) -> Floats:
+    """Integral of the squared second derivative in the control points, (4, r) in banded storage.
+
+    Times are in units of the median time step. The second derivative is linear between two knots,
+    so two Gauss points integrate its square.
+    """
+    step = np.median(np.concatenate([np.diff(t) for t, _ in stretches]))
+    total = np.zeros_like(grid.sample_band)
+    for node in (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)):
+        firsts, bends = [], []
+        for knots, start, (t, _) in zip(grid.knots, grid.starts[:-1], stretches, strict=True):
+            span = np.diff(t)
+            first, bend = local_basis(knots, t[:-1] + node * span, order=2)
+            firsts.append(first + start)
+            bends.append(bend * np.sqrt(span / 2)[:, None])
+        total += normal_band(rows_from(np.concatenate(firsts), np.concatenate(bends), grid.r))
+    return total * step**3

@@ -92,7 +92,7 @@ def discover(
     """
     degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
     trajectories = check_trajectories(t, x)
-    times = [t] if x is not None else [pair[0] for pair in t]
+    times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     history = History()

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BSpline
 
+from ..arrays import Floats, Ints
+
 DEGREE = 3
 
 
-def clamped_knots(breakpoints: np.ndarray) -> np.ndarray:
+def clamped_knots(breakpoints: Floats) -> Floats:
     """Knot vector of a clamped cubic spline.
 
     Parameters
@@ -32,7 +34,7 @@ def clamped_knots(breakpoints: np.ndarray) -> np.ndarray:
     return np.concatenate([breakpoints[:1].repeat(3), breakpoints, breakpoints[-1:].repeat(3)])
 
 
-def local_basis(knots: np.ndarray, t: np.ndarray, order: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def local_basis(knots: Floats, t: Floats, order: int = 0) -> tuple[Ints, Floats]:
     """The four basis functions that are not zero at each time, or their derivatives.
 
     Parameters
@@ -66,7 +68,7 @@ def local_basis(knots: np.ndarray, t: np.ndarray, order: int = 0) -> tuple[np.nd
     return first, values
 
 
-def design_matrix(knots: np.ndarray, t: np.ndarray, order: int = 0) -> np.ndarray:
+def design_matrix(knots: Floats, t: Floats, order: int = 0) -> Floats:
     """Dense matrix of shape (n, r): ``G`` for order 0, ``dG/dt`` for order 1; see `local_basis`."""
     first, values = local_basis(knots, t, order)
     dense = np.zeros((len(t), len(knots) - DEGREE - 1))

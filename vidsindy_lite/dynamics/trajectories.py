@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays import Floats
 from ..checks import check_array, check_times
 
-Trajectory = tuple[np.ndarray, np.ndarray]
+Trajectory = tuple[Floats, Floats]
 """Times (n,) and states (n, d) without missing rows."""
 
 
-def check_trajectory(t: np.ndarray, x: np.ndarray) -> Trajectory:
+def check_trajectory(t: Floats, x: Floats) -> Trajectory:
     """Check one trajectory and leave out its missing rows.
 
     Parameters
@@ -50,7 +51,7 @@ def check_trajectory(t: np.ndarray, x: np.ndarray) -> Trajectory:
 
 
 def check_trajectories(
-    t: np.ndarray | Sequence[tuple[np.ndarray, np.ndarray]], x: np.ndarray | None = None
+    t: Floats | Sequence[tuple[Floats, Floats]], x: Floats | None = None
 ) -> list[Trajectory]:
     """Check one trajectory ``t, x``, or a list of several pairs ``(t, x)`` of one dimension.
 
@@ -74,10 +75,10 @@ def check_trajectories(
 
 
 def check_systematic(
-    systematic: np.ndarray | Sequence[np.ndarray] | None,
-    times: Sequence[np.ndarray],
+    systematic: Floats | Sequence[Floats] | None,
+    times: Sequence[Floats],
     trajectories: Sequence[Trajectory],
-) -> list[np.ndarray]:
+) -> list[Floats]:
     """Systematic errors as `discover` takes them, at the samples that are not missing.
 
     Parameters

@@ -14,18 +14,21 @@ than the target. It also has another *shape*, whereas whole views are alike up t
 that is how `strangeness` tells the one from the other.
 """
 
+from __future__ import annotations
+
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial.distance import cdist
 
-from .video import open_video, video_info
+from .video import pick_frames, video_info
 
 _SAMPLES = 21  # frames whose median is the background
-_SEEK_COST = 22  # a jump in a video file costs about as much as decoding this many frames
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
 _BORDER = 3  # coarse pixels around a place that show how its surroundings continue
@@ -42,28 +45,11 @@ _VIEWS = 200  # views among which the commonest one is sought
 # -------------------------------------------------------------------------------------- background
 
 
-def sample_frames(path):
-    """About `_SAMPLES` frames spread evenly over the clip, (m, height, width, 3) uint8."""
-    count = video_info(path).frames
-    wanted = set(np.linspace(0, max(count - 1, 0), _SAMPLES).round().astype(int).tolist())
-    capture = open_video(path)
-    frames = []
-    try:
-        if count > _SEEK_COST * _SAMPLES:
-            for index in sorted(wanted):
-                capture.set(cv2.CAP_PROP_POS_FRAMES, index)
-                more, frame = capture.read()
-                if more:
-                    frames.append(frame)
-        else:
-            index = 0
-            while capture.grab():
-                if index in wanted:
-                    frames.append(capture.retrieve()[1])
-                index += 1
-    finally:
-        capture.release()
-    return np.stack(frames)
+def sample_frames(path: str | os.PathLike) -> NDArray[np.uint8]:
+    """About `_SAMPLES` frames spread evenly over the clip, (m, height, width, 3)."""
+    last = max(video_info(path).frames - 1, 0)
+    spread = np.linspace(0, last, _SAMPLES).round().astype(int)
+    return np.stack(list(pick_frames(path, np.unique(spread).tolist())))
 
 
 def _median(frames):

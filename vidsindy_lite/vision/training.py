@@ -20,7 +20,9 @@ from tqdm import trange
 from ..checks import check_integer, check_path
 from ..stamp import write_file
 from .detector import STRIDE, WEIGHTS, Network, anchors, as_input
-from .video import BACKGROUNDS, COLOURS, LabelledFrame, Scene, render_labelled
+from .rendering import LabelledFrame, render_labelled
+from .scenery import BACKGROUNDS
+from .scenes import COLOURS, Scene
 
 SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
 SEEN_SHAPES = ("disc", "polygon")
