@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vidsindy_lite.companion import differences
 from vidsindy_lite.companion import run as runner
+from vidsindy_lite.companion.compare import differences
 from vidsindy_lite.stamp import PACKAGE
 
 ROOT = PACKAGE.parent

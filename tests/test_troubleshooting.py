@@ -138,7 +138,7 @@ def occupied(studio):
 
 TROUBLES = {
     "no such video file": lambda studio: studio.without_last(studio.folder / "none.mkv"),
-    "must be a video file that OpenCV can read": unreadable,
+    "must be a video file that PyAV can read": unreadable,
     "frames that its header states": damaged,
     "must show one moving target": still,
     "must have the image size of its camera": other_size,

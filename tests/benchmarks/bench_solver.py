@@ -5,7 +5,6 @@ in one run, or a time of the processor. The table is printed and saved to build/
 """
 
 import csv
-import inspect
 import time
 import tracemalloc
 from pathlib import Path
@@ -16,11 +15,11 @@ import torch
 
 from vidsindy_lite.dynamics import PolynomialSystem, cramer_rao, discover
 from vidsindy_lite.study import (
-    BASELINES,
     REFERENCE_OFFSET,
     SYSTEMS,
     add_noise,
-    discover_paper,
+    baselines,
+    paper_ado,
     score,
 )
 
@@ -117,13 +116,13 @@ def lorenz_exam(seed=0):
 def test_against_the_optimiser_of_the_paper():
     """Time for gradient descent to fall to the loss at which ours ends, or its whole budget.
 
-    The loss is Eq. 8 of the paper in standard units, with the weights that `discover_paper` uses:
+    The loss is Eq. 8 of the paper in standard units, with the weights that `PaperSettings` uses:
     data residual, physics residual and a price for every term. The schedule is nearer to that of
     the public code than the default one; it lasts more than 300 times as long as ours.
     """
     law, t, x = lorenz_exam()
-    weights = inspect.signature(discover_paper).parameters
-    alpha, beta = (weights[k].default for k in ("physics_weight", "sparsity_weight"))
+    settings = paper_ado.PaperSettings()
+    alpha, beta = settings.physics_weight, settings.sparsity_weight
 
     def loss(data, physics, terms):
         return data + alpha * physics + beta * terms
@@ -132,7 +131,7 @@ def test_against_the_optimiser_of_the_paper():
     assert score(found, law).exact
     misfit = (((found.curve(t) - x) / x.std(axis=0)) ** 2).sum(axis=1).mean()
     least = loss(misfit, found.history[-1].physics_loss, found.native.support.sum())
-    theirs, paper = seconds(discover_paper, t, x, pretraining=40000, epochs=70000)
+    theirs, paper = seconds(paper_ado.discover_paper, t, x, pretraining=40000, epochs=70000)
     losses = [loss(h["data_loss"], h["physics_loss"], h["terms"]) for h in paper.history]
     reached = [
         h["seconds"] for h, value in zip(paper.history, losses, strict=True) if value <= least
@@ -153,7 +152,7 @@ def test_against_the_optimiser_of_the_paper():
 def test_against_baselines(name):
     truth, t, x = measured(name, 0.05)
     scores = {"ours": score(discover(t, x), truth)}
-    scores |= {key: score(method(t, x), truth) for key, method in BASELINES.items()}
+    scores |= {key: score(method(t, x), truth) for key, method in baselines.BASELINES.items()}
     for key, result in scores.items():
         note("5 % noise", f"{name}, {key}", 100 * result.l2, "l2 (e-2)")
         wrong = result.false_positives + result.missing

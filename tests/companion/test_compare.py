@@ -96,11 +96,13 @@ def test_an_earlier_comparison_is_replaced(folders, tmp_path):
 
 @pytest.mark.parametrize(
     "mine",
-    ["notes.txt", "committed/notes.txt", "committed/table_1.json", "regenerated", "index.html"],
+    ["notes.txt", "committed/notes.txt", "committed/fig_1.txt", "regenerated", "index.html"],
 )
-def test_other_peoples_files_are_not_touched(folders, tmp_path, mine):
+@pytest.mark.parametrize("earlier", [True, False])
+def test_other_peoples_files_are_not_touched(folders, tmp_path, mine, earlier):
     output = tmp_path / "out"
-    if mine == "committed/notes.txt":
+    if earlier and mine != "regenerated":
+        write(folders[1], FIGURE | {"numbers": {}})
         side_by_side(*folders, output)
     (output / mine).parent.mkdir(parents=True, exist_ok=True)
     (output / mine).write_text("mine")
@@ -114,11 +116,17 @@ def test_what_is_compared_is_not_replaced(folders, tmp_path):
     output = tmp_path / "out"
     write(folders[1], FIGURE | {"numbers": {}})
     side_by_side(*folders, output)
-    with pytest.raises(ValueError, match="output: must not hold what is compared"):
+    with pytest.raises(ValueError, match="output: must not hold or lie in what is compared"):
         side_by_side(output / "committed", output / "regenerated", output)
     assert (output / "committed" / "fig_1.json").exists()
+    for inside in (folders[0] / "out", folders[1], folders[1] / "a" / "b"):
+        before = sorted(tmp_path.rglob("*"))
+        with pytest.raises(ValueError, match="output: must not hold or lie in what is compared"):
+            side_by_side(*folders, inside)
+        assert sorted(tmp_path.rglob("*")) == before
+    (tmp_path / "file").touch()
     with pytest.raises(ValueError, match="output: must be a folder, got the file"):
-        side_by_side(*folders, folders[0] / "fig_1.png")
+        side_by_side(*folders, tmp_path / "file")
 
 
 @pytest.mark.parametrize("content", ["{", "[1]", "3", "null", "{}", '"rows"', b"\xff\xfe"])

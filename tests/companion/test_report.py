@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ def case(tmp_path_factory):
     tracks = [camera.project(x) for camera in rig.cameras]
     paths = []
     for i, track in enumerate(tracks):
-        paths.append(folder / f"<{i}>.mov")  # a name that has to be escaped
+        paths.append(folder / f"<{i}$^$>.mov")  # a name that has to be escaped
         scene = vl.Scene(background="plain", size=8, image_size=(96, 96))
         vl.render_video(paths[-1], track[:20], scene)
     tracks[1] = np.where(np.arange(150)[:, None] < 10, np.nan, tracks[1])
@@ -83,8 +84,8 @@ def test_the_page_tells_law_verdict_and_cameras(page, case):
     assert "No reason for doubt was found." in text
     assert "3.500 ± 0.01" in text
     assert "0.000 ± unknown" in text
-    assert "&lt;1&gt;.mov" in text
-    assert "<1>" not in text
+    assert "&lt;1$^$&gt;.mov" in text
+    assert "<1" not in text
     assert "degree 2" in text
 
 
@@ -147,6 +148,23 @@ def test_a_report_that_fails_leaves_what_was_there(case, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
 
 
+def test_an_earlier_report_survives_a_last_rename_that_fails(case, tmp_path, monkeypatch):
+    folder, rename = tmp_path / "report", Path.rename
+    folder.mkdir()
+    (folder / "report.html").write_text("old")
+
+    def refuse(path, target):
+        if path.name == "new":
+            raise OSError("the disk has gone")
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", refuse)
+    with pytest.raises(OSError, match="the disk has gone"):
+        write_report(*case, folder)
+    assert (folder / "report.html").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
 def test_other_peoples_files_are_not_overwritten(tmp_path):
     (tmp_path / "thesis.tex").write_text("")
     with pytest.raises(ValueError, match="out: must be a new folder .* with thesis.tex"):
@@ -168,7 +186,7 @@ t = np.linspace(0, 1, 20)
 x = np.column_stack((t, t**2, t**3))
 law = SimpleNamespace(curve=lambda t: x)
 figures = report._figures(SimpleNamespace(t=t, x=x, discovery=law), [])
-assert "<img" in next(figures)
+assert len(next(figures)[0]) > 1000
 figures.close()
 print("interactive:", matplotlib.is_interactive())
 """

@@ -7,8 +7,9 @@ import pdoc
 import pytest
 from browser import CHROMIUM, Browser
 
-from vidsindy_lite.companion.site import build_site, heading_anchor, page_of
-from vidsindy_lite.stamp import PACKAGE
+from vidsindy_lite.companion.manifest import clear, sign
+from vidsindy_lite.companion.site import build_site, heading_anchor, page_of, reference_modules
+from vidsindy_lite.stamp import PACKAGE, write_file
 
 ROOT = PACKAGE.parent
 LAPTOP, PHONE = 1280, 390  # CSS pixels
@@ -93,16 +94,13 @@ GOOD = """<!DOCTYPE html><link rel='icon' href='data:,'>
 
 @pytest.mark.slow
 def test_the_reference_reads_all_annotations(tmp_path):
-    modules = [path.stem for path in PACKAGE.glob("*.py") if not path.stem.startswith("__")]
+    modules = reference_modules()
+    assert {"vidsindy_lite", "vidsindy_lite.dynamics.solver"} < set(modules)
     with warnings.catch_warnings():
         warnings.filterwarnings("error", message="Error parsing type annotation")
-        pdoc.pdoc(
-            PACKAGE.name,
-            *(f"{PACKAGE.name}.{name}" for name in modules),
-            output_directory=tmp_path,
-        )
+        pdoc.pdoc(PACKAGE.name, output_directory=tmp_path)
     for name in modules:
-        assert (tmp_path / PACKAGE.name / f"{name}.html").exists()
+        assert (tmp_path / f"{name.replace('.', '/')}.html").exists()
 
 
 @needs_browser
@@ -160,8 +158,32 @@ def test_anchors_are_those_of_a_code_host():
     assert heading_anchor("Figure_S1: what it <em>shows</em>") == "figure_s1-what-it-shows"
 
 
-def test_a_folder_of_something_else_is_not_emptied(tmp_path):
-    (tmp_path / "letter").write_text("dear")
-    with pytest.raises(ValueError, match="output: expected a new or empty folder or a site"):
+@pytest.mark.parametrize("name", ["letter", "site.css", "MANIFEST"])
+def test_a_folder_of_something_else_is_not_emptied(tmp_path, name):
+    (tmp_path / name).write_text("dear")
+    with pytest.raises(ValueError, match="output: must be a new folder or hold an earlier site"):
         build_site(tmp_path, ROOT)
-    assert (tmp_path / "letter").exists()
+    assert (tmp_path / name).read_text() == "dear"
+
+
+@pytest.mark.parametrize("name", ["vidsindy_lite", "notebooks", "figures", "figures/site"])
+def test_what_is_shown_is_not_written_over(tmp_path, name):
+    for folder in ("vidsindy_lite", "notebooks", "figures"):
+        (tmp_path / folder).mkdir()
+    with pytest.raises(ValueError, match="output: must not lie in what is shown"):
+        build_site(tmp_path / name, tmp_path)
+
+
+def test_only_what_was_signed_and_is_unchanged_is_removed(tmp_path):
+    for name in ("a", "folder/b"):
+        write_file(tmp_path / name, b"ours")
+    sign(tmp_path)
+    for name, content in (("folder/b", b"edited"), ("folder/c", b"theirs")):
+        before = (tmp_path / name).read_bytes() if (tmp_path / name).exists() else None
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ValueError, match=f"an earlier site, .* with {name}"):
+            clear(tmp_path, "site")
+        assert (tmp_path / "a").exists()
+        (tmp_path / name).unlink() if before is None else (tmp_path / name).write_bytes(before)
+    clear(tmp_path, "site")
+    assert not tmp_path.exists()

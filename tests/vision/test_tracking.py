@@ -13,18 +13,11 @@ from vidsindy_lite.cameras import Rig
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.vision.background import _shape
 from vidsindy_lite.vision.detector import LEAST, Detection
+from vidsindy_lite.vision.rendering import coverage, render, render_restless, render_video
+from vidsindy_lite.vision.scenery import BACKGROUNDS
+from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
 from vidsindy_lite.vision.tracking import check_detector, link, track
-from vidsindy_lite.vision.video import (
-    BACKGROUNDS,
-    COLOURS,
-    SHAPES,
-    Scene,
-    _coverage,
-    render,
-    render_restless,
-    render_video,
-    write_video,
-)
+from vidsindy_lite.vision.video import write_video
 
 pytestmark = pytest.mark.slow  # renders and tracks videos
 
@@ -118,7 +111,7 @@ def test_a_hidden_target_is_not_seen_and_a_partly_hidden_one_not_trusted(tmp_pat
 
 def shape_of(polygon, hidden=0):
     """The shape numbers of a polygon (m, 2) of which the last `hidden` pixels to the right lack."""
-    alpha, corner = _coverage(polygon)
+    alpha, corner = coverage(polygon)
     u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
     alpha[:, u + corner[0] > polygon[:, 0].max() - hidden] = 0
     centre = [alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v] / alpha.sum()

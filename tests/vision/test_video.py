@@ -8,20 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidsindy_lite.vision.video import (
-    BACKGROUNDS,
-    COLOURS,
-    SHAPES,
-    Scene,
-    read_frame,
-    read_video,
-    render,
-    render_labelled,
-    render_restless,
-    render_video,
-    video_info,
-    write_video,
-)
+from vidsindy_lite.vision.rendering import render, render_labelled, render_restless, render_video
+from vidsindy_lite.vision.scenery import BACKGROUNDS
+from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
+from vidsindy_lite.vision.video import read_frame, read_video, video_info, write_video
 
 SMALL = (96, 80)
 
@@ -185,7 +175,7 @@ def test_a_seed_gives_the_same_frames_and_another_seed_others():
 @pytest.mark.parametrize(
     ("name", "codec"), [("clip.mov", None), ("clip.mkv", None), ("clip.avi", "FFV1")]
 )
-@pytest.mark.parametrize("size", [SMALL, (128, 96), (102, 66)])
+@pytest.mark.parametrize("size", [SMALL, (128, 96), (101, 67), (1, 1)])
 def test_lossless_files_are_exact(tmp_path, name, codec, size):
     rng = np.random.default_rng(0)
     frames = [rng.integers(0, 256, (size[1], size[0], 3), np.uint8) for _ in range(5)]
@@ -292,8 +282,8 @@ def test_render_rejects(track, message):
         ("clip.txt", {}, ValueError, "path: must end in .mov or .mkv"),
         ("clip.mkv", {"codec": "XVID"}, ValueError, "codec: must be one of"),
         ("clip.mkv", {"codec": "mp4v"}, ValueError, "path: must end in .mp4"),
-        ("clip.mkv", {"fps": 0}, ValueError, r"fps: must be in \[0.01, 10000\], got 0"),
-        ("clip.mov", {"fps": 1e300}, ValueError, r"fps: must be in \[0.01, 10000\], got 1e\+300"),
+        ("clip.mkv", {"fps": 0}, ValueError, r"fps: must be in \[0.01, 1000\] for .mkv, got 0"),
+        ("clip.mov", {"fps": 1e300}, ValueError, r"fps: must be in .* for .mov, got 1e\+300"),
         ("clip.mov", {"fps": np.nan}, ValueError, "fps: must be a finite number, got nan"),
         ("none/clip.mkv", {}, FileNotFoundError, "path: the folder must exist"),
     ],
@@ -312,12 +302,6 @@ def test_write_video_rejects_frames(tmp_path, frame):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("shape", [(64, 65, 3), (65, 64, 3)])
-def test_write_video_rejects_odd_sizes(tmp_path, shape):
-    with pytest.raises(ValueError, match="frames: width and height must be even"):
-        write_video(tmp_path / "clip.mkv", [np.zeros(shape, np.uint8)])
-
-
 @pytest.mark.parametrize("read", [read_video, video_info])
 def test_reading_rejects(tmp_path, read):
     with pytest.raises(FileNotFoundError, match="path: no such video file"):
@@ -328,7 +312,7 @@ def test_reading_rejects(tmp_path, read):
         read(empty)
     text = tmp_path / "text.mkv"
     text.write_text("this is no video\n" * 100)
-    with pytest.raises(ValueError, match="path: must be a video file that OpenCV can read"):
+    with pytest.raises(ValueError, match="path: must be a video file that PyAV can read"):
         read(text)
     headers = tmp_path / "headers.avi"
     writer = cv2.VideoWriter(

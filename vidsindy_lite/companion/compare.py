@@ -4,13 +4,13 @@ import html
 import json
 import math
 import os
-import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 from ..checks import check_path
 from .artifacts import SECONDS
+from .manifest import clear, sign
 from .records import RUN_TIMES
 
 __all__ = ["differences", "side_by_side"]
@@ -83,11 +83,11 @@ def side_by_side(
     """
     output = check_path("output", output)
     for folder in (committed, regenerated):
-        if Path(folder).resolve().is_relative_to(output.resolve()):
-            raise ValueError(f"output: must not hold what is compared, got '{output}'")
-    found, earlier = differences(committed, regenerated), _earlier(output)
-    for file in earlier:
-        file.unlink()
+        ours, theirs = output.resolve(), Path(folder).resolve()
+        if ours.is_relative_to(theirs) or theirs.is_relative_to(ours):
+            raise ValueError(f"output: must not hold or lie in what is compared, got '{output}'")
+    found = differences(committed, regenerated)
+    clear(output, "comparison")
     page = []
     for side, folder in zip(SIDES, (committed, regenerated), strict=True):
         (output / side).mkdir(parents=True, exist_ok=True)
@@ -100,27 +100,8 @@ def side_by_side(
             if (output / side / f"{name}.png").exists():
                 page.append(f"<img src='{side}/{name}.png' alt='{side}' style='width: 49%'>\n")
     (output / PAGE).write_text(_HEAD + "".join(page), encoding="utf-8")
+    sign(output)
     return found
-
-
-def _earlier(output: Path) -> set[Path]:
-    """The files of an earlier comparison, checked to be all that is there."""
-    if output.exists() and not output.is_dir():
-        raise ValueError(f"output: must be a folder, got the file '{output}'")
-    page, folders, files = output / PAGE, [output / side for side in SIDES], set()
-    text = page.read_text("utf-8", errors="replace") if page.is_file() else ""
-    if text.startswith(_HEAD):
-        names = re.findall("<h2>(.*)</h2>", text)
-        files = {file for part in folders for name in names for file in part.glob(f"{name}.*")}
-        files.add(page)
-    strange = sorted(set(output.rglob("*")) - files - set(folders if files else ()))
-    if strange:
-        shown = ", ".join(str(path.relative_to(output)) for path in strange[:3])
-        raise ValueError(
-            f"output: must be a new folder or hold an earlier comparison, got '{output}' with "
-            f"{shown}"
-        )
-    return files
 
 
 def _numbers(name: str, folder: str | os.PathLike) -> dict[str, object]:

@@ -8,39 +8,28 @@ name only when it is complete.
 from __future__ import annotations
 
 import base64
-import html
 import io
 import json
+import os
 import tempfile
-from collections.abc import Mapping, Sequence
-from itertools import islice
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+import jinja2
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
+from ..arrays import Floats
 from ..cameras import DISAGREEMENT, residuals
 from ..checks import check_path
+from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
 from ..study.plots import plot_path, plot_residuals, plot_rig, plot_views
-from ..vision import read_video, video_info
+from ..vision import read_frame, video_info
 from .records import as_json
 
 PAGE, DATA, RIG = FILES = ("report.html", "result.json", "rig.toml")
-
-_STYLE = """\
-body { font: 16px/1.5 sans-serif; color: #222 }
-body { max-width: 62rem; margin: 2rem auto; padding: 0 1rem }
-pre { background: #f4f4f4; padding: .8rem; overflow-x: auto; font-size: 14px }
-table { border-collapse: collapse; margin: 1rem 0; font-size: 14px }
-table { display: block; overflow-x: auto }
-th, td { padding: .25rem .7rem; border-bottom: 1px solid #ddd; text-align: right }
-th:first-child, td:first-child { text-align: left }
-img { max-width: 100% }
-figure { margin: 1.5rem 0 } figcaption { font-style: italic }
-.verdict { padding: .6rem 1rem; border-left: .5rem solid #009e73; background: #eef8f4 }
-.suspect { border-color: #d55e00; background: #fdf1ea }
-"""
 
 
 def check_folder_is_free(folder: str | Path) -> Path:
@@ -49,11 +38,13 @@ def check_folder_is_free(folder: str | Path) -> Path:
     Raises
     ------
     ValueError
-        If something else is there, or the folder around it does not exist.
+        If something else is there, or the folder around it does not exist or is not writable.
     """
     folder = check_path("out", folder)
     if not folder.absolute().parent.is_dir():
         raise ValueError(f"out: the folder around it must exist, got '{folder}'")
+    if not os.access(folder.absolute().parent, os.W_OK):
+        raise ValueError(f"out: the folder around it must be writable, got '{folder}'")
     if folder.is_dir():
         strange = sorted({path.name for path in folder.iterdir()} - set(FILES))
         if strange:
@@ -106,13 +97,18 @@ def write_report(
         (new / PAGE).write_text(_page(found, paths, content), "utf-8")
         if folder.exists():
             folder.rename(old)
-        new.rename(folder)
+        try:
+            new.rename(folder)
+        except OSError:
+            if old.exists():
+                old.rename(folder)
+            raise
     return folder / PAGE
 
 
 def summary(
     found: VideoDiscovery, paths: Sequence[str | Path], options: Mapping[str, object] | None = None
-) -> dict:
+) -> dict[str, object]:
     """All that the report tells, as plain data for JSON; None in place of NaN.
 
     Parameters
@@ -156,7 +152,7 @@ def summary(
     return as_json(content, "found")
 
 
-def _law(found, frame, origin, errors):
+def _law(found: Discovery, frame: str, origin: Floats, errors: Floats) -> dict[str, object]:
     """One form of the law: as text, and term by term."""
     law, deviations = (
         (found.system, found.standard_errors)
@@ -178,98 +174,19 @@ def _law(found, frame, origin, errors):
 # ---------------------------------------------------------------------------------------- the page
 
 
-def _page(found, paths, content):
+def _page(found: VideoDiscovery, paths: Sequence[str | Path], content: Mapping[str, object]) -> str:
     """The report as one HTML page."""
-    native, data = content["law"]["native"], content["law"]["data"]
-    origin = ", ".join(
-        f"{value:.6g} ± {error:.1g}" if error else f"{value:.6g}"
-        for value, error in zip(native["origin"], native["origin_errors"], strict=True)
+    loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    pages = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, keep_trailing_newline=True
     )
-    options = ", ".join(f"{key} {value}" for key, value in content["options"].items())
-    parts = [
-        "<h1>The law of a moving target</h1>",
-        _verdict(found),
-        "<h2>The law</h2>",
-        f"<p>In the frame in which it is shortest, with its origin at ({origin}):</p>",
-        f"<pre>{html.escape(native['equations'])}</pre>",
-        "<p>In the frame of the rig file:</p>",
-        f"<pre>{html.escape(data['equations'])}</pre>",
-        "<p>After ± stands one standard error, if these terms are the right ones. Lengths are in "
-        "scene units, time in seconds of video unless other times were given.</p>",
-        _table(_term_rows(data)),
-        "<h2>The path</h2>",
-        *_figures(found, paths),
-        "<h2>The cameras</h2>",
-        _table(_camera_rows(content["cameras"])),
-        "<p>The lag is by how many frames of the first video a video starts later. Residuals are "
-        "the distances, in pixels, between the tracks and what the cameras see of the "
-        f"reconstructed target; above {DISAGREEMENT:g} in a tenth of the frames, the rig is "
-        "doubted.</p>",
-        "<h2>How it was found</h2>",
-        f"<p>{html.escape(options) or 'Default options'}. Estimated noise of the path: "
-        f"{', '.join(f'{value:.2g}' for value in content['noise'])} scene units in x, y, z. All "
-        f"numbers are in {DATA}; the learned cameras are also in {RIG}.</p>",
-    ]
-    body = "\n".join(parts)
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f"<title>Law of a moving target</title>\n<style>\n{_STYLE}</style>\n</head>\n"
-        f"<body>\n{body}\n</body>\n</html>\n"
+    return pages.get_template(PAGE).render(
+        content, figures=_figures(found, paths), limit=DISAGREEMENT, data_file=DATA, rig_file=RIG
     )
 
 
-def _verdict(found):
-    if found.status == "ok":
-        return (
-            '<div class="verdict"><strong>No reason for doubt was found.</strong> That is no '
-            "proof: the law was judged on the range of these videos alone.</div>"
-        )
-    doubts = "".join(f"<li>{html.escape(text)}</li>" for text in found.warnings)
-    return (
-        '<div class="verdict suspect"><strong>Suspect: do not trust this law as it is.</strong>'
-        f"<ul>{doubts}</ul></div>"
-    )
-
-
-def _term_rows(law):
-    return [
-        {
-            "equation": term["equation"], "term": term["term"],
-            "coefficient": f"{term['coefficient']:.6g}",
-            "standard error": f"{term['standard_error']:.2g}",
-            "relative (%)": f"{abs(100 * term['standard_error'] / term['coefficient']):.2g}",
-        }
-        for term in law["terms"]
-    ]  # fmt: skip
-
-
-def _camera_rows(cameras):
-    def shown(value, form):
-        return "unknown" if value is None else format(value, form)
-
-    return [
-        {
-            "video": c["video"], "frames": str(c["frames"]), "fps": f"{c['fps']:g}",
-            "camera": c["model"], "scale": f"{c['scale']:.6g}", "angle (rad)": f"{c['angle']:.5f}",
-            "lag (frames)": f"{c['lag']:.3f} ± {shown(c['lag_error'], '.1g')}" if i else "0",
-            "seen (%)": f"{100 * c['share_of_frames_seen']:.1f}",
-            "residual, rms (px)": shown(c["residual_rms"], ".3f"),
-            "nine in ten below (px)": shown(c["residual_of_nine_in_ten"], ".3f"),
-        }
-        for i, c in enumerate(cameras)
-    ]  # fmt: skip
-
-
-def _table(rows):
-    if not rows:
-        return "<p>No terms.</p>"
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])
-    lines = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row.values()) for row in rows]
-    return "\n".join(["<table>", *(f"<tr>{line}</tr>" for line in (head, *lines)), "</table>"])
-
-
-def _figures(found, paths):
-    """The figures as HTML, one after the other."""
+def _figures(found: VideoDiscovery, paths: Sequence[str | Path]) -> Iterator[tuple[str, str]]:
+    """The figures, each as a PNG in base64 with its caption, one after the other."""
     # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
     # switched on meanwhile off again: so this comes first.
     plt.draw_if_interactive()
@@ -298,22 +215,18 @@ def _figures(found, paths):
         )
 
 
-def _first_look(found, paths, instant):
+def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:
     """The frames of all videos at one instant of the first."""
     places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
-    images = [next(islice(read_video(path), frame, None)) for path, frame in places]
-    titles = [f"{path.name}, frame {frame}" for path, frame in places]
+    images = [read_frame(path, frame) for path, frame in places]
+    # A dollar sign would begin a formula.
+    titles = [f"{path.name}, frame {frame}".replace("$", r"\$") for path, frame in places]
     return plot_views(images, titles, found.tracks, instant)
 
 
-def _figure(figure, caption):
-    """A figure inside the page."""
+def _figure(figure: Figure, caption: str) -> tuple[str, str]:
+    """A figure as text, closed."""
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=110)
     plt.close(figure)
-    text = base64.b64encode(image.getvalue()).decode()
-    caption = html.escape(caption)
-    return (
-        f'<figure><img src="data:image/png;base64,{text}" alt="{caption}">'
-        f"<figcaption>{caption}</figcaption></figure>"
-    )
+    return base64.b64encode(image.getvalue()).decode(), caption

@@ -4,10 +4,10 @@ Everything lies in the folder, MathJax included, which draws the formulas: the p
 and no server.
 """
 
-import ast
 import os
 import re
 import shutil
+from importlib import import_module
 from pathlib import Path
 
 import jupyter_server_mathjax
@@ -18,6 +18,7 @@ from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from pygments.formatters import HtmlFormatter
 
 from ..stamp import PACKAGE, repository_root, write_file
+from .manifest import clear, sign
 from .run import find_notebooks
 
 __all__ = ["build_site", "heading_anchor", "page_of"]
@@ -62,7 +63,7 @@ MathJax.Hub.Config({{
 
 
 def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None) -> list[Path]:
-    """Write the pages and what they show into a folder, which is emptied before.
+    """Write the pages and what they show into a folder; an earlier site there is replaced.
 
     Parameters
     ----------
@@ -80,15 +81,16 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
     Raises
     ------
     ValueError
-        If the folder holds something else than a site.
+        If the folder holds anything but a site, or lies in what is shown.
     FileNotFoundError
         If there is no repository, or a notebook has not been executed yet.
     """
     root, output = repository_root(root), Path(output)
-    if output.exists() and any(output.iterdir()) and not (output / "site.css").exists():
-        raise ValueError(f"output: expected a new or empty folder or a site, got {str(output)!r}")
-    shutil.rmtree(output, ignore_errors=True)
-    style = (PACKAGE / "site.css").read_text("utf-8")
+    for shown in (root / "figures", root / "notebooks", root / PACKAGE.name):
+        if output.resolve().is_relative_to(shown):
+            raise ValueError(f"output: must not lie in what is shown, got '{output}'")
+    clear(output, "site")
+    style = (Path(__file__).parent / "site.css").read_text("utf-8")
     colours = HtmlFormatter(style="default").get_style_defs(".highlight")
     write_file(output / "site.css", f"{style}\n{colours}\n".encode())
     shutil.copytree(root / "figures", output / "figures")
@@ -103,6 +105,7 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
         source = root / folder.relative_to(output) / "README.md"
         _write_page(folder / "index.html", _html(source.read_text("utf-8")))
     _write_reference(output / "api")
+    sign(output)
     return sorted(output.rglob("*.html"))
 
 
@@ -157,20 +160,23 @@ def _notebook_body(path: Path) -> str:
 def _write_reference(folder: Path) -> None:
     """A page of each module, as pdoc makes it, and a list of them."""
     pdoc.render.configure(docformat="numpy", show_source=False, search=False)
-    modules = sorted(path for path in PACKAGE.glob("*.py") if not path.stem.startswith("__"))
-    names = [PACKAGE.name, *(f"{PACKAGE.name}.{path.stem}" for path in modules)]
-    pdoc.pdoc(*names, output_directory=folder)
+    pages = {name: f"{name.replace('.', '/')}.html" for name in reference_modules()}
+    pdoc.pdoc(PACKAGE.name, output_directory=folder)
     for page in folder.rglob("*.html"):  # a long name or signature scrolls, too
         narrow = "<style>main { overflow-x: auto; overflow-wrap: anywhere; }</style>\n</head>"
         write_file(page, page.read_text("utf-8").replace("</head>", narrow).encode())
     lines = [
-        f"* [{path.stem}]({PACKAGE.name}/{path.stem}.html): "
-        + ast.get_docstring(ast.parse(path.read_text("utf-8"))).split("\n\n")[0].replace("\n", " ")
-        for path in modules
+        f"* [{name}]({page}): " + (import_module(name).__doc__ or "").split("\n\n")[0]
+        for name, page in pages.items()
     ]
-    head = f"# Reference\n\n`import {PACKAGE.name}` has [these names]({PACKAGE.name}.html)."
-    page = f"{head} They and all others, by module:\n\n" + "\n".join(lines)
-    _write_page(folder / "index.html", _html(page))
+    _write_page(folder / "index.html", _html("# Reference\n\n" + "\n".join(lines)))
+
+
+def reference_modules() -> list[str]:
+    """Dotted names of the package's modules, rooms before what they hold."""
+    parts = [path.relative_to(PACKAGE).with_suffix("").parts for path in PACKAGE.rglob("*.py")]
+    names = {tuple(part for part in each if part != "__init__") for each in parts}
+    return [".".join((PACKAGE.name, *each)) for each in sorted(names - {("__main__",)})]
 
 
 def _write_page(path: Path, body: str) -> None:

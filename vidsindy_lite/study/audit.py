@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..arrays import Floats
 from ..checks import check_integer
 from ..dynamics import PolynomialSystem
 from .metrics import coefficients_in
@@ -81,7 +82,7 @@ def could_be(row: PublishedScore, true_terms: int, trials: int = 1) -> bool:
     return bool((printed & (low <= precision[1]) & (high >= precision[0])).any())
 
 
-def _precision_sums(true_terms: int, trials: int, most_false: int) -> tuple[np.ndarray, ...]:
+def _precision_sums(true_terms: int, trials: int, most_false: int) -> tuple[Floats, ...]:
     """Least and largest sum of precisions, by total of true and of false terms found."""
     shape = (trials * true_terms + 1, most_false + 1)
     low, high = np.full(shape, np.inf), np.full(shape, -np.inf)
@@ -117,7 +118,7 @@ def rounding_reach(law: PolynomialSystem, truth: PolynomialSystem) -> float:
 
 
 def seen_in(
-    law: PolynomialSystem, scale: np.ndarray, offset: np.ndarray, clock: float = 1.0
+    law: PolynomialSystem, scale: Floats, offset: Floats, clock: float = 1.0
 ) -> PolynomialSystem:
     """The same motion in stretched and shifted coordinates, by a clock of other units.
 
@@ -161,8 +162,8 @@ class Coordinates:
         the reference frame: an l2 error after the coordinates are accounted for.
     """
 
-    scale: np.ndarray
-    offset: np.ndarray
+    scale: Floats
+    offset: Floats
     clock: float
     law: PolynomialSystem
     misfit: float
@@ -171,7 +172,7 @@ class Coordinates:
 def fit_coordinates(
     printed: PolynomialSystem,
     native: PolynomialSystem,
-    offset: np.ndarray,
+    offset: Floats,
     free_clock: bool = False,
 ) -> Coordinates:
     """Least-squares stretch and shift of each axis that turn a true law into a printed one.
@@ -197,11 +198,11 @@ def fit_coordinates(
     library = np.unique(np.concatenate([printed.exponents, truth.exponents]), axis=0)
     target, true = coefficients_in(printed, library), coefficients_in(truth, library)
 
-    def law(parameters):
+    def law(parameters: Floats) -> PolynomialSystem:
         scale, clock = np.exp(parameters[:d]), np.exp(parameters[2 * d :].sum())
         return seen_in(native, scale, parameters[d : 2 * d], clock)
 
-    def misfit(parameters):
+    def misfit(parameters: Floats) -> Floats:
         return ((coefficients_in(law(parameters), library) - target) / norm).ravel()
 
     both = (true != 0) & (target / np.where(true, true, 1) > 0)

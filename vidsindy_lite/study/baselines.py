@@ -25,6 +25,7 @@ import pysindy
 from pysindy.optimizers import BaseOptimizer
 from sklearn import config_context
 
+from ..arrays import Floats
 from ..checks import check_integer
 from ..dynamics import (
     PolynomialSystem,
@@ -61,11 +62,11 @@ WEAK_WIDTH = 0.05
 Half of pysindy's default: alike on clean data, better under noise, erratic all the same.
 """
 
-Rows = tuple[np.ndarray, np.ndarray]
+Rows = tuple[Floats, Floats]
 """Values of the candidate terms (k, l) and of the derivatives (k, d): a linear regression."""
 
 
-def stlsq(t: np.ndarray, x: np.ndarray, degree: int = 3, ridge: float = RIDGE) -> PolynomialSystem:
+def stlsq(t: Floats, x: Floats, degree: int = 3, ridge: float = RIDGE) -> PolynomialSystem:
     """PySINDy: central differences, then sequentially thresholded least squares.
 
     Parameters
@@ -100,7 +101,7 @@ def stlsq(t: np.ndarray, x: np.ndarray, degree: int = 3, ridge: float = RIDGE) -
     )
 
 
-def ensemble(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> PolynomialSystem:
+def ensemble(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSystem:
     """E-SINDy: the median of 20 fits like `stlsq` to resampled rows (bagging).
 
     Parameters
@@ -124,7 +125,7 @@ def ensemble(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> Po
         return _discover(t, x, library, lambda s: _difference_rows(s, library), bagged)
 
 
-def weak(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> PolynomialSystem:
+def weak(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSystem:
     """WeakSINDy: integrals over random windows in place of derivatives.
 
     The result changes with the windows: report several seeds.
@@ -149,7 +150,7 @@ def weak(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> Polyno
         )
 
 
-def model_a(t: np.ndarray, x: np.ndarray, degree: int = 3, seed: int = 0) -> PolynomialSystem:
+def model_a(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSystem:
     """The paper's Model-A: a cubic spline and its slope, then SINDy (paper: Table 2).
 
     The spline smooths as much as generalised cross-validation asks for; on clean data it
@@ -184,8 +185,8 @@ BASELINES: dict[str, Callable[..., PolynomialSystem]] = {
 
 
 def _discover(
-    t: np.ndarray,
-    x: np.ndarray,
+    t: Floats,
+    x: Floats,
     library: pysindy.PolynomialLibrary,
     rows: Callable[[Sequence[Trajectory]], Rows],
     optimizer: Callable[[float], BaseOptimizer],
@@ -194,7 +195,7 @@ def _discover(
     record = check_trajectory(t, x)
     library.fit(record[1])
     split = int(TRAINING * len(record[0]))
-    first, last = tuple(part[:split] for part in record), tuple(part[split:] for part in record)
+    first, last = (record[0][:split], record[1][:split]), (record[0][split:], record[1][split:])
     step = LONGEST_STEP * typical_step([record])
     everything, training, held_out = (rows(_segments(part, step)) for part in (record, first, last))
     errors = np.array([_error(_fit(optimizer(h), training), held_out) for h in THRESHOLDS])
@@ -214,7 +215,7 @@ def _segments(record: Trajectory, longest_step: float) -> list[Trajectory]:
     return segments
 
 
-def _error(coefficients: np.ndarray, rows: Rows) -> float:
+def _error(coefficients: Floats, rows: Rows) -> float:
     """Root mean square error of the derivatives over their spread, all equations alike."""
     terms, derivatives = rows
     squares = ((derivatives - terms @ coefficients) ** 2).mean(axis=0)
@@ -226,7 +227,7 @@ def _least_squares(threshold: float, ridge: float = RIDGE) -> BaseOptimizer:
     return pysindy.STLSQ(threshold=threshold, alpha=ridge)
 
 
-def _fit(optimizer: BaseOptimizer, rows: Rows) -> np.ndarray:
+def _fit(optimizer: BaseOptimizer, rows: Rows) -> Floats:
     # Without the checks of arguments, which take longer than such small regressions.
     unchecked = config_context(skip_parameter_validation=True, assume_finite=True)
     with unchecked, warnings.catch_warnings():
@@ -236,7 +237,7 @@ def _fit(optimizer: BaseOptimizer, rows: Rows) -> np.ndarray:
         return optimizer.fit(*rows).coef_.T
 
 
-def _terms(library: pysindy.PolynomialLibrary, x: np.ndarray) -> np.ndarray:
+def _terms(library: pysindy.PolynomialLibrary, x: Floats) -> Floats:
     return np.asarray(library.transform(x))
 
 

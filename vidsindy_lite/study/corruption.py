@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays import Floats
 from ..checks import check_array, check_instance, check_integer, check_number
 
 BLOCK = 0.01
 """Length of a random block, as a fraction of the record."""
 
 
-def add_noise(x: np.ndarray, level: float, rng: np.random.Generator) -> np.ndarray:
+def add_noise(x: Floats, level: float, rng: np.random.Generator) -> Floats:
     """Add Gaussian noise.
 
     Parameters
@@ -42,7 +43,7 @@ def add_noise(x: np.ndarray, level: float, rng: np.random.Generator) -> np.ndarr
     return x + level * np.nanstd(x, axis=0) * rng.standard_normal(x.shape)
 
 
-def drop_blocks(x: np.ndarray, rate: float, rng: np.random.Generator) -> np.ndarray:
+def drop_blocks(x: Floats, rate: float, rng: np.random.Generator) -> Floats:
     """Hide random blocks (paper: "random block missing").
 
     Parameters
@@ -67,7 +68,7 @@ def drop_blocks(x: np.ndarray, rate: float, rng: np.random.Generator) -> np.ndar
     return _drop(x, rate, max(1, round(_rate(rate) / BLOCK)), rng)
 
 
-def drop_fibers(x: np.ndarray, rate: float, rng: np.random.Generator, gaps: int = 5) -> np.ndarray:
+def drop_fibers(x: Floats, rate: float, rng: np.random.Generator, gaps: int = 5) -> Floats:
     """Hide a few long stretches (paper: "fiber missing"); see `drop_blocks`.
 
     Parameters
@@ -84,7 +85,7 @@ def drop_fibers(x: np.ndarray, rate: float, rng: np.random.Generator, gaps: int 
     return _drop(x, _rate(rate), check_integer("gaps", gaps, 1), rng)
 
 
-def _drop(x: np.ndarray, rate: float, count: int, rng: np.random.Generator) -> np.ndarray:
+def _drop(x: Floats, rate: float, count: int, rng: np.random.Generator) -> Floats:
     x = _states(x).copy()
     check_instance("rng", rng, np.random.Generator)
     total = round(rate * len(x))
@@ -112,7 +113,7 @@ def _rate(rate: float) -> float:
     return rate
 
 
-def _states(x: np.ndarray) -> np.ndarray:
+def _states(x: Floats) -> Floats:
     x = check_array("x", x)
     if x.ndim != 2 or not len(x):
         raise ValueError(f"x: must have shape (n, d) with n of at least 1, got {x.shape}")

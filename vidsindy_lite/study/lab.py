@@ -10,10 +10,14 @@ All lengths are in millimetres.
 Paper: Appendix "Lab Experiment on Trajectory Extraction".
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ..arrays import Floats
 from ..cameras import (
     OrthographicCamera,
     PerspectiveCamera,
@@ -24,10 +28,11 @@ from ..cameras import (
     rotation_to_z,
 )
 from ..vision import Scene, render_video, track
+from .published import LAB
 
-MARKED = np.array([180.0, 300.0, 26.25])  # where the paper compares
-IDENTIFIED = np.array([182.92, 291.81, 24.50])  # what it finds there
-RADIUS = MARKED[2]  # a ball on the table has its centre there
+MARKED = np.array(LAB.truth)  # where the paper compares
+IDENTIFIED = np.array(LAB.found)  # what it finds there
+RADIUS = float(MARKED[2])  # a ball on the table has its centre there
 MIDDLE = np.array([350.0, 350.0, 0.0])  # of the part of the table that the cameras look at
 FPS = 25
 
@@ -41,7 +46,7 @@ _PATHS = (
 _SLOWING = 60.0  # mm/s^2: rolling resistance of 0.6 % of the ball's weight
 
 
-def paths(frames=50):
+def paths(frames: int = 50) -> Floats:
     """Centre of the ball on three straight paths, on which it rolls and slows down.
 
     Parameters
@@ -57,12 +62,13 @@ def paths(frames=50):
     """
     t = (np.arange(frames)[:, None] - frames // 2) / FPS
     x = np.full((len(_PATHS), frames, 3), RADIUS)
-    for path, (middle, velocity) in zip(x, _PATHS, strict=True):
+    for path, middle_and_velocity in zip(x, _PATHS, strict=True):
+        middle, velocity = np.array(middle_and_velocity)
         path[:, :2] = middle + (t - t**2 * _SLOWING / (2 * np.linalg.norm(velocity))) * velocity
     return x
 
 
-def cameras(distance=1.0):
+def cameras(distance: float = 1.0) -> Rig:
     """Three perspective cameras around the table, all calibrated: the truth.
 
     Parameters
@@ -76,16 +82,18 @@ def cameras(distance=1.0):
     Rig
     """
     return Rig(
-        _camera(azimuth, elevation, distance * reach, distance * focal, roll)
-        for azimuth, elevation, reach, focal, roll in (
-            (-80.0, 35.0, 1900.0, 1100.0, 3.0),
-            (40.0, 30.0, 2200.0, 1250.0, -5.0),
-            (160.0, 40.0, 2000.0, 1150.0, 8.0),
+        tuple(
+            _camera(azimuth, elevation, distance * reach, distance * focal, roll)
+            for azimuth, elevation, reach, focal, roll in (
+                (-80.0, 35.0, 1900.0, 1100.0, 3.0),
+                (40.0, 30.0, 2200.0, 1250.0, -5.0),
+                (160.0, 40.0, 2000.0, 1150.0, 8.0),
+            )
         )
     )
 
 
-def random_cameras(rng):
+def random_cameras(rng: np.random.Generator) -> Rig:
     """Three cameras as someone else might have put them around the same table.
 
     Distances of 1.2 to 3 m, 20 to 50 degrees above the table, at least 60 degrees apart around it,
@@ -104,14 +112,18 @@ def random_cameras(rng):
         if np.diff(azimuths, append=azimuths[0] + 360).min() >= 60:
             break
     return Rig(
-        _camera(azimuth, rng.uniform(20, 50), reach, 0.575 * reach, rng.uniform(-10, 10))
-        for azimuth, reach in zip(
-            rng.permutation(azimuths), rng.uniform(1200, 3000, 3), strict=True
+        tuple(
+            _camera(azimuth, rng.uniform(20, 50), reach, 0.575 * reach, rng.uniform(-10, 10))
+            for azimuth, reach in zip(
+                rng.permutation(azimuths), rng.uniform(1200, 3000, 3), strict=True
+            )
         )
     )
 
 
-def _camera(azimuth, elevation, reach, focal, roll):
+def _camera(
+    azimuth: float, elevation: float, reach: float, focal: float, roll: float
+) -> PerspectiveCamera:
     """A camera that looks at the middle, seen from there in the given direction (degrees)."""
     a, e, roll = np.deg2rad([azimuth, elevation, roll])
     normal = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
@@ -124,7 +136,7 @@ def _camera(azimuth, elevation, reach, focal, roll):
     )
 
 
-def orthographic(rig):
+def orthographic(rig: Rig) -> Rig:
     """The same rig as the paper's model has it: one pixel measures the same at every distance.
 
     Each camera is calibrated at the middle of the table.
@@ -140,18 +152,20 @@ def orthographic(rig):
         Of orthographic cameras.
     """
     return Rig(
-        OrthographicCamera(
-            position=c.position,
-            normal=c.normal,
-            scale=c.scale * (c.normal @ (c.position - MIDDLE)),
-            angle=c.angle,
-            image_size=c.image_size,
+        tuple(
+            OrthographicCamera(
+                position=c.position,
+                normal=c.normal,
+                scale=c.scale * (c.normal @ (c.position - MIDDLE)),
+                angle=c.angle,
+                image_size=c.image_size,
+            )
+            for c in rig.cameras
         )
-        for c in rig.cameras
     )
 
 
-def orthographic_error(rig, flat, x):
+def orthographic_error(rig: Rig, flat: Rig, x: Floats) -> Floats:
     """First-order error of a path that orthographic cameras reconstruct from perspective images.
 
     A point that lies by delta nearer to the camera than the middle, at the distance D, is drawn
@@ -179,14 +193,14 @@ def orthographic_error(rig, flat, x):
     for camera, (growth, turn) in zip(rig.cameras, wrong, strict=True):
         away = camera.normal @ (camera.position - MIDDLE)
         growth = growth + (x - MIDDLE) @ camera.normal / away
-        across = (x - camera.position) @ camera.rows.T
+        across = (x - np.asarray(camera.position)) @ camera.rows.T
         pixel = camera.scale * away
         rows.append(camera.rows / pixel)
         views.append((growth[:, None] * across + turn * across[:, ::-1] * (1, -1)) / pixel)
     return np.hstack(views) @ np.linalg.pinv(np.vstack(rows)).T
 
 
-def film_ball(rig, x, folder, seed=0):
+def film_ball(rig: Rig, x: Floats, folder: str | Path, seed: int = 0) -> list[Floats]:
     """Film each path with every camera and track the ball.
 
     The ball is drawn as the ellipse that a perspective image of a ball is, in one colour: no
@@ -209,7 +223,7 @@ def film_ball(rig, x, folder, seed=0):
         A track per camera, of one path after the other.
     """
     tracks = []
-    for i, camera in enumerate(rig.cameras):
+    for i, camera in enumerate(_perspective(rig)):
         scene = Scene(background="plain", image_size=camera.image_size)
         parts = []
         for k, path in enumerate(x):
@@ -223,7 +237,9 @@ def film_ball(rig, x, folder, seed=0):
     return tracks
 
 
-def learn_from_ball(tracks, rig, radius=RADIUS, rounds=3):
+def learn_from_ball(
+    tracks: Sequence[Floats], rig: Rig, radius: float = RADIUS, rounds: int = 3
+) -> tuple[Rig, Floats]:
     """Learn the cameras from centroids of a ball's images, which are not images of its centre.
 
     How far the two differ follows from the ball's radius and place (`ball_image`). So: learn and
@@ -251,6 +267,11 @@ def learn_from_ball(tracks, rig, radius=RADIUS, rounds=3):
         x = reconstruct(corrected, learned)
         corrected = [
             pixels - camera.ball_image(x, radius)[0] + camera.project(x)
-            for pixels, camera in zip(tracks, learned.cameras, strict=True)
+            for pixels, camera in zip(tracks, _perspective(learned), strict=True)
         ]
     return learned, x
+
+
+def _perspective(rig: Rig) -> list[PerspectiveCamera]:
+    """The cameras of a rig that has only such ones."""
+    return [camera for camera in rig.cameras if isinstance(camera, PerspectiveCamera)]

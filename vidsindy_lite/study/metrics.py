@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -83,22 +84,22 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
     >>> score(truth, truth).exact
     True
     """
-    found = getattr(found, "system", found)
-    for name, law in (("found", found), ("truth", truth)):
-        if not isinstance(law, PolynomialSystem):
+    law: Any = getattr(found, "system", found)  # of which type, is checked now
+    for name, one in (("found", law), ("truth", truth)):
+        if not isinstance(one, PolynomialSystem):
             raise ValueError(
                 f"{name}: must be a PolynomialSystem (what was found comes first, the truth "
-                f"second), got {law!r:.60}"
+                f"second), got {one!r:.60}"
             )
-    if found.d != truth.d:
-        raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {found.d}")
+    if law.d != truth.d:
+        raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {law.d}")
     if not truth.support.any():
         raise ValueError("truth: must have at least one term, got none")
-    library = np.unique(np.concatenate([found.exponents, truth.exponents]), axis=0)
-    guess, true = coefficients_in(found, library), coefficients_in(truth, library)
+    library = np.unique(np.concatenate([law.exponents, truth.exponents]), axis=0)
+    guess, true = coefficients_in(law, library), coefficients_in(truth, library)
     hits = int(((guess != 0) & (true != 0)).sum())
     claimed, actual = int(np.count_nonzero(guess)), int(np.count_nonzero(true))
-    here = coefficients_in(found, truth.exponents)
+    here = coefficients_in(law, truth.exponents)
     errors = np.full(truth.coefficients.shape, np.nan)
     support = truth.support
     errors[support] = np.abs(here[support] / truth.coefficients[support] - 1)

@@ -30,6 +30,7 @@ import numpy as np
 import torch
 from scipy.linalg import solveh_banded
 
+from ..arrays import Floats, Ints
 from ..checks import check_integer
 from ..dynamics import (
     DEGREE,
@@ -68,37 +69,16 @@ class PaperDiscovery:
 
     system: PolynomialSystem
     native: PolynomialSystem
-    offset: np.ndarray
+    offset: Floats
     history: tuple[dict[str, float], ...]
 
 
-def discover_paper(
-    t: np.ndarray,
-    x: np.ndarray,
-    degree: int = 3,
-    seed: int = 0,
-    knots_per_sample: float = 1.0,
-    collocation_per_knot: int = 5,
-    physics_weight: float = 1.0,
-    sparsity_weight: float = 5e-3,
-    pretraining: int = 2000,
-    alternations: int = 5,
-    epochs: int = 1000,
-    learning_rate: float = 0.01,
-    prune: float = 0.1,
-) -> PaperDiscovery:
-    """Discover a law with the paper's alternating direction optimisation (Eqs. 7-10, S8-S9).
+@dataclass(frozen=True)
+class PaperSettings:
+    """Hyperparameters of `discover_paper`.
 
     Parameters
     ----------
-    t : array_like, shape (n,)
-        Increasing times.
-    x : array_like, shape (n, d)
-        States; a row with a NaN is missing. The spline runs on through a gap, held by physics.
-    degree : int
-        Highest degree of the candidate terms. Paper: 3.
-    seed : int
-        Of the collocation times and of the rows that STRidge holds out.
     knots_per_sample : float
         Knot spans per sample. The paper does not say; PiSL: 2.5 at 20 samples a time unit.
     collocation_per_knot : int
@@ -125,6 +105,42 @@ def discover_paper(
     prune : float
         Coefficients of the final law below this magnitude, in units of the data, are cut. Paper:
         "a small value"; PiSL: 0.1.
+    """
+
+    knots_per_sample: float = 1.0
+    collocation_per_knot: int = 5
+    physics_weight: float = 1.0
+    sparsity_weight: float = 5e-3
+    pretraining: int = 2000
+    alternations: int = 5
+    epochs: int = 1000
+    learning_rate: float = 0.01
+    prune: float = 0.1
+
+    def __post_init__(self) -> None:
+        least = {"knots_per_sample": 0.1, "collocation_per_knot": 1, "pretraining": 1, "epochs": 1}
+        for name, bound in least.items():
+            if not getattr(self, name) >= bound:
+                raise ValueError(f"{name}: must be at least {bound}, got {getattr(self, name)}")
+
+
+def discover_paper(
+    t: Floats, x: Floats, degree: int = 3, seed: int = 0, **settings: float
+) -> PaperDiscovery:
+    """Discover a law with the paper's alternating direction optimisation (Eqs. 7-10, S8-S9).
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Increasing times.
+    x : array_like, shape (n, d)
+        States; a row with a NaN is missing. The spline runs on through a gap, held by physics.
+    degree : int
+        Highest degree of the candidate terms. Paper: 3.
+    seed : int
+        Of the collocation times and of the rows that STRidge holds out.
+    **settings
+        Fields of `PaperSettings`.
 
     Returns
     -------
@@ -136,40 +152,41 @@ def discover_paper(
         If the input is malformed (see `dynamics.check_trajectory`), a coordinate does not move, or
         there are fewer samples than candidate terms, or a hyperparameter is too small.
     """
+    chosen = PaperSettings(**settings)  # type: ignore[arg-type]
     t, x = check_trajectory(t, x)
     exponents = monomial_exponents(x.shape[1], degree)
     if len(t) < len(exponents):
         raise ValueError(f"x: must hold at least {len(exponents)} samples, got {len(t)}")
     if not (np.ptp(x, axis=0) > 0).all():
         raise ValueError(f"x: every coordinate must move, got ranges {np.ptp(x, axis=0)}")
-    for name, value, least in (
-        ("knots_per_sample", knots_per_sample, 0.1),
-        ("collocation_per_knot", collocation_per_knot, 1),
-        ("pretraining", pretraining, 1),
-        ("epochs", epochs, 1),
-    ):
-        if not value >= least:
-            raise ValueError(f"{name}: must be at least {least}, got {value}")
     rng = np.random.default_rng(check_integer("seed", seed))
-    spans = max(1, round(knots_per_sample * (len(t) - 1)))
-    fit = _Fit(t, x, exponents, spans, collocation_per_knot, physics_weight, rng)
-    fit.descend(pretraining, learning_rate)
-    for _ in range(alternations):
+    spans = max(1, round(chosen.knots_per_sample * (len(t) - 1)))
+    fit = _Fit(t, x, exponents, spans, chosen.collocation_per_knot, chosen.physics_weight, rng)
+    fit.descend(chosen.pretraining, chosen.learning_rate)
+    for _ in range(chosen.alternations):
         before = fit.active
         curve, slope = fit.collocation()
-        fit.restart(
-            stridge(monomials(curve, exponents), slope, rng, sparsity_weight=sparsity_weight)
-        )
-        fit.descend(epochs, learning_rate)
+        terms = monomials(curve, exponents)
+        fit.restart(stridge(terms, slope, rng, sparsity_weight=chosen.sparsity_weight))
+        fit.descend(chosen.epochs, chosen.learning_rate)
         if (fit.active == before).all():
             break
-    return fit.result(prune)
+    return fit.result(chosen.prune)
 
 
 class _Fit:
     """Spline, coefficients and offset in standardised units, with the paper's two losses."""
 
-    def __init__(self, t, x, exponents, spans, per_span, physics_weight, rng) -> None:
+    def __init__(
+        self,
+        t: Floats,
+        x: Floats,
+        exponents: Ints,
+        spans: int,
+        per_span: int,
+        physics_weight: float,
+        rng: np.random.Generator,
+    ) -> None:
         self.began = time.perf_counter()
         self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         self.exponents = exponents
@@ -200,18 +217,19 @@ class _Fit:
         self.control_points = self._tensor(control).requires_grad_()
         self.offset = self._tensor(np.zeros(x.shape[1])).requires_grad_()
         curve, slope = self.collocation()
-        self.restart(np.linalg.lstsq(monomials(curve, exponents), slope, rcond=None)[0])
+        fitted = np.linalg.lstsq(monomials(curve, exponents), slope, rcond=None)[0]
+        self.restart(fitted.astype(float))
 
-    def _tensor(self, array: np.ndarray) -> torch.Tensor:
+    def _tensor(self, array: Floats) -> torch.Tensor:
         return torch.tensor(array, dtype=torch.float64, device=self.device)
 
-    def restart(self, coefficients: np.ndarray) -> None:
+    def restart(self, coefficients: Floats) -> None:
         """Set the coefficients; from now on only those that are not zero are learned."""
         self.active = coefficients != 0
         self.mask = self._tensor(self.active)
         self.coefficients = self._tensor(coefficients).requires_grad_()
 
-    def collocation(self) -> tuple[np.ndarray, np.ndarray]:
+    def collocation(self) -> tuple[Floats, Floats]:
         """Curve without offset and its slope at the collocation times, each (k, d)."""
         with torch.no_grad():
             control = self.control_points
@@ -274,7 +292,7 @@ def _curve(basis: torch.Tensor, control_points: torch.Tensor) -> torch.Tensor:
     return (basis @ windows).reshape(-1, control_points.shape[1])
 
 
-def _monomials(x: torch.Tensor, exponents: np.ndarray) -> torch.Tensor:
+def _monomials(x: torch.Tensor, exponents: Ints) -> torch.Tensor:
     """Monomials of points (n, d), shape (n, l): as `polynomials.monomials`, for autograd."""
     columns = []
     for powers in exponents:
@@ -286,7 +304,7 @@ def _monomials(x: torch.Tensor, exponents: np.ndarray) -> torch.Tensor:
     return torch.stack(columns, dim=1) if columns else x.new_zeros((len(x), 0))
 
 
-def _first_curve(first: np.ndarray, values: np.ndarray, x: np.ndarray, r: int) -> np.ndarray:
+def _first_curve(first: Ints, values: Floats, x: Floats, r: int) -> Floats:
     """Control points (r, d) of a spline through the data, smooth where there are none."""
     band = np.zeros((DEGREE + 1, r))
     right = np.zeros((r, x.shape[1]))
@@ -302,22 +320,21 @@ def _first_curve(first: np.ndarray, values: np.ndarray, x: np.ndarray, r: int) -
 
 
 def stridge(
-    library: np.ndarray,
-    derivative: np.ndarray,
+    library: Floats,
+    derivative: Floats,
     rng: np.random.Generator,
     ridge: float = 1e-6,
     sparsity_weight: float = 5e-3,
     step: float = 1e-2,
     trials: int = 100,
-) -> np.ndarray:
+) -> Floats:
     """Sequentially thresholded ridge regression with an adaptive threshold (paper: Eq. S8).
 
-    Ridge regression, columns below a threshold cut, again until none is cut. The threshold is
-    raised while the loss on held-out rows, ``|residual| + sparsity_weight |coefficients|_0``, does
-    not grow; when it grows the threshold goes back and its step shrinks. A plain least squares on
-    all rows ends it. This is the training loop of Rudy et al. (2017), but for the residual, here a
-    root mean square, and the condition number, left out of the price of a term: the price then
-    means the same for any number of rows and any library.
+    Ridge regression, columns below a threshold cut, again until none is. The threshold is raised
+    while the loss on held-out rows, ``|residual| + sparsity_weight |coefficients|_0``, does not
+    grow, else it goes back in smaller steps; a plain least squares on all rows ends it. So do Rudy
+    et al. (2017), but the residual is a root mean square here, and the condition number is left
+    out of the price of a term, which then means the same for any rows and library.
 
     Parameters
     ----------
@@ -372,19 +389,29 @@ def stridge(
     return np.stack(columns, axis=1) * speed / size[:, None]
 
 
-def _root_mean_square(columns: np.ndarray) -> np.ndarray:
+def _root_mean_square(columns: Floats) -> Floats:
     """Scale of each column; 1 for a column of zeros."""
     scale = np.sqrt((columns**2).mean(axis=0))
     return np.where(scale > 0, scale, 1.0)
 
 
-def _stridge_column(scaled, target, training, held_out, ridge, price, step, trials) -> np.ndarray:
+def _stridge_column(
+    scaled: Floats,
+    target: Floats,
+    training: Ints,
+    held_out: Ints,
+    ridge: float,
+    price: float,
+    step: float,
+    trials: int,
+) -> Floats:
+    """Sparse coefficients of one equation, in scaled columns."""
     gram = scaled[training].T @ scaled[training] / len(training)
     pull = scaled[training].T @ target[training] / len(training)
 
-    def loss(coefficients):
+    def loss(coefficients: Floats) -> float:
         residual = target[held_out] - scaled[held_out] @ coefficients
-        return np.sqrt((residual**2).mean()) + price * np.count_nonzero(coefficients)
+        return float(np.sqrt((residual**2).mean())) + price * np.count_nonzero(coefficients)
 
     best = _thresholded(gram, pull, ridge, 0.0)
     lowest, threshold = loss(best), step
@@ -404,7 +431,8 @@ def _stridge_column(scaled, target, training, held_out, ridge, price, step, tria
     return refit
 
 
-def _thresholded(gram, pull, ridge, threshold) -> np.ndarray:
+def _thresholded(gram: Floats, pull: Floats, ridge: float, threshold: float) -> Floats:
+    """Ridge regression; columns below the threshold are cut, again until none is."""
     support = np.ones(len(pull), dtype=bool)
     coefficients = np.zeros(len(pull))
     while support.any():

@@ -20,10 +20,10 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 from uuid import uuid4
 
 from filelock import FileLock
@@ -140,7 +140,7 @@ def _is_hashable(task: object) -> bool:
     return True
 
 
-def _remember(function: Callable, task: object, file: Path | None) -> object:
+def _remember(function: Callable[[Task], Result], task: Task, file: Path | None) -> Result:
     if file is None:
         return function(task)
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -153,8 +153,8 @@ def _remember(function: Callable, task: object, file: Path | None) -> object:
 
 
 def _call(
-    function: Callable, number: int, task: object, file: Path | None = None
-) -> tuple[int, object]:
+    function: Callable[[Task], Result], number: int, task: Task, file: Path | None = None
+) -> tuple[int, Result]:
     try:
         return number, _remember(function, task, file)
     except Exception as error:
@@ -164,8 +164,8 @@ def _call(
 
 
 def _here(
-    function: Callable, todo: dict[int, object], jobs: int, files: dict[int, Path]
-) -> Iterator[tuple[int, object]]:
+    function: Callable[[Task], Result], todo: Mapping[int, Task], jobs: int, files: dict[int, Path]
+) -> Iterator[tuple[int, Result]]:
     """Numbers and results of the tasks as they come, from processes of this machine."""
     import cv2
     from joblib import Parallel, delayed, parallel_config
@@ -185,8 +185,11 @@ def _here(
 
 
 def _on_cluster(
-    function: Callable, todo: dict[int, object], address: str, files: dict[int, Path]
-) -> Iterator[tuple[int, object]]:
+    function: Callable[[Task], Result],
+    todo: Mapping[int, Task],
+    address: str,
+    files: dict[int, Path],
+) -> Iterator[tuple[int, Result]]:
     """Numbers and results of the tasks as they come, from the workers of a Dask cluster.
 
     The workers need not see the files of this machine, so the results are stored here. Not by
@@ -239,7 +242,7 @@ def _store(file: Path, result: object) -> None:
     write_file(file, content + hashlib.sha256(content).digest())
 
 
-def _stored(files: dict[int, Path]) -> dict[int, object]:
+def _stored(files: Mapping[int, Path]) -> dict[int, Any]:
     """The results that are stored as they were written: the digest at the end says so."""
     results = {}
     for number, file in files.items():

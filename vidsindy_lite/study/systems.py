@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Floats
 from ..checks import check_integer, check_positive, check_vector
 from ..dynamics import PolynomialSystem
+
+Terms = dict[str, float]  # coefficients of an equation by the name of the term
 
 REFERENCE_OFFSET = (10.0, 10.0, 0.0)
 """Shift from a system's native frame to the paper's reference frame, in scene units.
@@ -41,25 +45,24 @@ class Benchmark(PolynomialSystem):
         check_vector("x0", self.x0, self.d)
         check_positive("period", self.period)
 
-    def shift(self, offset) -> Benchmark:
+    def shift(self, offset: Sequence[float] | Floats) -> Benchmark:
         """The same experiment seen from a shifted origin; see `PolynomialSystem.shift`."""
-        shifted = super().shift(offset)
-        return replace(shifted, x0=tuple(float(v) for v in np.add(self.x0, offset)))
+        law = super().shift(offset)
+        x0 = tuple(float(v) for v in np.add(self.x0, offset))
+        return Benchmark(law.names, law.exponents, law.coefficients, self.name, x0, self.period)
 
-    def times(self, n: int = 1500, samples_per_period: float = 100) -> np.ndarray:
+    def times(self, n: int = 1500, samples_per_period: float = 100) -> Floats:
         """Times of ``n`` video frames, shape (n,), starting at 0."""
         step = self.period / check_positive("samples_per_period", samples_per_period)
-        return np.arange(check_integer("n", n, 1)) * step
+        return step * np.arange(check_integer("n", n, 1), dtype=float)
 
-    def trajectory(
-        self, n: int = 1500, samples_per_period: float = 100
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def trajectory(self, n: int = 1500, samples_per_period: float = 100) -> tuple[Floats, Floats]:
         """Times (n,) and states (n, d) of the motion from ``x0``, one row a video frame."""
         t = self.times(n, samples_per_period)
-        return t, self.simulate(t, self.x0)
+        return t, self.simulate(t, np.array(self.x0))
 
 
-def _benchmark(name: str, x0: tuple[float, ...], period: float, **equations) -> Benchmark:
+def _benchmark(name: str, x0: tuple[float, ...], period: float, **equations: Terms) -> Benchmark:
     law = PolynomialSystem.from_terms(equations, degree=3)
     return Benchmark(law.names, law.exponents, law.coefficients, name=name, x0=x0, period=period)
 

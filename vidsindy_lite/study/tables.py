@@ -6,7 +6,7 @@ the processor. So tables show medians and rates.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -83,14 +83,14 @@ def by_condition(trials: DataFrame) -> DataFrame:
     return pandas.concat(ordered, ignore_index=True) if parts else trials[:0]
 
 
-def summary(trials: DataFrame, by: str | Sequence[str]) -> DataFrame:
+def summary(trials: DataFrame, by: str | list[str]) -> DataFrame:
     """Repeated trials as rows of the paper's tables, in its units.
 
     Parameters
     ----------
     trials : DataFrame
         See `tabulate`.
-    by : str or sequence of str
+    by : str or list of str
         Columns whose values tell the groups; they are the first columns of the result.
 
     Returns

@@ -191,7 +191,7 @@ def source_path(filmed: FilmResult, source: str) -> tuple[Floats, Floats | None]
     """The path of a film from one of the `SOURCES`, (n, 3), and its systematic errors, if any."""
     check_choice("source", source, SOURCES)
     if source == "truth":
-        return filmed.truth.simulate(filmed.t, filmed.truth.x0), None
+        return filmed.truth.simulate(filmed.t, np.array(filmed.truth.x0)), None
     if source == "videos":
         return filmed.x, filmed.systematic
     tracks = [np.round(track) for track in filmed.tracks]

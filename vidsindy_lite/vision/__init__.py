@@ -1,28 +1,23 @@
-"""Video files and pixels: reading and writing, drawing scenes, tracking."""
+"""Files and pixels: where the target is in each frame of a video, and films of synthetic scenes.
+
+    video       reading and writing of video files
+    tracking    track: a video in, the target's pixels out, by one of
+    background      what differs from a background at rest (the most exact)
+    detector        what looks like a target in a single frame: our network, or any YOLO-v8
+    training    how that network was trained, on frames that are drawn here
+    scenes      what a camera sees; scenery draws its backgrounds, rendering its frames
+"""
 
 from .detector import WEIGHTS, LearnedDetector, detections
+from .rendering import render, render_labelled, render_restless, render_video
+from .scenery import BACKGROUNDS
+from .scenes import SHAPES, Scene
 from .tracking import Track, check_detector, track
-from .training import SEEN_BACKGROUNDS, SEEN_SHAPES
-from .video import (
-    BACKGROUNDS,
-    SHAPES,
-    Scene,
-    VideoInfo,
-    read_frame,
-    read_video,
-    render,
-    render_labelled,
-    render_restless,
-    render_video,
-    video_info,
-    write_video,
-)
+from .video import VideoInfo, read_frame, read_video, video_info, write_video
 
 __all__ = [
     "BACKGROUNDS",
     "LearnedDetector",
-    "SEEN_BACKGROUNDS",
-    "SEEN_SHAPES",
     "SHAPES",
     "Scene",
     "Track",

@@ -31,15 +31,13 @@ def plot_view_plane(camera: Camera, x: Floats) -> Figure:
     for start, end in zip(x[:: len(x) // 12], flat[:: len(x) // 12], strict=True):
         axes.plot(*np.transpose([start, end]), color="0.6", lw=0.6, ls=":")
     _draw_plane(axes, camera, "C1")
-    axes.scatter(*camera.position, color="k", s=15)
+    place, reach = np.asarray(camera.position), 180 * float(camera.scale or 0)
+    axes.scatter(*place, color="k", s=15)
     halo = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
-    reach = 180 * camera.scale
     for axis, name in zip((*camera.rows, camera.normal), ("X'", "Y'", "Z'"), strict=True):
-        axes.quiver(*camera.position, *(reach * axis), color="k", lw=1.2, arrow_length_ratio=0.15)
-        axes.text(
-            *(camera.position + 1.2 * reach * axis), name, ha="center", va="center", bbox=halo
-        )
-    axes.text(*(camera.position - 0.35 * reach * camera.rows[1]), "$C_1$", ha="center", bbox=halo)
+        axes.quiver(*place, *(reach * axis), color="k", lw=1.2, arrow_length_ratio=0.15)
+        axes.text(*(place + 1.2 * reach * axis), name, ha="center", va="center", bbox=halo)
+    axes.text(*(place - 0.35 * reach * camera.rows[1]), "$C_1$", ha="center", bbox=halo)
     finish_space(axes, azimuth=-40, elevation=8)
     figure.legend(loc="outside upper center", ncols=2)
     return figure

@@ -38,10 +38,11 @@ def plot_table(
     for path in x:
         space.plot(*path.T, color="k", lw=1.2)
     for i, camera in enumerate(rig.cameras):
-        middle = camera.position - camera.normal * np.linalg.norm(camera.position - x.mean((0, 1)))
-        space.plot(*np.transpose([camera.position, middle]), f"C{i + 2}:", lw=1)
-        space.plot(*camera.position, f"C{i + 2}s", ms=8)
-        space.text(*camera.position + [0, 0, 130], f"$C_{i + 1}$", ha="center")
+        place = np.asarray(camera.position)
+        middle = place - camera.normal * np.linalg.norm(place - x.mean((0, 1)))
+        space.plot(*np.transpose([place, middle]), f"C{i + 2}:", lw=1)
+        space.plot(*place, f"C{i + 2}s", ms=8)
+        space.text(*place + [0, 0, 130], f"$C_{i + 1}$", ha="center")
     space.plot([0, 750, 750, 0, 0], [0, 0, 750, 750, 0], 0, color="0.6", lw=0.8)
     space.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     space.set_zlim3d(0, space.get_zlim3d()[1])

@@ -67,7 +67,7 @@ def plot_gaps(t: Floats, x: Floats, truth: Floats) -> Figure:
         "truth": (truth, {"color": "0.4", "ls": "--", "lw": 0.8}),
         "reconstructed": (x, {"color": "C0", "lw": 1.4}),
     }
-    return _over_time_and_in_space(t, curves, np.isnan(x).any(axis=1), "hidden", "time units")
+    return _over_time_and_in_space(t, curves, _missing(x), "hidden", "time units")
 
 
 def plot_path(t: Floats, x: Floats, curve: Floats) -> Figure:
@@ -86,7 +86,7 @@ def plot_path(t: Floats, x: Floats, curve: Floats) -> Figure:
         "reconstructed": (x, {"color": "0.75", "lw": 4}),
         "curve that obeys the law": (curve, {"color": "C0", "lw": 1}),
     }
-    missing, unit = np.isnan(x).any(axis=1), "units of the equations"
+    missing, unit = _missing(x), "units of the equations"
     return _over_time_and_in_space(t, curves, missing, "not seen", unit)
 
 
@@ -182,3 +182,8 @@ def _over_time_and_in_space(
     finish_space(space, azimuth=-60, elevation=25, zoom=0.85)
     figure.legend(*space.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
+
+
+def _missing(x: Floats) -> Bools:
+    """Rows that are not known."""
+    return np.asarray(np.isnan(x).any(axis=1))

@@ -89,11 +89,10 @@ def plot_shares(shares: DataFrame) -> Figure:
         width_ratios=[shares[condition].shape[1] for condition in conditions],
     )  # fmt: skip
     for axes, condition in zip(panels[0], conditions, strict=True):
-        percent = 100 * shares[condition]
-        percent.columns = [f"{100 * level:.0f}" for level in percent.columns]
+        levels = [f"{100 * level:.0f}" for level in shares[condition]]
         sns.heatmap(
-            percent, vmin=0, vmax=100, cmap="Blues", annot=True, fmt=".0f", cbar=False,
-            linewidths=1.5, annot_kws={"size": 9}, ax=axes,
+            100 * shares[condition], xticklabels=levels, vmin=0, vmax=100, cmap="Blues",
+            annot=True, fmt=".0f", cbar=False, linewidths=1.5, annot_kws={"size": 9}, ax=axes,
         )  # fmt: skip
         axes.set(title=_TITLES[condition], ylabel="")
         axes.set_xlabel("level (%)" if condition == "noise" else "rate (%)")

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import ArrayLike
 
 from ...arrays import Bools, Floats
 
@@ -176,7 +175,7 @@ def plot_ranks(panels: Mapping[str, tuple[Floats, float | None]], true: Bools) -
         if threshold is not None:
             axes.axhline(threshold, color="k", ls="--", lw=1, label="penalty of a linear term")
         axes.set(yscale="log", xlabel="rank", title=name, xlim=(0, len(values) + 1))
-    handles = {}
+    handles: dict[str, object] = {}
     for axes in grid:
         handles |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=3)
@@ -210,7 +209,12 @@ def plot_windows(thresholds: Floats, exact: Mapping[str, Bools]) -> Figure:
 
 
 def plot_origin_map(
-    x_axis: Floats, y_axis: Floats, count: Floats, data: Floats, best: ArrayLike, truth: ArrayLike
+    x_axis: Floats,
+    y_axis: Floats,
+    count: Floats,
+    data: Floats,
+    best: Sequence[float],
+    truth: Sequence[float],
 ) -> Figure:
     """Smoothed number of significant terms against the origin of the law's frame.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -197,7 +198,7 @@ def _magnify(axes: Axes, image: Image, track: Floats, index: int, reach: int = 2
     right, bottom = corners[int(np.argmin(inside))]
     place = (right * (1 - part[0]), (1 - bottom) * (1 - part[1]), *part)
     centre = track[index]
-    near = {"xlim": (centre[0] - reach, centre[0] + reach)}
+    near: dict[str, Any] = {"xlim": (centre[0] - reach, centre[0] + reach)}
     near |= {"ylim": (centre[1] + reach, centre[1] - reach), "xticks": (), "yticks": ()}
     inset = axes.inset_axes(place, **near)
     _show(inset, image)
