@@ -130,7 +130,7 @@ assert not np.allclose(stack @ np.linalg.pinv(stack), np.eye(6), atol=0.1)
 # one linear least-squares solve.
 
 # %%
-learned = learn_cameras(tracks, start, method="paper")
+learned = cameras.learn_cameras_eq4(tracks, start)
 for found, true in zip(learned.cameras, truth.cameras, strict=True):
     print(f"scale {found.scale:.9f} (true {true.scale:.9f})", end="   ")
     print(f"angle {found.angle:+.9f} (true {true.angle:+.9f})")
@@ -148,7 +148,7 @@ assert np.abs(cameras.calibration_errors(learned, truth)).max() < 1e-9
 # \mathbf Q\in\mathbb R^{6\times3}.$$
 #
 # Eq. (4) uses two of them. The third is the *epipolar* condition between cameras 2 and 3, which the
-# least-squares "inverse" absorbs. `method="joint"`, the default, uses all three, still linear, and then
+# least-squares "inverse" absorbs. `learn_cameras` uses all three, still linear, and then
 # polishes the result to the smallest reprojection error in pixels.
 
 # %%
@@ -169,12 +169,12 @@ assert np.linalg.matrix_rank(eq_4) == len(stack) - np.linalg.matrix_rank(stack) 
 rng = np.random.default_rng(seed)
 rounded = [np.round(track) for track in tracks]
 noisy = [track + 2 * rng.normal(size=track.shape) for track in tracks]
-learn_cameras(tracks, start, "gradient")  # so that importing PyTorch is not timed
+cameras.learn_cameras_lbfgs(tracks, start)  # so that importing PyTorch is not timed
 
 
 def row(pixels, observed, method):
     began = perf_counter()
-    found = learn_cameras(observed, start, method)
+    found = methods[method](observed, start)
     seconds = perf_counter() - began
     scale, angle = np.abs(cameras.calibration_errors(found, truth)).max(axis=0)
     rmse = np.sqrt(np.mean((reconstruct(observed, found) - x) ** 2)) / pixel
@@ -184,7 +184,11 @@ def row(pixels, observed, method):
 
 # %%
 cases = {"exact": tracks, "rounded": rounded, "2 px noise": noisy}
-methods = ("paper", "gradient", "joint")
+methods = {
+    "paper": cameras.learn_cameras_eq4,
+    "gradient": cameras.learn_cameras_lbfgs,
+    "joint": learn_cameras,
+}
 rows = [row(name, observed, method) for name, observed in cases.items() for method in methods]
 for entry in rows:  # so small a number says nothing but "rounding"
     entry |= {k: "below 1e-6" for k in tuple(entry)[2:5] if entry[k] < 1e-6}
@@ -204,7 +208,7 @@ def errors_of(method, noise, number):
     def trial(stream):
         generator = np.random.default_rng(stream)
         observed = [track + noise * generator.normal(size=track.shape) for track in tracks]
-        return cameras.calibration_errors(learn_cameras(observed, start, method), truth)[1:]
+        return cameras.calibration_errors(methods[method](observed, start), truth)[1:]
 
     return np.array([trial(stream) for stream in np.random.SeedSequence(seed).spawn(number)])
 
@@ -310,7 +314,7 @@ assert np.allclose(reconstruct(gappy, learned), x, atol=1e-6)
 
 # %%
 try:
-    learn_cameras(gappy, start, method="paper")
+    cameras.learn_cameras_eq4(gappy, start)
 except ValueError as error:
     message = str(error)
 print(message)

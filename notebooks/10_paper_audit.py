@@ -256,7 +256,7 @@ conditions = len(stack) - np.linalg.matrix_rank(stack)
 assert np.allclose(eq_4 @ stack, 0, atol=1e-12)
 assert (np.linalg.matrix_rank(eq_4), conditions) == (2, 3)
 
-closed = learn_cameras(tracks, rig.uncalibrated(keep=0), method="paper")
+closed = cameras.learn_cameras_eq4(tracks, rig.uncalibrated(keep=0))
 worst = np.abs(cameras.calibration_errors(closed, rig)).max()
 assert worst < 1e-9
 print("closed form: scales and angles are exact to 1e-9")

@@ -102,11 +102,15 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
         (["--rig", "rig.toml", "--lag", "0,7"], "lags: must be 3 finite numbers"),
         (
             ["--rig", "rig.toml", "--lag", "0,9999,0"],
-            "lags: every video must overlap with the first (220 frames), got 9999 for b.avi (208",
+            "in common with the first (220 frames), got 9999 for b.avi (208 frames)",
         ),
         (
             ["--rig", "rig.toml", "--lag=0,0,-210"],
-            "lags: every video must overlap with the first (220 frames), got -210 for c.avi (210",
+            "in common with the first (220 frames), got -210 for c.avi (210 frames)",
+        ),
+        (  # one frame in common
+            ["--rig", "rig.toml", "--lag", "0,219,0"],
+            "lags: every video must have half of the shorter of the two in common with the first",
         ),
         (["--rig", "none.toml", "--detector", "none.onnx"], "detector: no such file, got"),
         (["--rig", "rig.toml", "--fps", "0"], "fps: must be positive, got 0"),

@@ -242,6 +242,7 @@ def _observed(
         systematic=np.concatenate(shared),
         warnings=(
             *_rig_warnings(tracks, learned, rig, names, learned_lags),
+            *learned.warnings,
             *doubts,
             *used_lags.warnings,
         ),
@@ -325,13 +326,16 @@ def _clock(shots: Sequence[VideoInfo], t: ArrayLike | None) -> tuple[Floats, Flo
 def _check_overlap(
     lags: Floats, rates: Floats | None, shots: Sequence[VideoInfo], paths: Sequence[Path]
 ) -> None:
-    """That every video runs, at its given lag, during some of the first."""
+    """That every video shares, at its given lag, half of the shorter one's time with the first."""
     rates = np.ones(len(lags)) if rates is None else rates
     for path, shot, lag, rate in zip(paths, shots, lags, rates, strict=True):
-        if not -shot.frames / rate < lag < shots[0].frames:
+        end = shot.frames / rate
+        common = min(lag + end, shots[0].frames) - max(lag, 0)
+        if common < min(end, shots[0].frames) / 2:
             raise ValueError(
-                f"lags: every video must overlap with the first ({shots[0].frames} frames), got "
-                f"{lag:g} for {path.name} ({shot.frames} frames)"
+                "lags: every video must have half of the shorter of the two in common with the "
+                f"first ({shots[0].frames} frames), got {lag:g} for {path.name} ({shot.frames} "
+                "frames)"
             )
 
 

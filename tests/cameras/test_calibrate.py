@@ -13,6 +13,8 @@ from vidsindy_lite.cameras import (
     Rig,
     calibration_errors,
     learn_cameras,
+    learn_cameras_eq4,
+    learn_cameras_lbfgs,
     learn_normal,
     reconstruct,
     residuals,
@@ -311,12 +313,12 @@ class TestRig:
 
 
 class TestLearning:
-    @pytest.mark.parametrize("method", ["joint", "paper"])
+    @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
     @given(SEEDS, st.integers(0, 2))
     @settings(max_examples=15)
-    def test_exact_pixels_give_exact_cameras(self, method, seed, keep):
+    def test_exact_pixels_give_exact_cameras(self, learn, seed, keep):
         x, truth, tracks, _ = scene(seed)
-        learned = learn_cameras(tracks, truth.uncalibrated(keep), method)
+        learned = learn(tracks, truth.uncalibrated(keep))
         assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
         np.testing.assert_allclose(reconstruct(tracks, learned), x, atol=1e-9 * np.ptp(x))
 
@@ -331,11 +333,11 @@ class TestLearning:
 
     @given(SEEDS)
     @settings(max_examples=4)
-    def test_gradient_descends_to_the_closed_form(self, seed):
+    def test_lbfgs_descends_to_the_closed_form(self, seed):
         _, truth, tracks, rng = scene(seed, n=100)
         tracks = [track + rng.normal(size=track.shape) for track in tracks]
         start = truth.uncalibrated()
-        descended, closed = (learn_cameras(tracks, start, m) for m in ("gradient", "paper"))
+        descended, closed = (f(tracks, start) for f in (learn_cameras_lbfgs, learn_cameras_eq4))
         assert np.abs(calibration_errors(descended, closed)).max() < 1e-6
 
     @pytest.mark.slow
@@ -366,20 +368,20 @@ class TestLearning:
         learned = learn_cameras(tracks, truth.uncalibrated())
         assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
         with pytest.raises(ValueError, match="common views must give at least 4 equations"):
-            learn_cameras(tracks, truth.uncalibrated(), "paper")
+            learn_cameras_eq4(tracks, truth.uncalibrated())
 
     @pytest.mark.slow
-    def test_joint_is_closer_and_less_biased_than_eq_4(self):
-        errors = {"joint": [], "paper": []}
+    def test_ours_is_closer_and_less_biased_than_eq_4(self):
+        errors = {learn_cameras: [], learn_cameras_eq4: []}
         for seed in range(30):
             rng = np.random.default_rng(seed)
             x = trajectory(rng, 400)
             truth = Rig.around(x)
             tracks = [c.project(x) + 4 * rng.normal(size=(400, 2)) for c in truth.cameras]
-            for method, found in errors.items():
-                learned = learn_cameras(tracks, truth.uncalibrated(), method)
+            for learn, found in errors.items():
+                learned = learn(tracks, truth.uncalibrated())
                 found.extend(calibration_errors(learned, truth)[1:])
-        joint, paper = np.array(errors["joint"]), np.array(errors["paper"])
+        joint, paper = map(np.array, errors.values())
         assert (np.mean(joint**2, axis=0) < np.mean(paper**2, axis=0)).all()
         # Noise in the regressors shrinks the scale in Eq. (4), not at the least reprojection error.
         standard_error = joint[:, 0].std() / np.sqrt(len(joint))
@@ -481,13 +483,13 @@ def test_calibration_errors(small):
 
 
 class TestOutliers:
-    @pytest.mark.parametrize("method", ["joint", "paper"])
+    @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
     @pytest.mark.parametrize("seed", range(5))
-    def test_one_outlier_does_not_bend_the_cameras(self, method, seed):
+    def test_one_outlier_does_not_bend_the_cameras(self, learn, seed):
         _, truth, tracks, rng = scene(seed)
         turn = rng.uniform(0, 2 * np.pi)
         tracks[rng.integers(3)][rng.integers(500)] += 200 * np.array([np.cos(turn), np.sin(turn)])
-        learned = learn_cameras(tracks, truth.uncalibrated(), method)
+        learned = learn(tracks, truth.uncalibrated())
         assert np.abs(calibration_errors(learned, truth)).max() < 1e-9
 
     @pytest.mark.parametrize("seed", range(3))
@@ -573,11 +575,6 @@ class TestBadTracks:
         with pytest.raises(ValueError, match="at least one camera must be calibrated .* none of 3"):
             learn_cameras(tracks, rig)
 
-    def test_unknown_method(self, small):
-        _, rig, tracks, _ = small
-        with pytest.raises(ValueError, match="method: must be one of .* got 'magic'"):
-            learn_cameras(tracks, rig, method="magic")
-
     def test_too_few_common_frames(self, small):
         _, rig, tracks, _ = small
         start = rig.uncalibrated()
@@ -593,14 +590,14 @@ class TestBadTracks:
             learn_cameras(tracks, start)
 
     @pytest.mark.parametrize("noise", [0, 0.3, 3])
-    @pytest.mark.parametrize("method", ["joint", "paper", "gradient"])
-    def test_static_target(self, small, noise, method):
+    @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4, learn_cameras_lbfgs])
+    def test_static_target(self, small, noise, learn):
         _, rig, tracks, rng = small
         still = [track[:1] + noise * rng.normal(size=track.shape) for track in tracks]
         with pytest.raises(
             ValueError, match=r"motion must determine .* cameras\[1\] and cameras\[2"
         ):
-            learn_cameras(still, rig.uncalibrated(), method)
+            learn(still, rig.uncalibrated())
 
     def test_motion_that_one_camera_does_not_see(self, small):
         # Motion along the line of sight of camera 2 leaves it one equation short.
@@ -617,8 +614,8 @@ class TestBadTracks:
         _, rig, tracks, _ = small
         twin = replace(rig.cameras[1], normal=-rig.cameras[1].normal)
         rig = Rig([rig.cameras[0], rig.cameras[1], twin])
-        with pytest.raises(ValueError, match="'paper' needs two independent normals among the unc"):
-            learn_cameras(tracks, rig.uncalibrated(), "paper")
+        with pytest.raises(ValueError, match=r"Eq. \(4\) needs two independent normals among"):
+            learn_cameras_eq4(tracks, rig.uncalibrated())
 
     def test_joint_learns_parallel_unknown_cameras(self, small):
         x, rig, _, _ = small
@@ -690,8 +687,8 @@ class TestPosition:
         x, rig, tracks, _ = small
         with pytest.raises(ValueError, match=r"rig: the positions of two cameras .* got 1"):
             learn_cameras(tracks, self.without(rig, 1, 2))
-        with pytest.raises(ValueError, match=r"'joint' .* position of cameras\[2\], got 'paper'"):
-            learn_cameras(tracks, self.without(rig.uncalibrated(), 2), method="paper")
+        with pytest.raises(ValueError, match=r"Eq. \(4\) needs all positions, got .* cameras\[2\]"):
+            learn_cameras_eq4(tracks, self.without(rig.uncalibrated(), 2))
         still = [np.repeat(track[:1], 40, axis=0) for track in tracks]
         message = r"must determine scale, angle and position of .*cameras\[2\]"
         with pytest.raises(ValueError, match=message):

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from vidsindy_lite.cameras import OrthographicCamera
 from vidsindy_lite.cameras.geometry import (
-    in_plane_offset,
     plane_projection,
     plane_through,
     rodrigues,
@@ -119,12 +119,15 @@ def test_offset_is_the_signed_distance_to_the_turned_coordinate_planes(position,
     x_axis, y_axis, z_axis = rotation_to_z(normal)
     to_yz = signed_distance(position, *plane_through((0, 0, 0), y_axis, z_axis))
     to_xz = signed_distance(position, *plane_through((0, 0, 0), z_axis, x_axis))
-    np.testing.assert_allclose(in_plane_offset(position, normal), [to_yz, to_xz], atol=1e-11)
+    offset = OrthographicCamera(position=position, normal=normal).offset
+    np.testing.assert_allclose(offset, [to_yz, to_xz], atol=1e-11)
 
 
 def test_offset_by_hand_has_a_sign():
-    np.testing.assert_allclose(in_plane_offset([3, -4, 7], [0, 0, 1]), [3, -4], atol=1e-15)
-    np.testing.assert_allclose(in_plane_offset([3, -4, 7], [1, 0, 0]), [-7, -4], atol=1e-14)
+    above = OrthographicCamera(position=[3, -4, 7], normal=[0, 0, 1])
+    np.testing.assert_allclose(above.offset, [3, -4], atol=1e-15)
+    beside = OrthographicCamera(position=[3, -4, 7], normal=[1, 0, 0])
+    np.testing.assert_allclose(beside.offset, [-7, -4], atol=1e-14)
 
 
 def test_plane_through_by_hand():
@@ -155,7 +158,6 @@ def test_nan_rows_pass_through():
         (lambda: rodrigues([0, 0, 1], np.inf), "angle: must be a finite number, got inf"),
         (lambda: plane_projection([1, 2], [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
         (lambda: signed_distance(1.0, [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
-        (lambda: in_plane_offset([[1, 2, 3]], [0, 0, 1]), "position: must be 3 finite"),
         (lambda: plane_through((0, 0, 0), (1, 1, 1), (2, 2, 2)), "must not lie on one line"),
     ],
 )

@@ -16,6 +16,8 @@ from vidsindy_lite.cameras import (
     Rig,
     calibration_errors,
     learn_cameras,
+    learn_cameras_eq4,
+    learn_cameras_lbfgs,
     reconstruct,
     residuals,
 )
@@ -266,11 +268,11 @@ class TestLearning:
         assert learn_cameras(tracks, truth) == truth
         assert learn_cameras(tracks, truth.uncalibrated(1)).cameras[1] == truth.cameras[1]
 
-    @pytest.mark.parametrize("method", ["paper", "gradient"])
-    def test_eq_4_is_orthographic(self, small, method):
+    @pytest.mark.parametrize("learn", [learn_cameras_eq4, learn_cameras_lbfgs])
+    def test_eq_4_is_orthographic(self, small, learn):
         _, rig, tracks, _ = small
-        with pytest.raises(ValueError, match=f"must be 'joint' for a rig .* got '{method}'"):
-            learn_cameras(tracks, rig.uncalibrated(), method)
+        with pytest.raises(ValueError, match=r"Eq. \(4\) needs orthographic cameras, got a persp"):
+            learn(tracks, rig.uncalibrated())
 
 
 class TestReconstruction:

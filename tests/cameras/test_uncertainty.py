@@ -6,13 +6,13 @@ from helpers import trajectory
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras.calibrate import camera_parameters
 from vidsindy_lite.cameras.synchronise import Lags
 from vidsindy_lite.cameras.uncertainty import (
     long_run_covariance,
     systematic_errors,
     trailing_errors,
 )
+from vidsindy_lite.cameras.unknowns import Unknowns
 
 NOISE = 0.05  # pixels
 
@@ -34,7 +34,9 @@ def learned_rig(rng, memory, frames=250):
     learned = vl.learn_cameras(tracks, rig)
     still = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
     modes = systematic_errors(tracks, rig, learned, still)
-    return camera_parameters(rig, learned) - camera_parameters(rig, truth), modes, x, learned
+    unknowns = Unknowns.of(rig)
+    errors = unknowns.read(learned.cameras) - unknowns.read(truth.cameras)
+    return errors, modes, x, learned
 
 
 @pytest.mark.parametrize("memory", [0.0, pytest.param(0.6, marks=pytest.mark.slow)])

@@ -1,14 +1,21 @@
-"""Pixels and space: camera models, calibration, triangulation, synchronisation."""
+"""Pixels and space: cameras, and what several of them that watch one target say of it.
 
-from .calibrate import (
-    Rig,
-    calibration_errors,
-    check_learnable,
-    learn_cameras,
-    learn_normal,
-    reconstruct,
-    residuals,
-)
+    geometry      rotations and planes
+    models        the two models of camera: orthographic and perspective
+    rig           the cameras that watch one scene, and their file
+    triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
+    unknowns      what is unknown of a rig as one vector
+    agreement     orthographic views agree on one point: linear equations for the unknowns
+    calibrate     tracks -> what is unknown of the cameras; eq4: the paper's own way, to compare
+    synchronise   tracks -> when each camera started
+    uncertainty   what errors of cameras, lags and codecs do to the path
+    messages      all warnings
+
+The other rooms import from here alone.
+"""
+
+from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
+from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import (
     plane_projection,
     plane_through,
@@ -17,22 +24,25 @@ from .geometry import (
     signed_distance,
 )
 from .models import Camera, OrthographicCamera, PerspectiveCamera
+from .rig import Rig, rig_template
 from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
-from .template import rig_template
+from .triangulate import reconstruct, residuals
 from .uncertainty import systematic_errors, trailing_errors
 
 __all__ = [
     "Camera",
-    "OrthographicCamera",
     "DISAGREEMENT",
+    "Lags",
+    "OrthographicCamera",
     "PerspectiveCamera",
     "Rig",
-    "Lags",
     "align",
     "calibration_errors",
     "check_learnable",
     "disagreement",
     "learn_cameras",
+    "learn_cameras_eq4",
+    "learn_cameras_lbfgs",
     "learn_lags",
     "learn_normal",
     "list_lags",

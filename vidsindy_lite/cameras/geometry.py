@@ -10,11 +10,16 @@ distance of a camera plane".
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats
 from ..checks import check_array, check_number, check_vector
 
+PARALLEL = 1e-6
+"""Sine of the angle below which two lines of sight count as parallel."""
 
-def rodrigues(axis, angle):
+
+def rodrigues(axis: ArrayLike, angle: float) -> Floats:
     """Rotation by an angle about an axis, by Rodrigues' formula.
 
     Paper: Eq. (1)-(2), R = I + sin(angle) U + (1 - cos(angle)) U^2, where U w = u x w.
@@ -42,7 +47,7 @@ def rodrigues(axis, angle):
     return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
 
 
-def rotation_to_z(normal):
+def rotation_to_z(normal: ArrayLike) -> Floats:
     """The shortest rotation R that takes a plane's normal to e_z: R n = e_z.
 
     Paper: Eq. (1)-(2) with axis n x e_z and the angle between n and e_z. The axis is 0/0 for a
@@ -71,7 +76,7 @@ def rotation_to_z(normal):
     return rodrigues(axis, np.arctan2(horizontal, c))
 
 
-def plane_projection(x, normal, d):
+def plane_projection(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:
     """Foot of the perpendicular from points to the plane normal . x + d = 0.
 
     Paper: Eq. (S3), x_p = x - n (n . x + D) / (n . n) with n = (A, B, C).
@@ -99,7 +104,7 @@ def plane_projection(x, normal, d):
     return x - signed_distance(x, normal, d)[..., None] * unit
 
 
-def signed_distance(x, normal, d):
+def signed_distance(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:
     """Signed distance of points to the plane normal . x + d = 0, positive on the normal's side.
 
     Parameters
@@ -125,7 +130,7 @@ def signed_distance(x, normal, d):
     return x @ unit + float(d) / np.linalg.norm(normal)
 
 
-def plane_through(p1, p2, p3):
+def plane_through(p1: ArrayLike, p2: ArrayLike, p3: ArrayLike) -> tuple[Floats, float]:
     """Plane through three points, as the normal and constant of normal . x + d = 0.
 
     Paper: Appendix "Compute offset distance of a camera plane", n = p1p2 x p1p3.
@@ -155,44 +160,15 @@ def plane_through(p1, p2, p3):
     return normal, -float(normal @ p1)
 
 
-def in_plane_offset(position, normal):
-    """Offset Delta_c = R^- position of a view plane whose origin is at `position`.
-
-    Its two components are the *signed* distances of the position to the planes Y'OZ' and X'OZ'
-    through the reference origin (the paper's text names the image plane X'OY' itself, and
-    distances without a sign).
-
-    Paper: Appendix "Compute offset distance of a camera plane".
-
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Origin of the view plane in the reference frame, scene units.
-    normal : array_like, shape (3,)
-        Normal of the plane, of any length but zero.
-
-    Returns
-    -------
-    ndarray, shape (2,)
-        Scene units.
-
-    Raises
-    ------
-    ValueError
-        If position or normal is not a vector of shape (3,), or the normal is zero.
-    """
-    position = check_vector("position", position, 3)
-    return rotation_to_z(normal)[:2] @ position
+def _points(name: str, x: ArrayLike) -> Floats:
+    """Real numbers of shape (..., 3)."""
+    points = check_array(name, x)
+    if points.ndim == 0 or points.shape[-1] != 3:
+        raise ValueError(f"{name}: must have shape (..., 3), got {points.shape}")
+    return points
 
 
-def _points(name, x):
-    x = check_array(name, x)
-    if x.ndim == 0 or x.shape[-1] != 3:
-        raise ValueError(f"{name}: must have shape (..., 3), got {x.shape}")
-    return x
-
-
-def unit_vector(name, value):
+def unit_vector(name: str, value: ArrayLike) -> Floats:
     """A finite vector of shape (3,), of any length but zero, at unit length.
 
     Raises
@@ -200,9 +176,9 @@ def unit_vector(name, value):
     ValueError
         If the vector is zero, not finite or of another shape.
     """
-    value = check_vector(name, value, 3)
-    largest = np.abs(value).max()
+    vector = check_vector(name, value, 3)
+    largest = np.abs(vector).max()
     if largest == 0:
-        raise ValueError(f"{name}: must not be the zero vector, got {value.tolist()}")
-    value = value / largest  # so that squares neither overflow nor underflow
-    return value / np.linalg.norm(value)
+        raise ValueError(f"{name}: must not be the zero vector, got {vector.tolist()}")
+    vector = vector / largest  # so that squares neither overflow nor underflow
+    return vector / np.linalg.norm(vector)

@@ -8,7 +8,7 @@ Two cameras see one point only if they look at the same instant; otherwise their
 each other, and no scale and angle can mend it. So the lags are found like the cameras, as those of
 the smallest reprojection error, in three steps:
 
-1. pair by pair, with a calibrated camera: the epipolar equation (`sights.epipolar_equations`) is
+1. pair by pair, with a calibrated camera: the epipolar equation (`triangulate.epipolar_lines`) is
    linear in what is unknown of the other camera, and is tried at every whole lag;
 2. all cameras together (`learn_cameras`) at the most promising whole lags;
 3. from there, fractions by Gauss-Newton, with all that is unknown of the cameras projected out.
@@ -17,15 +17,26 @@ A motion that repeats itself fits at several lags, one that hardly moves at all 
 result says so.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
+from ..arrays import Bools, Floats
 from ..checks import check_positive, check_tracks, check_vector
-from .calibrate import Rig, check_learnable, learn_cameras, residuals
-from .triangulate import epipolar_equations
+from .calibrate import check_learnable, fit_cameras
+from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
+from .models import Camera
+from .rig import Rig
+from .triangulate import Views, epipolar_design, epipolar_lines, reprojection, residuals
+from .unknowns import Unknowns
+
+Curve = Callable[[Floats], Floats]
+"""A track as a function of the frame number, whole or not."""
 
 DISAGREEMENT = 1.0
 """Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
@@ -70,12 +81,12 @@ class Lags:
     residual : float
         The `disagreement` of the worst camera that is left, pixels.
     warnings : tuple of str
-        Why the lags should not be trusted although the views agree, with advice.
+        Why the lags should not be trusted, with advice.
     """
 
-    frames: np.ndarray
-    rates: np.ndarray
-    errors: np.ndarray
+    frames: Floats
+    rates: Floats
+    errors: Floats
     residual: float
     warnings: tuple[str, ...] = ()
 
@@ -90,8 +101,8 @@ class Lags:
 
 
 def align(
-    tracks: Sequence[np.ndarray], lags: Sequence[float], rates: Sequence[float] | None = None
-) -> tuple[np.ndarray, ...]:
+    tracks: Sequence[Floats], lags: ArrayLike, rates: ArrayLike | None = None
+) -> tuple[Floats, ...]:
     """Tracks of all videos at the instants of the first video's frames.
 
     Parameters
@@ -116,30 +127,34 @@ def align(
         positive rate, per track, or one of them is absurdly large or small.
     """
     tracks = check_tracks(tracks)
-    lags = _check_lags("lags", lags, len(tracks))
-    rates = _check_rates(rates, len(tracks))
-    clock = np.arange(len(tracks[0]))
-    at = [_curve(track) for track in tracks]
-    return tuple(c((clock - lag) * r) for c, lag, r in zip(at, lags, rates, strict=True))
+    shifts = _check_lags("lags", lags, len(tracks))
+    speeds = _check_rates(rates, len(tracks))
+    return _aligned([_curve(track) for track in tracks], shifts, speeds, len(tracks[0]))
 
 
-def disagreement(tracks: Sequence[np.ndarray], rig: Rig) -> list[float]:
+def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
     """Residual in pixels that one frame in ten exceeds, per camera.
 
     That tenth may hold anything: a few outliers of the tracker do not accuse the rig.
+
+    Parameters
+    ----------
+    tracks, rig
+        See `residuals`.
+
+    Returns
+    -------
+    list of float
+        Pixels; zero for a camera that takes part in no point.
     """
-    missed = []
-    for residual in residuals(tracks, rig):
-        seen = residual[np.isfinite(residual).all(axis=1)]
-        missed.append(np.quantile(np.hypot(*seen.T), _TRIMMED) if len(seen) else 0.0)
-    return missed
+    return [_trimmed(part) for part in residuals(tracks, rig)]
 
 
 def learn_lags(
-    tracks: Sequence[np.ndarray],
+    tracks: Sequence[Floats],
     rig: Rig,
-    rates: Sequence[float] | None = None,
-    start: Sequence[float] | None = None,
+    rates: ArrayLike | None = None,
+    start: ArrayLike | None = None,
 ) -> Lags:
     """Learn by how much each video starts later than the first.
 
@@ -172,180 +187,203 @@ def learn_lags(
         if not np.isfinite(track).all(axis=1).any():
             raise ValueError(f"tracks[{i}]: must show the target in some frame, got none")
     first = _check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
-    views = _Views(tracks, rig, _check_rates(rates, len(tracks)))
-    missed = views.missed(first)
-    if missed <= DISAGREEMENT:
-        found = [views.refined(first)]
+    videos = _Videos.of(tracks, rig, _check_rates(rates, len(tracks)))
+    residual = videos.disagreement(first)
+    if residual <= DISAGREEMENT:
+        found = [_refined(videos, first)]
     else:
-        found = [views.refined(lags) for lags in _whole_lags(views)]
+        found = [_refined(videos, lags) for lags in _whole_lags(videos)]
     found = sorted((s for s in found if s.agree), key=lambda s: s.residual)
     if not found:
-        return Lags(first, views.rates, np.full(len(first), np.inf), missed)
+        return _untold(videos, first, residual, no_lags(list_lags(first), residual))
     alike = [s for s in found if s.residual <= max(ALIKE * found[0].residual, FINE)]
     best = min(alike, key=lambda s: np.abs(s.frames).sum())
-    return replace(best, warnings=tuple(_ambiguous(alike) + _blurred(best)))
+    warnings = list(best.warnings)
+    if len(alike) > 1:
+        warnings.append(ambiguous_lags([list_lags(s.frames) for s in alike[:_SHOWN]]))
+    blurred = np.flatnonzero(best.errors > BLURRED)
+    warnings += [blurred_lag(int(i) + 1, best.frames[i]) for i in blurred]
+    return replace(best, warnings=tuple(warnings))
 
 
-def list_lags(lags: Sequence[float]) -> str:
+def list_lags(lags: Sequence[float] | Floats) -> str:
     """Lags as text, to a hundredth of a frame, e.g. ``0, 7, -12.5``."""
     return ", ".join(f"{round(lag, 2) + 0.0:g}" for lag in lags)
 
 
-def _ambiguous(alike: Sequence[Lags]) -> list[str]:
-    if len(alike) < 2:
-        return []
-    lags = " or ".join(f"({list_lags(s.frames)})" for s in alike[:_SHOWN])
-    return [
-        f"the lags of the videos cannot be told: {lags} frames fit about equally well, because the "
-        "motion repeats itself; give the lags if you know them"
-    ]
-
-
-def _blurred(best: Lags) -> list[str]:
-    return [
-        f"the lag of video {i + 1} cannot be told, because the target moves too little or too "
-        f"slowly: {lag:g} frames were taken; give the lags if you know them"
-        for i, (lag, error) in enumerate(zip(best.frames, best.errors, strict=True))
-        if error > BLURRED
-    ]
-
-
-class _Views:
+@dataclass(frozen=True)
+class _Videos:
     """The tracks as functions of time, and how well they agree at given lags."""
 
-    def __init__(self, tracks, rig, rates):
-        self.tracks, self.rig, self.rates = tracks, rig, rates
-        self.ends = np.array([len(track) for track in tracks]) / rates  # on the clock
+    curves: tuple[Curve, ...]
+    frames: Floats  # of each video
+    rates: Floats
+    unknowns: Unknowns
+    speed: float  # pixels in a frame
+    tried: dict[tuple[float, ...], Floats | None] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, tracks: Sequence[Floats], rig: Rig, rates: Floats) -> _Videos:
+        """Of tracks, a rig and rates that were checked."""
         seen = [track[np.isfinite(track).all(axis=1)] for track in tracks]
         steps = np.concatenate([np.hypot(*np.diff(track, axis=0).T) for track in seen])
-        self.speed = np.quantile(steps, _TRIMMED) if len(steps) else 0.0  # pixels in a frame
-        self.known = {}  # the cameras learned at lags that were tried
+        speed = float(np.quantile(steps, _TRIMMED)) if len(steps) else 0.0
+        lengths = np.array([float(len(track)) for track in tracks])
+        return cls(tuple(map(_curve, tracks)), lengths, rates, Unknowns.of(rig), speed)
 
-    def at(self, lags):
-        return align(self.tracks, lags, self.rates)
+    @property
+    def ends(self) -> Floats:
+        """Durations on the clock."""
+        return self.frames / self.rates
 
-    def learned(self, lags):
-        """The cameras that fit best at these lags; None if none do."""
-        key = tuple(lags)
-        if key not in self.known:
-            try:
-                self.known[key] = learn_cameras(self.at(lags), self.rig)
-            except ValueError:  # these lags leave too little in common, or nothing that agrees
-                self.known[key] = None
-        return self.known[key]
-
-    def residuals(self, lags):
+    def residuals(self, lags: Floats) -> Floats | None:
         """Reprojection residuals of the cameras that fit best, (n_0, 2 m); None if none do."""
-        rig = self.learned(lags)
-        return None if rig is None else np.hstack(residuals(self.at(lags), rig))
+        key = tuple(lags.tolist())
+        if key not in self.tried:
+            tracks = _aligned(self.curves, lags, self.rates, int(self.frames[0]))
+            self.tried[key] = _best_residuals(tracks, self.unknowns)
+        return self.tried[key]
 
-    def missed(self, lags):
-        """The worst camera's disagreement, pixels; infinite where no cameras fit."""
-        rig = self.learned(lags)
-        return np.inf if rig is None else max(disagreement(self.at(lags), rig))
-
-    def refined(self, whole):
-        """The lags of the smallest reprojection error near whole ones, as `Lags`."""
-        lags, step = np.array(whole, float), np.inf
-        shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
-        for _ in range(_STEPS):
-            tried = [self.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)]
-            if any(part is None for part in tried):
-                return Lags(lags, self.rates, np.full(len(lags), np.inf), self.missed(lags))
-            here, ahead, behind = tried[0], *np.split(np.array(tried[1:]), 2)
-            used = np.isfinite(tried).all(axis=0)
-            limit = max(OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
-            used &= np.abs(np.where(used, here, 0)) <= limit
-            slope = (ahead - behind)[:, used].T / (2 * PROBE)
-            step, *_ = np.linalg.lstsq(slope, -here[used])
-            size = np.abs(step).max()
-            lags[1:] += step / max(size, 1)  # further than a frame the slope does not hold
-            if size < _SETTLED:
-                break
-        noise = max(np.mean((here[used] + slope @ step) ** 2), _ROUNDING**2)
-        told = self._told(lags, used, noise, np.sum(slope**2, axis=0))
-        information = slope.T @ slope / noise * np.sqrt(np.outer(told, told))
-        if not told.all():
-            errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-            return Lags(np.array(whole, float), self.rates, errors, self.missed(whole))
-        errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information)))))
-        # Schwarz's criterion: a fraction is one more unknown per video.
-        rounded = np.rint(lags) + 0.0  # and not -0
-        beside = (rounded - lags)[1:]
-        if beside @ information @ beside < len(beside) * np.log(used.sum()):
-            lags = rounded
-        return Lags(lags, self.rates, errors, self.missed(lags))
-
-    def _told(self, lags, used, noise, slopes):
-        """Share of each lag's squared slope that is motion and not noise, between 0 and 1.
-
-        Interpolated noise has a slope, too. But whole frames beside the lags its size is the same
-        as at them: there only motion makes the residuals larger.
-        """
-        shares = []
-        for one, slope in zip(np.eye(len(lags))[1:], slopes, strict=True):
-            tried = [self.residuals(lags + shift) for shift in (0 * one, one, -one)]
-            if any(part is None for part in tried):  # a frame beside, nothing fits at all
-                shares.append(1.0)
-                continue
-            both = used & np.isfinite(tried).all(axis=0)
-            here, ahead, behind = (np.sum(part[both] ** 2) for part in tried)
-            chance = 2 * noise * np.sqrt(2 * both.sum())  # two standard deviations of such a sum
-            rise = ((ahead + behind) / 2 - here - chance) / slope
-            shares.append(float(np.clip(rise, 0, 1)))
-        return np.array(shares)
+    def disagreement(self, lags: Floats) -> float:
+        """The worst camera's, pixels; infinite where no cameras fit."""
+        missed = self.residuals(lags)
+        if missed is None:
+            return np.inf
+        return max(_trimmed(part) for part in np.split(missed, len(self.curves), axis=1))
 
 
-def _whole_lags(views: _Views) -> list[np.ndarray]:
+def _best_residuals(tracks: Sequence[Floats], unknowns: Unknowns) -> Floats | None:
+    """Residuals of the cameras that fit aligned tracks best; None if none do."""
+    if not all(np.isfinite(track).any() for track in tracks):
+        return None
+    views = Views.of(tracks)
+    try:
+        return np.hstack(reprojection(views, fit_cameras(views, unknowns).cameras))
+    except ValueError:  # these lags leave too little in common, or nothing that agrees
+        return None
+
+
+def _trimmed(residual: Floats) -> float:
+    """Length of the residuals, (n, 2), that one frame in ten exceeds."""
+    seen = residual[np.isfinite(residual).all(axis=1)]
+    return float(np.quantile(np.hypot(*seen.T), _TRIMMED)) if len(seen) else 0.0
+
+
+def _refined(videos: _Videos, whole: Floats) -> Lags:
+    """The lags of the smallest reprojection error near whole ones."""
+    lags, size = np.array(whole, float), np.inf
+    shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
+    for _ in range(_STEPS):
+        parts = [videos.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)]
+        if any(part is None for part in parts):
+            return _untold(videos, lags, videos.disagreement(lags))
+        tried = np.array(parts)
+        here, ahead, behind = tried[0], *np.split(tried[1:], 2)
+        used = np.isfinite(tried).all(axis=0)
+        limit = max(OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
+        used &= np.abs(np.where(used, here, 0)) <= limit
+        slope = (ahead - behind)[:, used].T / (2 * PROBE)
+        step, *_ = np.linalg.lstsq(slope, -here[used])
+        size = np.abs(step).max()
+        lags[1:] += step / max(size, 1)  # further than a frame the slope does not hold
+        if size < _SETTLED:
+            break
+    noise = max(np.mean((here[used] + slope @ step) ** 2), _ROUNDING**2)
+    told = _told(videos, lags, used, noise, np.sum(slope**2, axis=0))
+    if not told.all():
+        return _untold(videos, np.array(whole, float), videos.disagreement(whole))
+    information = slope.T @ slope / noise * np.sqrt(np.outer(told, told))
+    errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information)))))
+    # Schwarz's criterion: a fraction is one more unknown per video.
+    rounded = np.rint(lags) + 0.0  # and not -0
+    beside = (rounded - lags)[1:]
+    if beside @ information @ beside < len(beside) * np.log(used.sum()):
+        lags = rounded
+    warnings = () if size < _SETTLED else (unsettled_lags(size),)
+    return Lags(lags, videos.rates, errors, videos.disagreement(lags), warnings)
+
+
+def _untold(videos: _Videos, lags: Floats, residual: float, *warnings: str) -> Lags:
+    """Lags of which the tracks tell nothing; that of the first video is zero in any case."""
+    errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
+    return Lags(lags, videos.rates, errors, residual, warnings)
+
+
+def _told(videos: _Videos, lags: Floats, used: Bools, noise: float, slopes: Floats) -> Floats:
+    """Share of each lag's squared slope that is motion and not noise, between 0 and 1.
+
+    Interpolated noise has a slope, too. But whole frames beside the lags its size is the same
+    as at them: there only motion makes the residuals larger.
+    """
+    shares = []
+    for one, slope in zip(np.eye(len(lags))[1:], slopes, strict=True):
+        parts = [videos.residuals(lags + shift) for shift in (0 * one, one, -one)]
+        if any(part is None for part in parts):  # a frame beside, nothing fits at all
+            shares.append(1.0)
+            continue
+        tried = np.array(parts)
+        both = used & np.isfinite(tried).all(axis=0)
+        here, ahead, behind = (np.sum(part[both] ** 2) for part in tried)
+        chance = 2 * noise * np.sqrt(2 * both.sum())  # two standard deviations of such a sum
+        rise = ((ahead + behind) / 2 - here - chance) / slope
+        shares.append(float(np.clip(rise, 0, 1)))
+    return np.array(shares)
+
+
+def _whole_lags(videos: _Videos) -> list[Floats]:
     """Whole lags at which all cameras agree as well as they can between two frames."""
-    known = next(i for i, camera in enumerate(views.rig.cameras) if camera.is_calibrated)
-    others = [i for i in range(len(views.tracks)) if i != known]
-    promising = {i: _pair_lags(views, known, i) for i in others}
-    best = np.zeros(len(views.tracks))
+    cameras = videos.unknowns.cameras
+    known = next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
+    others = [i for i in range(len(cameras)) if i != known]
+    promising = {i: _pair_lags(videos, known, i) for i in others}
+    best = np.zeros(len(cameras))
     best[others] = [promising[i][0] for i in others]
     while True:
         tried = [best]
         for i in others:
-            for lag in promising[i][1:]:
-                tried.append(best.copy())
-                tried[-1][i] = lag
-        missed = np.array([views.missed(lags) for lags in tried])
+            for lag in promising[i]:
+                if lag != best[i]:
+                    tried.append(best.copy())
+                    tried[-1][i] = lag
+        missed = np.array([videos.disagreement(lags) for lags in tried])
         winner = int(missed.argmin())
         if winner == 0:
             break
         best = tried[winner]
-        promising = {i: sorted(promising[i], key=lambda lag: lag != best[i]) for i in others}  # noqa: B023
     # Half a frame beside the right lag, the views miss each other by half a frame of motion.
-    limit = max(missed.min(), DISAGREEMENT + views.speed / 2)
+    limit = max(missed.min(), DISAGREEMENT + videos.speed / 2)
     return [lags - lags[0] for lags, value in zip(tried, missed, strict=True) if value <= limit]
 
 
-def _pair_lags(views: _Views, known: int, other: int) -> list[float]:
+def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
     """The most promising lags of one camera behind a calibrated one, best first."""
-    shortest = min(views.ends[known], views.ends[other])
+    shortest = min(videos.ends[known], videos.ends[other])
     margin = _OVERLAP * shortest
-    lags = np.arange(np.ceil(margin - views.ends[other]), views.ends[known] - margin + 1)
-    cameras = views.rig.cameras[known], views.rig.cameras[other]
-    frames = np.arange(0, len(views.tracks[known]), max(1, int(shortest // _INSTANTS)))
-    ours, theirs = views.tracks[known][frames], _curve(views.tracks[other])
-    instants = frames / views.rates[known]
-    rate = views.rates[other]
-    missed = np.array(
-        [_pair_missed(*cameras, ours, theirs((instants - lag) * rate)) for lag in lags]
-    )
+    lags = np.arange(np.ceil(margin - videos.ends[other]), videos.ends[known] - margin + 1)
+    frames = np.arange(0, videos.frames[known], max(1, int(shortest // _INSTANTS)))
+    first, second = videos.unknowns.cameras[known], videos.unknowns.cameras[other]
+    placed = [c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second)]
+    lines = epipolar_lines(placed[0], videos.curves[known](frames), placed[1])
+    instants, rate = frames / videos.rates[known], videos.rates[other]
+    at = videos.curves[other]
+    missed = np.array([_pair_missed(first, second, lines, at((instants - k) * rate)) for k in lags])
     padded = np.concatenate(([np.inf], missed, [np.inf]))
     dips = (missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed)
     ranked = sorted(np.flatnonzero(dips), key=lambda k: missed[k])
     return [float(lags[k]) for k in ranked[:_PROMISING]] or [0.0]
 
 
-def _pair_missed(known, other, ours: np.ndarray, theirs: np.ndarray) -> float:
-    """How badly two views agree at best, in pixels of the first; one instant in ten is left out."""
-    common = np.isfinite(ours).all(axis=1) & np.isfinite(theirs).all(axis=1)
-    cameras = [c if c.is_placed else replace(c, position=np.zeros(3)) for c in (known, other)]
-    design, target = epipolar_equations(cameras[0], ours[common], cameras[1], theirs[common])
+def _pair_missed(
+    known: Camera, other: Camera, lines: tuple[Floats, Floats], theirs: Floats
+) -> float:
+    """How badly two views agree at best, in pixels of the first; one instant in ten is left out.
+
+    `lines` are the epipolar lines of the first view's pixels, `theirs` the pixels of the second.
+    """
+    design, target = epipolar_design(lines, other, theirs)
     if other.is_calibrated:
-        turned = other.scale * np.array([np.cos(other.angle), np.sin(other.angle)])
+        scale, angle = other.calibration
+        turned = scale * np.array([np.cos(angle), np.sin(angle)])
         design, target = design[:, :0], target - design @ turned
     if not (known.is_placed and other.is_placed):  # the offset adds the same to all equations
         design = np.column_stack((design, np.ones(len(design))))
@@ -356,19 +394,27 @@ def _pair_missed(known, other, ours: np.ndarray, theirs: np.ndarray) -> float:
         solution = np.linalg.lstsq(design[fits], target[fits])[0]
         missed = np.abs(design @ solution - target)
         fits = missed <= np.quantile(missed, _TRIMMED)
-    return float(np.sqrt(np.mean(missed[fits] ** 2))) / known.scale
+    return float(np.sqrt(np.mean(missed[fits] ** 2))) / known.calibration[0]
 
 
-def _curve(track: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+def _aligned(
+    curves: Sequence[Curve], lags: Floats, rates: Floats, frames: int
+) -> tuple[Floats, ...]:
+    """What each curve shows at so many frames of the clock."""
+    clock = np.arange(frames)
+    return tuple(c((clock - lag) * r) for c, lag, r in zip(curves, lags, rates, strict=True))
+
+
+def _curve(track: Floats) -> Curve:
     """A track as a function of the frame number, whole or not: a cubic spline through its frames.
 
     Its values are NaN outside, and unless the target is seen in the frames before and after.
     """
-    shown = np.isfinite(track).all(axis=1)
+    shown = np.asarray(np.isfinite(track).all(axis=1))
     seen = np.flatnonzero(shown)
     spline = make_interp_spline(seen, track[seen], k=min(3, len(seen) - 1)) if len(seen) else None
 
-    def at(frames):
+    def at(frames: Floats) -> Floats:
         inside = (frames >= 0) & (frames <= len(track) - 1)
         frames = np.where(inside, frames, 0)
         low, high = np.floor(frames).astype(int), np.ceil(frames).astype(int)
@@ -377,23 +423,25 @@ def _curve(track: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         whole = inside & (low == high)
         values[whole] = track[low[whole]]
         between = inside & (low != high)
-        if between.any():
+        if spline is not None and between.any():
             values[between] = spline(frames[between])
         return values
 
     return at
 
 
-def _check_lags(name, lags, count):
-    lags = check_vector(name, lags, count)
-    far = np.abs(lags).max()
+def _check_lags(name: str, lags: ArrayLike, count: int) -> Floats:
+    """One lag per video, counted from the first one's."""
+    checked = check_vector(name, lags, count)
+    far = np.abs(checked).max()
     if far > _FARTHEST:
         raise ValueError(f"{name}: must be at most {_FARTHEST:g} frames, got {far:g}")
-    return lags - lags[0]
+    return checked - checked[0]
 
 
-def _check_rates(rates, count):
-    rates = np.ones(count) if rates is None else check_vector("rates", rates, count)
+def _check_rates(given: ArrayLike | None, count: int) -> Floats:
+    """One rate per video, in units of the first one's."""
+    rates = np.ones(count) if given is None else check_vector("rates", given, count)
     for rate in rates:
         if not 1 / _FASTEST <= check_positive("rates", rate) <= _FASTEST:
             raise ValueError(

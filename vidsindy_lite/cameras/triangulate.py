@@ -1,27 +1,181 @@
-"""Lines of sight: where those of one target meet, and the equations they put on a camera.
+"""Triangulation: from the pixels of several cameras to points in space, and back to residuals.
 
 A camera sees the point x at the pixel x_c (from the middle of the image, y up) with
 
-    s T(theta) x_c = (X, Y) / W,        (X, Y, W) = matrix @ (x, 1),
+    s T(theta) x_c = (X, Y) / W,        (X, Y, W) = matrix @ (x, 1).
 
-where the 3 x 4 camera matrix holds what is known of it, position and normal. W is 1 in an
-orthographic camera and the distance along the line of view in a perspective one. For known s and
-theta these are two linear equations for x, the line of sight: `intersect`. For known x on some
-other camera's line of sight they leave one linear equation for (s cos theta, s sin theta), the
-epipolar one: `epipolar_equations`. Neither asks which kind of camera it is.
+For known s and theta these are two linear equations for x, the line of sight: `intersect`. For
+known x on some other camera's line of sight they leave one linear equation for
+(s cos theta, s sin theta), the epipolar one: `epipolar_lines` and `epipolar_design`. None of them
+asks which model of camera it is.
+
+Paper: Eq. (6).
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-# Lines of sight closer to parallel than this (sine of their angle) count as one.
-PARALLEL = 1e-6
+from ..arrays import Bools, Floats, Ints
+from ..checks import check_instance, check_tracks
+from .geometry import PARALLEL
+from .models import Camera, all_orthographic, independent
+from .rig import Rig
 
 _STEPS = 30  # of Gauss and Newton; from the linear solution four or five are usual
 _SETTLED = 1e-11  # pixels
 
 
-def intersect(cameras, tracks):
-    """Points that calibrated cameras of any kind see at given pixels, by least squares in pixels.
+@dataclass(frozen=True)
+class Views:
+    """What the cameras of a rig saw: tracks of equal length whose rows are whole or all NaN.
+
+    `groups` are the frames with the same two or more views: pairs (cameras, frames) of indices.
+    """
+
+    tracks: tuple[Floats, ...]
+    groups: tuple[tuple[Ints, Ints], ...]
+
+    @classmethod
+    def of(cls, tracks: Sequence[Floats]) -> Views:
+        """Group the frames of tracks; half a pixel tells nothing."""
+        seen = np.column_stack([np.isfinite(track).all(axis=1) for track in tracks])
+        patterns, group = np.unique(seen, axis=0, return_inverse=True)
+        return cls(
+            tuple(np.where(s[:, None], t, np.nan) for s, t in zip(seen.T, tracks, strict=True)),
+            tuple(
+                (np.flatnonzero(pattern), np.flatnonzero(group == g))
+                for g, pattern in enumerate(patterns)
+                if pattern.sum() >= 2
+            ),
+        )
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return len(self.tracks[0])
+
+
+def reconstruct(tracks: Sequence[Floats], rig: Rig) -> Floats:
+    """3D trajectory from the tracks of a calibrated rig, by least squares in pixels.
+
+    Paper: Eq. (6), whose "inverse" of a 6 x 3 matrix is the least-squares solution; here with any
+    number of cameras, of either model, and each view weighted so that all count in pixels.
+
+    Every frame is taken as it is: an outlier of one track moves the point. Three views show it as
+    a large residual of that frame (see `residuals`), two views cannot.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n, 2)
+        One track per camera of the rig; NaN = not seen.
+    rig : Rig
+        All cameras calibrated.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Scene units; NaN where fewer than two cameras see the target, where all that do look along
+        the same line, or where the lines of sight meet behind a perspective camera.
+
+    Raises
+    ------
+    ValueError
+        If the tracks do not match the rig or a camera is not calibrated.
+    """
+    views = check_views(tracks, rig)
+    check_calibrated("rig", rig)
+    return triangulate(views, rig.cameras)
+
+
+def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
+    """Reprojection residuals: by how many pixels the reconstructed target misses each track.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n, 2)
+        One track per camera of the rig; NaN = not seen.
+    rig : Rig
+        All cameras calibrated.
+
+    Returns
+    -------
+    list of ndarray, shape (n, 2)
+        Track minus projection, pixels, one array per camera; NaN where the camera does not see
+        the target or it cannot be reconstructed. Of the six numbers of a frame three are used up
+        by the point itself, so pixel noise of standard deviation sigma leaves sigma / sqrt(2).
+
+    Raises
+    ------
+    ValueError
+        If the tracks do not match the rig or a camera is not calibrated.
+    """
+    views = check_views(tracks, rig)
+    check_calibrated("rig", rig)
+    return reprojection(views, rig.cameras)
+
+
+def check_views(tracks: Sequence[Floats], rig: Rig) -> Views:
+    """That there is one track per camera of the rig, of equal length, each seeing the target."""
+    check_instance("rig", rig, Rig)
+    tracks = check_tracks(tracks, len(rig.cameras))
+    lengths = [len(track) for track in tracks]
+    if len(set(lengths)) > 1:
+        raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
+    for i, track in enumerate(tracks):
+        if np.isnan(track).any(axis=1).all():
+            raise ValueError(f"tracks[{i}]: must see the target in some frame, got only NaN rows")
+    return Views.of(tracks)
+
+
+def check_calibrated(name: str, rig: Rig) -> None:
+    """That scale, angle and position of all cameras are known."""
+    for i, camera in enumerate(rig.cameras):
+        if not camera.is_calibrated:
+            raise ValueError(
+                f"{name}: all cameras must be calibrated, got cameras[{i}] without scale and "
+                "angle; use learn_cameras first"
+            )
+        if not camera.is_placed:
+            raise ValueError(
+                f"{name}: all cameras must have a position, got cameras[{i}] without; use "
+                "learn_cameras first"
+            )
+
+
+# What follows takes its arguments as they are.
+
+
+def reprojection(views: Views, cameras: Sequence[Camera]) -> list[Floats]:
+    """`residuals` of views that were checked."""
+    x = triangulate(views, cameras)
+    return [t - camera.image(x) for t, camera in zip(views.tracks, cameras, strict=True)]
+
+
+def triangulate(views: Views, cameras: Sequence[Camera]) -> Floats:
+    """`reconstruct` of views that were checked; one linear solve if all are orthographic."""
+    if not all_orthographic(cameras):
+        return intersect(cameras, views.tracks)[0]
+    x = np.full((views.frames, 3), np.nan)
+    for indices, frames in views.groups:
+        group = [cameras[i] for i in indices]
+        if not independent(group):
+            continue
+        scales = [camera.calibration[0] for camera in group]
+        rows = np.vstack([c.rows / scale for c, scale in zip(group, scales, strict=True)])
+        seen = [
+            (scale * camera.turned(views.tracks[i][frames]) + camera.offset) / scale
+            for i, camera, scale in zip(indices, group, scales, strict=True)
+        ]
+        x[frames] = np.hstack(seen) @ np.linalg.pinv(rows).T
+    return x
+
+
+def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floats, Bools]:
+    """Points that calibrated cameras of any model see at given pixels, by least squares in pixels.
 
     The linear equations, in scene units, are the start of a Gauss-Newton search for the least
     reprojection error.
@@ -34,84 +188,65 @@ def intersect(cameras, tracks):
 
     Returns
     -------
-    ndarray, shape (n, 3)
+    x : ndarray, shape (n, 3)
         Scene units; NaN where all lines of sight are parallel, or meet behind a camera.
+    settled : ndarray of bool, shape (n,)
+        Whether the search for a point came to its end.
     """
-    seen = np.stack([camera.turned(track) for camera, track in zip(cameras, tracks, strict=True)])
-    visible = np.isfinite(seen).all(axis=-1)
+    matrices = np.array([camera.matrix for camera in cameras])
+    scales = np.array([camera.calibration[0] for camera in cameras])
+    seen = np.stack([c.turned(track) for c, track in zip(cameras, tracks, strict=True)], axis=1)
+    visible = np.asarray(np.isfinite(seen).all(axis=-1))
     seen = np.where(visible[..., None], seen, 0)
 
-    def stacked(pairs):
-        """Equations of all cameras, (n, 2 m, 3) and (n, 2 m), zero where the target is hidden."""
-        left, right = (np.stack(part, axis=1) for part in zip(*pairs, strict=True))
-        shown = visible.T[:, :, None]
-        left, right = np.where(shown[..., None], left, 0), np.where(shown, right, 0)
-        rows = 2 * len(cameras)
-        return left.reshape(-1, rows, 3), right.reshape(-1, rows)
-
-    matrices, scales = [camera.matrix for camera in cameras], [camera.scale for camera in cameras]
-    left, right = stacked(map(_line, matrices, scales, seen))
+    left, right = _stacked(*_lines(matrices, scales, seen), visible)
     crossing = np.linalg.svd(left, compute_uv=False)[:, 2] > PARALLEL
-    visible, seen = visible[:, crossing], seen[:, crossing]
-    point = _least_squares(left[crossing], right[crossing])
+    seen, visible = seen[crossing], visible[crossing]
 
-    def look(point):
-        views = zip(matrices, scales, seen, strict=True)
-        slope, missed = stacked(_reprojection(*view, point) for view in views)
-        return slope, missed, np.sum(missed**2, axis=1)
+    def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:
+        slope, missed = _reprojection(matrices, scales, seen[frames], point)
+        return _stacked(slope, missed, visible[frames])
 
-    slope, missed, error = look(point)
-    part = np.ones((len(point), 1))  # of the step, halved where the whole one leads uphill
-    for _ in range(_STEPS):
-        step = part * _least_squares(slope, missed)
-        with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
-            new_slope, new_missed, new_error = look(point + step)
-        moved = np.max(np.abs(slope @ step[..., None]), initial=0)
-        lower = new_error <= (1 + 1e-12) * error + _SETTLED**2  # or equal, but for rounding
-        part = np.where(lower[:, None], 1, part / 2)
-        point[lower] += step[lower]
-        slope[lower], missed[lower], error[lower] = (
-            new_slope[lower], new_missed[lower], new_error[lower],
-        )  # fmt: skip
-        if moved <= _SETTLED:
-            break
-    for matrix, shown in zip(matrices, visible, strict=True):
-        depth = point @ matrix[2, :3] + matrix[2, 3]
-        point[shown & (depth <= 0)] = np.nan
-    x = np.full((len(crossing), 3), np.nan)
-    x[crossing] = point
-    return x
+    start = _least_squares(left[crossing], right[crossing])
+    point, settled = _gauss_newton(look, start)
+    depth = point @ matrices[:, 2, :3].T + matrices[:, 2, 3]
+    point[(visible & (depth <= 0)).any(axis=1)] = np.nan
+    x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
+    x[crossing], ended[crossing] = point, settled
+    return x, ended
 
 
-def epipolar_equations(known, known_pixels, unknown, pixels):
-    """Linear equations for scale and angle of one camera from the lines of sight of another.
+def epipolar_lines(known: Camera, pixels: Floats, unknown: Camera) -> tuple[Floats, Floats]:
+    """What the lines of sight of one camera are in the image of another, of whatever scale.
 
     On the line x = a + lambda d of the known camera, numerator and denominator of the unknown
     one are g + lambda h and u + lambda v. That (g + lambda h) = (u + lambda v) s T x_c for some
     lambda means, taking lambda out,
 
-        (u h - v g) x (s T x_c) = h x g        (x: cross product in the plane),
-
-    and s T (X, Y) = [[X, Y], [Y, -X]] (s cos theta, s sin theta).
+        (u h - v g) x (s T x_c) = h x g        (x: cross product in the plane).
 
     Parameters
     ----------
     known : Camera
         Calibrated.
-    known_pixels : ndarray, shape (n, 2)
+    pixels : ndarray, shape (n, 2)
+        Where the known camera sees some points.
     unknown : Camera
         Its scale and angle are not used.
-    pixels : ndarray, shape (n, 2)
-        Where the unknown camera sees the same points.
 
     Returns
     -------
-    design : ndarray, shape (k, 2)
-        Pixels. Frames whose lines of sight cannot disagree are left out.
-    target : ndarray, shape (k,)
-        In the unit of the unknown camera's scale, times pixels.
+    normals : ndarray, shape (n, 2)
+        u h - v g at unit length; NaN where the point is not seen, or the cameras cannot disagree
+        on it.
+    constants : ndarray, shape (n,)
+        h x g in the same unit: scene units, or for a perspective camera those at distance 1.
     """
-    left, right = _line(known.matrix, known.scale, known.turned(known_pixels))
+    normals, constants = np.full((len(pixels), 2), np.nan), np.full(len(pixels), np.nan)
+    seen = np.isfinite(pixels).all(axis=1)
+    scale = np.array([known.calibration[0]])
+    left, right = _lines(known.matrix[None], scale, known.turned(pixels[seen])[:, None])
+    left, right = left[:, 0], right[:, 0]
     direction = np.cross(left[:, 0], left[:, 1])
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     on_line = (np.linalg.pinv(left) @ right[..., None])[..., 0]
@@ -121,27 +256,83 @@ def epipolar_equations(known, known_pixels, unknown, pixels):
     size = np.linalg.norm(across, axis=1)
     reach = np.abs(g[:, 2]) + np.abs(h[:, 2]) * np.linalg.norm(g[:, :2], axis=1)
     good = size > PARALLEL * reach
-    (a, b), (x, y) = (across[good] / size[good, None]).T, unknown.centred(pixels[good]).T
-    design = np.column_stack((a * y - b * x, -a * x - b * y))
-    return design, (h[good, 0] * g[good, 1] - h[good, 1] * g[good, 0]) / size[good]
+    told = np.flatnonzero(seen)[good]
+    normals[told] = across[good] / size[good, None]
+    constants[told] = (h[good, 0] * g[good, 1] - h[good, 1] * g[good, 0]) / size[good]
+    return normals, constants
 
 
-def _line(matrix, scale, turned):
-    """Equations left @ x = right of the lines of sight at T x_c, (n, 2, 3), (n, 2), scene units."""
-    seen = scale * turned
-    left = matrix[:2, :3] - seen[:, :, None] * matrix[2, :3]
-    return left, seen * matrix[2, 3] - matrix[:2, 3]
+def epipolar_design(
+    lines: tuple[Floats, Floats], camera: Camera, pixels: Floats
+) -> tuple[Floats, Floats]:
+    """Linear equations for scale and angle of a camera from `epipolar_lines` and its own pixels.
+
+    s T (X, Y) = [[X, Y], [Y, -X]] (s cos theta, s sin theta). Design, (k, 2), in pixels, and
+    target, (k,); frames without a line or pixel are left out.
+    """
+    normals, constants = lines
+    common = np.isfinite(normals[:, 0]) & np.isfinite(pixels).all(axis=1)
+    (a, b), (x, y) = normals[common].T, camera.centred(pixels[common]).T
+    return np.column_stack((a * y - b * x, -a * x - b * y)), constants[common]
 
 
-def _reprojection(matrix, scale, turned, x):
-    """Slope of the T x_c at which points are seen, (n, 2, 3), and how far it is off, (n, 2)."""
-    image = x @ matrix[:, :3].T + matrix[:, 3]
-    plane, depth = image[:, :2] / image[:, 2:], image[:, 2, None, None]
-    slope = (matrix[:2, :3] - plane[:, :, None] * matrix[2, :3]) / (scale * depth)
-    return slope, turned - plane / scale
+def _lines(matrices: Floats, scales: Floats, turned: Floats) -> tuple[Floats, Floats]:
+    """Equations left @ x = right of the lines of sight at T x_c, scene units.
+
+    From (m, 3, 4), (m,) and (n, m, 2) to (n, m, 2, 3) and (n, m, 2).
+    """
+    seen = scales[:, None] * turned
+    left = matrices[:, :2, :3] - seen[..., None] * matrices[:, None, 2, :3]
+    return left, seen * matrices[:, 2, 3, None] - matrices[:, :2, 3]
 
 
-def _least_squares(left, right):
+def _reprojection(
+    matrices: Floats, scales: Floats, turned: Floats, x: Floats
+) -> tuple[Floats, Floats]:
+    """Slope of the T x_c at which points are seen, (n, m, 2, 3), and how far it is off."""
+    image = np.moveaxis(x @ matrices[:, :, :3].swapaxes(1, 2), 0, 1) + matrices[:, :, 3]
+    plane, depth = image[..., :2] / image[..., 2:], image[..., 2, None, None]
+    slope = matrices[:, :2, :3] - plane[..., None] * matrices[:, None, 2, :3]
+    return slope / (scales[:, None, None] * depth), turned - plane / scales[:, None]
+
+
+def _stacked(left: Floats, right: Floats, visible: Bools) -> tuple[Floats, Floats]:
+    """Equations of all cameras, (n, 2 m, 3) and (n, 2 m), zero where the target is hidden."""
+    rows = 2 * visible.shape[1]
+    left = np.where(visible[..., None, None], left, 0).reshape(-1, rows, 3)
+    return left, np.where(visible[..., None], right, 0).reshape(-1, rows)
+
+
+def _gauss_newton(
+    look: Callable[[Floats, Ints], tuple[Floats, Floats]], start: Floats
+) -> tuple[Floats, Bools]:
+    """Points of the least squared misses, each searched by itself, and which of them settled.
+
+    `look(points, frames)` gives the slopes, (k, 2 m, 3), and the misses, (k, 2 m).
+    """
+    point, active = start.copy(), np.arange(len(start))
+    part = np.ones(len(start))  # of the step, halved where the whole one leads uphill
+    slope, missed = look(point, active)
+    for _ in range(_STEPS):
+        step = part[active, None] * _least_squares(slope[active], missed[active])
+        with np.errstate(all="ignore"):  # lines that hardly cross may send a point far away
+            new_slope, new_missed = look(point[active] + step, active)
+            new_error, error = np.sum(new_missed**2, axis=1), np.sum(missed[active] ** 2, axis=1)
+        moved = np.abs(slope[active] @ step[..., None]).max(axis=(1, 2), initial=0)
+        lower = new_error <= (1 + 1e-12) * error + _SETTLED**2  # or equal, but for rounding
+        part[active] = np.where(lower, 1, part[active] / 2)
+        taken = active[lower]
+        point[taken] += step[lower]
+        slope[taken], missed[taken] = new_slope[lower], new_missed[lower]
+        active = active[~(moved <= _SETTLED)]
+        if not active.size:
+            break
+    settled = np.ones(len(start), bool)
+    settled[active] = False
+    return point, settled
+
+
+def _least_squares(left: Floats, right: Floats) -> Floats:
     """Solutions of many small systems; zero where one is singular: a point that ran far away."""
     q, r = np.linalg.qr(left)
     pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))

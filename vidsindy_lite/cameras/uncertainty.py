@@ -16,20 +16,26 @@ with weights w that fall linearly to zero over as many frames as the residuals d
 The tracks themselves may share an error, too: see `trailing_errors`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from .calibrate import Rig, camera_parameters, reconstruct, residuals, with_parameters
+from ..arrays import Floats
+from .rig import Rig
 from .synchronise import OUTLIER, PROBE, Lags, align
+from .triangulate import Views, check_calibrated, check_views, reprojection, triangulate
+from .unknowns import Unknowns
 
 _PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 
 
 def systematic_errors(
-    tracks: Sequence[np.ndarray], rig: Rig, learned: Rig, lags: Lags
-) -> np.ndarray:
+    tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: Lags
+) -> Floats:
     """Errors of the reconstructed path that come from what was learned of cameras and lags.
 
     Parameters
@@ -47,21 +53,25 @@ def systematic_errors(
         Scene units; what k independent causes, each off by one standard error, add to the path.
         Zero where nothing can be reconstructed.
     """
-    start = camera_parameters(rig, learned)
+    unknowns = Unknowns.of(rig)
+    start = unknowns.read(learned.cameras)
     moving = np.flatnonzero((lags.errors > 0) & np.isfinite(lags.errors))
     steps = np.concatenate([np.full(len(start), _PROBE), np.full(len(moving), PROBE)])
+    still = Views.of(align(tracks, lags.frames, lags.rates))
 
-    def both(change):
-        shifted = lags.frames.copy()
-        shifted[moving] += change[len(start) :]
-        aligned = align(tracks, shifted, lags.rates)
-        cameras = with_parameters(rig, start + change[: len(start)])
-        missed = np.hstack(residuals(aligned, cameras))
-        return np.hstack((missed, reconstruct(aligned, cameras)))
+    def both(change: Floats) -> Floats:
+        """Residuals and path, side by side, at other parameters."""
+        views, shift = still, change[len(start) :]
+        if shift.any():
+            shifted = lags.frames.copy()
+            shifted[moving] += shift
+            views = Views.of(align(tracks, shifted, lags.rates))
+        cameras = unknowns.filled(start + change[: len(start)])
+        return np.hstack((*reprojection(views, cameras), triangulate(views, cameras)))
 
     here = both(0 * steps)
-    slopes = [(both(e) - both(-e)) / (2 * h) for e, h in zip(np.diag(steps), steps, strict=True)]
-    slopes = np.reshape(slopes, (len(steps), *here.shape))
+    tried = [(both(e) - both(-e)) / (2 * h) for e, h in zip(np.diag(steps), steps, strict=True)]
+    slopes = np.reshape(tried, (len(steps), *here.shape))
     missed, slope = here[:, :-3], np.moveaxis(slopes[:, :, :-3], 0, -1)
     used = np.isfinite(missed) & np.isfinite(slope).all(axis=-1)
     limit = OUTLIER * np.median(np.abs(missed[used])) if used.any() else 0.0
@@ -70,7 +80,7 @@ def systematic_errors(
     return np.einsum("ik,inj->knj", factor, np.nan_to_num(slopes[:, :, -3:]))
 
 
-def trailing_errors(tracks: Sequence[np.ndarray], rig: Rig) -> np.ndarray:
+def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
     """Errors of the reconstructed path if tracks stay a constant distance behind the motion.
 
     A codec that codes changes leaves out the smallest ones, so that a trace of the target stays
@@ -90,22 +100,25 @@ def trailing_errors(tracks: Sequence[np.ndarray], rig: Rig) -> np.ndarray:
         Scene units; what the trail of each camera, one standard deviation long, adds to the path.
         Zero where nothing can be reconstructed.
     """
-    x = reconstruct(tracks, rig)
-    missed = np.hstack(residuals(tracks, rig))
+    views = check_views(tracks, rig)
+    check_calibrated("rig", rig)
+    x = triangulate(views, rig.cameras)
+    missed = np.hstack(reprojection(views, rig.cameras))
     count = missed.shape[1]
     missed = np.abs(missed[np.isfinite(missed)])
     noise = 1.4826 * np.median(missed) * np.sqrt(count / (count - 3)) if missed.size else 0.0
     modes = []
-    for i, track in enumerate(tracks):
+    for i, track in enumerate(views.tracks):
         step = np.gradient(track, axis=0)
         # Noise has no direction: the trail ends where the target moves by less than that.
         length = np.sqrt((step**2).sum(axis=1, keepdims=True) + noise**2)
         trail = _TRAIL * noise * np.nan_to_num(step / np.maximum(length, 1e-300))
-        modes.append(reconstruct([*tracks[:i], track - trail, *tracks[i + 1 :]], rig) - x)
+        moved = replace(views, tracks=(*views.tracks[:i], track - trail, *views.tracks[i + 1 :]))
+        modes.append(triangulate(moved, rig.cameras) - x)
     return np.nan_to_num(np.array(modes))
 
 
-def _sandwich(missed: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def _sandwich(missed: Floats, slope: Floats) -> Floats:
     """A factor F of the covariance F F' of the parameters, from residuals (n, m) and slopes."""
     bread = np.linalg.inv(np.einsum("nmk,nml->kl", slope, slope))
     scores = np.einsum("nmk,nm->nk", slope, missed) @ bread
@@ -114,7 +127,7 @@ def _sandwich(missed: np.ndarray, slope: np.ndarray) -> np.ndarray:
     return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
-def long_run_covariance(series: np.ndarray) -> np.ndarray:
+def long_run_covariance(series: Floats) -> Floats:
     """Covariance of the mean of a stationary series of mean zero, times its length.
 
     Parameters

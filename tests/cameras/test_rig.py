@@ -35,6 +35,7 @@ def test_its_origin_is_in_the_middle_and_z_is_up(tmp_path, model):
     ("arguments", "message"),
     [
         ((1,), "cameras: must be an integer of at least 2, got 1"),
+        ((10**11,), "cameras: must be at most 100, got 100000000000"),
         ((3, "fisheye"), "model: must be one of orthographic, perspective, got 'fisheye'"),
         ((3, "orthographic", (0, 1)), "image_size: must be two integers of at least 1"),
     ],

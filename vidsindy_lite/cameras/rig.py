@@ -1,0 +1,298 @@
+"""Rigs: the cameras that watch one scene, their file, and the template of such a file.
+
+A file holds one [[camera]] table per video, with the keys position, normal, scale, angle,
+image_size, and model unless it is orthographic; what is left out is learned (`learn_cameras`).
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..checks import check_image_size, check_instance, check_integer, check_path, check_rows
+from .models import MODELS, Camera, OrthographicCamera, all_orthographic, independent
+
+_MOST = 100  # cameras of a template
+_HEAD = """\
+# Rig file: one [[camera]] table per video, in the order of the videos.
+# Choose an origin, axes and a unit of length (here: metres) and replace every number.
+# Cameras stand still. What is left out is learned from the videos, but for one camera at least
+# scale and angle must be given.
+"""
+_SCALES = {
+    "orthographic": "scale = 0.005    # scene units per pixel: length of an object over its pixels",
+    "perspective": "scale = 0.001    # one over the focal length in pixels",
+}
+_POSITIONS = {
+    "orthographic": "# of the camera, or a landmark in the middle of its image",
+    "perspective": "# of the camera: of its pinhole, near the lens",
+}
+_ANGLE = """\
+angle = {angle:.3f}    # radians: for this normal and the z axis upright in the image; add how
+                  # far the z axis is turned anticlockwise there"""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Cameras that watch one scene in one reference frame.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        Two or more, orthographic or perspective, that do not all look along the same lines: two
+        orthographic normals must not be parallel, or two pinholes not coincide, or there is one
+        camera of each kind.
+
+    warnings : tuple of str, optional
+        What `learn_cameras` has to say of the cameras that it learned. Not part of a file, nor of
+        what makes two rigs equal.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two cameras, or all look along the same lines.
+    """
+
+    cameras: tuple[Camera, ...]
+    warnings: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        cameras = tuple(self.cameras) if isinstance(self.cameras, Iterable) else (self.cameras,)
+        object.__setattr__(self, "cameras", cameras)
+        for i, camera in enumerate(cameras):
+            check_instance(f"cameras[{i}]", camera, Camera)
+        if len(cameras) < 2:
+            raise ValueError(f"cameras: must be two or more, got {len(cameras)}")
+        if not independent(cameras):
+            kind = "normal" if isinstance(cameras[0], OrthographicCamera) else "position"
+            raise ValueError(
+                f"cameras: must have at least two independent {kind}s, got only "
+                f"{[getattr(camera, kind).tolist() for camera in cameras]}"
+            )
+
+    @property
+    def is_orthographic(self) -> bool:
+        """Whether all cameras are: then agreement of the views is linear in what is unknown."""
+        return all_orthographic(self.cameras)
+
+    @classmethod
+    def around(cls, x: ArrayLike, image_size: tuple[int, int] = (512, 512)) -> Rig:
+        """Three calibrated cameras around a scene, which fills most of every image.
+
+        The cameras stand 120 degrees apart in azimuth, look 15 to 25 degrees down, and differ in
+        scale and in-plane angle; z is up in the images but for a roll of 6 to 14 degrees.
+
+        Parameters
+        ----------
+        x : array_like, shape (n, 3)
+            Points of the scene, e.g. a trajectory; NaN rows are ignored.
+        image_size : tuple of int, default (512, 512)
+            Width and height in pixels.
+
+        Returns
+        -------
+        Rig
+
+        Raises
+        ------
+        ValueError
+            If x has a wrong shape or all its points coincide.
+        """
+        points = check_rows("x", x, 3)
+        points = points[~np.isnan(points).any(axis=1)]
+        if len(np.unique(points, axis=0)) < 2:
+            got = f"{points.tolist()!r:.60}" if len(points) else "only rows with NaN"
+            raise ValueError(f"x: must hold at least two different points, got {got}")
+        low, high = points.min(axis=0), points.max(axis=0)
+        middle, reach = (low + high) / 2, np.linalg.norm(high - low)
+        half = (np.array(check_image_size(image_size, least=2)) - 1) / 2
+        cameras = []
+        for azimuth, elevation, roll in np.deg2rad([[20, 20, 6], [140, 15, -9], [260, 25, 14]]):
+            across = np.array([np.cos(azimuth), np.sin(azimuth), 0])
+            normal = np.cos(elevation) * across + np.sin(elevation) * np.array([0, 0, 1])
+            camera = OrthographicCamera(
+                position=middle + reach * normal,
+                normal=normal,
+                scale=1.0,
+                # Without the roll, R^- e_z would be straight up in the image.
+                angle=np.arctan2(-np.cos(azimuth), -np.sin(azimuth)) + roll,
+                image_size=image_size,
+            )
+            extent = np.max(np.abs(camera.centred(camera.image(points))) / half)
+            # The outermost point comes to 85 % of the half image: room for the target's size.
+            cameras.append(replace(camera, scale=extent / 0.85))
+        return cls(tuple(cameras))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Rig:
+        """Read a rig from a TOML file, one [[camera]] table per camera.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Returns
+        -------
+        Rig
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file.
+        ValueError
+            If the file is not TOML or does not describe a rig; names file, camera and key.
+        """
+        path = check_path("path", path)
+        if not path.is_file():
+            raise FileNotFoundError(f"{path}: no such rig file")
+        try:
+            content = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ValueError(f"{path}: must be a TOML file: {error}") from error
+        tables = content.pop("camera", None)
+        if content or not isinstance(tables, list):
+            found = sorted([*content, "camera"] if tables is not None else content)
+            raise ValueError(f"{path}: must hold [[camera]] tables and nothing else, got {found}")
+        try:
+            return cls(tuple(_from_table(i, table) for i, table in enumerate(tables)))
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from error
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the rig to a TOML file, from which `load` gives back exactly this rig.
+
+        Parameters
+        ----------
+        path : path-like
+            Overwritten if it exists.
+        """
+        lines = [
+            "# Cameras of a rig; scale in scene units per pixel (of a perspective camera: at "
+            "distance 1), angle in radians."
+        ]
+        for camera in self.cameras:
+            lines += ["", "[[camera]]"]
+            # repr of a float is its shortest exact decimal form, and valid TOML.
+            lines += [f"{key} = {value!r}" for key, value in _to_table(camera).items()]
+        check_path("path", path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def uncalibrated(self, keep: int = 0) -> Rig:
+        """The same rig with scale and angle forgotten in all cameras but one.
+
+        Parameters
+        ----------
+        keep : int, default 0
+            Index of the camera that stays as it is.
+
+        Returns
+        -------
+        Rig
+
+        Raises
+        ------
+        ValueError
+            If there is no such camera.
+        """
+        if not check_integer("keep", keep) < len(self.cameras):
+            raise ValueError(f"keep: must be an index of {len(self.cameras)} cameras, got {keep}")
+        return Rig(
+            tuple(
+                camera if i == keep else replace(camera, scale=None, angle=None)
+                for i, camera in enumerate(self.cameras)
+            )
+        )
+
+
+def rig_template(
+    cameras: int = 3, model: str = "orthographic", image_size: tuple[int, int] = (1920, 1080)
+) -> str:
+    """Text of a rig file, to be filled in with what was measured.
+
+    Parameters
+    ----------
+    cameras : int
+        Between 2 and 100, evenly around the scene, looking 20 degrees down on its origin from a
+        distance of three units.
+    model : {"orthographic", "perspective"}
+        Of all cameras.
+    image_size : tuple of int
+        Width and height of the videos in pixels.
+
+    Returns
+    -------
+    str
+        A file that `Rig.load` reads.
+
+    Raises
+    ------
+    ValueError
+        If an argument breaks its rule.
+    """
+    if check_integer("cameras", cameras, 2) > _MOST:
+        raise ValueError(f"cameras: must be at most {_MOST}, got {cameras}")
+    if model not in MODELS:
+        raise ValueError(f"model: must be one of {', '.join(MODELS)}, got {model!r}")
+    width, height = check_image_size(image_size)
+    parts = [_HEAD]
+    for i in range(cameras):
+        # Of two cameras, one is a third of a turn from the other: face to face both see the same.
+        azimuth = 2 * np.pi * i / max(cameras, 3) + np.deg2rad(20)
+        elevation = np.deg2rad(20)
+        across = np.array([np.cos(azimuth), np.sin(azimuth), 0])
+        normal = np.cos(elevation) * across + [0, 0, np.sin(elevation)]
+        lines = ["[[camera]]"]
+        if model != "orthographic":
+            lines.append(f'model = "{model}"')
+        lines += [
+            f"position = {_vector(3 * normal)}    {_POSITIONS[model]}",
+            f"normal = {_vector(normal)}    # from the scene to the camera; any length",
+            f"image_size = [{width}, {height}]",
+        ]
+        if i == 0:
+            angle = np.arctan2(-np.cos(azimuth), -np.sin(azimuth))
+            lines += [_SCALES[model], _ANGLE.format(angle=angle)]
+        parts.append("\n".join(lines) + "\n")
+    return "\n".join(parts)
+
+
+def _vector(values: Floats) -> str:
+    """Three decimals of each number, as TOML."""
+    return f"[{', '.join(f'{value:.3f}' for value in values)}]"
+
+
+def _to_table(camera: Camera) -> dict[str, object]:
+    """A camera as plain numbers under the keys of the file; None is left out."""
+    table: dict[str, object] = {}
+    if not isinstance(camera, OrthographicCamera):
+        table["model"] = camera.model
+    if camera.position is not None:
+        table["position"] = camera.position.tolist()
+    table["normal"] = camera.normal.tolist()
+    if camera.is_calibrated:
+        table |= {"scale": camera.scale, "angle": camera.angle}
+    return table | {"image_size": list(camera.image_size)}
+
+
+def _from_table(index: int, table: object) -> Camera:
+    """A camera from a table of a file; errors say which."""
+    keys = ["model", *(part.name for part in fields(Camera))]
+    try:
+        if not isinstance(table, dict):
+            raise ValueError(f"must be a table, got {table!r}")
+        for key in table:
+            if key not in keys:
+                raise ValueError(f"{key}: must be one of {', '.join(keys)}")
+        if "normal" not in table:
+            raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
+        model = table.get("model", OrthographicCamera.model)
+        if model not in MODELS:
+            raise ValueError(f"model: must be one of {', '.join(MODELS)}, got {model!r}")
+        return MODELS[model](**{key: value for key, value in table.items() if key != "model"})
+    except ValueError as error:
+        raise ValueError(f"camera {index}: {error}") from error
