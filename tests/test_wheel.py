@@ -1,6 +1,7 @@
 """The wheel: it holds its data, and its commands run where there is no repository."""
 
 import os
+import shutil
 import subprocess
 import sys
 import venv
@@ -29,10 +30,13 @@ sys.exit(main(sys.argv[1:]))
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """The wheel of this tree, built without the network."""
-    folder = tmp_path_factory.mktemp("wheel")
+    """The wheel of this tree, built without the network from a copy: a build leaves files behind."""
+    folder, copy = tmp_path_factory.mktemp("wheel"), tmp_path_factory.mktemp("copy")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, copy)
+    shutil.copytree(PACKAGE, copy / PACKAGE.name)
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index"]
-    command += ["--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)]
+    command += ["--no-build-isolation", "--wheel-dir", str(folder), str(copy)]
     subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": ""})
     (found,) = folder.glob("*.whl")
     return found

@@ -154,17 +154,20 @@ class _Part:
 def _reached(start: _Part) -> tuple[dict[_Node, _Part], list[Path]]:
     """The parts of the package that some code leads to, and their data files."""
     parts: dict[_Node, _Part] = {}
-    todo, seen, strings = set(start.references), set(), set(start.strings)
+    todo, strings = set(start.references), set(start.strings)
+    seen: set[Reference] = set()
+    beside: set[Path] = set()
     while todo:
         seen.add(reference := todo.pop())
         for node in _nodes(*reference):
-            if node not in parts:
-                file = _file(node.module)
+            file = _file(node.module)
+            if file and node not in parts:
                 source, is_front_door = file.read_text("utf-8"), file.name == "__init__.py"
                 parts[node] = _part(source, node.module, is_front_door, node.name)
                 todo |= parts[node].references - seen
                 strings |= parts[node].strings
-    beside, text = {_file(node.module).with_suffix("") for node in parts}, "\n".join(strings)
+                beside.add(file.with_suffix(""))
+    text = "\n".join(strings)
     return parts, [
         file
         for file in sorted(PACKAGE.rglob("*"))
@@ -317,9 +320,9 @@ def _binds(line: ast.stmt) -> set[str]:
         return {line.name}
     if isinstance(line, IMPORTS):
         return {alias.asname or alias.name.partition(".")[0] for alias in line.names}
-    targets = line.targets if isinstance(line, ast.Assign) else [getattr(line, "target", None)]
-    if not isinstance(line, ast.Assign | ast.AnnAssign):
-        return set()
+    targets: list[ast.expr] = []
+    if isinstance(line, ast.Assign | ast.AnnAssign):
+        targets = line.targets if isinstance(line, ast.Assign) else [line.target]
     return {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
 
 

@@ -129,7 +129,7 @@ class _Client(PapermillNotebookClient):
     returns from its last request reports it on stderr.
     """
 
-    def wait_for_reply(self, msg_id, cell=None):
+    def wait_for_reply(self, msg_id: str, cell: NotebookNode | None = None) -> dict | None:
         reply = super().wait_for_reply(msg_id, cell)
         next_message = run_sync(self.kc.get_iopub_msg)
         with suppress(Empty):
