@@ -183,7 +183,5 @@ def _write_page(path: Path, body: str) -> None:
     title, *_ = re.findall(r"<h1[^>]*>(.*?)</h1>", body, re.DOTALL)
     top = "" if (path.parent / "site.css").exists() else "../"
     formulas = FORMULAS.format(top=top) if "$" in body else ""
-    page = PAGE.format(
-        title=re.sub(r"<[^>]*>", "", title), top=top, body=body, formulas=formulas
-    )
+    page = PAGE.format(title=re.sub(r"<[^>]*>", "", title), top=top, body=body, formulas=formulas)
     write_file(path, page.encode())
