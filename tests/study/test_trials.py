@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import discover
-from vidsindy_lite.pipeline import Observation
+from vidsindy_lite.observation import Observation
 from vidsindy_lite.study import baselines, score
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.baselines import BASELINES
