@@ -148,6 +148,10 @@ def test_every_method_gets_the_same_data(condition, level, no_videos, monkeypatc
         np.testing.assert_array_equal(other_x, x)
 
 
+def test_methods_are_ours_and_every_baseline():
+    assert experiments.METHODS == ("ours", *BASELINES)
+
+
 def test_corruption_is_that_of_the_protocol():
     x = SYSTEMS["Lorenz"].trajectory(1500)[1]
     noisy = Trial("Lorenz", "noise", 0.2).corrupt(x) - x
