@@ -252,7 +252,7 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # ```
 #
 # Next to nothing: with learned and with true cameras the relative l2 error of the first trial is below
-# 1e-4, and no coefficient is off by more than two standard errors.
+# 1e-3, and no coefficient is off by more than two standard errors.
 # </details>
 #
 # **2.** Only the first two cameras were there. Does the law survive?
