@@ -225,3 +225,16 @@ def test_a_rig_without_calibrated_camera_is_refused_before_tracking(shot, cut_of
 def test_unknown_options_are_refused_before_tracking(shot, cut_off):
     with pytest.raises(TypeError, match="unexpected keyword argument 'degre'"):
         vl.discover_from_videos([cut_off, *shot.paths[1:]], shot.rig, degre=2)
+
+
+def test_observing_tracks_is_observing_their_videos(shot, monkeypatch):
+    seen = vl.observe(shot.paths, shot.rig.uncalibrated(keep=0), shot.t, lags=(0, 0, 0))
+    rig = shot.rig.uncalibrated(keep=0)
+    again = vl.observe_tracks(seen.tracks, rig, shot.t, lags=(5, 5, 5))
+    np.testing.assert_array_equal(again.x, seen.x)
+    np.testing.assert_array_equal(again.systematic, seen.systematic)
+    assert again.warnings == seen.warnings == ()
+    with pytest.raises(ValueError, match=r"t: must have shape \(200,\), one per row of tracks"):
+        vl.observe_tracks(seen.tracks, rig, shot.t[1:])
+    with pytest.raises(ValueError, match="lags: must make the views agree"):
+        vl.observe_tracks(seen.tracks, rig, shot.t, lags=(0, 3, 0))

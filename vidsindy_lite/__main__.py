@@ -65,7 +65,7 @@ both again from the video files: the whole pipeline in less than a minute.
 
 TRAIN_DESCRIPTION = """\
 Train the learned detector from scratch on frames that the package renders, and write its weights
-(detector.pt) and the record of the training (detector.json) into the package. A few minutes on one
+(detector.pt) and the log of the training (detector.json) into the package. A few minutes on one
 core. Stopped, it goes on from its last checkpoint when it is started again.
 """
 

@@ -5,8 +5,10 @@ Booleans are no numbers here, and text is none even where numpy would read it as
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from numbers import Integral, Real
 from pathlib import Path
 
@@ -47,9 +49,9 @@ def check_integer(name: str, value: int, least: int = 0) -> int:
     return int(value)
 
 
-def check_number(name: str, value: float) -> float:
+def check_number(name: str, value: float | Fraction) -> float:
     """A finite real number."""
-    if not isinstance(value, Real) or isinstance(value, bool) or not np.isfinite(value):
+    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
         raise ValueError(f"{name}: must be a finite number, got {value!r:.60}")
     return float(value)
 

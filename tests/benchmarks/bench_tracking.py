@@ -12,8 +12,6 @@ from scipy.integrate import solve_ivp
 
 from vidsindy_lite.vision import (
     BACKGROUNDS,
-    SEEN_BACKGROUNDS,
-    SEEN_SHAPES,
     SHAPES,
     LearnedDetector,
     Scene,
@@ -25,6 +23,7 @@ from vidsindy_lite.vision import (
     track,
     write_video,
 )
+from vidsindy_lite.vision.training import SEEN_BACKGROUNDS, SEEN_SHAPES
 
 FRAMES = 1500
 REPEATS = 3

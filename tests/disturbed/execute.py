@@ -13,6 +13,12 @@ from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
+from PIL import Image
+
+
+def save_nothing(figure, file, **_):
+    """In place of `Figure.savefig`, which takes most of the time: one pixel."""
+    Image.new("RGB", (1, 1)).save(file, "PNG")
 
 
 def execute(path):
@@ -34,5 +40,5 @@ if __name__ == "__main__":
     folder, *paths = (Path(argument).resolve() for argument in sys.argv[1:])
     os.environ["VIDSINDY_FIGURES"] = str(folder)
     mpl.use("agg")
-    mpl.figure.Figure.savefig = lambda *_, **__: None
+    mpl.figure.Figure.savefig = save_nothing
     sys.exit(sum(not execute(path) for path in paths))

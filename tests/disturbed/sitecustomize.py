@@ -17,7 +17,7 @@ from tempfile import gettempdir
 # What returns a track or a trajectory, by the module that defines it.
 TARGETS = {
     "vidsindy_lite.vision.tracking": ["track"],
-    "vidsindy_lite.cameras.calibrate": ["reconstruct"],
+    "vidsindy_lite.cameras.triangulate": ["reconstruct"],
     "vidsindy_lite.dynamics.polynomials": ["PolynomialSystem.simulate"],
     "vidsindy_lite.dynamics.integrate": ["runge_kutta_4"],
     "vidsindy_lite.study.lab": ["paths"],

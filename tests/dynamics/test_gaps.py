@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from vidsindy_lite.dynamics.collocation import Segment
 from vidsindy_lite.dynamics.gaps import gaps, join
+from vidsindy_lite.dynamics.grid import Segment
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
@@ -21,7 +21,7 @@ def pieces():
     return trajectories, segments, splines
 
 
-def test_gaps_are_within_one_record():
+def test_gaps_are_within_one_trajectory():
     _, segments, _ = pieces()
     assert gaps(segments) == [(0, 2.0)]
 
@@ -49,3 +49,37 @@ def test_a_law_that_blows_up_in_a_gap_leaves_the_curve_finite():
     _, curves = join(segments, splines, [(0, 2.0)], trajectories, wild, 0.2)
     t = np.linspace(2.1, 2.9, 40)
     assert np.isfinite(curves[0](t)).all()
+
+
+def test_gaps_come_shortest_first():
+    t = np.linspace(0, 10, 101)
+    x = np.stack([np.sin(t), np.cos(t)], axis=1)
+    cuts = [t <= 2, (t >= 4) & (t <= 5), (t >= 6) & (t <= 7), t >= 7.5]
+    segments = [Segment.even(t[s], x[s], 0.2, 0) for s in cuts]
+    assert gaps(segments) == [(0, 7.0), (0, 5.0), (0, 2.0)]
+
+
+def test_both_sides_are_blended_linearly_across_the_gap():
+    """Two circles of other sizes: the law keeps each, so the shares show."""
+    t = np.linspace(0, 6, 121)
+    x = np.stack([np.sin(t), np.cos(t)], axis=1)
+    x[t >= 3] *= 2
+    parts = [t <= 2, t >= 3]
+    segments = [Segment.even(t[s], x[s], 0.2, 0) for s in parts]
+    splines = [make_interp_spline(s.t, s.x, 3) for s in segments]
+    joined, (curve,) = join(segments, splines, [(0, 2.0)], [(t, x)], CIRCLE, 0.2)
+    assert len(joined) == 1
+    inside = np.linspace(2, 3, 30)
+    size = 1 + (inside - 2)
+    exact = size[:, None] * np.stack([np.sin(inside), np.cos(inside)], axis=1)
+    np.testing.assert_allclose(curve(inside), exact, atol=1e-5)
+    outside = np.array([1.5, 4.5])
+    np.testing.assert_allclose(curve(outside), [splines[0](1.5), splines[1](4.5)])
+
+
+def test_a_joined_segment_holds_what_was_measured_in_the_gap():
+    trajectories, segments, splines = pieces()
+    joined, _ = join(segments, splines, [(0, 2.0)], trajectories, CIRCLE, 0.25)
+    assert joined[0].t[[0, -1]].tolist() == [0.0, 6.0]
+    np.testing.assert_array_equal(joined[0].t, trajectories[0][0])
+    assert np.diff(joined[0].breakpoints).max() <= 0.25 + 1e-12

@@ -70,3 +70,46 @@ def test_a_linear_law_has_its_fixed_point_as_origin():
         algebra(law, 1e-3), law.support, np.zeros(2), box, 12.0, 4, np.random.default_rng(0)
     )
     assert min(np.abs(o - (2.0, 1.0)).max() for o in origins) < 0.01
+
+
+def test_the_count_is_that_of_significant_terms():
+    """Each term counts z^2 / (z^2 + penalty), with z its value over its standard error."""
+    law = PolynomialSystem.from_terms({"x": {"1": 3.0, "x": -1.0, "x^2": 0.5}})
+    information = np.diag([4.0, 1.0, 100.0])
+    frames = ShiftedLaw(law.exponents, law.coefficients, information)
+    scores = np.array([36.0, 1.0, 25.0])
+    active = np.array([[True], [True], [False]])
+    count, _ = frames.smooth_count(np.zeros(1), active, 9.0)
+    assert count == pytest.approx((scores / (scores + 9))[:2].sum(), rel=1e-9)
+
+
+def test_coefficients_are_made_to_vanish():
+    law = SYSTEMS["SprottF"].shift((0.4, -0.3, 0.2))
+    frames = algebra(law, 0.1)
+    entries = np.argwhere((law.support & ~SYSTEMS["SprottF"].support).T)
+    origin = frames.vanish(np.zeros(3), entries)
+    left = frames.at(origin)[0].T[tuple(entries.T)]
+    np.testing.assert_allclose(left, 0, atol=1e-8)
+    moved = frames.vanish(np.array([0.4, -0.3, 0.2]), entries)
+    np.testing.assert_allclose(moved, (0.4, -0.3, 0.2), atol=1e-12)
+
+
+def test_a_coefficient_that_cannot_vanish_leaves_no_origin_or_a_finite_one():
+    law = PolynomialSystem.from_terms({"x": {"1": 1.0, "x^2": 1.0}})  # no real root
+    origin = algebra(law, 0.1).vanish(np.array([0.5]), np.array([[0, 0]]))
+    assert np.isnan(origin).all() or np.abs(origin).max() < 1e6
+
+
+def test_origins_are_distinct_within_the_box_and_best_first():
+    law = SYSTEMS["Lorenz"].shift((0.5, 0.2, 0.0))
+    active = closure_mask(law.exponents, law.support)
+    low, high = np.full(3, -1.0), np.full(3, 1.0)
+    frames, rng = algebra(law, 1e-3), np.random.default_rng(0)
+    origins = sparse_origins(frames, active, np.zeros(3), (low, high), 12.0, keep=3, rng=rng)
+    assert 1 <= len(origins) <= 3
+    counts = [frames.smooth_count(origin, active, 12.0)[0] for origin in origins]
+    assert counts == sorted(counts)
+    for i, origin in enumerate(origins):
+        assert (origin >= low).all()
+        assert (origin <= high).all()
+        assert all(np.abs(origin - other).max() > 0.02 for other in origins[:i])

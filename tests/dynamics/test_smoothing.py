@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.interpolate import BSpline, make_smoothing_spline
 
-from vidsindy_lite.dynamics.smoothing import smooth
+from vidsindy_lite.dynamics.grid import Grid, Segment
+from vidsindy_lite.dynamics.smoothing import PENALTIES, _roughness, smooth
+from vidsindy_lite.dynamics.splines import design_matrix
 
 
 def wave(n):
@@ -41,3 +45,56 @@ def test_a_line_is_reproduced_on_uneven_times():
     line = 2 * t[:, None] - 1
     spline = smooth([(t, line)], rng).splines[0]
     np.testing.assert_allclose(spline(t), line, atol=1e-6)
+
+
+def dense(band):
+    """The matrix of a lower banded storage."""
+    lower = sum(np.diag(row[: band.shape[1] - k], -k) for k, row in enumerate(band))
+    return lower + np.tril(lower, -1).T
+
+
+def uneven(lengths, rng):
+    """Stretches of uneven times, and their grid with a knot at every sample."""
+    starts = 10.0 * np.arange(len(lengths))
+    times = [
+        low + np.cumsum(rng.uniform(0.5, 2, n)) for low, n in zip(starts, lengths, strict=True)
+    ]
+    stretches = [(t, rng.normal(size=(len(t), 2))) for t in times]
+    return stretches, Grid.of([Segment(t, x, t) for t, x in stretches])
+
+
+def test_the_roughness_is_the_integral_of_the_squared_bend():
+    stretches, grid = uneven([6, 5], np.random.default_rng(0))
+    matrix = dense(_roughness(stretches, grid))
+    control = np.random.default_rng(1).normal(size=grid.r)
+    step = np.median(np.concatenate([np.diff(t) for t, _ in stretches]))
+    integral = 0.0
+    for knots, part in zip(grid.knots, np.split(control, grid.starts[1:-1]), strict=True):
+        bend = BSpline(knots, part, 3).derivative(2)
+        spans = np.unique(knots)
+        for low, high in zip(spans, spans[1:], strict=False):
+            integral += quad(lambda t, bend=bend: bend(t) ** 2, low, high)[0]
+    assert control @ matrix @ control == pytest.approx(step**3 * integral)
+
+
+def test_few_samples_agree_with_dense_algebra():
+    """With fewer samples than probes the trace is exact: penalty, curve and noise follow."""
+    rng = np.random.default_rng(4)
+    t = np.cumsum(rng.uniform(0.5, 1.5, 22))
+    x = np.sin(0.4 * t)[:, None] + 0.1 * rng.normal(size=(22, 1))
+    grid = Grid.of([Segment(t, x, t)])
+    basis, bend = design_matrix(grid.knots[0], t), dense(_roughness([(t, x)], grid))
+    scores, noises, curves = [], [], []
+    for penalty in PENALTIES:
+        influence = basis @ np.linalg.solve(basis.T @ basis + penalty * bend, basis.T)
+        left = np.eye(22) - influence
+        squares = float(((left @ x) ** 2).sum())
+        scores.append(22 * squares / np.trace(left) ** 2 if penalty > 1e-3 else np.inf)
+        noises.append(np.sqrt(squares / np.trace(left @ left.T)))
+        curves.append(influence @ x)
+    best = int(np.argmin(scores))
+    smoothed = smooth([(t, x)], rng)
+    np.testing.assert_allclose(smoothed.splines[0](t), curves[best], rtol=1e-5, atol=1e-7)
+    assert smoothed.noise[0] == pytest.approx(noises[best], rel=1e-5)
+    scipys = make_smoothing_spline(t, x[:, 0], lam=PENALTIES[best] * np.median(np.diff(t)) ** 3)
+    np.testing.assert_allclose(smoothed.splines[0](t)[:, 0], scipys(t), atol=1e-6)

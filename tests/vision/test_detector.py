@@ -13,23 +13,13 @@ from tiny_onnx import BOX, write_red_detector
 
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.vision import training
-from vidsindy_lite.vision.detector import (
-    LEAST,
-    STRIDE,
-    WEIGHTS,
-    LearnedDetector,
-    Network,
-    OnnxDetector,
-    _fused,
-    anchors,
-    as_input,
-    detections,
-)
+from vidsindy_lite.vision.detector import LEAST, WEIGHTS, LearnedDetector, OnnxDetector, detections
+from vidsindy_lite.vision.network import STRIDE, Network, anchors, as_input, fused
 from vidsindy_lite.vision.rendering import render
 from vidsindy_lite.vision.scenery import BACKGROUNDS
 from vidsindy_lite.vision.scenes import SHAPES, Scene
 
-RECORD = json.loads(WEIGHTS.with_suffix(".json").read_text())
+LOG = json.loads(WEIGHTS.with_suffix(".json").read_text())
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +30,8 @@ def learned():
 def unseen_scene(seed, **fixed):
     """A random scene whose background and shape are of kinds that the training has not drawn."""
     rng = np.random.default_rng([seed, 99])
-    background = rng.choice(sorted(set(BACKGROUNDS) - set(RECORD["backgrounds"])))
-    shape = rng.choice(sorted(set(SHAPES) - set(RECORD["shapes"])))
+    background = rng.choice(sorted(set(BACKGROUNDS) - set(LOG["backgrounds"])))
+    shape = rng.choice(sorted(set(SHAPES) - set(LOG["shapes"])))
     return Scene.random(rng, background=str(background), shape=str(shape), **fixed)
 
 
@@ -97,22 +87,22 @@ def test_fused_normalisation_changes_no_value():
     network.eval()
     with torch.inference_mode():
         plain = network(images)
-        torch.testing.assert_close(_fused(network)(images), plain, rtol=1e-4, atol=1e-4)
+        torch.testing.assert_close(fused(network)(images), plain, rtol=1e-4, atol=1e-4)
 
 
 # ----------------------------------------------------------------------------- the learned detector
 
 
-def test_the_weights_are_small_and_their_record_is_complete():
+def test_the_weights_are_small_and_the_log_of_their_training_is_complete():
     assert WEIGHTS.stat().st_size < 2e6
     parameters = sum(p.numel() for p in Network().parameters())
-    assert RECORD["parameters"] == parameters <= 300_000
-    assert RECORD["frames"] == RECORD["steps"] * training.BATCH
-    assert len(RECORD["loss"]) * RECORD["steps_per_loss"] >= RECORD["steps"]
-    assert RECORD["loss"][-1] < 0.3 * RECORD["loss"][0]
-    assert set(RECORD["versions"]) == {"python", "torch", "numpy", "opencv"}
-    assert RECORD["backgrounds"] == list(training.SEEN_BACKGROUNDS)
-    assert RECORD["shapes"] == list(training.SEEN_SHAPES)
+    assert LOG["parameters"] == parameters <= 300_000
+    assert LOG["frames"] == LOG["steps"] * training.BATCH
+    assert len(LOG["loss"]) * LOG["steps_per_loss"] >= LOG["steps"]
+    assert LOG["loss"][-1] < 0.3 * LOG["loss"][0]
+    assert set(LOG["versions"]) == {"python", "torch", "numpy", "opencv"}
+    assert LOG["backgrounds"] == list(training.SEEN_BACKGROUNDS)
+    assert LOG["shapes"] == list(training.SEEN_SHAPES)
 
 
 @pytest.mark.parametrize(("variance", "bound"), [(0.0, 0.5), (0.01, 0.7)])

@@ -14,33 +14,3 @@ from .smoothing import smooth
 from .solver import discover
 from .splines import DEGREE, clamped_knots, design_matrix, local_basis
 from .trajectories import Trajectory, check_trajectory, cut, typical_step
-
-__all__ = [
-    "Collocation",
-    "DEGREE",
-    "Discovery",
-    "ShiftedLaw",
-    "PolynomialSystem",
-    "Trajectory",
-    "Segment",
-    "State",
-    "Status",
-    "Units",
-    "check_trajectory",
-    "clamped_knots",
-    "closest_rival",
-    "cramer_rao",
-    "cut",
-    "design_matrix",
-    "discover",
-    "local_basis",
-    "monomial_exponents",
-    "monomial_gradients",
-    "monomials",
-    "smooth",
-    "runge_kutta_4",
-    "subset_search",
-    "term_penalties",
-    "typical_step",
-    "variable_names",
-]

@@ -43,6 +43,7 @@ DISTURBANCES = {
 _SIZE = 0.055  # diameter of the target, share of the image's width
 _TREE = 0.24, 0.66  # width and height of a tree, shares of the image
 _WHOLE = 0.999  # visible share from which a view counts as whole: edges are rounded
+_NOTHING = 0.01  # visible share below which the target counts as hidden: a pixel of its rim
 _SHIFT = 0.12  # of the image: how far from its middle a tree stands at most
 
 
@@ -98,7 +99,7 @@ class View:
     @property
     def hidden(self) -> Bools:
         """Frames in which nothing of the target can be seen, (n,) bool."""
-        return self.visible == 0
+        return self.visible < _NOTHING
 
     @property
     def delays(self) -> Ints:

@@ -13,28 +13,4 @@ from .rendering import render, render_labelled, render_restless, render_video
 from .scenery import BACKGROUNDS
 from .scenes import SHAPES, Scene
 from .tracking import Track, check_detector, track
-from .training import SEEN_BACKGROUNDS, SEEN_SHAPES
 from .video import VideoInfo, read_frame, read_video, video_info, write_video
-
-__all__ = [
-    "BACKGROUNDS",
-    "LearnedDetector",
-    "SEEN_BACKGROUNDS",
-    "SEEN_SHAPES",
-    "SHAPES",
-    "Scene",
-    "Track",
-    "VideoInfo",
-    "WEIGHTS",
-    "check_detector",
-    "detections",
-    "read_frame",
-    "read_video",
-    "render",
-    "render_labelled",
-    "render_restless",
-    "render_video",
-    "track",
-    "video_info",
-    "write_video",
-]

@@ -11,7 +11,7 @@ weighted with it. Being linear in the frame, it stays unbiased under image noise
 
 Behind an occluder or across the image border the visible part of the target has another centroid
 than the target. It also has another *shape*, whereas whole views are alike up to rotation and size:
-that is how `strangeness` tells the one from the other.
+that is how `view_distances` tells the one from the other.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial.distance import cdist
 
+from ..arrays import Bools, Floats, Image, Ints
 from .video import pick_frames, video_info
 
 _SAMPLES = 21  # frames whose median is the background
@@ -41,6 +42,9 @@ _BLIND = 0.1  # share of the target's outline that may lie on background of the 
 _ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
 _VIEWS = 200  # views among which the commonest one is sought
 
+Floats32 = NDArray[np.float32]
+Window = tuple[slice, slice]
+
 
 # -------------------------------------------------------------------------------------- background
 
@@ -52,7 +56,7 @@ def sample_frames(path: str | os.PathLike) -> NDArray[np.uint8]:
     return np.stack(list(pick_frames(path, np.unique(spread).tolist())))
 
 
-def _median(frames):
+def _median(frames: Image) -> Image:
     """Median over the first axis of uint8 images, by a sorting network (8 times numpy's speed)."""
     images = list(frames)
     for step in range(len(images)):
@@ -63,14 +67,14 @@ def _median(frames):
     return images[len(images) // 2]
 
 
-def _reduce(image):
+def _reduce(image: Image) -> Floats32:
     """Means over squares of 4 x 4 pixels, as floats."""
     height, width = image.shape[:2]
     size = (-(-width // _COARSE), -(-height // _COARSE))
     return cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
 
 
-def _uncover(background, samples, floor):
+def _remove_ghosts(background: Image, samples: Image, floor: float) -> None:
     """Correct in place a background that contains the target where it stayed for long.
 
     Where many samples differ from the background, they show the same place with or without the
@@ -99,36 +103,37 @@ def _uncover(background, samples, floor):
         view[inside] = min(looks, key=lambda look: np.abs(look - expected).sum())
 
 
-def _unrest(changes, floor):
+def _background_motion(changes: list[Floats32], floor: float) -> float:
     """How much differs from the background far from the largest thing that does, in its areas.
 
     Of a target before a background at rest nothing does: 0. Something that fills much of the image
     is no target. The median over the samples, given their differences from the background.
     """
-    unrest = []
+    shares = []
     for change in changes:
         differs = np.linalg.norm(change, axis=-1) > floor
-        _, largest = _components(differs.astype(np.uint8))
-        if largest is None:
+        found = _largest_component(differs.astype(np.uint8))
+        if found is None:
             continue
+        largest = found[1]
         area = largest[cv2.CC_STAT_AREA]
         far = differs
         if area < _TOO_LARGE * differs.size:
             left, top, width, height = largest[:4]
             v, u = np.ogrid[:differs.shape[0], :differs.shape[1]]
             far = differs & (np.hypot(u - left - width / 2, v - top - height / 2) > _NEAR)
-        unrest.append(far.sum() / area)
-    return float(np.median(unrest)) if unrest else 0.0
+        shares.append(far.sum() / area)
+    return float(np.median(shares)) if shares else 0.0
 
 
-def _shake(background, changes, floor):
+def _camera_motion(background: Floats32, changes: list[Floats32], floor: float) -> float:
     """Pixels by which the whole background is displaced, where that is certain, else 0.
 
     To first order a displacement changes the image by minus that times its slope: least squares,
     with a prior of one coarse pixel where there is little to see. The median over the samples.
     """
-    slope = np.stack(np.gradient(background, axis=(1, 0)))
-    shake = []
+    slope = np.array(np.gradient(background, axis=(1, 0)))
+    displaced: list[float] = []
     for change in changes:
         calm = np.linalg.norm(change, axis=-1) <= floor
         g, d = slope[:, calm].reshape(2, -1), change[calm].ravel()
@@ -136,9 +141,9 @@ def _shake(background, changes, floor):
         information = g @ g.T / variance + np.eye(2)
         displacement = np.linalg.solve(information, g @ d / variance)
         error = np.sqrt(np.trace(np.linalg.inv(information)))
-        distance = np.linalg.norm(displacement)
-        shake.append(_COARSE * distance if distance > 5 * error else 0.0)
-    return float(np.median(shake))
+        distance = float(np.linalg.norm(displacement))
+        displaced.append(_COARSE * distance if distance > 5 * error else 0.0)
+    return float(np.median(displaced))
 
 
 # --------------------------------------------------------------------------------------- the model
@@ -151,10 +156,10 @@ class Blob:
     `shape` is None where frame, background and target do not fit together.
     """
 
-    centroid: np.ndarray
+    centroid: Floats
     area: float
     inside: bool
-    shape: np.ndarray | None
+    shape: Floats | None
 
 
 class BackgroundModel:
@@ -166,32 +171,32 @@ class BackgroundModel:
         Frames spread evenly over the clip, see `sample_frames`.
     """
 
-    def __init__(self, samples):
+    def __init__(self, samples: Image) -> None:
         self.background = _median(samples)
         deviation = [cv2.absdiff(s, self.background)[::3, ::3] for s in samples]
         self.noise = 1.4826 * float(np.median(deviation))
         self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
-        _uncover(self.background, samples, self.coarse_floor)
+        _remove_ghosts(self.background, samples, self.coarse_floor)
         self.size = np.array(self.background.shape[1::-1])
         self.coarse_background = _reduce(self.background)
         changes = [_reduce(sample) - self.coarse_background for sample in samples]
-        self.unrest = _unrest(changes, self.coarse_floor)
-        self.shake = _shake(self.coarse_background, changes, self.coarse_floor)
+        self.background_motion = _background_motion(changes, self.coarse_floor)
+        self.camera_motion = _camera_motion(self.coarse_background, changes, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         self.blur = 1.2 if self.noise > _QUIET else 0.0
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
         self.floor = max(5 * remaining, 12.0)
-        self.contrast = None
+        self.contrast: Floats32 | None = None
         self._learn_target(samples)
 
-    def _learn_target(self, samples):
+    def _learn_target(self, samples: Image) -> None:
         """Colour and area of the target: the medians over the sampled frames."""
         looks = []
         for frame in samples:
             near = self.search(frame)
-            if near is not None:
-                looks.append(self._look(frame, *near))
-        looks = [look for look in looks if look is not None]
+            look = near and self._look(frame, *near)
+            if look:
+                looks.append(look)
         if not looks:
             self.area = 0.0
             return
@@ -205,29 +210,31 @@ class BackgroundModel:
             "ijk,ijk->ij", self.coarse_contrast, self.coarse_contrast
         )
 
-    def _window(self, centre, half):
+    def _window(self, centre: Floats, half: float) -> tuple[Ints, Ints, Window]:
+        """First pixel, the one after the last, and the slices, of the square around a place."""
         low = np.clip(np.floor(centre - half).astype(int), 0, self.size - 1)
         high = np.clip(np.ceil(centre + half).astype(int) + 1, low + 1, self.size)
         return low, high, np.s_[low[1]:high[1], low[0]:high[0]]
 
-    def _difference(self, frame, window):
+    def _difference(self, frame: Image, window: Window) -> tuple[Floats32, Floats32]:
         """Signed difference from the background, and its (smoothed) square summed over colours."""
         change = frame[window].astype(np.float32) - self.background[window]
         smooth = cv2.GaussianBlur(change, (0, 0), self.blur) if self.blur else change
         return change, np.einsum("ijk,ijk->ij", smooth, smooth)
 
-    def _look(self, frame, centre, half):
+    def _look(self, frame: Image, centre: Floats, half: float) -> tuple[Floats, float] | None:
         """Colour and rough area of what differs most from the background near `centre`."""
         _, _, window = self._window(centre, half)
         _, energy = self._difference(frame, window)
         mask = (energy > max(self.floor**2, 0.2 * energy.max())).astype(np.uint8)
-        label, stats = _components(mask)
-        if label is None:
+        found = _largest_component(mask)
+        if found is None:
             return None
+        label, stats = found
         core = (_erode(label) > 0) if _erode(label).any() else label > 0
         return np.median(frame[window][core], axis=0), stats[cv2.CC_STAT_AREA]
 
-    def search(self, frame):
+    def search(self, frame: Image) -> tuple[Floats, float] | None:
         """Centre and half width of the part of the whole frame where the target seems to be."""
         change = _reduce(frame) - self.coarse_background
         energy = np.einsum("ijk,ijk->ij", change, change)
@@ -235,21 +242,26 @@ class BackgroundModel:
         if self.contrast is not None:
             match = np.einsum("ijk,ijk->ij", change, self.coarse_contrast)
             weight = np.clip(match / (self.coarse_square + self.coarse_floor**2), 0, 1)
-        label, stats = _components((energy > self.coarse_floor**2).astype(np.uint8), weight)
-        if label is None:
+        found = _largest_component((energy > self.coarse_floor**2).astype(np.uint8), weight)
+        if found is None:
             return None
+        stats = found[1]
         box = stats[[cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP, cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
         centre = _COARSE * (box[:2] + (box[2:] - 1) / 2) + (_COARSE - 1) / 2
         return centre, _COARSE * (box[2:].max() / 2 + 1) + 2 * _RING
 
-    def measure(self, frame, centre, half):
-        """The target within `half` pixels of `centre`, or None. -> Blob"""
+    def measure(self, frame: Image, centre: Floats, half: float) -> Blob | None:
+        """The target within `half` pixels of `centre`, if it is there."""
         low, high, window = self._window(centre, half)
+        assert self.contrast is not None  # else nobody asks
         change, energy = self._difference(frame, window)
         square = self.square[window]
         mask = energy > np.maximum(self.floor**2, 0.1 * square)
-        label, stats = _components(mask.astype(np.uint8))
-        if label is None or not 0.2 < stats[cv2.CC_STAT_AREA] / self.area < 5:
+        found = _largest_component(mask.astype(np.uint8))
+        if found is None:
+            return None
+        label, stats = found
+        if not 0.2 < stats[cv2.CC_STAT_AREA] / self.area < 5:
             return None
         near = cv2.dilate(label, _DISC) > 0
         match = np.einsum("ijk,ijk->ij", change, self.contrast[window])
@@ -278,15 +290,19 @@ class BackgroundModel:
 _DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
 
 
-def _erode(label):
-    return cv2.erode(label, _DISC, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+def _erode(label: Image) -> Image:
+    """A mask without its rim of `_RING` pixels."""
+    eroded = cv2.erode(label, _DISC, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    return np.asarray(eroded, np.uint8)
 
 
-def _components(mask, weight=None):
-    """Mask and statistics of the connected component of largest area or weight, or two Nones."""
+def _largest_component(
+    mask: Image, weight: Floats32 | None = None
+) -> tuple[Image, NDArray[np.int32]] | None:
+    """Mask and statistics of the connected component of largest area or weight."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     if count < 2:
-        return None, None
+        return None
     total = stats[:, cv2.CC_STAT_AREA]
     if weight is not None:
         total = np.bincount(labels.ravel(), weight.ravel(), count)
@@ -294,7 +310,7 @@ def _components(mask, weight=None):
     return (labels == largest).astype(np.uint8), stats[largest]
 
 
-def _shape(alpha, u, v):
+def _shape(alpha: Floats, u: Floats, v: Floats) -> Floats:
     """Four numbers that tell shapes apart and stay the same under rotation and change of size.
 
     With z = u + iv from the centroid, rotation changes only the phase of the complex moments
@@ -314,7 +330,7 @@ def _shape(alpha, u, v):
 # ------------------------------------------------------------------------------------------- track
 
 
-def follow_blobs(model: BackgroundModel, frames: Iterable[np.ndarray]) -> Iterator[Blob | None]:
+def track_blobs(model: BackgroundModel, frames: Iterable[Image]) -> Iterator[Blob | None]:
     """The target in each frame (None if not found): near its predicted position, else anywhere."""
     position, velocity, age = None, np.zeros(2), 0
     for frame in frames:
@@ -336,33 +352,32 @@ def follow_blobs(model: BackgroundModel, frames: Iterable[np.ndarray]) -> Iterat
         yield blob
 
 
-def strangeness(blobs: Sequence[Blob | None]) -> np.ndarray:
+def view_distances(blobs: Sequence[Blob | None]) -> Floats:
     """How far each view (None = not found) is from those of the whole target, (n,).
 
     Partial views differ from each other, whole views are alike: in the space of shapes they lie
     close around one of them, at least a quarter of all views. As far as these also agree in size,
     it is the target's. Up to 1 a view may be whole, infinite is no view at all.
     """
-    views = [i for i, b in enumerate(blobs) if b is not None and b.inside]
-    sound = [i for i in views if blobs[i].shape is not None]
-    quarter = len(views) // 4
-    strange = np.full(len(blobs), np.inf)
+    seen = [(i, blob) for i, blob in enumerate(blobs) if blob is not None and blob.inside]
+    sound = [(i, blob.area, blob.shape) for i, blob in seen if blob.shape is not None]
+    quarter = len(seen) // 4
+    found = np.full(len(blobs), np.inf)
     if len(sound) > quarter:
-        shape = np.array([blobs[i].shape for i in sound])
-        area = np.array([blobs[i].area for i in sound])
-        distance = cdist(shape[:: 1 + len(shape) // _VIEWS], shape)
-        radius = np.partition(distance, quarter, axis=1)[:, quarter]
-        alike = _ALIKE / np.sqrt(area)
-        odd = distance[radius.argmin()] / np.maximum(alike, 6 * radius.min())
-        size = np.abs(np.log(area / np.median(area[odd < 1])))
-        odd_size = size / np.maximum(alike, 10 * np.median(size[odd < 1]))
-        strange[sound] = np.maximum(odd, odd_size)
-    return strange
+        frames, areas, shapes = (np.array(column) for column in zip(*sound, strict=True))
+        apart = cdist(shapes[:: 1 + len(shapes) // _VIEWS], shapes)
+        radius = np.partition(apart, quarter, axis=1)[:, quarter]
+        alike = _ALIKE / np.sqrt(areas)
+        odd_shape = apart[radius.argmin()] / np.maximum(alike, 6 * radius.min())
+        size = np.abs(np.log(areas / np.median(areas[odd_shape < 1])))
+        odd_size = size / np.maximum(alike, 10 * np.median(size[odd_shape < 1]))
+        found[frames] = np.maximum(odd_shape, odd_size)
+    return found
 
 
-def whole(strange: np.ndarray) -> np.ndarray:
-    """Frames (n,) in which the whole target is seen, given their `strangeness`.
+def whole_views(distance: Floats) -> Bools:
+    """Frames (n,) in which the whole target is seen, given their `view_distances`.
 
-    A view beside a strange one may be cut a little: it must be twice as close.
+    A view beside a distant one may be cut a little: it must be twice as close.
     """
-    return ~ndimage.binary_propagation(strange > 1, mask=strange > 0.5)
+    return ~ndimage.binary_propagation(distance > 1, mask=distance > 0.5)

@@ -245,7 +245,8 @@ def render_restless(
     large = BACKGROUNDS[scene.background](np.random.default_rng(seed), (across, down))
     for place, (u, v), factor in zip(track, corners, light, strict=True):
         view = cv2.convertScaleAbs(large[v:v + height, u:u + width], alpha=factor)
-        yield next(render_labelled(place[None], scene, seed, scenery=view)).frame
+        labelled = render_labelled(place[None], scene, seed, scenery=np.asarray(view, np.uint8))
+        yield next(labelled).frame
 
 
 def _frames(
@@ -270,7 +271,7 @@ def _frames(
         if scene.noise_variance > 0:
             # Takes less than half the time of normal numbers; grey levels are coarser by far.
             grain = grains[noise.integers(0, len(grains), frame.shape, np.uint16)]
-            frame = cv2.add(frame, grain, dtype=cv2.CV_8U)
+            frame = np.asarray(cv2.add(frame, grain, dtype=cv2.CV_8U), np.uint8)
         yield LabelledFrame(frame, extent, seen)
 
 

@@ -107,7 +107,7 @@ class Scene:
         """
         if not isinstance(rng, np.random.Generator):
             rng = np.random.default_rng(check_integer("rng", rng))
-        drawn = {
+        drawn: dict[str, Any] = {
             "background": str(rng.choice(list(BACKGROUNDS))),
             "shape": str(rng.choice(SHAPES)),
             "size": float(rng.uniform(8, 40)),
@@ -140,11 +140,11 @@ class Scene:
 
 
 def _check_rectangles(
-    name: str, rectangles: Iterable[Iterable[int]], size: Size
+    name: str, rectangles: Iterable[Box], size: Size
 ) -> tuple[Box, ...]:
     """Boxes of whole pixels that lie in the image."""
-    rectangles = tuple(tuple(rectangle) for rectangle in rectangles)
-    for rectangle in rectangles:
+    boxes: tuple[Any, ...] = tuple(tuple(rectangle) for rectangle in rectangles)
+    for rectangle in boxes:
         whole = len(rectangle) == 4 and all(x == int(x) for x in rectangle)
         if not whole or min(rectangle[:2]) < 0 or min(rectangle[2:]) < 4:
             raise ValueError(
@@ -153,7 +153,7 @@ def _check_rectangles(
             )
         if rectangle[0] + rectangle[2] > size[0] or rectangle[1] + rectangle[3] > size[1]:
             raise ValueError(f"{name}: must lie in the {size} image, got {rectangle}")
-    return rectangles
+    return boxes
 
 
 def _area_and_centroid(polygon: Floats) -> tuple[float, Floats]:

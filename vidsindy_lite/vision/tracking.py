@@ -15,19 +15,17 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .background import BackgroundModel, follow_blobs, sample_frames, strangeness, whole
+from ..arrays import Floats
+from .background import BackgroundModel, sample_frames, track_blobs, view_distances, whole_views
+from .detector import Detection, Detector, LearnedDetector, OnnxDetector, detections
 from .video import read_video
-
-if TYPE_CHECKING:
-    from .detector import Detection
 
 DETECTORS = ("auto", "background", "learned")
 
-_RESTLESS = 0.3  # unrest above which a background is not at rest; before one at rest it is 0.03
+_RESTLESS = 0.3  # motion above which a background is not at rest; before one at rest it is 0.03
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
 _SAME = 3.0  # pixels, within which two tracks are of the same thing
 _GAIN = 0.15  # of confidence, that a sighting has to exceed to be worth anything
@@ -55,8 +53,8 @@ class Track:
         Reasons not to trust the track.
     """
 
-    pixels: np.ndarray
-    confidence: np.ndarray
+    pixels: Floats
+    confidence: Floats
     detector: str
     warnings: tuple[str, ...] = ()
 
@@ -93,17 +91,17 @@ def track(path: str | os.PathLike, detector: str | os.PathLike = "auto") -> Trac
     if detector not in ("auto", "background"):
         return _link_detections(path, _detector(detector), str(detector))
     model = BackgroundModel(sample_frames(path))
-    found = _follow_model(path, model)
+    found = _track_blobs(path, model)
     name, doubts = Path(path).name, []
-    if model.shake > _SHAKY:
+    if model.camera_motion > _SHAKY:
         doubts.append(
-            f"{name}: the camera moves, typically by {model.shake:.1f} px or more; its motion is "
-            "part of the track"
+            f"{name}: the camera moves, typically by {model.camera_motion:.1f} px or more; "
+            "its motion is part of the track"
         )
-    if model.unrest > _RESTLESS:
+    if model.background_motion > _RESTLESS:
         doubts.append(
             f"{name}: the background is not at rest; far from the largest thing that moves, "
-            f"{model.unrest:.1f} times its area changes in a typical frame"
+            f"{model.background_motion:.1f} times its area changes in a typical frame"
         )
         if detector == "auto":
             found = _surer(found, _link_detections(path, _detector("learned"), "learned"))
@@ -138,24 +136,20 @@ def check_detector(name: str | os.PathLike) -> None:
         raise FileNotFoundError(f"detector: no such file, got '{name}'")
 
 
-def _detector(name):
-    """The detector of that name. Torch takes a second to import, which most videos do not need."""
-    from .detector import LearnedDetector, OnnxDetector
-
+def _detector(name: str | os.PathLike) -> Detector:
+    """The detector of that name."""
     return LearnedDetector() if name == "learned" else OnnxDetector(name)
 
 
-def _follow_model(path, model):
-    blobs = list(follow_blobs(model, read_video(path)))
-    strange = strangeness(blobs)
+def _track_blobs(path: str | os.PathLike, model: BackgroundModel) -> Track:
+    blobs = list(track_blobs(model, read_video(path)))
+    distance = view_distances(blobs)
     centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
-    centroids[~whole(strange)] = np.nan
-    return Track(centroids, np.exp(-strange), "background")
+    centroids[~whole_views(distance)] = np.nan
+    return Track(centroids, np.exp(-distance), "background")
 
 
-def _link_detections(path, detector, name):
-    from .detector import detections
-
+def _link_detections(path: str | os.PathLike, detector: Detector, name: str) -> Track:
     sightings = [detections(detector.predict(frame)) for frame in read_video(path)]
     chain = link(sightings)
     pixels = np.array([d.centre if d else (np.nan, np.nan) for d in chain], float)
@@ -201,7 +195,7 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
         if len(worth) and worth.max() > 0:
             before[j] = recent[worth.argmax()]
             value[j] += worth.max()
-    chain = [None] * len(sightings)
+    chain: list[Detection | None] = [None] * len(sightings)
     flat = [d for seen in sightings for d in seen]
     j = int(value.argmax()) if len(rows) else -1
     while j >= 0:

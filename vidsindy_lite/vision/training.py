@@ -8,21 +8,26 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import platform
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch.nn import functional
 from tqdm import trange
 
+from ..arrays import Floats, Image
 from ..checks import check_integer, check_path
 from ..stamp import write_file
-from .detector import STRIDE, WEIGHTS, Network, anchors, as_input
+from .detector import WEIGHTS
+from .network import STRIDE, Network, anchors, as_input
 from .rendering import LabelledFrame, render_labelled
 from .scenery import BACKGROUNDS
-from .scenes import COLOURS, Scene
+from .scenes import COLOURS, Box, Scene
 
 SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
 SEEN_SHAPES = ("disc", "polygon")
@@ -39,14 +44,14 @@ _WARMING = 0.05  # of the steps: the rate rises
 _ABSENT = 0.15  # of the frames show no target
 _WHOLE, _HIDDEN = 0.95, 0.6  # visible share of the target above which it is one, below which none
 _CHECKPOINT = 250  # steps between two
-_CURVE = 100  # points of the loss curve in the record
+_CURVE = 100  # points of the loss curve in the log
 
 # ------------------------------------------------------------------------------------------ frames
 
 
 def training_frame(
-    rng: np.random.Generator, pool: np.ndarray
-) -> tuple[LabelledFrame, np.ndarray]:
+    rng: np.random.Generator, pool: Image
+) -> tuple[LabelledFrame, Floats]:
     """One random frame, its labels, and the centroid of the target, (2,), NaN without target.
 
     Scenes, colours and occluders are random, targets stretched, frames disturbed as by a camera.
@@ -83,20 +88,21 @@ def training_frame(
     return drawn._replace(frame=_seen_by_a_camera(drawn.frame, rng)), centre
 
 
-def _rectangle(rng):
+def _rectangle(rng: np.random.Generator) -> Box:
     """Left, top, width and height of a post or a hedge."""
     size = rng.integers((8, 24), (60, SIDE))
     size = size if rng.random() < 0.5 else size[::-1]
-    return (*(int(rng.integers(0, SIDE - s + 1)) for s in size), *map(int, size))
+    left, top = (int(rng.integers(0, SIDE - s + 1)) for s in size)
+    return left, top, int(size[0]), int(size[1])
 
 
-def background_pool(rng: np.random.Generator) -> np.ndarray:
+def background_pool(rng: np.random.Generator) -> Image:
     """Backgrounds to cut training frames from, (m, 512, 512, 3) uint8."""
     size = (_POOLED, _POOLED)
     return np.stack([BACKGROUNDS[kind](rng, size) for kind in SEEN_BACKGROUNDS * _EACH])
 
 
-def _scenery(rng, pool):
+def _scenery(rng: np.random.Generator, pool: Image) -> Image:
     """A patchwork of backgrounds at several scales and in unlike colours, (SIDE, SIDE, 3)."""
     image = _background(rng, pool)
     for _ in range(rng.choice(4, p=(0.55, 0.15, 0.15, 0.15))):
@@ -105,45 +111,47 @@ def _scenery(rng, pool):
             part = np.s_[top:top + height, left:left + width]
             image[part] = _background(rng, pool)[part]
         else:
-            image = cv2.add(image, _tiles(rng), dtype=cv2.CV_8U)
+            image = np.asarray(cv2.add(image, _tiles(rng), dtype=cv2.CV_8U), np.uint8)
     return image
 
 
-def _background(rng, pool):
+def _background(rng: np.random.Generator, pool: Image) -> Image:
     """A piece of a background, sometimes magnified or reduced, in colours of its own."""
     size = round(SIDE * np.exp(rng.uniform(np.log(0.5), np.log(_POOLED / SIDE))))
     left, top = rng.integers(0, _POOLED - size + 1, 2)
     image = pool[rng.integers(len(pool))][top:top + size, left:left + size]
-    image = cv2.resize(image, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+    resized = cv2.resize(image, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
     # Its colours are mixed, muted: the target's are the vivid ones.
     mix = np.eye(3) + rng.uniform(-0.25, 0.25, (3, 3))
     mix *= rng.uniform(0.6, 1.3) / mix.sum(axis=1, keepdims=True)
-    return cv2.transform(image, mix.astype(np.float32))
+    return np.asarray(cv2.transform(resized, mix.astype(np.float32)), np.uint8)
 
 
-def _tiles(rng):
+def _tiles(rng: np.random.Generator) -> NDArray[np.float32]:
     """Brightness of tiles: a grid of random pitch, turned at random, (SIDE, SIDE, 3)."""
     v, u = np.mgrid[:SIDE, :SIDE].astype(np.float32)
     angle = rng.uniform(0, np.pi)
-    across, along = np.float32([np.cos(angle), np.sin(angle)])
+    across, along = np.array([np.cos(angle), np.sin(angle)], np.float32)
     rows = ((u * across + v * along) / np.float32(rng.uniform(8, 60))).astype(int)
     columns = ((v * across - u * along) / np.float32(rng.uniform(8, 60))).astype(int)
     light = rng.uniform(-40, 40, (SIDE, SIDE)).astype(np.float32)[rows % SIDE, columns % SIDE]
-    return cv2.merge([light] * 3)
+    return np.stack([light] * 3, axis=-1)
 
 
-def _seen_by_a_camera(frame, rng):
+def _seen_by_a_camera(frame: Image, rng: np.random.Generator) -> Image:
     """Another white balance, colours exchanged, blur, or a lossy codec."""
     frame = frame[..., rng.permutation(3)] if rng.random() < 0.5 else frame
     if rng.random() < 0.1:
-        frame = cv2.cvtColor(cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+        grey = cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
+        frame = np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)
     gain = rng.uniform(0.8, 1.2) * rng.uniform(0.9, 1.1, 3)
     frame = np.clip(frame * gain + rng.uniform(-15, 15), 0, 255).astype(np.uint8)
     if rng.random() < 0.2:
-        frame = cv2.GaussianBlur(frame, (0, 0), rng.uniform(0.4, 1.2))
+        frame = np.asarray(cv2.GaussianBlur(frame, (0, 0), rng.uniform(0.4, 1.2)), np.uint8)
     if rng.random() < 0.15:
         quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(40, 95))]
-        frame = cv2.imdecode(cv2.imencode(".jpg", frame, quality)[1], cv2.IMREAD_COLOR)
+        coded = cv2.imencode(".jpg", frame, quality)[1]
+        frame = np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR), np.uint8)
     return frame
 
 
@@ -184,7 +192,7 @@ def detection_loss(
     return what / quality.sum().clamp(min=1) + where / weight.sum().clamp(min=1)
 
 
-def _batch(seed, step, pool):
+def _batch(seed: int, step: int, pool: Image) -> tuple[torch.Tensor, ...]:
     """Images and labels of one step."""
     rngs = [np.random.default_rng(s) for s in np.random.SeedSequence((seed, step)).spawn(BATCH)]
     frames, centres = zip(*(training_frame(rng, pool) for rng in rngs), strict=True)
@@ -200,9 +208,9 @@ def _batch(seed, step, pool):
 
 
 def train(
-    weights: str | Path = WEIGHTS, seed: int = 0, steps: int = STEPS, progress: bool = True
-) -> dict:
-    """Train the detector and write its weights, with a record of the training beside them.
+    weights: str | os.PathLike = WEIGHTS, seed: int = 0, steps: int = STEPS, progress: bool = True
+) -> dict[str, Any]:
+    """Train the detector and write its weights, with the log of the training beside them.
 
     Interrupted, it goes on from its last checkpoint (a file beside the weights) when it is called
     again with the same seed and number of steps.
@@ -210,7 +218,7 @@ def train(
     Parameters
     ----------
     weights : path
-        File for the weights (.pt); the record is a .json of the same name.
+        File for the weights (.pt); the log is a .json of the same name.
     seed : int
     steps : int
         Batches of 16 frames.
@@ -219,14 +227,15 @@ def train(
 
     Returns
     -------
-    record : dict
+    log : dict
         Seed, numbers of steps, frames and parameters, loss curve, what was trained on, versions.
     """
     weights = check_path("weights", weights)
     seed, steps = check_integer("seed", seed), check_integer("steps", steps, 1)
     with torch.random.fork_rng():
         torch.manual_seed(seed)
-        network = Network().to(memory_format=torch.channels_last).train()
+        network = Network().train()
+        network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-3)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, _RATE, total_steps=steps + 1, pct_start=_WARMING
@@ -251,20 +260,22 @@ def train(
             state |= {"seed": seed, "steps": steps, "losses": losses}
             _save(checkpoint, state)
     _save(weights, network.state_dict())
-    record = _record(seed, losses, sum(p.numel() for p in network.parameters()))
-    write_file(weights.with_suffix(".json"), (json.dumps(record, indent=1) + "\n").encode())
+    log = _training_log(seed, losses, sum(p.numel() for p in network.parameters()))
+    write_file(weights.with_suffix(".json"), (json.dumps(log, indent=1) + "\n").encode())
     checkpoint.unlink(missing_ok=True)
-    return record
+    return log
 
 
-def _save(path, state):
+def _save(path: Path, state: dict[str, Any]) -> None:
     """Write a file of torch in one step."""
     memory = io.BytesIO()
     torch.save(state, memory)
     write_file(path, memory.getvalue())
 
 
-def _resume(checkpoint, parts, seed, steps):
+def _resume(
+    checkpoint: Path, parts: dict[str, Any], seed: int, steps: int
+) -> tuple[int, list[float]]:
     """Number of steps done and their losses; the parts are brought to where they were."""
     if not checkpoint.is_file():
         return 0, []
@@ -276,7 +287,7 @@ def _resume(checkpoint, parts, seed, steps):
     return len(state["losses"]), state["losses"]
 
 
-def _record(seed, losses, parameters):
+def _training_log(seed: int, losses: list[float], parameters: int) -> dict[str, Any]:
     """What the training was, as it goes into a JSON file."""
     block = max(len(losses) // _CURVE, 1)
     means = [np.mean(losses[i:i + block]) for i in range(0, len(losses), block)]

@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -184,7 +184,7 @@ def _add_stream(
 ) -> VideoStream:
     """A stream that takes the frames; the same bytes on any number of cores."""
     options = {"g": str(_KEY_FRAMES)} if codec.encoder == "qtrle" else {}
-    stream = container.add_stream(codec.encoder, rate, options=options)
+    stream = cast("VideoStream", container.add_stream(codec.encoder, rate, options=options))
     stream.width, stream.height = size
     stream.pix_fmt = codec.pixels
     stream.codec_context.thread_count = 1
@@ -287,11 +287,11 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
     """
     with _opened(path) as (container, stream):
         packets = _packets(container, stream)
-        if any(packet.pts is None for packet in packets):  # some old files count frames only
+        times = sorted(packet.pts for packet in packets if packet.pts is not None)
+        if len(times) < len(packets):  # some old files do not say
             yield from (image for i, image in enumerate(_images(path)) if i in numbers)
             return
-        times = sorted(packet.pts for packet in packets)
-        keys = sorted(packet.pts for packet in packets if packet.is_keyframe)
+        keys = sorted(packet.pts or 0 for packet in packets if packet.is_keyframe)
         frames: Iterator[VideoFrame] = iter(())
         now = -math.inf
         for number in numbers:
@@ -302,10 +302,10 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
             if key > now:
                 container.seek(key, stream=stream)
                 frames = _decoded(container, stream)
-            frame = next((frame for frame in frames if frame.pts >= time), None)
+            frame = next((f for f in frames if f.pts is not None and f.pts >= time), None)
             if frame is None:
                 return
-            now = frame.pts
+            now = time
             yield _image(frame)
 
 
@@ -330,7 +330,7 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
         stream = container.streams.best("video")
         if stream is None:
             raise _NoVideo(f"path: must be a video file, got '{path}', which holds none")
-        yield container, stream
+        yield container, cast("VideoStream", stream)
 
 
 def _packets(container: InputContainer, stream: VideoStream) -> list[Packet]:
