@@ -13,6 +13,10 @@ code finds no results. A package installed outside a clone of its repository sto
 The tasks run in processes of this machine, or on a Dask cluster of any size. Two sweeps of this
 machine that share tasks may run at the same time: who comes second waits for the first one's
 result.
+
+Why not joblib.Memory: it watches the source of the one function that it wraps, not of what that
+calls; it does not make two processes share a task, nor take a result that a cluster computed. With
+the stamp, the lock and the storing added, it would save no more than the pickling.
 """
 
 from __future__ import annotations
@@ -26,7 +30,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 from uuid import uuid4
 
-from filelock import FileLock
 from tqdm import tqdm
 
 from ..stamp import PACKAGE, code_stamp, repository_root, write_file
@@ -143,6 +146,8 @@ def _is_hashable(task: object) -> bool:
 def _remember(function: Callable[[Task], Result], task: Task, file: Path | None) -> Result:
     if file is None:
         return function(task)
+    from filelock import FileLock
+
     file.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{file}.lock"):
         results = _stored({0: file})
