@@ -385,3 +385,10 @@ def test_one_task_is_remembered_by_whoever_asks_next(cache):
     assert sweep(double, [Holder(3), Holder(4)], jobs=1) == [6, 8]
     assert remember(double, Holder(4)) == 8
     assert calls == [Holder(3), Holder(4)]
+
+
+def test_the_study_is_imported_without_what_only_parts_of_it_need():
+    heavy = ("torch", "pysindy", "sklearn", "pandas", "matplotlib", "seaborn", "joblib")
+    code = f"import sys, vidsindy_lite.study; print([m for m in {heavy} if m in sys.modules])"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import discover
-from vidsindy_lite.pipeline import Observation
+from vidsindy_lite.observation import Observation
 from vidsindy_lite.study import baselines, score
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.baselines import BASELINES
@@ -146,6 +146,10 @@ def test_every_method_gets_the_same_data(condition, level, no_videos, monkeypatc
     for other_t, other_x in seen.values():
         np.testing.assert_array_equal(other_t, t)
         np.testing.assert_array_equal(other_x, x)
+
+
+def test_methods_are_ours_and_every_baseline():
+    assert experiments.METHODS == ("ours", *BASELINES)
 
 
 def test_corruption_is_that_of_the_protocol():

@@ -19,8 +19,6 @@ from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
 from vidsindy_lite.vision.tracking import check_detector, link, track
 from vidsindy_lite.vision.video import write_video
 
-pytestmark = pytest.mark.slow  # renders and tracks videos
-
 SIZE = (256, 192)
 
 
@@ -47,16 +45,17 @@ def distance_to_rectangle(points, rectangle):
 def test_clean_textured_video(tmp_path, background):
     truth = winding_path()
     scene = Scene(background, size=18, image_size=SIZE)
-    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=1), truth)
+    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=1), truth)
     assert np.isfinite(error).all()
     assert np.sqrt(np.mean(error**2)) < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_random_scenes(tmp_path, seed):
     truth = winding_path(margin=45)  # holds the largest outline, a triangle of area pi 24^2
     scene = Scene.random(seed, image_size=SIZE, size_variation=0.2)
-    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=seed), truth)
+    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=seed), truth)
     assert np.isfinite(error).mean() >= 0.99
     assert np.nanmedian(error) < 0.05
 
@@ -67,7 +66,7 @@ def test_image_noise(tmp_path, seed):
     scene = Scene.random(
         seed, size=18, noise_variance=0.01, size_variation=0.2, image_size=SIZE
     )
-    path = render_video(tmp_path / "clip.mkv", truth, scene, seed=seed)
+    path = render_video(tmp_path / "clip.mov", truth, scene, seed=seed)
     difference = track(path).pixels - truth
     assert np.isfinite(difference[:, 0]).mean() >= 0.97
     assert np.sqrt(np.nanmean(difference**2)) < 0.15
@@ -102,7 +101,7 @@ def test_a_hidden_target_is_not_seen_and_a_partly_hidden_one_not_trusted(tmp_pat
         "bricks", size=22, size_variation=0.1, noise_variance=variance, occluders=(post,),
         image_size=SIZE,
     )
-    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=4), truth)
+    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=4), truth)
     distance = distance_to_rectangle(truth, post)
     assert np.isnan(error[distance < 8]).all()
     assert np.isfinite(error[distance > 14]).mean() > 0.97
@@ -149,20 +148,21 @@ def test_a_target_that_lingers_half_hidden_is_not_trusted(tmp_path, form):
     scene = Scene(
         "bricks", shape=form, size=22, turns=3, shape_seed=5, occluders=(post,), image_size=SIZE
     )
-    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=1), truth)
+    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=1), truth)
     distance = distance_to_rectangle(truth, post)
     assert np.isnan(error[distance < 8]).all()
     assert np.isfinite(error[distance > 16]).mean() > 0.97
     assert np.nanmax(error) < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frames", [200, 400])
 def test_a_chaotic_orbit_that_turns_at_the_edge_of_a_post(tmp_path, frames):
     _, x = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET).trajectory(frames, 100)
     truth = Rig.around(x).cameras[0].project(x)
     post = (230, 0, 50, 512)
     scene = Scene("hills", size=18, occluders=(post,))
-    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=1), truth)
+    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=1), truth)
     assert np.isfinite(error[distance_to_rectangle(truth, post) > 10]).mean() > 0.97
     assert np.nanmax(error) < 0.3
 
@@ -176,7 +176,7 @@ def test_an_occluder_of_the_colour_of_the_target(tmp_path):
             frame[:, post[0]:post[0] + post[2]] = COLOURS["red"]
             yield frame
 
-    error = errors(write_video(tmp_path / "clip.mkv", frames()), truth)
+    error = errors(write_video(tmp_path / "clip.mov", frames()), truth)
     assert np.isfinite(error[distance_to_rectangle(truth, post) > 16]).mean() > 0.97
     assert np.nanmax(error) < 0.3
 
@@ -184,7 +184,7 @@ def test_an_occluder_of_the_colour_of_the_target(tmp_path):
 def test_a_target_across_the_border_is_not_trusted(tmp_path):
     truth = winding_path(150, margin=0)
     scene = Scene("wood", size=20, image_size=SIZE)
-    error = errors(render_video(tmp_path / "clip.mkv", truth, scene), truth)
+    error = errors(render_video(tmp_path / "clip.mov", truth, scene), truth)
     depth = np.minimum(truth, np.array(SIZE) - 1 - truth).min(axis=1)
     assert np.isnan(error[depth < 9.5]).all()
     assert np.isfinite(error[depth > 12]).all()
@@ -195,7 +195,7 @@ def test_frames_without_target_are_nan_and_it_is_found_again(tmp_path):
     truth = winding_path()
     drawn = truth.copy()
     drawn[40:60] = np.nan
-    path = render_video(tmp_path / "clip.mkv", drawn, Scene("sea", size=14, image_size=SIZE))
+    path = render_video(tmp_path / "clip.mov", drawn, Scene("sea", size=14, image_size=SIZE))
     found = track(path).pixels
     assert np.array_equal(np.isnan(found[:, 0]), np.isnan(drawn[:, 0]))
     assert np.nanmax(np.abs(found - drawn)) < 0.05
@@ -207,7 +207,7 @@ def test_a_target_that_stays_for_long_leaves_no_ghost(tmp_path, share):
     truth = np.tile([60.0, 60.0], (n, 1))
     truth[stay:] += np.linspace(0, 1, n - stay)[:, None] * [150, 80]
     error = errors(
-        render_video(tmp_path / "clip.mkv", truth, Scene("bricks", size=24, image_size=SIZE)), truth
+        render_video(tmp_path / "clip.mov", truth, Scene("bricks", size=24, image_size=SIZE)), truth
     )
     assert np.isfinite(error).mean() > 0.97
     assert np.nanmax(error) < 0.3
@@ -218,19 +218,20 @@ def circle(radius, n=150):
     return [120, 90] + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variance", [0, 0.005])
 @pytest.mark.parametrize("radius", [0, 2, 5])
 @pytest.mark.parametrize("form", ["disc", "polygon"])
 def test_a_target_that_never_leaves_its_place_is_background(tmp_path, form, radius, variance):
     truth = circle(radius, 100)
     scene = Scene("sea", form, size=18, turns=2, noise_variance=variance, image_size=SIZE)
-    assert np.isnan(track(render_video(tmp_path / "clip.mkv", truth, scene, seed=2)).pixels).all()
+    assert np.isnan(track(render_video(tmp_path / "clip.mov", truth, scene, seed=2)).pixels).all()
 
 
 def test_a_target_that_leaves_its_place_by_its_own_width_is_tracked(tmp_path):
     truth = circle(10)
     scene = Scene("sea", size=18, image_size=SIZE)
-    error = errors(render_video(tmp_path / "clip.mkv", truth, scene, seed=2), truth)
+    error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=2), truth)
     assert np.isfinite(error).mean() > 0.97
     assert np.nanmax(error) < 0.1
 
@@ -238,21 +239,21 @@ def test_a_target_that_leaves_its_place_by_its_own_width_is_tracked(tmp_path):
 @pytest.mark.parametrize("variance", [0, 0.01])
 def test_nothing_is_invented_in_an_empty_scene(tmp_path, variance):
     scene = Scene("hills", noise_variance=variance, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mkv", np.full((40, 2), np.nan), scene)
+    path = render_video(tmp_path / "clip.mov", np.full((40, 2), np.nan), scene)
     found = track(path).pixels
     assert found.shape == (40, 2)
     assert np.isnan(found).all()
 
 
 def test_a_single_frame_shows_no_motion(tmp_path):
-    path = render_video(tmp_path / "clip.mkv", [[80.0, 80.0]], Scene(image_size=SIZE))
+    path = render_video(tmp_path / "clip.mov", [[80.0, 80.0]], Scene(image_size=SIZE))
     assert np.isnan(track(path).pixels).all()
 
 
 def test_a_long_clip_is_sampled_by_jumps(tmp_path):
     size = (96, 80)
     truth = winding_path(600, size, margin=14)
-    path = render_video(tmp_path / "clip.mkv", truth, Scene("sea", size=10, image_size=size))
+    path = render_video(tmp_path / "clip.mov", truth, Scene("sea", size=10, image_size=size))
     error = errors(path, truth)
     assert np.isfinite(error).mean() >= 0.99
     assert np.nanmax(error) < 0.1
@@ -278,6 +279,7 @@ def drifting(n):
     return np.column_stack([2 * np.arange(n), np.zeros(n, int)])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*the camera moves")
 @pytest.mark.parametrize(
     ("background", "motion", "light"),
@@ -289,7 +291,7 @@ def test_auto_takes_the_learned_detector_where_the_background_moves(
     truth = winding_path(60)
     scene = Scene(background, shape="irregular", size=20, image_size=SIZE)
     light = 1 + light * np.sin(np.arange(60) / 3)
-    path = write_video(tmp_path / "clip.mkv", render_restless(truth, scene, motion(60), light))
+    path = write_video(tmp_path / "clip.mov", render_restless(truth, scene, motion(60), light))
     found = track(path)
     assert found.detector == "learned"
     assert any("the background is not at rest" in w for w in found.warnings)
@@ -303,7 +305,7 @@ def test_auto_takes_the_learned_detector_where_the_background_moves(
 def test_auto_keeps_the_background_model_where_it_copes(tmp_path):
     truth = winding_path(60)
     scene = Scene("sea", size=20, image_size=SIZE)
-    path = write_video(tmp_path / "clip.mkv", render_restless(truth, scene, drifting(60)))
+    path = write_video(tmp_path / "clip.mov", render_restless(truth, scene, drifting(60)))
     found = track(path)
     assert any("the background is not at rest" in w for w in found.warnings)
     assert found.detector == "background"
@@ -313,7 +315,7 @@ def test_auto_keeps_the_background_model_where_it_copes(tmp_path):
 @pytest.mark.parametrize("background", BACKGROUNDS)
 def test_an_ordinary_video_raises_no_doubt(tmp_path, background):
     scene = Scene(background, size=30, noise_variance=0.01, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mkv", winding_path(40), scene)
+    path = render_video(tmp_path / "clip.mov", winding_path(40), scene)
     found = track(path)
     assert found.detector == "background"
     assert found.warnings == ()
@@ -324,17 +326,18 @@ def test_a_camera_that_trembles_is_told(tmp_path):
     scene = Scene("sky", size=20, image_size=SIZE)
     tremble = np.random.default_rng(1).integers(-1, 2, (60, 2))
     frames = render_restless(winding_path(60), scene, tremble)
-    path = write_video(tmp_path / "clip.mkv", frames)
+    path = write_video(tmp_path / "clip.mov", frames)
     found = track(path)
-    shakes = r"clip\.mkv: the camera moves, typically by [\d.]+ px"
+    shakes = r"clip\.mov: the camera moves, typically by [\d.]+ px"
     assert any(re.match(shakes, warning) for warning in found.warnings)
 
 
+@pytest.mark.slow
 def test_the_learned_detector_invents_nothing_behind_a_post(tmp_path):
     truth = winding_path(150)
     post = (100, 0, 44, SIZE[1])
     scene = Scene("bricks", "irregular", size=22, occluders=(post,), image_size=SIZE)
-    found = track(render_video(tmp_path / "clip.mkv", truth, scene, seed=4), "learned")
+    found = track(render_video(tmp_path / "clip.mov", truth, scene, seed=4), "learned")
     inside = np.abs(truth[:, 0] - (post[0] + (post[2] - 1) / 2)) < post[2] / 2 - 13
     assert inside.sum() > 5
     assert np.isnan(found.pixels[inside]).all()
@@ -346,10 +349,11 @@ def test_the_learned_detector_invents_nothing_behind_a_post(tmp_path):
     assert (found.confidence[clear] >= LEAST).mean() > 0.97
 
 
+@pytest.mark.slow
 def test_a_noisy_video_and_the_learned_detector(tmp_path):
     truth = winding_path(60)
     scene = Scene("sea", "irregular", size=22, noise_variance=0.01, image_size=SIZE)
-    difference = track(render_video(tmp_path / "clip.mkv", truth, scene), "learned").pixels - truth
+    difference = track(render_video(tmp_path / "clip.mov", truth, scene), "learned").pixels - truth
     assert np.isfinite(difference).mean() >= 0.97
     assert np.sqrt(np.nanmean(difference**2)) < 0.7
 
@@ -357,7 +361,7 @@ def test_a_noisy_video_and_the_learned_detector(tmp_path):
 def test_any_onnx_model_tracks(tmp_path):
     truth = winding_path(40)
     scene = Scene("sea", size=32, image_size=SIZE)
-    path = render_video(tmp_path / "clip.mkv", truth, scene)
+    path = render_video(tmp_path / "clip.mov", truth, scene)
     model = write_red_detector(tmp_path / "red.onnx", (256, 256))
     found = track(path, model)
     assert found.detector == str(model)
@@ -368,7 +372,7 @@ def test_any_onnx_model_tracks(tmp_path):
 def test_confidence_is_that_the_target_is_seen_whole(tmp_path):
     truth = winding_path()
     truth[40:50] = np.nan
-    path = render_video(tmp_path / "clip.mkv", truth, Scene("sea", size=20, image_size=SIZE))
+    path = render_video(tmp_path / "clip.mov", truth, Scene("sea", size=20, image_size=SIZE))
     found = track(path)
     assert (found.confidence[40:50] == 0).all()
     assert (np.delete(found.confidence, np.s_[40:50]) > np.exp(-1)).all()
@@ -378,7 +382,7 @@ def test_confidence_is_that_the_target_is_seen_whole(tmp_path):
 @pytest.mark.parametrize("detector", ["yolo", "model.pt", 3, None, np.zeros(2)])
 def test_unknown_detectors(tmp_path, detector):
     with pytest.raises(ValueError, match="detector: must be one of auto, background, learned, or"):
-        track(tmp_path / "clip.mkv", detector)
+        track(tmp_path / "clip.mov", detector)
 
 
 def test_a_missing_detector_is_told_at_once(tmp_path):

@@ -1,4 +1,9 @@
-"""A trajectory goes in, its law comes out."""
+"""A trajectory goes in, its law comes out.
+
+trajectories -> problem (smoothing: noise, gaps, units) -> solver -> discovery (diagnostics)
+solver: search (collocation on a grid of splines, selection of terms), origin, gaps
+law: polynomials, on a library of monomials; integrate solves it, cramer_rao bounds its errors
+"""
 
 from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao
@@ -14,33 +19,3 @@ from .smoothing import smooth
 from .solver import discover
 from .splines import DEGREE, clamped_knots, design_matrix, local_basis
 from .trajectories import Trajectory, check_trajectory, cut, typical_step
-
-__all__ = [
-    "Collocation",
-    "DEGREE",
-    "Discovery",
-    "ShiftedLaw",
-    "PolynomialSystem",
-    "Trajectory",
-    "Segment",
-    "State",
-    "Status",
-    "Units",
-    "check_trajectory",
-    "clamped_knots",
-    "closest_rival",
-    "cramer_rao",
-    "cut",
-    "design_matrix",
-    "discover",
-    "local_basis",
-    "monomial_exponents",
-    "monomial_gradients",
-    "monomials",
-    "smooth",
-    "runge_kutta_4",
-    "subset_search",
-    "term_penalties",
-    "typical_step",
-    "variable_names",
-]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..checks import check_array
 from ..dynamics import Discovery, PolynomialSystem
 
@@ -152,7 +152,7 @@ def pulls(found: Discovery, truth: PolynomialSystem) -> Floats:
     return (values - truth.coefficients)[seen] / errors[seen]
 
 
-def coefficients_in(system: PolynomialSystem, library: Floats) -> Floats:
+def coefficients_in(system: PolynomialSystem, library: Ints) -> Floats:
     """Coefficients of a system in another library.
 
     Parameters

@@ -13,6 +13,10 @@ code finds no results. A package installed outside a clone of its repository sto
 The tasks run in processes of this machine, or on a Dask cluster of any size. Two sweeps of this
 machine that share tasks may run at the same time: who comes second waits for the first one's
 result.
+
+Why not joblib.Memory: it watches the source of the one function that it wraps, not of what that
+calls; it does not make two processes share a task, nor take a result that a cluster computed. With
+the stamp, the lock and the storing added, it would save no more than the pickling.
 """
 
 from __future__ import annotations

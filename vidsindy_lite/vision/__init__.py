@@ -14,24 +14,3 @@ from .scenery import BACKGROUNDS
 from .scenes import SHAPES, Scene
 from .tracking import Track, check_detector, track
 from .video import VideoInfo, read_frame, read_video, video_info, write_video
-
-__all__ = [
-    "BACKGROUNDS",
-    "LearnedDetector",
-    "SHAPES",
-    "Scene",
-    "Track",
-    "VideoInfo",
-    "WEIGHTS",
-    "check_detector",
-    "detections",
-    "read_frame",
-    "read_video",
-    "render",
-    "render_labelled",
-    "render_restless",
-    "render_video",
-    "track",
-    "video_info",
-    "write_video",
-]

@@ -23,7 +23,7 @@ from ..arrays import Floats, Image
 from ..checks import check_path
 
 WEIGHTS = Path(__file__).with_name("detector.pt")
-"""The weights of the package's own network; detector.json beside it is the log of their training."""
+"""The weights of the package's own network; detector.json beside it is their training log."""
 LEAST = 0.4
 """Smallest confidence of a detection. Detectors of this family are modest: the package's own gives
 0.44 to 0.9 to whole targets, more the smaller they are, and less than 0.3 to what is none."""

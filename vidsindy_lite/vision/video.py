@@ -288,7 +288,7 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
     with _opened(path) as (container, stream):
         packets = _packets(container, stream)
         times = sorted(packet.pts for packet in packets if packet.pts is not None)
-        if len(times) < len(packets):  # some old files do not say
+        if len(set(times)) < len(packets):  # some old files do not say
             yield from (image for i, image in enumerate(_images(path)) if i in numbers)
             return
         keys = sorted(packet.pts or 0 for packet in packets if packet.is_keyframe)

@@ -257,7 +257,7 @@ def plot_lags(lags: Floats, missed: Floats, limit: float) -> Figure:
 def _on_plane(camera: Camera, pixels: Floats) -> Floats:
     """The points of the view plane that are the pixels' places in space."""
     in_plane = camera.plane_coordinates(pixels) - camera.offset
-    return camera.position + in_plane @ camera.rows
+    return np.asarray(camera.position) + in_plane @ camera.rows
 
 
 def _draw_plane(axes: Axes3D, camera: Camera, color: str) -> None:

@@ -1,0 +1,226 @@
+"""Rendering against exact geometry, and bad arguments."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidsindy_lite.vision.rendering import render, render_labelled, render_restless, render_video
+from vidsindy_lite.vision.scenery import BACKGROUNDS
+from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
+from vidsindy_lite.vision.video import read_video
+
+SMALL = (96, 80)
+
+
+def drawn_centroid_and_area(frame, empty, colour):
+    """Centroid and area of the target, from the exact mixture of target and background."""
+    contrast = np.array(COLOURS[colour], float) - empty
+    alpha = ((frame.astype(float) - empty) * contrast).sum(-1) / (contrast**2).sum(-1)
+    area = alpha.sum()
+    return np.array([alpha.sum(0) @ np.arange(alpha.shape[1]),
+                     alpha.sum(1) @ np.arange(alpha.shape[0])]) / area, area
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    shape=st.sampled_from(SHAPES), size=st.floats(8, 40), u=st.floats(35, 60), v=st.floats(35, 45),
+    seed=st.integers(0, 2**20),
+)
+def test_drawn_centroid_and_area(shape, size, u, v, seed):
+    scene = Scene("plain", shape, size, tumbling=1, shape_seed=seed, image_size=SMALL)
+    empty, frame = render([[np.nan, np.nan], [u, v]], scene, seed)
+    centroid, area = drawn_centroid_and_area(frame, empty, scene.colour)
+    assert centroid == pytest.approx([u, v], abs=0.02)
+    assert area == pytest.approx(np.pi * size**2 / 4, rel=0.01)
+
+
+def test_labels_of_a_frame():
+    scene = Scene("plain", size=20, occluders=((50, 0, 21, 80),), image_size=SMALL)
+    track = [[30.0, 40.0], [49.5, 40.0], [60.0, 40.0], [-0.5, 40.0], [np.nan, np.nan]]
+    drawn = list(render_labelled(track, scene))
+    whole, half, hidden, cut, absent = drawn
+    for labelled, visible in ((whole, 1), (half, 0.5), (hidden, 0), (cut, 0.5)):
+        np.testing.assert_allclose(labelled.extent, 20, atol=0.02)
+        assert labelled.visible == pytest.approx(visible, abs=1e-6)
+    assert np.isnan(absent.extent).all()
+    assert absent.visible == 0
+    for labelled, frame in zip(drawn, render(track, scene), strict=True):
+        np.testing.assert_array_equal(labelled.frame, frame)
+
+
+def test_scenery_stands_in_for_the_background():
+    scenery = np.random.default_rng(0).integers(0, 255, (80, 96, 3), np.uint8)
+    before = scenery.copy()
+    scene = Scene(occluders=((0, 0, 10, 10),), image_size=SMALL)
+    (drawn,) = render_labelled([[60.0, 40.0]], scene, scenery=scenery)
+    np.testing.assert_array_equal(drawn.frame[:, 10:40], scenery[:, 10:40])
+    assert (drawn.frame[:10, :10] != scenery[:10, :10]).any()
+    np.testing.assert_array_equal(scenery, before)
+    for bad in (scenery[:70], scenery.astype(float)):
+        with pytest.raises(ValueError, match=r"scenery: must be uint8 .* \(96, 80\), got"):
+            render_labelled([[60.0, 40.0]], scene, scenery=bad)
+
+
+def test_a_restless_background_moves_behind_the_target():
+    scene, track = Scene("bricks", size=16, image_size=SMALL), np.full((3, 2), [48.0, 40.0])
+    shifts = np.array([[0, 0], [5, -3], [0, 0]])
+    first, second, third = render_restless(track, scene, shifts, light=[1, 1, 0.5])
+    np.testing.assert_array_equal(first[:20, 5:], second[3:23, :-5])
+    np.testing.assert_array_equal(first[38:43, 46:51], second[38:43, 46:51])
+    np.testing.assert_allclose(third[:20].astype(float), first[:20] / 2, atol=0.51)
+    for bad in (shifts[:2], shifts / 2):
+        with pytest.raises(ValueError, match=r"shifts: must be integers .* \(3, 2\), got"):
+            next(render_restless(track, scene, bad))
+
+
+def test_size_variation_keeps_the_centroid():
+    track = np.tile([48.3, 40.6], (40, 1))
+    scene = Scene("plain", "irregular", 24, size_variation=0.4, image_size=SMALL)
+    empty = next(render([[np.nan, np.nan]], scene))
+    looks = [drawn_centroid_and_area(f, empty, "red") for f in render(track, scene)]
+    assert np.abs([c - track[0] for c, _ in looks]).max() < 0.02
+    areas = np.array([a for _, a in looks])
+    assert areas.max() / areas.min() > 3
+
+
+def test_shapes_map_the_outline_and_keep_the_centroid():
+    track = np.tile([48.3, 40.6], (3, 1))
+    shapes = np.array([np.eye(2), [[1.5, 0], [0, 1]], [[1.2, 0.3], [0.3, 0.8]]])
+    scene = Scene("plain", size=24, image_size=SMALL)
+    empty = next(render([[np.nan, np.nan]], scene))
+    frames = list(render(track, scene, shapes=shapes))
+    looks = [drawn_centroid_and_area(frame, empty, "red") for frame in frames]
+    assert np.abs([centroid - track[0] for centroid, _ in looks]).max() < 0.02
+    expected = np.pi * 12**2 * np.linalg.det(shapes)
+    np.testing.assert_allclose([area for _, area in looks], expected, rtol=0.01)
+    wide = np.any(frames[1] != empty, axis=-1)
+    assert np.ptp(np.flatnonzero(wide.any(axis=0))) == pytest.approx(36, abs=1.5)
+    assert np.ptp(np.flatnonzero(wide.any(axis=1))) == pytest.approx(24, abs=1.5)
+
+
+@pytest.mark.parametrize("shapes", [np.eye(2), np.ones((3, 2, 2)), np.full((2, 2, 2), np.nan)])
+def test_render_rejects_shapes(shapes):
+    with pytest.raises(ValueError, match=r"shapes: must be finite, of shape \(2, 2, 2\), got"):
+        render(np.zeros((2, 2)), Scene(), shapes=shapes)
+
+
+@pytest.mark.parametrize("background", BACKGROUNDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_target_stands_out_of_every_background(background, seed):
+    scene = Scene(background)
+    frame = next(render([[np.nan, np.nan]], scene, seed)).astype(float)
+    for colour in COLOURS.values():
+        distance = np.linalg.norm(frame - colour, axis=-1)
+        assert distance.min() > 60
+        assert np.median(distance) > 90
+
+
+def test_target_behind_an_occluder_and_outside_leaves_no_trace():
+    scene = Scene("wood", size=10, occluders=((40, 10, 20, 60),), image_size=SMALL)
+    empty, behind, outside, partly = render(
+        [[np.nan, np.nan], [50, 40], [-30, 400], [40, 40]], scene, 1
+    )
+    assert np.array_equal(behind, empty)
+    assert np.array_equal(outside, empty)
+    changed = np.any(partly != empty, axis=-1)
+    assert changed[:, :40].any()
+    assert not changed[:, 40:60].any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tree_hides_what_is_behind_it_and_nothing_else(seed):
+    box = (30, 20, 60, 76)
+    scene = Scene("sky", size=90, colour="magenta", trees=(box,), image_size=(128, 96))
+    empty, full = render([[np.nan, np.nan], [63.5, 47.5]], scene, seed)
+    hidden = (full == empty).all(axis=-1)[27:69, 43:84]  # well inside the disc
+    assert 0.2 < hidden.mean() < 1
+    inside = np.s_[box[1]:box[1] + box[3], box[0]:box[0] + box[2]]
+    bare = next(render([[np.nan, np.nan]], replace(scene, trees=()), seed))
+    changed = (bare != empty).any(axis=-1)
+    assert changed[inside].sum() == changed.sum() > 0
+    assert changed[95, 58:62].all()  # the trunk stands on the lower side
+    assert np.array_equal(changed[27:69, 43:84], hidden)
+
+
+def test_target_across_the_border_is_clipped():
+    scene = Scene("plain", size=20, image_size=SMALL)
+    empty, corner = render([[np.nan, np.nan], [0, 0]], scene)
+    changed = np.any(corner != empty, axis=-1)
+    assert changed[0, 0]
+    assert not changed[15:].any()
+    assert not changed[:, 15:].any()
+
+
+def test_noise_has_the_variance_asked_for():
+    scene = Scene("plain", noise_variance=0.001, image_size=SMALL)
+    clean = next(render([[np.nan, np.nan]], Scene("plain", image_size=SMALL)))
+    noisy = list(render(np.full((5, 2), np.nan), scene))
+    assert np.var((np.array(noisy) - clean.astype(float)) / 255) == pytest.approx(0.001, rel=0.05)
+    assert not np.array_equal(noisy[0], noisy[1])
+
+
+def test_a_seed_gives_the_same_frames_and_another_seed_others():
+    scene = Scene.random(7, image_size=SMALL, noise_variance=0.01)
+    assert scene == Scene.random(np.random.default_rng(7), image_size=SMALL, noise_variance=0.01)
+    track = [[40.0, 40.0], [50.0, 42.0]]
+    first, again, other = (list(render(track, scene, seed)) for seed in (1, 1, 2))
+    assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
+    assert not np.array_equal(first[0], other[0])
+
+
+def test_render_video_writes_what_render_yields(tmp_path):
+    scene = Scene("hills", turns=1, image_size=SMALL)
+    track = np.linspace([20, 20], [70, 60], 6)
+    path = render_video(tmp_path / "clip.mkv", track, scene, seed=3)
+    for a, b in zip(read_video(path), render(track, scene, 3), strict=True):
+        assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("background", "moon"), ("shape", "cube"), ("colour", "teal"), ("size", 2),
+        ("size", np.nan),
+        ("turns", np.inf), ("tumbling", -1), ("size_variation", 0.9), ("noise_variance", -0.1),
+        ("shape_seed", -1), ("shape_seed", 1.5), ("size", True), ("turns", "many"),
+        ("image_size", 512), ("image_size", (10, 10)), ("image_size", (512,)),
+        ("occluders", ((1, 2, 3),)), ("occluders", ((500, 0, 50, 50),)),
+        ("occluders", ((0, 0, 1, 50),)), ("trees", ((1, 2, 3),)), ("trees", ((0, 500, 50, 50),)),
+    ],
+)
+def test_scene_rejects(field, value):
+    with pytest.raises(ValueError, match=f"^{field}: must|^{field}: each must"):
+        Scene(**{field: value})
+
+
+@pytest.mark.parametrize(
+    ("track", "message"),
+    [
+        (np.zeros((4, 3)), r"track: must have shape \(n, 2\)"),
+        (np.zeros((0, 2)), r"track: must have shape \(n, 2\)"),
+        ([[np.inf, 0]], "track: must be finite or NaN"),
+    ],
+)
+def test_render_rejects(track, message):
+    with pytest.raises(ValueError, match=message):
+        render(track, Scene())
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "a", None])
+def test_seeds_are_whole_numbers(tmp_path, seed):
+    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got"):
+        render_video(tmp_path / "clip.mkv", [[40, 40]], Scene(), seed=seed)
+    with pytest.raises(ValueError, match="rng: must be an integer of at least 0, got"):
+        Scene.random(seed)
+
+
+def test_masked_rows_of_a_track_are_frames_without_target():
+    scene = Scene("plain", image_size=SMALL)
+    masked = np.ma.masked_array([[40, 40], [50, 40]], mask=[[0, 0], [0, 1]])
+    seen, hidden = render(masked, scene)
+    empty = next(render([[np.nan, np.nan]], scene))
+    assert not np.array_equal(seen, empty)
+    assert np.array_equal(hidden, empty)
