@@ -63,7 +63,7 @@ def notebooks(root: Path) -> str:
     times, headlines = load_run_times(figures), _headlines(figures)
     lines = ["| notebook | what it shows | result | run time |", "|---|---|---|---:|"]
     for path in sorted((root / "notebooks").glob("*.py")):
-        title = re.search(r"^# # (.*)", path.read_text("utf-8"), re.MULTILINE)[1]
+        (title, *_) = re.findall(r"^# # (.*)", path.read_text("utf-8"), re.MULTILINE)
         time = f"{times[path.stem]:.0f} s" if path.stem in times else ""
         link = f"[{path.stem}](notebooks/{path.stem}.ipynb)"
         lines.append(f"| {link} | {title} | {headlines.get(path.stem, '')} | {time} |")
@@ -93,7 +93,8 @@ PARTS: dict[str, Callable[[Path], str]] = {
 
 def _beside_the_paper(table: Table, keys: list[str]) -> str:
     """Relative l2 in 1e-2, with the number of false positives if there are any, by method."""
-    groups, methods = {}, list(dict.fromkeys(row["method"] for row in table.rows))
+    groups: dict[tuple, dict[str, list[str]]] = {}
+    methods = list(dict.fromkeys(row["method"] for row in table.rows))
     for row in table.rows:
         cells = groups.setdefault(tuple(row[key] for key in keys), {})
         cells[row["method"]] = [
