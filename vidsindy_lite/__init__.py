@@ -21,7 +21,8 @@ from .cameras import (
     rig_template,
 )
 from .dynamics import Discovery, PolynomialSystem, discover
-from .pipeline import Observation, VideoDiscovery, discover_from_videos, observe, observe_tracks
+from .observation import Observation, observe, observe_tracks
+from .pipeline import VideoDiscovery, discover_from_videos
 from .vision import (
     Scene,
     Track,

@@ -16,7 +16,7 @@ import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
 from vidsindy_lite.companion.report import FILES, check_folder_is_free, summary, write_report
-from vidsindy_lite.pipeline import Observation
+from vidsindy_lite.observation import Observation
 
 
 @pytest.fixture(scope="module")

@@ -54,7 +54,7 @@ def told(duffing, dropped=None):
     return diagnose(*fitted(duffing, dropped))
 
 
-def test_the_true_law_is_not_doubted(duffing):
+def test_the_true_law_is_trusted(duffing):
     assert told(duffing) == ()
 
 
@@ -106,7 +106,7 @@ def test_outliers_at_the_ends_and_in_a_row_are_named(duffing, rows, sign):
 
 
 @pytest.mark.parametrize("rate", [0.03, 0.3])
-def test_a_motion_that_comes_to_rest_is_no_stray(rate):
+def test_a_motion_that_comes_to_rest_is_no_outliers(rate):
     k = np.arange(3000)
     x = np.exp(-rate * k)[:, None] * np.column_stack((np.cos(0.2 * k), np.sin(0.2 * k)))
     for states in (x, x[::-1], np.exp(-rate * k)[:, None]):
@@ -115,7 +115,7 @@ def test_a_motion_that_comes_to_rest_is_no_stray(rate):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", SYSTEMS.values(), ids=SYSTEMS)
-def test_noise_and_gaps_are_no_strays(law):
+def test_noise_and_gaps_are_no_outliers(law):
     rng = np.random.default_rng(0)
     for period in ({}, {"samples_per_period": 25}):
         t, clean = law.trajectory(1500, **period)

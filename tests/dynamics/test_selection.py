@@ -174,7 +174,7 @@ def test_the_update_for_a_newcomer_is_a_fit_with_it(seed, m):
     np.testing.assert_allclose(updated.response, direct.response[:, stays], rtol=1e-5, atol=1e-6)
 
 
-def test_a_charge_of_minus_infinity_keeps_a_worthless_column():
+def test_a_penalty_of_minus_infinity_keeps_a_worthless_column():
     information, pull = np.eye(3), np.array([5.0, 0.0, 0.1])
     penalty = np.array([1.0, -np.inf, 1.0])
     support, solution, value = subset_search(

@@ -202,7 +202,7 @@ def test_history_tells_the_fit(lorenz):
 # -- warnings --------------------------------------------------------------------------------------
 
 
-def test_a_law_outside_the_library_is_doubted():
+def test_a_law_outside_the_library_is_suspected():
     t = np.linspace(0, 40, 800)
     from scipy.integrate import solve_ivp
 
@@ -215,28 +215,28 @@ def test_a_law_outside_the_library_is_doubted():
     assert any("outside the library" in warning for warning in found.warnings)
 
 
-def test_a_short_record_is_doubted():
+def test_a_short_trajectory_is_suspected():
     t = np.linspace(0, 2, 200)
     x = np.stack([np.sin(t), np.cos(t)], axis=1)
     found = discover(t, add_noise(x, 0.05, np.random.default_rng(0)))
     assert any("turns of the motion" in warning for warning in found.warnings)
 
 
-def test_on_a_line_a_record_needs_no_turns():
+def test_on_a_line_a_trajectory_needs_no_turns():
     terms, x0, duration = PLANAR["growth"]
     t = np.linspace(0, duration, 300)
     law = PolynomialSystem.from_terms(terms)
     assert discover(t, law.simulate(t, x0)).status == "ok"
 
 
-def test_a_coarse_record_is_doubted():
+def test_a_coarse_trajectory_is_suspected():
     t = 1.3 * np.arange(200)
     x = np.stack([np.sin(t), np.cos(t)], axis=1)
     found = discover(t, add_noise(x, 0.02, np.random.default_rng(0)), degree=1)
     assert any("sample faster" in warning for warning in found.warnings)
 
 
-def test_pure_noise_gives_no_law_without_doubt():
+def test_pure_noise_gives_no_law_without_a_warning():
     x = np.random.default_rng(0).normal(size=(400, 2))
     found = discover(np.arange(400.0), x)
     assert found.status == "suspect"
@@ -289,7 +289,7 @@ def test_bad_degrees_are_refused(degree):
         discover(t, x, degree=degree)
 
 
-def test_charges_rise_with_the_number_of_rivals():
+def test_penalties_rise_with_the_number_of_rivals():
     penalties = term_penalties(monomial_exponents(3, 3))
     by_degree = [np.unique(penalties[monomial_exponents(3, 3).sum(axis=1) == k]) for k in range(4)]
     assert all(len(values) == 1 for values in by_degree)

@@ -1,4 +1,9 @@
-"""A trajectory goes in, its law comes out."""
+"""A trajectory goes in, its law comes out.
+
+trajectories -> problem (smoothing: noise, gaps, units) -> solver -> discovery (diagnostics)
+solver: search (collocation on a grid of splines, selection of terms), origin, gaps
+law: polynomials, on a library of monomials; integrate solves it, cramer_rao bounds its errors
+"""
 
 from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao

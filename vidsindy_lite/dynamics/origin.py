@@ -6,6 +6,9 @@ is evaluated at ``x - offset``: then it is the origin of the law's own frame.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from scipy.optimize import minimize
 
@@ -17,6 +20,7 @@ DRAWS = 200
 """Random sets of coefficients that an origin is asked to make vanish."""
 
 
+@dataclass(frozen=True, eq=False)
 class ShiftedLaw:
     """Coefficients and information of an estimated law in shifted frames, exactly.
 
@@ -30,14 +34,25 @@ class ShiftedLaw:
         Its information matrix, equation by equation.
     """
 
-    def __init__(self, exponents: Ints, coefficients: Floats, information: Floats) -> None:
-        self.exponents = exponents
-        self.l, self.d = exponents.shape
-        self.coefficients = coefficients
-        self.information = information
-        blocks = inverse(information).reshape(self.d, self.l, self.d, self.l)
-        self.covariances = np.stack([blocks[j, :, j, :] for j in range(self.d)])
-        self.generators = shift_generators(exponents)
+    exponents: Ints
+    coefficients: Floats
+    information: Floats
+
+    @property
+    def d(self) -> int:
+        """Dimension of the state."""
+        return self.exponents.shape[1]
+
+    @cached_property
+    def _covariances(self) -> Floats:
+        """Covariance of the coefficients of each equation, (d, l, l)."""
+        l, d = self.exponents.shape
+        blocks = inverse(self.information).reshape(d, l, d, l)
+        return np.stack([blocks[j, :, j, :] for j in range(d)])
+
+    @cached_property
+    def _generators(self) -> Floats:
+        return shift_generators(self.exponents)
 
     def at(self, origin: Floats) -> tuple[Floats, Floats]:
         """Coefficients (l, d) and information (l d, l d) in monomials of ``x - origin``."""
@@ -58,7 +73,7 @@ class ShiftedLaw:
         equations, terms = entries.T
         for _ in range(6):
             estimate = shift_matrix(self.exponents, -origin) @ self.coefficients
-            rates = (self.generators @ estimate)[:, terms, equations].T
+            rates = (self._generators @ estimate)[:, terms, equations].T
             step, *_ = np.linalg.lstsq(rates, -estimate[terms, equations], rcond=1e-6)
             origin = origin + step
             if not np.abs(origin).max() < 1e6:
@@ -70,7 +85,7 @@ class ShiftedLaw:
     def _scores(self, origin: Floats) -> tuple[Floats, Floats, Floats]:
         forth = shift_matrix(self.exponents, -origin)
         estimate = (forth @ self.coefficients).T
-        covariance = forth @ self.covariances @ forth.T
+        covariance = forth @ self._covariances @ forth.T
         variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300)
         return estimate, covariance, estimate**2 / variance
 
@@ -86,7 +101,7 @@ class ShiftedLaw:
         value = (score / (score + penalty))[mask].sum()
         weight = penalty / (score + penalty) ** 2
         gradient = np.empty(self.d)
-        for i, generator in enumerate(self.generators):
+        for i, generator in enumerate(self._generators):
             estimate_rate = estimate @ generator.T
             variance_rate = 2 * np.einsum("ka,jak->jk", generator, covariance)
             rate = 2 * estimate * estimate_rate / variance - score * variance_rate / variance
@@ -131,16 +146,7 @@ def sparse_origins(
     list of ndarray, shape (d,), best first
     """
     low, high = np.minimum(box[0], home), np.maximum(box[1], home)
-    # Only what divides another term of its equation can vanish by a shift.
-    below = divides(algebra.exponents) & ~np.eye(algebra.l, dtype=bool)
-    droppable = np.argwhere((active & (below @ active)).T)
-    starts = []
-    for draw in range(DRAWS if len(droppable) else 0):
-        origin = home if draw % 2 else rng.uniform(low, high)
-        size = min(1 + draw % algebra.d, len(droppable))
-        origin = algebra.vanish(origin, droppable[rng.permutation(len(droppable))[:size]])
-        if np.isfinite(origin).all():
-            starts.append(np.clip(origin, low, high))
+    starts = _starts(algebra, active, home, (low, high), rng)
     counts = [algebra.smooth_count(start, active, penalty)[0] for start in starts]
     found: list[tuple[float, Floats]] = []
     for index in np.argsort(counts)[: 4 * keep]:
@@ -157,3 +163,25 @@ def sparse_origins(
         if all(np.abs(origin - other).max() > 0.02 for other in distinct):
             distinct.append(origin)
     return distinct[:keep]
+
+
+def _starts(
+    algebra: ShiftedLaw,
+    active: Bools,
+    home: Floats,
+    box: tuple[Floats, Floats],
+    rng: np.random.Generator,
+) -> list[Floats]:
+    """Origins in the box near which a few coefficients drawn at random vanish."""
+    low, high = box
+    # Only what divides another term of its equation can vanish by a shift.
+    below = divides(algebra.exponents) & ~np.eye(len(algebra.exponents), dtype=bool)
+    droppable = np.argwhere((active & (below @ active)).T)
+    starts = []
+    for draw in range(DRAWS if len(droppable) else 0):
+        origin = home if draw % 2 else rng.uniform(low, high)
+        size = min(1 + draw % algebra.d, len(droppable))
+        origin = algebra.vanish(origin, droppable[rng.permutation(len(droppable))[:size]])
+        if np.isfinite(origin).all():
+            starts.append(np.clip(origin, low, high))
+    return starts

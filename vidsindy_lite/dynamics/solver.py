@@ -96,9 +96,8 @@ def discover(
     shared = check_systematic(systematic, times, trajectories)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     history = History()
-    with tqdm(total=5, disable=not progress, desc="discover", leave=False) as bar:
-        problem = pose(trajectories, shared, degree, seed)
-        bar.update()
+    problem = pose(trajectories, shared, degree, seed)
+    with tqdm(total=4, disable=not progress, desc="discover", leave=False) as bar:
         found = candidates(problem, degree, rng, history)
         bar.update()
         fit = cheapest(problem, found, history)

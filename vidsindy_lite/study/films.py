@@ -20,7 +20,7 @@ import numpy as np
 from ..arrays import Floats
 from ..cameras import Rig
 from ..checks import check_choice, check_integer
-from ..pipeline import Observation, observe
+from ..observation import Observation, observe
 from ..vision import Scene, render_video
 from .metrics import trajectory_error
 from .sweeps import remember

@@ -24,7 +24,7 @@ from ..arrays import Bools, Floats, Image, Ints
 from ..cameras import Camera, Rig
 from ..checks import check_integer
 from ..dynamics import Discovery, discover
-from ..pipeline import observe_tracks
+from ..observation import observe_tracks
 from ..vision import Scene, Track, read_frame, render_labelled, track, write_video
 from .films import SAMPLES_PER_PERIOD, TOGETHER
 from .metrics import Score, score

@@ -20,7 +20,7 @@ import numpy as np
 from ..arrays import Floats
 from ..checks import check_choice
 from ..dynamics import Discovery, PolynomialSystem, discover
-from ..pipeline import observe_tracks
+from ..observation import observe_tracks
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import TOGETHER, FilmResult, FilmTask, film_result
 from .metrics import Score, pulls, score

@@ -1,0 +1,350 @@
+"""From video files to a path in space: track, synchronise, learn the cameras, reconstruct."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+from tqdm import tqdm
+
+from .arrays import Floats
+from .cameras import (
+    DISAGREEMENT,
+    Lags,
+    Rig,
+    align,
+    check_learnable,
+    disagreement,
+    learn_cameras,
+    learn_lags,
+    learn_normal,
+    list_lags,
+    reconstruct,
+    systematic_errors,
+    trailing_errors,
+)
+from .checks import check_path, check_times, check_tracks, check_vector
+from .vision import Track, VideoInfo, check_detector, track, video_info
+
+_WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What the videos of one target tell before any law is asked for.
+
+    Parameters
+    ----------
+    tracks : tuple of ndarray, shape (n, 2)
+        Pixels of the target in each video at the instants ``t``; NaN where it was not seen.
+    rig : Rig
+        The cameras, all calibrated.
+    lags : Lags
+        When each video started.
+    t : ndarray, shape (n,)
+        Time of each frame of the first video.
+    x : ndarray, shape (n, 3)
+        Reconstructed path in scene units; NaN where fewer than two cameras saw the target.
+    systematic : ndarray, shape (k, n, 3)
+        Errors of the path that all frames share: what k independent causes, each off by one
+        standard error, add to it, in scene units. See `discover`.
+    warnings : tuple of str
+        Why the result should not be trusted, with advice; empty if nothing was found.
+    """
+
+    tracks: tuple[Floats, ...]
+    rig: Rig
+    lags: Lags
+    t: Floats
+    x: Floats
+    systematic: Floats
+    warnings: tuple[str, ...]
+
+    @property
+    def status(self) -> str:
+        """``"ok"``, or ``"suspect"`` if there is a warning."""
+        return "suspect" if self.warnings else "ok"
+
+
+def observe(
+    paths: Sequence[str | Path],
+    rig: Rig,
+    t: ArrayLike | None = None,
+    *,
+    lags: Sequence[float] | None = None,
+    detector: str | os.PathLike = "auto",
+    progress: bool = False,
+) -> Observation:
+    """Track a target in the videos of several fixed cameras and reconstruct its path.
+
+    The frames of the first video are the clock; the others may start earlier or later, differ in
+    length, and in frame rate if their files state it.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        One video file per camera of the rig.
+    rig : Rig
+        Positions and normals of all cameras, scale and angle of at least one.
+    t : array_like, shape (n,), optional
+        Time of each frame of the first video, increasing; all videos then have the same frame rate.
+        By default the frame number over the frame rate, in seconds.
+    lags : array_like, shape (m,), optional
+        By how many frames of the first video each one starts later; only differences count. By
+        default they are learned, see `learn_lags`.
+    detector : str or path
+        See `track`.
+    progress : bool
+        Show progress bars.
+
+    Returns
+    -------
+    Observation
+        Its first warnings are that the rig does not agree with the tracks, if it does not, and
+        which backgrounds are not at rest.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If a file is missing, cut off or no video, if the numbers of files and cameras disagree, if
+        a target is not found, if the given lags are clearly wrong, or if the cameras cannot be
+        learned (see `learn_cameras`). What can be told before a video is tracked is.
+    """
+    footage = _check_footage(paths, rig, t, lags, detector)
+    seen = _track_all(footage, detector, progress)
+    tracks = [track.pixels for track in seen]
+    doubts = [warning for track in seen for warning in track.warnings]
+    names = [path.name for path in footage.paths]
+    return _observed(tracks, rig, footage.t, footage.lags, footage.rates, names, doubts)
+
+
+def observe_tracks(
+    tracks: Sequence[ArrayLike], rig: Rig, t: ArrayLike, *, lags: Sequence[float] | None = None
+) -> Observation:
+    """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n_i, 2)
+        Pixels of the target, one track per camera of the rig, each from its own first frame; all
+        cameras have the same frame rate. NaN where it was not seen.
+    rig, lags
+        See `observe`.
+    t : array_like, shape (n_0,)
+        Time of each frame of the first track, increasing.
+
+    Returns
+    -------
+    Observation
+
+    Raises
+    ------
+    ValueError
+        If the numbers of tracks, cameras and times disagree, or as `observe` does.
+    """
+    check_learnable(rig)
+    raw = check_tracks(tracks, len(rig.cameras))
+    t = check_times(t)
+    if t.shape != (len(raw[0]),):
+        raise ValueError(
+            f"t: must have shape ({len(raw[0])},), one per row of tracks[0], got {t.shape}"
+        )
+    given = None if lags is None else check_vector("lags", lags, len(raw))
+    if given is not None:
+        given -= given[0]
+    return _observed(raw, rig, t, given, None, [f"tracks[{i}]" for i in range(len(raw))])
+
+
+def _observed(
+    raw: Sequence[Floats],
+    rig: Rig,
+    t: Floats,
+    lags: Floats | None,
+    rates: Floats | None,
+    names: Sequence[str],
+    doubts: Sequence[str] = (),
+) -> Observation:
+    """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    learned_lags = learn_lags(raw, rig, rates, start=lags)
+    used_lags = learned_lags if lags is None else _given(lags, learned_lags)
+    tracks = align(raw, used_lags.frames, rates)
+    learned = learn_cameras(tracks, rig)
+    shared = systematic_errors(raw, rig, learned, used_lags), trailing_errors(tracks, learned)
+    return Observation(
+        tracks=tracks,
+        rig=learned,
+        lags=used_lags,
+        t=t,
+        x=reconstruct(tracks, learned),
+        systematic=np.concatenate(shared),
+        warnings=(
+            *_rig_warnings(tracks, learned, rig, names, learned_lags),
+            *learned.warnings,
+            *doubts,
+            *used_lags.warnings,
+        ),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Footage:
+    """Video files that fit a rig, their clock, and their lags if they are given."""
+
+    paths: list[Path]
+    shots: list[VideoInfo]
+    t: Floats
+    rates: Floats | None
+    lags: Floats | None
+
+
+def _check_footage(
+    paths: Sequence[str | Path],
+    rig: Rig,
+    t: ArrayLike | None,
+    lags: Sequence[float] | None,
+    detector: str | os.PathLike,
+) -> _Footage:
+    """All that can be told before a video is tracked."""
+    check_learnable(rig)
+    check_detector(detector)
+    files = _check_paths(paths, rig)
+    given = None if lags is None else check_vector("lags", lags, len(files))
+    shots = _check_shots(files, rig)
+    times, rates = _clock(shots, t)
+    if given is not None:
+        given = given - given[0]
+        _check_overlap(given, rates, shots, files)
+    return _Footage(files, shots, times, rates, given)
+
+
+def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
+    """One file name per camera."""
+    if isinstance(paths, str) or not isinstance(paths, Iterable):
+        raise ValueError(f"paths: must be a list of files, one per camera, got {paths!r:.60}")
+    files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
+    if len(files) != len(rig.cameras):
+        raise ValueError(
+            f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
+            f"got {len(files)}"
+        )
+    return files
+
+
+def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
+    """What each file is, if it is a video of the size that its camera has."""
+    shots = [video_info(path) for path in files]
+    for path, shot, camera in zip(files, shots, rig.cameras, strict=True):
+        if shot.frames < 2:
+            raise ValueError(f"paths: {path.name} must be a video, got a single frame")
+        if shot.size != camera.image_size:
+            raise ValueError(
+                f"paths: {path.name} must have the image size of its camera in the rig, "
+                f"{camera.image_size}, got {shot.size}"
+            )
+    return shots
+
+
+def _clock(shots: Sequence[VideoInfo], t: ArrayLike | None) -> tuple[Floats, Floats | None]:
+    """Time of each frame of the first video, and frames of each video in one frame of the first."""
+    if t is not None:
+        times = check_times(t)
+        if times.shape != (shots[0].frames,):
+            raise ValueError(
+                f"t: must have shape ({shots[0].frames},), one per frame of the first video, "
+                f"got {times.shape}"
+            )
+        return times, None
+    fps = np.array([shot.fps for shot in shots])
+    if not (np.isfinite(fps) & (fps > 0)).all():
+        raise ValueError(f"t: must be given if a file states no frame rate, got {fps.tolist()}")
+    return np.arange(shots[0].frames) / fps[0], fps / fps[0]
+
+
+def _check_overlap(
+    lags: Floats, rates: Floats | None, shots: Sequence[VideoInfo], paths: Sequence[Path]
+) -> None:
+    """That every video shares, at its given lag, half of the shorter one's time with the first."""
+    rates = np.ones(len(lags)) if rates is None else rates
+    for path, shot, lag, rate in zip(paths, shots, lags, rates, strict=True):
+        end = shot.frames / rate
+        common = min(lag + end, shots[0].frames) - max(lag, 0)
+        if common < min(end, shots[0].frames) / 2:
+            raise ValueError(
+                "lags: every video must have half of the shorter of the two in common with the "
+                f"first ({shots[0].frames} frames), got {lag:g} for {path.name} ({shot.frames} "
+                "frames)"
+            )
+
+
+def _track_all(footage: _Footage, detector: str | os.PathLike, progress: bool) -> list[Track]:
+    """The track of the target in each video."""
+    videos = list(zip(footage.paths, footage.shots, strict=True))
+    bar = tqdm(videos, desc="track", disable=not progress)
+    return [_track_one(path, shot.frames, detector) for path, shot in bar]
+
+
+def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
+    """Track a video that should have so many frames and one moving target."""
+    found = track(path, detector)
+    if len(found.pixels) != frames:
+        raise ValueError(
+            f"paths: {path.name} must hold the {frames} frames that its header states, got "
+            f"{len(found.pixels)} that can be read: the file is cut off or damaged, or its header "
+            "wrong"
+        )
+    if not np.isfinite(found.pixels).any():
+        raise ValueError(
+            f"paths: {path.name} must show one moving target, got none in any frame: what never "
+            "moves away from a place by about its own width is taken for background"
+        )
+    return found
+
+
+def _given(lags: Floats, learned: Lags) -> Lags:
+    """The lags that are given, unless others are clearly those of the tracks."""
+    apart = np.abs(learned.frames - lags) > _WRONG_LAG + 5 * learned.errors
+    if learned.agree and apart.any():
+        raise ValueError(
+            f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
+            f"({list_lags(learned.frames)}) do: leave them out, or check them"
+        )
+    return replace(learned, frames=lags, errors=0 * lags, warnings=())
+
+
+def _rig_warnings(
+    tracks: Sequence[Floats],
+    learned: Rig,
+    given: Rig,
+    names: Sequence[str],
+    lags: Lags,
+) -> list[str]:
+    """Do the cameras agree on the target to within what tracking can be blamed for?"""
+    missed = disagreement(tracks, learned)
+    if max(missed) <= DISAGREEMENT:
+        return []
+    sizes = ", ".join(f"{size:.1f}" for size in missed)
+    apart = (
+        "in one frame of ten, tracked and reconstructed target lie more than "
+        f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
+    )
+    if lags.agree:  # at lags that differ by too little from the given ones to refuse these
+        return [
+            f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
+            f"({list_lags(lags.frames)}) would explain it best"
+        ]
+    # The largest residual does not tell which camera is wrong: the others were fitted to it.
+    others = [learn_normal(tracks, given, i) for i in range(len(names))]
+    left = [max(disagreement(tracks, other)) for other in others]
+    i = int(np.argmin(left))
+    normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
+    advice = (
+        f"the normal ({normal}) of cameras[{i}] ({names[i]}) would explain it best"
+        if left[i] <= DISAGREEMENT
+        else "no single wrong normal explains it; check the positions, the scales and angles that "
+        "are given, and that at least half of the shortest video is in common with the others"
+    )
+    return [f"the rig does not agree with the tracks: {apart}: {advice}"]
