@@ -19,7 +19,7 @@ help:
 	@echo "make test             all tests, the notebooks in the quick profile among them"
 	@echo "make test-fast        the quick ones of the tests, in less than 90 seconds"
 	@echo "make bench            speed and memory, as ratios"
-	@echo "make lint             ruff"
+	@echo "make lint             style, types, and who may import whom"
 	@echo "make demo             three videos of one target, and its equations, in a minute"
 	@echo "make site             README, notebooks, figures and reference as web pages, in build/site/"
 	@echo "make lab              JupyterLab on the notebooks"
@@ -48,6 +48,8 @@ bench: $(READY)
 
 lint: $(READY)
 	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
 
 demo: $(READY)
 	$(BIN)/python -m vidsindy_lite demo
@@ -59,5 +61,5 @@ lab: $(READY)
 	$(BIN)/jupyter lab --ServerApp.root_dir=. --LabApp.default_url=/lab/tree/notebooks
 
 clean:
-	rm -rf $(VENV) build .pytest_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf $(VENV) build .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis *.egg-info
 	find . -type d -name __pycache__ -prune -exec rm -rf {} +

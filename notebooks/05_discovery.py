@@ -47,6 +47,7 @@ from IPython.display import Math, display
 from vidsindy_lite import discover
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
+    LEAST,
     METHODS,
     REFERENCE_OFFSET,
     SCORES,
@@ -184,9 +185,11 @@ assert (ours.l2 <= (0.1e-2 if full else 0.5e-2)).all()
 
 # %% [markdown]
 # No method is better than ours in any row to the two decimals that the paper prints; beyond them
-# there is only what the tracker left.
+# there is only what the tracker left. An error of 0.001 stands for any below: a few grey levels of the
+# videos decide on it.
 
 # %%
+assert ours.groupby("system").l2.median().max() < LEAST
 rows = pd.concat((table_1, table_S3))
 best = rows[rows.method == "ours"].drop_duplicates("system").set_index("system")["l2 (e-2)"]
 assert (rows["l2 (e-2)"] > rows.system.map(best) - 0.005).all()
@@ -201,8 +204,8 @@ for name, mine in ours.groupby("system", sort=False):
     shots = [film for film in films if film.truth.name == name]
     rows.append({
         "system": name, "exact": rate(mine.exact),
-        "l2 (e-2)": significant(100 * mine.l2.median()),
-        "worst coefficient (%)": significant(100 * mine.max_coefficient_error.median()),
+        "l2 (e-2)": significant(100 * mine.l2.median(), least=100 * LEAST),
+        "worst coefficient (%)": significant(100 * mine.max_coefficient_error.median(), least=0.01),
         "pixel error (px)": significant(np.median([film.pixel_error for film in shots])),
         "path error": significant(np.median([np.linalg.norm(f.path_error) for f in shots])),
         "seconds": shots[0].seconds + mine.seconds.iloc[0],
@@ -353,7 +356,7 @@ both["source"] = both.source.replace("videos", "as tracked")
 fig = plots.plot_methods(both)
 caption = "Relative error of each method on each system; open symbols: the terms are wrong."
 numbers = {
-    f"{method}, {source}": {name: significant(l2, 3) for name, l2 in zip(g.system, g.l2, strict=True)}
+    f"{method}, {source}": {name: significant(l2, 3, LEAST) for name, l2 in zip(g.system, g.l2, strict=True)}
     for (source, method), g in both.groupby(["source", "method"], sort=False)
 }
 save_figure("discovery_methods", fig, caption=caption, numbers=numbers)
@@ -373,7 +376,7 @@ assert all(error[method] > 2 * error["ours"] for method in baselines.BASELINES)
 # ## What we learned
 #
 # * Seven systems, one call, nothing chosen by hand: all true terms, no false one, from three videos
-#   with one calibrated camera. From clean videos the relative error is of the order of $10^{-6}$,
+#   with one calibrated camera. From clean videos the relative error is below $10^{-5}$,
 #   from whole pixels of $10^{-4}$.
 # * The offset of the reference frame was not given and is found with the law.
 # * The standard errors are what they claim to be: nine of ten coefficients lie within two of them.

@@ -46,6 +46,7 @@ from vidsindy_lite import dynamics
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     ABLATION,
+    LEAST,
     METHODS,
     REFERENCE_OFFSET,
     SYSTEMS,
@@ -158,7 +159,7 @@ def robustness(figure_id, caption, trials, published=None):
     fig = plots.plot_robustness(trials, published)
     groups = trials.groupby(["condition", "method", "level"], sort=False)[["l2", "wrong_terms"]]
     numbers = {f"{c}, {m}, {level:g}": group.median() for (c, m, level), group in groups}
-    numbers = {key: [significant(v, 3) for v in value] for key, value in numbers.items()}
+    numbers = {key: [significant(l2, 3, LEAST), n] for key, (l2, n) in numbers.items()}
     save_figure(figure_id, fig, caption=caption, numbers=numbers)
 
 
@@ -534,8 +535,8 @@ rows = [
     {
         "system": name,
         "path / spread (e-2)": significant(100 * path_error[name] / np.linalg.norm(x.std(axis=0))),
-        "l2, videos (e-2)": significant(100 * l2["videos", 0, name]),
-        "l2, truth (e-2)": significant(100 * l2["truth", 0, name]),
+        "l2, videos (e-2)": significant(100 * l2["videos", 0, name], least=100 * LEAST),
+        "l2, truth (e-2)": significant(100 * l2["truth", 0, name], least=100 * LEAST),
         "l2, videos, noise (e-2)": significant(100 * l2["videos", level, name], 3),
         "l2, truth, noise (e-2)": significant(100 * l2["truth", level, name], 3),
     }

@@ -43,6 +43,7 @@ import numpy as np
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     DISTURBANCES,
+    LEAST,
     START,
     SYSTEMS,
     SceneTask,
@@ -200,7 +201,8 @@ save_figure("scene_coefficients", fig, caption=caption, numbers={"pulls": pulls(
 # %%
 rows = [
     {
-        "trial": n, "exact terms": trial.score.exact, "l2 (e-2)": significant(100 * trial.score.l2),
+        "trial": n, "exact terms": trial.score.exact,
+        "l2 (e-2)": significant(100 * trial.score.l2, least=100 * LEAST),
         "worst coefficient (%)": significant(100 * trial.score.max_coefficient_error),
         "gaps (%)": 100 * np.isnan(trial.path).any(axis=1).mean(),
         "status": trial.found.status, "seconds": trial.seconds,

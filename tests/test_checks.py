@@ -1,6 +1,7 @@
 """The checks that all modules share."""
 
 import re
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ def test_integers(value):
 @pytest.mark.parametrize("value", [np.nan, -np.inf, True, "1", 1j, None, np.ones(1)])
 def test_numbers(value):
     assert check_number("angle", np.float32(-0.5)) == -0.5
+    assert check_number("fps", Fraction(30000, 1001)) == 30000 / 1001
     with pytest.raises(ValueError, match="angle: must be a finite number, got "):
         check_number("angle", value)
 

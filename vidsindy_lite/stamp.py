@@ -2,9 +2,9 @@
 
 The code of a notebook, or the function of a sweep, depends on the modules that it imports from the
 package, and on those that they import, imports inside functions included. An import through a front
-door (an ``__init__.py``) leads to the module that defines the name, not to all of the room. In
-modules that draw or write files each function counts for itself, with what it uses of its module.
-To a module belong the data files that it names, and those that are named like it.
+door (an ``__init__.py``) leads to the module that defines the name, not to all of the room. In the
+pipeline and where figures are drawn and written each function counts for itself, with what it uses
+of its module. To a module belong the data files that it names, and those that are named like it.
 """
 
 import ast
@@ -27,9 +27,11 @@ LIBRARIES = (
     "matplotlib",
 )  # fmt: skip
 
-BY_DEFINITION = (
-    f"{NAME}.study.plots", f"{NAME}.companion.artifacts", f"{NAME}.companion.records"
-)  # fmt: skip
+# Of these each definition counts for itself: who only observes does not depend on the solver.
+BY_DEFINITION = tuple(
+    f"{NAME}.{module}"
+    for module in ("pipeline", "study.plots", "companion.artifacts", "companion.records")
+)
 WITHOUT_RESULTS = (f"{NAME}.companion", f"{NAME}.stamp")  # but for those above
 NO_DATA = {".py", ".pyc", ".checkpoint"}  # suffixes
 
@@ -154,17 +156,20 @@ class _Part:
 def _reached(start: _Part) -> tuple[dict[_Node, _Part], list[Path]]:
     """The parts of the package that some code leads to, and their data files."""
     parts: dict[_Node, _Part] = {}
-    todo, seen, strings = set(start.references), set(), set(start.strings)
+    todo, strings = set(start.references), set(start.strings)
+    seen: set[Reference] = set()
+    beside: set[Path] = set()
     while todo:
         seen.add(reference := todo.pop())
         for node in _nodes(*reference):
-            if node not in parts:
-                file = _file(node.module)
+            file = _file(node.module)
+            if file and node not in parts:
                 source, is_front_door = file.read_text("utf-8"), file.name == "__init__.py"
                 parts[node] = _part(source, node.module, is_front_door, node.name)
                 todo |= parts[node].references - seen
                 strings |= parts[node].strings
-    beside, text = {_file(node.module).with_suffix("") for node in parts}, "\n".join(strings)
+                beside.add(file.with_suffix(""))
+    text = "\n".join(strings)
     return parts, [
         file
         for file in sorted(PACKAGE.rglob("*"))
@@ -317,9 +322,9 @@ def _binds(line: ast.stmt) -> set[str]:
         return {line.name}
     if isinstance(line, IMPORTS):
         return {alias.asname or alias.name.partition(".")[0] for alias in line.names}
-    targets = line.targets if isinstance(line, ast.Assign) else [getattr(line, "target", None)]
-    if not isinstance(line, ast.Assign | ast.AnnAssign):
-        return set()
+    targets: list[ast.expr] = []
+    if isinstance(line, ast.Assign | ast.AnnAssign):
+        targets = line.targets if isinstance(line, ast.Assign) else [line.target]
     return {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
 
 

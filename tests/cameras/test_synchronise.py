@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import synchronise as synchrony
-from vidsindy_lite.cameras.calibrate import fit_cameras
-from vidsindy_lite.cameras.synchronise import (
+from vidsindy_lite.cameras import (
     DISAGREEMENT,
     align,
     disagreement,
     learn_lags,
     list_lags,
 )
+from vidsindy_lite.cameras import synchronise as synchrony
+from vidsindy_lite.cameras.calibrate import fit_cameras
 
 NOISE = 0.05  # pixels
 

@@ -6,7 +6,7 @@ from helpers import trajectory
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras.synchronise import Lags
+from vidsindy_lite.cameras import Lags, uncertainty
 from vidsindy_lite.cameras.uncertainty import (
     long_run_covariance,
     systematic_errors,
@@ -207,3 +207,92 @@ def test_malformed_systematic_errors_are_named(systematic, message):
     t = np.arange(10.0)
     with pytest.raises(ValueError, match=message):
         vl.discover(t, np.column_stack((np.sin(t), np.cos(t))), 1, systematic=systematic)
+
+
+# -------------------------------------------------------------------------- formulas, step by step
+
+
+def test_long_run_covariance_by_the_book():
+    """Newey and West 1987 with the width of Andrews 1991, written out."""
+    series = dependent(np.random.default_rng(2), 60, 0.5)
+    n = len(series)
+    parts = []
+    for column in series.T:
+        rho = sum(column[t] * column[t - 1] for t in range(1, n)) / sum(column**2)
+        parts.append(4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2))
+    width = 1.1447 * (np.mean(parts) * n) ** (1 / 3)
+    assert 2 < width < 20
+    total = np.zeros((2, 2))
+    for s in range(n):
+        for t in range(n):
+            total += max(0, 1 - abs(s - t) / (width + 1)) * np.outer(series[s], series[t])
+    found = long_run_covariance(series)
+    # The last weight that counts is the first one that is zero or less.
+    lag = int(np.ceil(width))
+    product = series[lag:].T @ series[:-lag]
+    total += min(0, 1 - lag / (width + 1)) * (product + product.T)
+    np.testing.assert_allclose(found, total / n, rtol=1e-10)
+
+
+def test_a_series_that_hardly_ever_changes_has_a_width():
+    series = np.ones((50, 1))
+    assert 0 < long_run_covariance(series)[0, 0] <= 50
+    assert long_run_covariance(np.zeros((50, 1)))[0, 0] == 0
+
+
+def test_covariance_of_independent_residuals_is_that_of_least_squares():
+    rng = np.random.default_rng(3)
+    slope = rng.normal(size=(4000, 3, 2))
+    missed = 0.2 * rng.normal(size=(4000, 3))
+    factor = uncertainty._sandwich(missed, slope)
+    flat = slope.reshape(-1, 2)
+    expected = 0.2**2 * np.linalg.inv(flat.T @ flat)
+    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.abs(factor @ factor.T - expected).max() < 0.15 * size.max()
+    # Every residual three times in a row: three times the variance for as many numbers.
+    tripled = uncertainty._sandwich(np.repeat(missed, 3, 0), np.repeat(slope, 3, 0))
+    grown = np.trace(tripled @ tripled.T) / np.trace(factor @ factor.T)
+    assert 0.6 < grown < 1.1  # and a third if they were taken as independent
+
+
+def test_trails_follow_the_motion():
+    """Half of the noise that the residuals show, backwards along the motion in each image."""
+    x = trajectory(np.random.default_rng(4), 80)
+    rig = vl.Rig.around(x)
+    rng = np.random.default_rng(5)
+    tracks = [c.project(x) + 0.3 * rng.normal(size=(80, 2)) for c in rig.cameras]
+    tracks[1][20] = np.nan
+    modes = trailing_errors(tracks, rig)
+    assert modes.shape == (3, 80, 3)
+    path = vl.reconstruct(tracks, rig)
+    missed = np.hstack(vl.residuals(tracks, rig))
+    noise = 1.4826 * np.median(np.abs(missed[np.isfinite(missed)])) * np.sqrt(2)  # 6 / (6 - 3)
+    assert 0.2 < noise < 0.4
+    for i, mode in enumerate(modes):
+        behind = [track.copy() for track in tracks]
+        for k in range(1, 79):
+            step = (tracks[i][k + 1] - tracks[i][k - 1]) / 2
+            if np.isfinite(step).all():
+                behind[i][k] = tracks[i][k] - 0.5 * noise * step / np.sqrt(step @ step + noise**2)
+        expected = np.nan_to_num(vl.reconstruct(behind, rig) - path)
+        np.testing.assert_allclose(mode[1:-1], expected[1:-1], atol=1e-9 * np.ptp(x))
+
+
+def test_a_lag_moves_the_path_as_far_as_it_may_be_wrong():
+    x = trajectory(np.random.default_rng(6), 120)
+    rig = vl.Rig.around(x)
+    rng = np.random.default_rng(7)
+    tracks = [c.project(x) + NOISE * rng.normal(size=(120, 2)) for c in rig.cameras]
+    lags = Lags(np.zeros(3), np.ones(3), np.array([0, 0.01, 0]), 0.0)
+    (mode,) = systematic_errors(tracks, rig, rig, lags)
+
+    def path(lag):
+        return vl.reconstruct(vl.align(tracks, (0, lag, 0)), rig)
+
+    speed = np.nan_to_num((path(0.05) - path(-0.05)) / 0.1)
+    size = np.sum(mode * speed) / np.sum(speed**2)
+    np.testing.assert_allclose(mode, size * speed, atol=1e-9 * np.abs(mode).max())
+    pixels = np.linalg.norm(np.gradient(tracks[1], axis=0), axis=1)
+    # The residuals see part of the motion of one camera, so the error is above noise / speed.
+    least = NOISE / np.sqrt(np.sum(pixels**2))
+    assert least < abs(size) < 5 * least

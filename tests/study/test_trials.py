@@ -149,7 +149,7 @@ def test_every_method_gets_the_same_data(condition, level, no_videos, monkeypatc
 
 
 def test_methods_are_ours_and_every_baseline():
-    assert experiments.METHODS == ("ours", *BASELINES)
+    assert ("ours", *BASELINES) == experiments.METHODS
 
 
 def test_corruption_is_that_of_the_protocol():

@@ -39,9 +39,10 @@ def unsettled_lags(step: float) -> str:
 
 def no_lags(lags: str, residual: float) -> str:
     """Nothing that was tried makes the views agree."""
+    left = f"leave {residual:.2g} pixels" if residual < float("inf") else "no cameras fit"
     return (
-        f"no lags of the videos make the views agree: ({lags}) frames were taken, which leave "
-        f"{residual:.2g} pixels; check the rig, or give the lags if you know them"
+        f"no lags of the videos make the views agree: ({lags}) frames were taken, which {left}; "
+        "check the rig, or give the lags if you know them"
     )
 
 

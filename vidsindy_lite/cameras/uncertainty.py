@@ -24,8 +24,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
+from .clock import align
 from .rig import Rig
-from .synchronise import OUTLIER, PROBE, Lags, align
+from .synchronise import OUTLIER, PROBE, Lags
 from .triangulate import Views, check_calibrated, check_views, reprojection, triangulate
 from .unknowns import Unknowns
 

@@ -3,5 +3,3 @@
 `run` executes the notebooks, whose cells hand their results to `artifacts`; `registry` keeps the
 folder of figures, `readme` the README's tables. `compare`, `report` and `site` write pages.
 """
-
-

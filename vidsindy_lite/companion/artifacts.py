@@ -100,7 +100,7 @@ class Table:
     rows: tuple[dict, ...]
     notebook: str
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.rows:
             raise ValueError(f"rows: table {self.table_id!r} needs at least one row, got none")
         for number, row in enumerate(self.rows):
@@ -289,7 +289,7 @@ def save_table(table_id: str, rows: Iterable[Mapping[str, object]], *, caption: 
         a scalar, or an id that another notebook of this run owns.
     """
     record = _new_record("table", table_id, caption)
-    plain = [as_json(dict(row), "rows", DIGITS) for row in rows]
+    plain = [{str(k): as_json(v, "rows", DIGITS) for k, v in row.items()} for row in rows]
     record["rows"] = _with_steady_seconds(record, plain)
     table = as_table(record)
     markdown = table._repr_markdown_().encode()

@@ -53,7 +53,7 @@ def clean(
 
 def _tidy_outputs(outputs: list[NotebookNode]) -> list[NotebookNode]:
     """Outputs without stderr, with neighbouring pieces of stdout joined."""
-    tidy = []
+    tidy: list[NotebookNode] = []
     for output in copy.deepcopy(outputs):
         is_stream = output.output_type == "stream"
         if is_stream and output.name == "stderr":

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty
+from typing import Any
 
 import jupytext
 import papermill
@@ -12,7 +13,7 @@ from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbclient.util import run_sync
 from nbformat import NotebookNode
 from papermill.clientwrap import PapermillNotebookClient
-from papermill.engines import Engine, papermill_engines
+from papermill.engines import Engine, NotebookExecutionManager, papermill_engines
 from papermill.exceptions import PapermillExecutionError, strip_color
 from traitlets.config import Config
 
@@ -129,7 +130,7 @@ class _Client(PapermillNotebookClient):
     returns from its last request reports it on stderr.
     """
 
-    def wait_for_reply(self, msg_id, cell=None):
+    def wait_for_reply(self, msg_id: str, cell: NotebookNode | None = None) -> dict | None:
         reply = super().wait_for_reply(msg_id, cell)
         next_message = run_sync(self.kc.get_iopub_msg)
         with suppress(Empty):
@@ -146,15 +147,11 @@ class _Engine(Engine):
 
     @classmethod
     def execute_managed_notebook(
-        cls, nb_man, kernel_name, *, timeout, startup_timeout, config, **_
-    ):
-        _Client(
-            nb_man,
-            kernel_name=kernel_name,
-            timeout=timeout,
-            startup_timeout=startup_timeout,
-            config=config,
-        ).execute()
+        cls, nb_man: NotebookExecutionManager, kernel_name: str, **options: Any
+    ) -> None:
+        """Execute the cells with papermill's options that are the client's, too."""
+        chosen = {name: options[name] for name in ("timeout", "startup_timeout", "config")}
+        _Client(nb_man, kernel_name=kernel_name, **chosen).execute()
 
 
 papermill_engines.register(ENGINE, _Engine)

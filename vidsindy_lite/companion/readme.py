@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..stamp import write_file
+from ..study import LEAST
 from .artifacts import Table, load_table
 from .registry import load_run_times
 
@@ -63,7 +64,7 @@ def notebooks(root: Path) -> str:
     times, headlines = load_run_times(figures), _headlines(figures)
     lines = ["| notebook | what it shows | result | run time |", "|---|---|---|---:|"]
     for path in sorted((root / "notebooks").glob("*.py")):
-        title = re.search(r"^# # (.*)", path.read_text("utf-8"), re.MULTILINE)[1]
+        (title, *_) = re.findall(r"^# # (.*)", path.read_text("utf-8"), re.MULTILINE)
         time = f"{times[path.stem]:.0f} s" if path.stem in times else ""
         link = f"[{path.stem}](notebooks/{path.stem}.ipynb)"
         lines.append(f"| {link} | {title} | {headlines.get(path.stem, '')} | {time} |")
@@ -93,7 +94,8 @@ PARTS: dict[str, Callable[[Path], str]] = {
 
 def _beside_the_paper(table: Table, keys: list[str]) -> str:
     """Relative l2 in 1e-2, with the number of false positives if there are any, by method."""
-    groups, methods = {}, list(dict.fromkeys(row["method"] for row in table.rows))
+    groups: dict[tuple, dict[str, list[str]]] = {}
+    methods = list(dict.fromkeys(row["method"] for row in table.rows))
     for row in table.rows:
         cells = groups.setdefault(tuple(row[key] for key in keys), {})
         cells[row["method"]] = [
@@ -114,7 +116,8 @@ def _cell(l2: float, false: float, found: str = "") -> str:
     hits, trials = map(int, found.split(" of ")) if found else (0, 0)
     wrong = [f"{false:g} false"] if false else []
     wrong += [f"misses in {trials - hits} of {trials}"] if hits < trials else []
-    return f"{l2:.3g}" + (f" ({', '.join(wrong)})" if wrong else "")
+    shown = f"< {100 * LEAST:g}" if l2 <= 100 * LEAST else f"{l2:.3g}"
+    return shown + (f" ({', '.join(wrong)})" if wrong else "")
 
 
 # ------------------------------------------------------------------------------------- headlines
@@ -122,13 +125,13 @@ def _cell(l2: float, false: float, found: str = "") -> str:
 
 def _below(value: float) -> str:
     """A bound with a margin: what others get of a number that is nearly nothing."""
-    return f"below {10 ** math.ceil(math.log10(2 * max(value, 1e-16))):.0e}"
+    return f"below {LEAST if value <= LEAST else 10 ** math.ceil(math.log10(2 * value)):.0e}"
 
 
 def _tour(table: Table) -> str:
     (row,) = table.rows
     found = row["true terms"] - row["missing"]
-    return f"{found} of {row['true terms']} terms, {row['false']} false, l2 {_below(row['l2'])}"
+    return f"{found} of {row['true terms']} terms, {row['false']} false, l2 {row['l2']}"
 
 
 def _projection(table: Table) -> str:

@@ -90,7 +90,9 @@ def check_folder(
     present = {path.name for path in folder.glob("*") if not path.name.startswith(".")}
     problems = [f"{name}: registered, but missing" for name in sorted(expected - present)]
     problems += [f"{name}: nothing registers it" for name in sorted(present - expected)]
-    for record in records.values() if stamps is not None else ():
+    for record in records.values():
+        if stamps is None:
+            continue
         if record["notebook"] not in stamps:
             problems.append(f"{record['id']}: no notebook {record['notebook']!r} to make it")
         elif stamps[record["notebook"]] not in (None, record["stamp"]):

@@ -149,7 +149,7 @@ def summary(
         "tracks": list(found.tracks),
         "residuals": missed,
     }
-    return as_json(content, "found")
+    return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
 
 
 def _law(found: Discovery, frame: str, origin: Floats, errors: Floats) -> dict[str, object]:

@@ -286,17 +286,17 @@ def _executed(tasks: Sequence[_Task]) -> Iterator[tuple[_Task, Outcome]]:
                     sender.close()  # here: so the end of the process is the end of the pipe
                     running[receiver] = task, process, time.perf_counter()
                 bar.set_postfix_str(", ".join(task.path.stem for task, *_ in running.values()))
-                for receiver in wait(list(running), timeout=1):
-                    task, process, started = running[receiver]
-                    outcome = _received(receiver, task, process, started)
-                    del running[receiver]
+                ended = wait(list(running), timeout=1)
+                for receiver in [each for each in running if each in ended]:
+                    outcome = _received(receiver, *running[receiver])
+                    task = running.pop(receiver)[0]
                     failed = f"FAILED\n\n{outcome.error}\n" if outcome.error else ""
                     _say(f"{task.label}: {failed or f'{outcome.seconds:.1f} s'}")
                     bar.update()
                     yield task, outcome
         finally:
-            for _, process, _ in running.values():
-                _end(process)
+            for _, left, _ in running.values():
+                _end(left)
 
 
 def _received(receiver: Connection, task: _Task, process: BaseProcess, started: float) -> Outcome:

@@ -134,7 +134,7 @@ def heading_anchor(text: str) -> str:
 class _Renderer(IPythonRenderer):
     """Markdown as nbconvert knows it, with links within the site and plain anchors."""
 
-    def heading(self, text: str, level: int, **_) -> str:
+    def heading(self, text: str, level: int, **_: object) -> str:
         return f'<h{level} id="{heading_anchor(text)}">{text}</h{level}>\n'
 
     def link(self, text: str, url: str, title: str | None = None) -> str:
@@ -180,10 +180,8 @@ def reference_modules() -> list[str]:
 
 
 def _write_page(path: Path, body: str) -> None:
-    title = re.search(r"<h1[^>]*>(.*?)</h1>", body, re.DOTALL)
+    title, *_ = re.findall(r"<h1[^>]*>(.*?)</h1>", body, re.DOTALL)
     top = "" if (path.parent / "site.css").exists() else "../"
     formulas = FORMULAS.format(top=top) if "$" in body else ""
-    page = PAGE.format(
-        title=re.sub(r"<[^>]*>", "", title[1]), top=top, body=body, formulas=formulas
-    )
+    page = PAGE.format(title=re.sub(r"<[^>]*>", "", title), top=top, body=body, formulas=formulas)
     write_file(path, page.encode())

@@ -25,7 +25,7 @@ from .published import ABLATION, DATASETS_CLAIMED, LAB, LAWS, SCORES, SYSTEMS_S1
 from .realistic import DISTURBANCES, START, SceneTask, run_scene
 from .sweeps import sweep
 from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
-from .tables import by_condition, rate, significant, summary, tabulate
+from .tables import LEAST, by_condition, rate, significant, summary, tabulate
 from .trials import METHODS, Trial, grid, run_trial
 
 __all__ = [
@@ -67,6 +67,7 @@ __all__ = [
     "DATASETS_CLAIMED",
     "LAB",
     "LAWS",
+    "LEAST",
     "SCORES",
     "SYSTEMS_S1",
 ]

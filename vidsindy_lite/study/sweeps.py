@@ -30,7 +30,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 from uuid import uuid4
 
-from filelock import FileLock
 from tqdm import tqdm
 
 from ..stamp import PACKAGE, code_stamp, repository_root, write_file
@@ -147,6 +146,8 @@ def _is_hashable(task: object) -> bool:
 def _remember(function: Callable[[Task], Result], task: Task, file: Path | None) -> Result:
     if file is None:
         return function(task)
+    from filelock import FileLock
+
     file.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{file}.lock"):
         results = _stored({0: file})

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 
 from .trials import CORRUPTIONS, TrialResult
 
+LEAST = 1e-5
+"""Relative l2 error below which a few grey levels in the videos decide: tables give it as that."""
+
 if TYPE_CHECKING:  # pandas is imported where a frame is made
     from pandas import DataFrame, Series
 
@@ -98,14 +101,15 @@ def summary(trials: DataFrame, by: str | list[str]) -> DataFrame:
     DataFrame
         One row a group, in the order of their first trials: in how many trials all true terms were
         found, and in how many these and no others; medians of false positives, relative l2 error,
-        precision and recall. Errors have two significant digits: the rest is rounding noise.
+        precision and recall. Errors have two significant digits, and one below `LEAST` is given as
+        that: the rest is rounding noise.
     """
     rows = trials.groupby(by, sort=False).agg(
         **{
             "terms found": ("terms_found", rate),
             "exact": ("exact", rate),
             "false positives": ("false_positives", "median"),
-            "l2 (e-2)": ("l2", lambda values: significant(100 * values.median())),
+            "l2 (e-2)": ("l2", lambda values: significant(100 * max(values.median(), LEAST))),
             "precision (%)": ("precision", lambda values: round(100 * values.median(), 2)),
             "recall (%)": ("recall", lambda values: round(100 * values.median(), 2)),
         }
@@ -118,6 +122,6 @@ def rate(happened: Series) -> str:
     return f"{int(happened.sum())} of {len(happened)}"
 
 
-def significant(value: float, digits: int = 2) -> float:
-    """A number rounded to so many significant digits."""
-    return float(f"{value:.{digits - 1}e}")
+def significant(value: float, digits: int = 2, least: float = 0.0) -> float:
+    """A number rounded to so many significant digits; what is below the least is given as that."""
+    return float(f"{max(value, least):.{digits - 1}e}")

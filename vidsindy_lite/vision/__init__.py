@@ -4,7 +4,7 @@
     tracking    track: a video in, the target's pixels out, by one of
     background      what differs from a background at rest (the most exact)
     detector        what looks like a target in a single frame: our network, or any YOLO-v8
-    training    how that network was trained, on frames that are drawn here
+    network     that network, in PyTorch; training trained it, on frames that are drawn here
     scenes      what a camera sees; scenery draws its backgrounds, rendering its frames
 """
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
-import seaborn as sns
 from matplotlib.figure import Figure
-from pandas import DataFrame
 from scipy.stats import halfnorm
 
 from ...arrays import Floats
+
+if TYPE_CHECKING:  # pandas and seaborn are imported where they draw
+    from pandas import DataFrame
 
 _COLOURS = {"ours": "C0", "PySINDy": "C1", "E-SINDy": "C2", "WeakSINDy": "C3", "Model-A": "C4"}
 _MARKERS = {"ours": "o", "PySINDy": "s", "E-SINDy": "^", "WeakSINDy": "v", "Model-A": "D"}
@@ -39,6 +41,8 @@ def plot_robustness(
     published : dict of str to dict of float to float, optional
         The paper's relative errors by level, by condition.
     """
+    import seaborn as sns
+
     conditions = trials.condition.unique()
     widths = [1 + n for n in trials.groupby("condition", sort=False)["level"].nunique()]
     figure, grid = plt.subplots(
@@ -83,6 +87,8 @@ def plot_shares(shares: DataFrame) -> Figure:
     shares : DataFrame
         From 0 to 1; a row a system, and columns by condition and level: one panel a condition.
     """
+    import seaborn as sns
+
     conditions = shares.columns.unique("condition")
     figure, panels = plt.subplots(
         1, len(conditions), figsize=(9.5, 3.4), sharey=True, squeeze=False,
@@ -158,6 +164,8 @@ def plot_pull_distribution(pulls: Mapping[str, Floats]) -> Figure:
     pulls : dict of str to ndarray
         ``(found - true) / standard error`` of all coefficients, by condition, in rising order.
     """
+    import seaborn as sns
+
     figure, axes = plt.subplots(figsize=(7, 4))
     reach = np.linspace(0, 4, 200)
     axes.plot(reach, 100 * halfnorm.cdf(reach), color="0.8", lw=7, label="if they are right")

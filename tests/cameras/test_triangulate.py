@@ -1,0 +1,202 @@
+"""Lines of sight against OpenCV, scipy and points found by hand."""
+
+import cv2
+import numpy as np
+import pytest
+from helpers import trajectory
+from scipy.optimize import least_squares
+
+from vidsindy_lite.cameras import (
+    OrthographicCamera,
+    PerspectiveCamera,
+    Rig,
+    reconstruct,
+    residuals,
+)
+from vidsindy_lite.cameras import triangulate as module
+from vidsindy_lite.cameras.triangulate import (
+    Views,
+    epipolar_design,
+    epipolar_lines,
+    intersect,
+)
+
+
+def scene(*kinds, frames=40, seed=3):
+    """Cameras of these models around a path, and the pixels at which they see it."""
+    x = trajectory(np.random.default_rng(seed), frames)
+    reach = np.linalg.norm(np.ptp(x, axis=0))
+    cameras = []
+    for i, kind in enumerate(kinds):
+        normal = np.array([np.cos(2 * i), np.sin(2 * i), 0.3 + 0.1 * i])
+        normal /= np.linalg.norm(normal)
+        distance = (1.5 + 0.4 * i) * reach
+        scale = reach / 300 / (distance if kind is PerspectiveCamera else 1)
+        position = x.mean(axis=0) + distance * normal
+        size = (640, 480 + 10 * i)
+        cameras.append(
+            kind(position=position, normal=normal, scale=scale, angle=0.7 * i, image_size=size)
+        )
+    return x, cameras, [camera.project(x) for camera in cameras]
+
+
+def pixel_matrix(camera):
+    """The 3 x 4 matrix of the field: homogeneous pixels, u to the right and v down."""
+    c, s = np.cos(camera.angle) / camera.scale, np.sin(camera.angle) / camera.scale
+    width, height = camera.image_size
+    inner = np.array([[c, -s, (width - 1) / 2], [-s, -c, (height - 1) / 2], [0, 0, 1]])
+    return inner @ camera.matrix
+
+
+KINDS = [
+    (PerspectiveCamera,) * 2,
+    (PerspectiveCamera,) * 3,
+    (OrthographicCamera, PerspectiveCamera, PerspectiveCamera),
+    (OrthographicCamera,) * 3,
+]
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_exact_pixels_as_opencv(kinds):
+    x, cameras, tracks = scene(*kinds)
+    first, second = pixel_matrix(cameras[0]), pixel_matrix(cameras[1])
+    theirs = cv2.triangulatePoints(first, second, tracks[0].T, tracks[1].T)
+    theirs = (theirs[:3] / theirs[3]).T
+    np.testing.assert_allclose(theirs, x, atol=1e-7 * np.ptp(x))
+    ours, settled = intersect(cameras[:2], tracks[:2])
+    np.testing.assert_allclose(ours, x, atol=1e-9 * np.ptp(x))
+    assert settled.all()
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_noisy_pixels_give_the_least_squares_of_scipy(kinds):
+    x, cameras, tracks = scene(*kinds, frames=6)
+    rng = np.random.default_rng(0)
+    tracks = [track + 3 * rng.normal(size=track.shape) for track in tracks]
+    if len(kinds) > 2:
+        tracks[2][1] = np.nan
+    found = reconstruct(tracks, Rig(cameras))
+    for k in range(6):
+        seen = [(c, t[k]) for c, t in zip(cameras, tracks, strict=True) if np.isfinite(t[k]).all()]
+
+        def missed(point, seen=seen):
+            return np.concatenate([c.project(point[None])[0] - pixel for c, pixel in seen])
+
+        best = least_squares(missed, x[k], xtol=1e-14, ftol=1e-14, gtol=1e-14, x_scale="jac")
+        np.testing.assert_allclose(found[k], best.x, atol=1e-6 * np.ptp(x))
+
+
+def test_one_view_or_none_gives_no_point():
+    x, cameras, tracks = scene(*KINDS[1])
+    tracks[0][3] = tracks[1][3] = np.nan
+    tracks[0][5] = tracks[1][5] = tracks[2][5] = np.nan
+    tracks[2][7] = np.nan
+    found = reconstruct(tracks, Rig(cameras))
+    missing = np.isnan(found).all(axis=1)
+    assert np.flatnonzero(missing).tolist() == [3, 5]
+    np.testing.assert_allclose(found[~missing], x[~missing], atol=1e-9 * np.ptp(x))
+
+
+def test_lines_that_meet_behind_a_camera_give_no_point():
+    straight = {"scale": 0.001, "angle": 0.0, "image_size": (1001, 1001)}
+    rig = Rig(
+        [
+            PerspectiveCamera(position=(0, 0, 10), normal=(0, 0, 1), **straight),
+            PerspectiveCamera(position=(4, 0, 10), normal=(0, 0, 1), **straight),
+        ]
+    )
+    # By hand: (0, 0, 2) lies 8 below the first camera, and .5 of the depth to the other's side.
+    seen = [np.array([[500.0, 500.0]]), np.array([[0.0, 500.0]])]
+    np.testing.assert_allclose(reconstruct(seen, rig), [[0, 0, 2]], atol=1e-9)
+    assert np.isnan(reconstruct([seen[0], 1000 - seen[1]], rig)).all()
+    assert np.isnan(reconstruct([seen[0], seen[0]], rig)).all()  # parallel
+
+
+@pytest.mark.parametrize("kinds", KINDS[1:])
+def test_epipolar_lines_as_opencv(kinds):
+    x, cameras, tracks = scene(*kinds)
+    for known, other, seen, pixels in zip(
+        cameras[:2], cameras[1:], tracks[:2], tracks[1:], strict=True
+    ):
+        first, second = pixel_matrix(known), pixel_matrix(other)
+        centre = np.linalg.svd(first)[2][-1]  # of the known camera, perhaps at infinity
+        e = second @ centre
+        cross = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
+        fundamental = cross @ second @ np.linalg.pinv(first)
+        lines = cv2.computeCorrespondEpilines(seen[:, None], 1, fundamental / abs(e).max())[:, 0]
+        moved = pixels + np.random.default_rng(1).normal(scale=20, size=pixels.shape)
+        distance = np.abs(np.sum(lines[:, :2] * moved, axis=1) + lines[:, 2])
+        unit = other.scale * np.array([np.cos(other.angle), np.sin(other.angle)])
+        ours = epipolar_lines(known, seen, other)
+        np.testing.assert_allclose(np.linalg.norm(ours[0], axis=1), 1)
+        design, target = epipolar_design(ours, other, pixels)
+        np.testing.assert_allclose(design @ unit, target, atol=1e-9 * other.scale * 300)
+        design, target = epipolar_design(ours, other, moved)
+        missed = np.abs(design @ unit - target) / other.scale
+        np.testing.assert_allclose(missed, distance, atol=1e-4)
+
+
+def test_epipolar_equations_leave_out_what_is_not_seen():
+    _, (known, other, _), (seen, pixels, _) = scene(*KINDS[1])
+    seen[4] = np.nan
+    pixels[6] = np.nan
+    normals, constants = lines = epipolar_lines(known, seen, other)
+    assert np.flatnonzero(np.isnan(constants)).tolist() == [4]
+    assert np.flatnonzero(np.isnan(normals).any(axis=1)).tolist() == [4]
+    design, target = epipolar_design(lines, other, pixels)
+    assert design.shape == (38, 2)
+    assert target.shape == (38,)
+    # A camera at the same place sees every line of sight as a point: it cannot disagree.
+    twin = PerspectiveCamera(position=known.position, normal=other.normal, scale=1, angle=0)
+    assert np.isnan(epipolar_lines(known, seen, twin)[1]).all()
+
+
+def test_small_systems_as_numpy():
+    rng = np.random.default_rng(0)
+    left, right = rng.normal(size=(5, 6, 3)), rng.normal(size=(5, 6))
+    left[2, :, 1] = 0  # singular
+    found = module._least_squares(left, right)
+    for k in (0, 1, 3, 4):
+        np.testing.assert_allclose(found[k], np.linalg.lstsq(left[k], right[k])[0], rtol=1e-10)
+    assert found[2].tolist() == [0, 0, 0]
+
+
+def test_a_search_that_leads_uphill_takes_half_the_step_and_one_that_never_ends_says_so():
+    # What is seen is arctan(20 x), and should be 0: the Newton step from .1 alone would run away.
+    def look(point, frames):
+        slope = np.zeros((len(point), 3, 3)) + np.eye(3)
+        slope[:, 0, 0] = 20 / (1 + 400 * point[:, 0] ** 2)
+        missed = np.zeros((len(point), 3))
+        missed[:, 0] = -np.arctan(20 * point[:, 0])
+        return slope, missed
+
+    point, settled = module._gauss_newton(look, np.array([[0.1, 0, 0], [0.01, 0, 0]]))
+    np.testing.assert_allclose(point, 0, atol=1e-9)
+    assert settled.all()
+
+    def endless(point, frames):  # every step is one and none is worse than the one before
+        return np.zeros((len(point), 3, 3)) + np.eye(3), np.ones((len(point), 3))
+
+    point, settled = module._gauss_newton(endless, np.zeros((2, 3)))
+    np.testing.assert_allclose(point, module._STEPS)
+    assert not settled.any()
+
+
+def test_views_are_grouped_by_who_sees():
+    tracks = [np.zeros((5, 2)) for _ in range(3)]
+    tracks[0][1, 0] = np.nan  # half a pixel tells nothing
+    tracks[2][[1, 3]] = np.nan
+    views = Views.of(tracks)
+    assert np.isnan(views.tracks[0][1]).all()
+    groups = [(cameras.tolist(), frames.tolist()) for cameras, frames in views.groups]
+    assert groups == [([0, 1], [3]), ([0, 1, 2], [0, 2, 4])]
+    assert views.frames == 5
+
+
+def test_residuals_are_track_minus_projection():
+    x, cameras, tracks = scene(*KINDS[3])
+    apart = np.array([2.0, -1.0])
+    three = residuals([tracks[0] + apart, *tracks[1:]], Rig(cameras))
+    moved = reconstruct([tracks[0] + apart, *tracks[1:]], Rig(cameras))
+    np.testing.assert_allclose(three[0], tracks[0] + apart - cameras[0].project(moved), atol=1e-9)
+    np.testing.assert_allclose(three[1], tracks[1] - cameras[1].project(moved), atol=1e-9)

@@ -1,0 +1,134 @@
+"""The parts of the background model by themselves, on arrays whose answer is known."""
+
+import cv2
+import numpy as np
+import pytest
+
+from vidsindy_lite.vision.background import (
+    BackgroundModel,
+    Blob,
+    _background_motion,
+    _camera_motion,
+    _largest_component,
+    _median,
+    _reduce,
+    track_blobs,
+    view_distances,
+    whole_views,
+)
+from vidsindy_lite.vision.rendering import render
+from vidsindy_lite.vision.scenes import Scene
+
+SIZE = (128, 96)
+
+
+@pytest.fixture(scope="module")
+def texture():
+    """A smooth random image, coarse pixels."""
+    rng = np.random.default_rng(0)
+    return cv2.GaussianBlur(rng.uniform(0, 255, (60, 80, 3)).astype(np.float32), (0, 0), 3) * 4
+
+
+def test_the_median_of_images():
+    images = np.random.default_rng(0).integers(0, 256, (21, 10, 12, 3), np.uint8)
+    before = images.copy()
+    np.testing.assert_array_equal(_median(images), np.median(images, axis=0))
+    np.testing.assert_array_equal(images, before)
+
+
+def test_coarse_pixels_are_means():
+    image = np.random.default_rng(0).integers(0, 256, (16, 24, 3), np.uint8)
+    means = image.reshape(4, 4, 6, 4, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(_reduce(image), means, atol=0.5)
+    assert _reduce(np.zeros((17, 25, 3), np.uint8)).shape == (5, 7, 3)
+
+
+@pytest.mark.parametrize("shift", [(0.1, 0.0), (0.0, 0.2), (0.12, -0.16)])
+def test_a_displaced_view_is_measured(texture, shift):
+    slope = np.gradient(texture, axis=(1, 0))
+    rng = np.random.default_rng(1)
+    change = -(shift[0] * slope[0] + shift[1] * slope[1])
+    changes = [(change + rng.normal(0, 0.1, change.shape)).astype(np.float32)] * 3
+    found = _camera_motion(texture, changes, 1e3)
+    assert found == pytest.approx(4 * np.hypot(*shift), rel=0.05)  # in pixels of the video
+    still = [rng.normal(0, 1, texture.shape).astype(np.float32) for _ in range(5)]
+    assert _camera_motion(texture, still, 1e3) == 0
+
+
+def test_what_differs_far_from_the_target_is_motion_of_the_background():
+    change = np.zeros((60, 80, 3), np.float32)
+    change[10:20, 10:20] = 50  # the target, 100 coarse pixels
+    change[10:20, 24:26] = 50  # close by
+    assert _background_motion([change], 8.0) == 0
+    change[40:45, 60:70] = 50  # far away
+    assert _background_motion([change], 8.0) == pytest.approx(0.5)
+    assert _background_motion([change], 100.0) == 0
+    change[:, 30:] = 50  # too large for a target: all of it counts
+    assert _background_motion([change], 8.0) > 1
+
+
+def test_the_largest_component_by_area_or_by_weight():
+    mask = np.zeros((10, 10), np.uint8)
+    mask[1:3, 1:3] = mask[5:8, 5:8] = 1
+    weight = np.ones((10, 10), np.float32)
+    weight[1:3, 1:3] = 10
+    assert _largest_component(mask)[0].sum() == 9
+    assert _largest_component(mask, weight)[0].sum() == 4
+    assert _largest_component(0 * mask) is None
+
+
+def blob(shape=(0, 0, 0, 0), area=400.0, inside=True, sound=True):
+    return Blob(np.zeros(2), area, inside, np.array(shape, float) if sound else None)
+
+
+def test_distances_of_views_from_the_commonest_one():
+    # At an area of 400 pixels, shapes 0.6 / 20 = 0.03 apart are just alike.
+    odd = [blob((0.06, 0, 0, 0)), blob((0, 0.3, 0, 0)), blob(area=800), None]
+    unseen = [blob(inside=False), blob(sound=False)]
+    distance = view_distances([*[blob()] * 20, *odd, *unseen])
+    np.testing.assert_allclose(distance[:20], 0)
+    np.testing.assert_allclose(distance[20:22], [2, 10])
+    assert distance[22] == pytest.approx(np.log(2) * np.sqrt(800) / 0.6)
+    assert np.isinf(distance[23:]).all()
+    assert np.isinf(view_distances([None, None])).all()
+
+
+def test_views_beside_a_distant_one_must_be_twice_as_close():
+    distance = np.array([0.1, 0.6, 0.7, 2.0, 0.6, 0.4, 0.6, 0.9, 0.2, np.inf, 0.45])
+    expected = [True, False, False, False, False, True, True, True, True, False, True]
+    np.testing.assert_array_equal(whole_views(distance), expected)
+
+
+@pytest.mark.parametrize("variance", [0.0, 0.005])
+def test_the_model_of_a_film(variance):
+    truth = np.column_stack([np.linspace(20, 108, 45), 48 + 20 * np.sin(np.arange(45) / 5)])
+    scene = Scene("bricks", size=16, noise_variance=variance, image_size=SIZE)
+    frames = np.array(list(render(truth, scene, 1)))
+    model = BackgroundModel(frames[::2])
+    clean = next(render([[np.nan, np.nan]], Scene("bricks", image_size=SIZE), 1)).astype(float)
+    off = np.abs(model.background - clean)
+    assert off.max() <= (0 if variance == 0 else 40)
+    assert off.mean() <= (0 if variance == 0 else 6)
+    assert model.noise == pytest.approx(255 * np.sqrt(variance), rel=0.15)
+    assert model.area == pytest.approx(np.pi * 8**2, rel=0.2)
+    assert model.background_motion < 0.3
+    assert model.camera_motion == 0
+    blobs = list(track_blobs(model, frames))
+    error = np.array([b.centroid for b in blobs]) - truth
+    assert np.sqrt(np.mean(error**2)) < (0.01 if variance == 0 else 0.1)
+    assert [b.area for b in blobs] == pytest.approx([np.pi * 8**2] * 45, rel=0.01 + 20 * variance)
+    assert whole_views(view_distances(blobs)).mean() > 0.95
+    near = model.search(frames[20])
+    assert np.abs(near[0] - truth[20]).max() < 4
+    assert 8 < near[1] < 24
+    assert model.search(clean.astype(np.uint8)) is None or variance
+    assert model.measure(frames[20], truth[20] + 30, 10) is None  # nothing there
+
+
+def test_a_target_cut_off_by_the_window_or_the_image():
+    truth = np.column_stack([np.linspace(0, 108, 45), np.full(45, 48.0)])
+    frames = list(render(truth, Scene("sea", size=16, image_size=SIZE), 1))
+    model = BackgroundModel(np.array(frames[::2]))
+    assert model.measure(frames[30], truth[30] + [9, 0], 9) is None
+    assert model.measure(frames[30], truth[30], 16).inside
+    assert not model.measure(frames[1], truth[1], 16).inside
