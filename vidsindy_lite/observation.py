@@ -1,7 +1,5 @@
 """From video files to a path in space: track, synchronise, learn the cameras, reconstruct."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

@@ -2,9 +2,9 @@
 
 The code of a notebook, or the function of a sweep, depends on the modules that it imports from the
 package, and on those that they import, imports inside functions included. An import through a front
-door (an ``__init__.py``) leads to the module that defines the name, not to all of the room. In the
-pipeline and where figures are drawn and written each function counts for itself, with what it uses
-of its module. To a module belong the data files that it names, and those that are named like it.
+door (an ``__init__.py``) leads to the module that defines the name, not to all of the room. Where
+figures are drawn and written each function counts for itself, with what it uses of its module. To a
+module belong the data files that it names, and those that are named like it.
 """
 
 import ast
@@ -27,10 +27,8 @@ LIBRARIES = (
     "matplotlib",
 )  # fmt: skip
 
-# Of these each definition counts for itself: who only observes does not depend on the solver.
 BY_DEFINITION = tuple(
-    f"{NAME}.{module}"
-    for module in ("pipeline", "study.plots", "companion.artifacts", "companion.records")
+    f"{NAME}.{module}" for module in ("study.plots", "companion.artifacts", "companion.records")
 )
 WITHOUT_RESULTS = (f"{NAME}.companion", f"{NAME}.stamp")  # but for those above
 NO_DATA = {".py", ".pyc", ".checkpoint"}  # suffixes

@@ -308,3 +308,8 @@ def test_a_camera_that_never_sees_the_target(motion, blind):
     tracks[blind][::2, 0] = tracks[blind][1::2, 1] = np.nan  # half a pixel tells nothing
     with pytest.raises(ValueError, match=rf"tracks\[{blind}\]: must show the target in some frame"):
         learn_lags(tracks, motion[1])
+
+
+def test_the_frame_of_an_instant():
+    lags = vl.Lags(np.array([0, 10.3, -4]), np.array([1, 1.2, 0.5]), np.zeros(3), 0.0)
+    assert [lags.frame_at(i, 100) for i in range(3)] == [100, 108, 52]

@@ -98,7 +98,7 @@ def test_the_reference_reads_all_annotations(tmp_path):
     assert {"vidsindy_lite", "vidsindy_lite.dynamics.solver"} < set(modules)
     with warnings.catch_warnings():
         warnings.filterwarnings("error", message="Error parsing type annotation")
-        pdoc.pdoc(PACKAGE.name, output_directory=tmp_path)
+        pdoc.pdoc(*modules, output_directory=tmp_path)
     for name in modules:
         assert (tmp_path / f"{name.replace('.', '/')}.html").exists()
 

@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidsindy_lite.vision.rendering import render, render_labelled, render_restless, render_video
+from vidsindy_lite.vision.rendering import (
+    _NORMAL,
+    render,
+    render_labelled,
+    render_restless,
+    render_video,
+)
 from vidsindy_lite.vision.scenery import BACKGROUNDS
 from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
 from vidsindy_lite.vision.video import read_video
@@ -152,6 +158,11 @@ def test_target_across_the_border_is_clipped():
     assert changed[0, 0]
     assert not changed[15:].any()
     assert not changed[:, 15:].any()
+
+
+def test_quantiles_of_the_noise_are_those_of_the_normal_distribution():
+    np.testing.assert_array_equal(_NORMAL, -_NORMAL[::-1])
+    assert _NORMAL.var() == pytest.approx(1, rel=1e-3)
 
 
 def test_noise_has_the_variance_asked_for():

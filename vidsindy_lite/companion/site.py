@@ -7,6 +7,7 @@ and no server.
 import os
 import re
 import shutil
+import warnings
 from importlib import import_module
 from pathlib import Path
 
@@ -95,7 +96,7 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
     write_file(output / "site.css", f"{style}\n{colours}\n".encode())
     shutil.copytree(root / "figures", output / "figures")
     shutil.copytree(Path(jupyter_server_mathjax.__file__).parent / "static", output / "mathjax")
-    for name in ("LICENSE", "CITATION.cff"):
+    for name in ("LICENSE", "CITATION.cff", "CHANGELOG.md"):
         shutil.copy(root / name, output / name)
 
     notebooks = [path.with_suffix(".ipynb") for path in find_notebooks(root)]
@@ -161,7 +162,9 @@ def _write_reference(folder: Path) -> None:
     """A page of each module, as pdoc makes it, and a list of them."""
     pdoc.render.configure(docformat="numpy", show_source=False, search=False)
     pages = {name: f"{name.replace('.', '/')}.html" for name in reference_modules()}
-    pdoc.pdoc(PACKAGE.name, output_directory=folder)
+    with warnings.catch_warnings():  # a room may bring its modules along
+        warnings.filterwarnings("ignore", message="The module specification")
+        pdoc.pdoc(*pages, output_directory=folder)
     for page in folder.rglob("*.html"):  # a long name or signature scrolls, too
         narrow = "<style>main { overflow-x: auto; overflow-wrap: anywhere; }</style>\n</head>"
         write_file(page, page.read_text("utf-8").replace("</head>", narrow).encode())

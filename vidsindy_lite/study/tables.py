@@ -124,4 +124,4 @@ def rate(happened: Series) -> str:
 
 def significant(value: float, digits: int = 2, least: float = 0.0) -> float:
     """A number rounded to so many significant digits; what is below the least is given as that."""
-    return float(f"{max(value, least):.{digits - 1}e}")
+    return float(f"{value if abs(value) > least else least:.{digits - 1}e}")

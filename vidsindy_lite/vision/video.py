@@ -26,7 +26,7 @@ from ..arrays import Image
 from ..checks import check_instance, check_integer, check_number, check_path
 
 if TYPE_CHECKING:
-    from av import Packet, VideoFrame
+    from av import VideoFrame
     from av.container import InputContainer, OutputContainer
     from av.video.stream import VideoStream
 
@@ -287,11 +287,11 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
     """
     with _opened(path) as (container, stream):
         packets = _packets(container, stream)
-        times = sorted(packet.pts for packet in packets if packet.pts is not None)
+        times = sorted(time for time, _ in packets if time is not None)
         if len(set(times)) < len(packets):  # some old files do not say
             yield from (image for i, image in enumerate(_images(path)) if i in numbers)
             return
-        keys = sorted(packet.pts or 0 for packet in packets if packet.is_keyframe)
+        keys = sorted(time or 0 for time, is_key in packets if is_key)
         frames: Iterator[VideoFrame] = iter(())
         now = -math.inf
         for number in numbers:
@@ -333,10 +333,10 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
         yield container, cast("VideoStream", stream)
 
 
-def _packets(container: InputContainer, stream: VideoStream) -> list[Packet]:
-    """What the frames are coded in, one packet each; the last one of a stream is empty."""
-    packets = container.demux(stream)
-    return [packet for packet in packets if packet.size and not packet.is_discard]
+def _packets(container: InputContainer, stream: VideoStream) -> list[tuple[int | None, bool]]:
+    """When each frame is shown, in ticks, and whether decoding can begin there."""
+    packets = container.demux(stream)  # one a frame; the last one of a stream is empty
+    return [(p.pts, p.is_keyframe) for p in packets if p.size and not p.is_discard]
 
 
 def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
