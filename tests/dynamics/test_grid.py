@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.grid import Grid, Segment, normal_band, rows_from
-from vidsindy_lite.dynamics.splines import design_matrix
+from vidsindy_lite.dynamics.splines import Grid, Segment, design_matrix, normal_band, rows_from
 
 
 def pieces():

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.collocation import State, Status
+from vidsindy_lite.dynamics.collocation import Fit, State, Status
 from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
-from vidsindy_lite.dynamics.search import Fit
 from vidsindy_lite.dynamics.solver import _variants, residual_noise
 
 

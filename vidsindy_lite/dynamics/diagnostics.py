@@ -11,11 +11,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import Floats
-from .collocation import CLEANEST, Linearisation, State, Status
+from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .library import variable_names
 from .polynomials import PolynomialSystem
 from .problem import Problem
-from .search import Fit
 from .selection import closest_rival, equilibrated
 from .trajectories import Trajectory, typical_step
 

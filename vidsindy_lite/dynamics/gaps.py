@@ -12,10 +12,10 @@ import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
 from ..arrays import Floats
-from .grid import Segment
 from .integrate import runge_kutta_4
 from .library import monomials
 from .polynomials import PolynomialSystem
+from .splines import Segment
 from .trajectories import Trajectory
 
 Gap = tuple[int, float]

@@ -25,11 +25,7 @@ RIDGE = 1e-12
 
 
 def subset_search(
-    information: Floats,
-    gradient: Floats,
-    present: Floats,
-    penalty: Floats,
-    start: Bools,
+    information: Floats, gradient: Floats, present: Floats, penalty: Floats, start: Bools
 ) -> tuple[Bools, Floats, float]:
     """Minimise a quadratic function of ``c`` plus a penalty per non-zero entry, by local search.
 
@@ -72,11 +68,7 @@ def subset_search(
 
 
 def closest_rival(
-    information: Floats,
-    gradient: Floats,
-    present: Floats,
-    penalty: Floats,
-    support: Bools,
+    information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
 ) -> Change:
     """The single change of a support that costs least.
 

@@ -16,21 +16,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.stats import chi2
 from tqdm import tqdm
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..checks import check_integer
-from .collocation import CLEANEST, Collocation, State
-from .discovery import Discovery, conclude
+from .collocation import CLEANEST, Collocation, Fit, Linearisation, State
+from .discovery import Discovery, History, conclude
 from .gaps import Gap, gaps, join
 from .library import closure_mask, monomials, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .problem import Problem, fit_curves, pose
-from .search import Fit, History, fitted, select
 from .selection import inverse, subset_search
-from .splines import DEGREE
 from .trajectories import check_systematic, check_trajectories
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
@@ -43,6 +40,8 @@ NEEDLESS_START = 0.1
 """Chance that a second start, from terms of all degrees, is made though the first left nothing."""
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
+LONGEST_SEARCH = 10
+"""Most rounds of a subset search."""
 EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
 
@@ -123,7 +122,6 @@ class Closed:
     """A law in the centred frame, with every term that a shift of it may contain."""
 
     state: State
-    columns: Ints
     law: ShiftedLaw
     objective: float
     collocation: Collocation
@@ -156,7 +154,7 @@ def unpruned(
     active = np.repeat(rows[:, None], d, axis=1)
     state = State(control, coefficients, active, np.zeros(d), np.zeros(d, dtype=bool))
     for weight in FIRST_WEIGHTS:
-        fit = fitted(problem.weighted(collocation, weight), state, tolerance=1.0, max_steps=15)
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         state = fit.state
         history.add(f"unpruned, degree {degree}", problem, fit, weight)
     return fit
@@ -215,26 +213,79 @@ def _closed(problem: Problem, fit: Fit, weight: float) -> Closed:
     information = np.diag(np.where(state.free()[: exponents.size], 0.0, 1e30))
     information[np.ix_(columns, columns)] = collocation.linearise(state, columns).information
     law = ShiftedLaw(exponents, state.coefficients, information)
-    return Closed(state, columns, law, collocation.objective(state), collocation)
+    return Closed(state, law, collocation.objective(state), collocation)
 
 
 def _candidate(problem: Problem, closed: Closed, origin: Floats, moving: Bools) -> Candidate:
     """The cheapest support at an origin, by the quadratic model around the closed law."""
     coefficients, information = closed.law.at(origin)
-    columns = closed.columns
-    support, solution, value = subset_search(
+    columns = np.flatnonzero(closed.state.free())
+    _, solution, value = subset_search(
         information[np.ix_(columns, columns)],
         np.zeros(len(columns)),
         coefficients.T.ravel()[columns],
         np.tile(problem.penalties, problem.d)[columns],
         np.ones(len(columns), dtype=bool),
     )
-    flat = np.zeros((2, problem.exponents.size))
-    flat[:, columns] = solution, support
-    coefficients, active = flat.reshape(2, problem.d, -1).transpose(0, 2, 1)
-    state = State(closed.state.control_points, coefficients, active != 0, origin.copy(), moving)
+    flat = np.zeros(problem.exponents.size)
+    flat[columns] = solution
+    coefficients = flat.reshape(problem.d, -1).T
+    state = State(
+        closed.state.control_points, coefficients, coefficients != 0, origin.copy(), moving
+    )
     cost = closed.objective + value + problem.axis_penalty * moving.sum()
     return Candidate(cost, state, closed.collocation)
+
+
+def select(
+    problem: Problem,
+    collocation: Collocation,
+    state: State,
+    weight: float,
+    stage: str,
+    history: History,
+) -> Fit:
+    """Alternate between the subset search and Gauss-Newton until the criterion stops falling.
+
+    The search runs over all terms, active or not, on the quadratic model with the curve
+    eliminated; its proposal is kept only if the true criterion falls after a refit.
+    """
+    weighted = problem.weighted(collocation, weight)
+
+    def refit(state: State) -> Fit:
+        fit = weighted.solve(state, tolerance=0.1)
+        return replace(fit, criterion=problem.criterion(weighted, fit.state))
+
+    best = refit(state)
+    history.add(stage, problem, best, weight)
+    size = problem.exponents.size
+    prices = np.append(np.tile(problem.penalties, problem.d), np.full(problem.d, -np.inf))
+    for _ in range(LONGEST_SEARCH):
+        state = best.state
+        columns = np.concatenate([np.arange(size), size + np.flatnonzero(state.moving)])
+        model = weighted.linearise(state, columns)
+        support, solution, _ = subset_search(
+            model.information, model.gradient, state.flat()[columns], prices[columns],
+            state.free()[columns],
+        )  # fmt: skip
+        if (support == state.free()[columns]).all():
+            break
+        trial = refit(_proposed(state, model, solution))
+        if not trial.criterion < best.criterion - 1e-6:
+            break
+        best = trial
+        history.add(stage, problem, best, weight)
+    return best
+
+
+def _proposed(state: State, model: Linearisation, solution: Floats) -> State:
+    """The state that the quadratic model promises for a solution of the subset search."""
+    flat = state.flat()
+    step = solution - flat[model.columns]
+    flat[model.columns] = solution
+    control = state.control_points + model.curve_step + model.curve_response @ step
+    moved = state.moved(control, flat)
+    return State(control, moved.coefficients, moved.coefficients != 0, moved.offset, state.moving)
 
 
 def cheapest(problem: Problem, found: Sequence[Candidate], history: History) -> Fit:
@@ -306,8 +357,9 @@ def bridge(problem: Problem, fit: Fit, history: History) -> Fit:
 def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
     """The fit with these gaps crossed, or those of them that the data allow."""
     law = problem.law(fit.state).shift(fit.state.offset)
+    splines = fit.collocation.grid.splines(fit.state.control_points)
     joined, curves = join(
-        fit.collocation.segments, _splines(fit), group, problem.trajectories, law, problem.spacing
+        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing
     )
     bridged = problem.collocation(joined)
     trial = replace(fit.state, control_points=fit_curves(bridged, curves))
@@ -327,15 +379,15 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     """Refit with the law exact, on finer knots until that no longer matters."""
-    fit = fitted(problem.weighted(fit.collocation, FINAL_WEIGHT), fit.state, EXACT)
+    fit = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
     columns = np.flatnonzero(fit.state.free())
     for _ in range(3):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
         finer = problem.collocation(segments, residual_noise(fit))
-        control = fit_curves(finer, _splines(fit))
-        state = replace(fit.state, control_points=control)
-        fit = fitted(problem.weighted(finer, FINAL_WEIGHT), state, EXACT)
+        splines = fit.collocation.grid.splines(fit.state.control_points)
+        state = replace(fit.state, control_points=fit_curves(finer, splines))
+        fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))
         # Half the spacing, a sixteenth of the error: so much is left of what it just was.
@@ -345,7 +397,7 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     # A term that only made up for the error of coarser splines goes, and the noise, known
     # better now, may change what is worth its penalty.
     fit = select(problem, fit.collocation, fit.state, FINAL_WEIGHT, "polish", history)
-    return fitted(fit.collocation, fit.state, EXACT)
+    return fit.collocation.solve(fit.state, EXACT)
 
 
 def residual_noise(fit: Fit) -> Floats:
@@ -354,8 +406,3 @@ def residual_noise(fit: Fit) -> Floats:
     residual, _ = fit.collocation.data_residual(fit.state.control_points)
     squares = (residual**2).sum(axis=0)
     return np.maximum(np.sqrt(squares / max(len(residual) - used, 1.0)), CLEANEST)
-
-
-def _splines(fit: Fit) -> list[BSpline]:
-    pieces = fit.collocation.splines(fit.state.control_points)
-    return [BSpline(knots, control, DEGREE) for knots, control in pieces]
