@@ -91,7 +91,8 @@ class Fit:
     status : Status
         Whether the state is a minimum.
     criterion : float
-        Objective and penalties, where the fit compares laws; else NaN.
+        Objective and penalties, where the fit compares laws (of a candidate that is not refined
+        yet, by the quadratic model); else NaN.
     """
 
     state: State
@@ -109,7 +110,6 @@ class Linearisation:
     goes best with it; ``fall`` is what the curve gains by itself.
     """
 
-    objective: float
     fall: float
     columns: Ints
     information: Floats
@@ -274,12 +274,11 @@ class Collocation:
         gram = self._gram(unknowns - physics @ solved, solved, data_residual, sizes)
         solved = solved.reshape(-1, self.d, solved.shape[1])
         gram, solved = _without_systematic(gram, solved, 1 + len(columns))
-        objective = float((data_residual**2).sum(axis=0) @ self.data_weights)
-        objective += float((unknowns[:, 0] ** 2).sum())
-        objective += float(sizes @ sizes)
+        objective = (data_residual**2).sum(axis=0) @ self.data_weights
+        objective += (unknowns[:, 0] ** 2).sum()
+        objective += sizes @ sizes
         return Linearisation(
-            objective=objective,
-            fall=objective - float(gram[0, 0]),
+            fall=float(objective - gram[0, 0]),
             columns=columns,
             information=gram[1:, 1:],
             gradient=-gram[1:, 0],
