@@ -251,11 +251,11 @@ def _spread(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:
 
 def _from_known(views: Views, cameras: Sequence[Camera], index: int) -> tuple[Floats, Floats]:
     """Linear equations for one unknown camera from all known ones."""
-    equations = [(np.zeros((0, 2)), np.zeros(0))]
     camera, track = cameras[index], views.tracks[index]
-    for known, other in zip(cameras, views.tracks, strict=True):
-        if known.is_calibrated:
-            lines = epipolar_lines(known, other, camera)
-            equations.append(epipolar_design(lines, camera, track))
-    design, target = zip(*equations, strict=True)
-    return np.vstack(design), np.concatenate(target)
+    equations = [
+        epipolar_design(epipolar_lines(known, other, camera), camera, track)
+        for known, other in zip(cameras, views.tracks, strict=True)
+        if known.is_calibrated
+    ]
+    design, target = map(np.concatenate, zip(*equations, strict=True))
+    return design, target
