@@ -219,7 +219,8 @@ class _Fit:
         self.control_points = self._tensor(control).requires_grad_()
         self.offset = self._tensor(np.zeros(x.shape[1])).requires_grad_()
         curve, slope = self.collocation()
-        self.restart(np.linalg.lstsq(monomials(curve, exponents), slope, rcond=None)[0])
+        fitted = np.linalg.lstsq(monomials(curve, exponents), slope, rcond=None)[0]
+        self.restart(fitted.astype(float))
 
     def _tensor(self, array: Floats) -> torch.Tensor:
         return torch.tensor(array, dtype=torch.float64, device=self.device)

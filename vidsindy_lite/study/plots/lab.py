@@ -11,6 +11,7 @@ from matplotlib.ticker import LogLocator
 
 from ...arrays import Floats
 from ...cameras import Rig
+from .common import SPACE
 
 
 def plot_table(
@@ -31,9 +32,8 @@ def plot_table(
     """
     figure = plt.figure(figsize=(10.5, 4.2), layout="compressed")
     panels = figure.subplot_mosaic(
-        [["above", "space"]], width_ratios=(1, 1.15),
-        per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}},
-    )  # fmt: skip
+        [["above", "space"]], width_ratios=(1, 1.15), per_subplot_kw={"space": SPACE}
+    )
     above, space = panels["above"], panels["space"]
     for path in x:
         space.plot(*path.T, color="k", lw=1.2)
