@@ -125,23 +125,18 @@ def _check(function: Callable, tasks: list, jobs: int) -> None:
             f"results depend on, got {function!r}"
         )
     for task in tasks:
-        parameters = getattr(type(task), "__dataclass_params__", None)
-        # Hashable, hence without arrays: the repr of a large one leaves numbers out.
-        if not (parameters and parameters.frozen and _is_hashable(task)):
+        try:
+            hash(task)  # fails with arrays, and the repr of a large one leaves numbers out
+            frozen = type(task).__dataclass_params__.frozen
+        except (AttributeError, TypeError):
+            frozen = False
+        if not frozen:
             raise ValueError(
                 "tasks: each must be a frozen dataclass of numbers, text and tuples of them, "
                 f"got {task!r}"
             )
     if jobs < 1:
         raise ValueError(f"jobs: must be at least 1, got {jobs}")
-
-
-def _is_hashable(task: object) -> bool:
-    try:
-        hash(task)
-    except TypeError:
-        return False
-    return True
 
 
 def _remember(function: Function[Task, Result], task: Task, file: Path | None) -> Result:

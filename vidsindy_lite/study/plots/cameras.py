@@ -11,7 +11,7 @@ from mpl_toolkits.mplot3d import Axes3D
 
 from ...arrays import Floats
 from ...cameras import Camera, Rig
-from .common import draw_against_first, finish_space, image_axes, space_axes
+from .common import SPACE, draw_against_first, finish_space, image_axes
 
 
 def plot_view_plane(camera: Camera, x: Floats) -> Figure:
@@ -24,7 +24,7 @@ def plot_view_plane(camera: Camera, x: Floats) -> Figure:
     x : ndarray, shape (n, 3)
         Curve, scene units.
     """
-    figure, axes = space_axes((7.5, 5.2))
+    figure, axes = plt.subplots(figsize=(7.5, 5.2), subplot_kw=SPACE)
     flat = _on_plane(camera, camera.project(x))
     axes.plot(*x.T, lw=1, label="3D trajectory")
     axes.plot(*flat.T, lw=1, label="its projection on the view plane")
@@ -106,7 +106,7 @@ def plot_rig(rig: Rig, x: Floats) -> Figure:
     x : ndarray, shape (n, 3)
         Trajectory, scene units.
     """
-    figure, axes = space_axes((7.5, 5.5))
+    figure, axes = plt.subplots(figsize=(7.5, 5.5), subplot_kw=SPACE)
     axes.plot(*x.T, color="k", lw=0.8)
     for i, camera in enumerate(rig.cameras):
         seen = _on_plane(camera, camera.project(x))

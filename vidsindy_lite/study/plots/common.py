@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 
 from ...arrays import Floats
@@ -16,17 +14,15 @@ STYLES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (7, 2)), (0, (1, 1)
 SPACE = {"projection": "3d", "proj_type": "ortho"}
 
 
-def space_axes(size: tuple[float, float]) -> tuple[Figure, Axes3D]:
-    figure = plt.figure(figsize=size)
-    return figure, figure.add_subplot(**SPACE)
-
-
-def finish_space(axes: Axes3D, azimuth: float, elevation: float, zoom: float = 1.05) -> None:
+def finish_space(
+    axes: Axes3D, azimuth: float, elevation: float, zoom: float = 1.05, unit: str = "scene units"
+) -> None:
+    """The same scale along three labelled axes, seen from a direction in degrees."""
     extent = np.ptp([axes.get_xlim3d(), axes.get_ylim3d(), axes.get_zlim3d()], axis=1)
     axes.set_box_aspect(extent, zoom=zoom)  # one unit is equally long on all three axes
     axes.locator_params(nbins=5)
     for name in "xyz":
-        axes.set(**{f"{name}label": f"{name} (scene units)"})
+        axes.set(**{f"{name}label": f"{name} ({unit})"})
         getattr(axes, f"{name}axis").labelpad = 7
     axes.view_init(elev=elevation, azim=azimuth)
 
