@@ -1,0 +1,123 @@
+"""A posed problem: standard units, gaps, prices, weights."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.dynamics.collocation import Fit, State, Status
+from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
+from vidsindy_lite.dynamics.solver import _candidate, _closed, _variants, residual_noise
+
+
+def posed(noise=0.0, seen=slice(None)):
+    t = np.linspace(0, 20, 401)
+    x = np.stack([3 + 2 * np.sin(t), 0.1 * np.cos(t)], axis=1)
+    x += noise * np.array([2, 0.1]) * np.random.default_rng(0).normal(size=x.shape)
+    t, x = t[seen], x[seen]
+    return pose([(t, x)], [np.ones((len(t), 2, 1))], degree=2, seed=0)
+
+
+def fit_of(problem, moving=(True, False)):
+    collocation = problem.collocation(problem.segments())
+    rng = np.random.default_rng(1)
+    active = rng.random((6, 2)) < 0.5
+    state = State(
+        fit_curves(collocation, problem.curves), rng.normal(size=(6, 2)) * active, active,
+        np.array([0.5, 0.0]), np.array(moving),
+    )  # fmt: skip
+    return Fit(state, collocation, Status.CONVERGED)
+
+
+def test_data_are_in_standard_units():
+    problem = posed()
+    ((t, x),) = problem.trajectories
+    np.testing.assert_allclose(x.mean(axis=0), 0, atol=1e-12)
+    np.testing.assert_allclose(x.std(axis=0), 1)
+    (measured,) = problem.measured
+    np.testing.assert_allclose(problem.units.point(x), measured[1])
+    np.testing.assert_allclose(problem.units.standard(measured[1]), x, atol=1e-12)
+    np.testing.assert_allclose(t * problem.units.time, measured[0])
+    speed = np.sqrt((np.gradient(x, t, axis=0) ** 2).mean())
+    assert speed == pytest.approx(1, rel=0.02)
+    np.testing.assert_allclose(problem.systematic[0][0, :, 0], 1 / measured[1].std(axis=0))
+    np.testing.assert_allclose(problem.home, -measured[1].mean(axis=0) / measured[1].std(axis=0))
+
+
+@pytest.mark.parametrize(("noise", "spacing"), [(0.0, NARROW), (0.005, NARROW), (0.1, WIDE)])
+def test_knots_are_wider_where_there_is_noise(noise, spacing):
+    assert posed(noise).spacing == spacing
+
+
+def test_a_pause_is_a_gap_if_the_target_moves_far_in_it():
+    step = posed().units.time * GAP / 0.05  # samples in the longest pause that is none
+    for missing, stretches in ((int(step) - 2, 1), (int(step) + 2, 2)):
+        seen = np.r_[0:150, 150 + missing : 401]
+        assert len(posed(seen=seen).stretches) == stretches
+
+
+@pytest.mark.parametrize("moving", [(False, False), (True, False), (True, True)])
+def test_the_criterion_adds_the_prices(moving):
+    problem = posed(0.1)
+    fit = fit_of(problem, moving)
+    price = sum(problem.penalties[row] for row, _ in np.argwhere(fit.state.active))
+    price += sum(moving) * OFFSET_PENALTY * problem.penalties[0]
+    expected = fit.collocation.objective(fit.state) + price
+    assert problem.criterion(fit.collocation, fit.state) == pytest.approx(expected)
+
+
+def test_physics_weights_are_relative_to_the_slack():
+    problem = posed(0.1)
+    collocation = problem.weighted(fit_of(problem).collocation, 7.0)
+    np.testing.assert_allclose(collocation.physics_weights, 7 / problem.slack**2)
+    np.testing.assert_allclose(collocation.data_weights, 1 / problem.noise**2)
+
+
+def test_the_noise_of_a_residual_counts_the_freedom_that_was_used():
+    problem = posed(0.1)
+    fit = fit_of(problem)
+    residual, _ = fit.collocation.data_residual(fit.state.control_points)
+    free = 401 - ((fit.state.active.sum() + 1) / 2 + 1)
+    expected = np.sqrt((residual**2).sum(axis=0) / free)
+    np.testing.assert_allclose(residual_noise(fit), expected)
+
+
+def test_an_origin_comes_with_all_ways_of_putting_axes_home():
+    home, origin = np.array([0.0, 1.0, 2.0]), np.array([5.0, 1.0, 7.0])
+    variants = {(tuple(o), tuple(m)) for o, m in _variants(origin, home)}
+    assert variants == {
+        ((5, 1, 7), (True, False, True)),
+        ((5, 1, 2), (True, False, False)),
+        ((0, 1, 7), (False, False, True)),
+        ((0, 1, 2), (False, False, False)),
+    }
+
+
+@pytest.mark.parametrize("moving", [(False, False), (True, False), (False, True), (True, True)])
+def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
+    problem = posed(0.1)
+    fit = fit_of(problem, (False, False))
+    linear = np.repeat(problem.exponents.sum(axis=1) <= 1, 2).reshape(-1, 2)
+    state = replace(fit.state, active=linear, coefficients=0.1 * linear, offset=np.zeros(2))
+    closed, law = _closed(problem, replace(fit, state=state), 1e2)
+    origin = np.where(moving, (0.3, -0.2), problem.home)
+    candidate = _candidate(problem, closed, law, origin, np.array(moving))
+
+    coefficients, information = law.at(origin)
+    estimate, penalties = coefficients.T.ravel(), np.tile(problem.penalties, 2)
+    costs = {}
+    for support in product([False, True], repeat=6):
+        out = np.zeros(12, dtype=bool)
+        out[linear.T.ravel()] = ~np.array(support)
+        # The rest of the law gives way to what is taken out.
+        covariance = np.linalg.inv(information)[np.ix_(out, out)]
+        misfit = estimate[out] @ np.linalg.solve(covariance, estimate[out])
+        costs[tuple(out)] = misfit + penalties[linear.T.ravel() & ~out].sum()
+    out = np.array(min(costs, key=costs.__getitem__))
+    assert (candidate.state.active.T.ravel() == linear.T.ravel() & ~out).all()
+    price = sum(moving) * OFFSET_PENALTY * problem.penalties[0]
+    expected = closed.collocation.objective(closed.state) + costs[tuple(out)] + price
+    assert candidate.criterion == pytest.approx(expected, rel=1e-9)
+    assert (candidate.state.moving == moving).all()
+    np.testing.assert_array_equal(candidate.state.offset, origin)
