@@ -227,6 +227,16 @@ def test_no_lags_are_tried_twice(motion, monkeypatch):
     assert len(set(tried)) == len(tried)
 
 
+def test_a_slope_that_is_noise_tells_nothing(motion, monkeypatch):
+    # If a quarter of each squared slope is motion, the errors are twice those of motion alone.
+    tracks, errors = filmed(motion, (60,) * 3, (0, 0, 0)), {}
+    for share in (1, 0.25):
+        monkeypatch.setattr(synchrony, "_told", lambda *_, share=share: np.full(2, share))
+        errors[share] = learn_lags(tracks, motion[1]).errors
+    assert (errors[1][1:] > 0).all()
+    np.testing.assert_allclose(errors[0.25], 2 * errors[1], rtol=1e-9)
+
+
 @pytest.mark.slow
 def test_lags_that_are_given_are_the_start(motion):
     tracks = filmed(motion, (250,) * 3, (0, 7, 0))
