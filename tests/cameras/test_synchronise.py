@@ -178,6 +178,12 @@ def periodic(k):
     )
 
 
+def test_a_repeated_motion_is_told_with_known_cameras_too():
+    rig = vl.Rig.around(periodic(np.arange(61)))
+    found = learn_lags(filmed((periodic, rig), (150,) * 3, (0, 20, 5)), rig)
+    assert "the lags of the videos cannot be told: (" in found.warnings[0]
+
+
 @pytest.mark.slow
 def test_a_motion_that_repeats_itself_leaves_several_lags():
     rig = vl.Rig.around(periodic(np.arange(61)))
