@@ -8,7 +8,7 @@ import pytest
 from helpers import trajectory
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import agreement, calibrate, learn_normal, synchronise, triangulate
+from vidsindy_lite.cameras import calibrate, learn_normal, synchronise, triangulate, unknowns
 
 NOISE = 0.3  # pixels
 
@@ -50,7 +50,7 @@ def test_outliers_that_cannot_be_told(monkeypatch):
     rig, tracks = filmed()
     tracks[0][::9] += 100
     assert vl.learn_cameras(tracks, rig.uncalibrated()).warnings == ()
-    monkeypatch.setattr(agreement, "_ROUNDS", 1)
+    monkeypatch.setattr(unknowns, "_ROUNDS", 1)
     (warning,) = vl.learn_cameras(tracks, rig.uncalibrated()).warnings
     assert "which frames hold outliers of a track cannot be told" in warning
 
@@ -79,6 +79,7 @@ def test_lags_at_which_nothing_fits():
     assert found.errors.tolist() == [0, np.inf, np.inf]
     (warning,) = found.warnings
     assert "no lags of the videos make the views agree: (0, 0, 0) frames were taken" in warning
+    assert "which no cameras fit; check the rig" in warning
 
 
 def test_warnings_are_no_part_of_a_rig(tmp_path):
