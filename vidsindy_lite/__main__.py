@@ -115,7 +115,8 @@ def _run(options: argparse.Namespace) -> int:
     The full profile writes the executed notebooks (notebooks/*.ipynb) and figures/ of the
     repository; the quick one is the same code on small problems, with the same layout, in
     build/quick/. A failing notebook is reported with its cell and traceback, and the run goes on
-    with the next. What this clone has executed with the same code, and whose outputs are untouched, is up to date.
+    with the next. What this clone has executed with the same code, and whose outputs are untouched,
+    is up to date.
 
     examples:
       python -m vidsindy_lite run                        everything, at full size
