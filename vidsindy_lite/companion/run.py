@@ -162,8 +162,7 @@ def run(
     """
     root = repository_root() if root is None else Path(root).resolve()
     output = _output(profile, output, root)
-    figures = output / "figures"
-    chosen = select_notebooks(notebooks, root)
+    figures, chosen = output / "figures", select_notebooks(notebooks, root)
     for path in chosen:
         check_parameters(path, ["profile"])
     stamps: dict[str, str | None] = dict.fromkeys(path.stem for path in find_notebooks(root))
