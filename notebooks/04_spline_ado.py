@@ -144,7 +144,7 @@ assert (native.support.sum(), moved.support.sum()) == (7, 12)
 # %%
 segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
 problem = dynamics.Collocation.of([segment], native.exponents, np.ones(3), np.ones(3))
-G = dynamics.design_matrix(problem.knots[0], segment.t)
+G = dynamics.design_matrix(problem.grid.knots[0], segment.t)
 P = np.linalg.lstsq(G, segment.x)[0]
 all_axes = np.ones(3, dtype=bool)
 state = dynamics.State(P, native.coefficients, native.support, offset, moving=all_axes)

@@ -1,5 +1,6 @@
 """Who may import whom: the contract in pyproject.toml holds, and the gate can fail."""
 
+import ast
 import shutil
 import subprocess
 import sys
@@ -48,6 +49,40 @@ def test_the_gate_sees_an_import_against_it(copy, module, line):
     path = copy / "vidsindy_lite" / module
     path.write_text(f"{path.read_text()}\n{line}\n")
     assert "BROKEN" in contract_problems(copy)
+
+
+def side_doors(path: Path) -> set[str]:
+    """Modules of other rooms that a module imports past their front door."""
+    room = path.relative_to(ROOT / "vidsindy_lite").parts[0]
+    taken = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            home = ["vidsindy_lite"] if node.level else []
+            parts = [*home, *(node.module or "").split(".")]
+            if parts[0] == "vidsindy_lite" and len(parts) > 2 and node.level != 1:
+                taken.add(".".join(parts[1:3]))
+    return {name for name in taken - {"study.plots"} if not name.startswith(f"{room}.")}
+
+
+@pytest.mark.parametrize("room", ["dynamics", "cameras", "vision", "study", "companion"])
+def test_rooms_are_entered_by_their_front_door(room):
+    modules = (ROOT / "vidsindy_lite" / room).rglob("*.py")
+    assert {door for path in modules for door in side_doors(path)} == set()
+
+
+@pytest.mark.parametrize(
+    ("line", "door"),
+    [
+        ("from ..dynamics.solver import discover", "dynamics.solver"),
+        ("from vidsindy_lite.cameras.rig import Rig", "cameras.rig"),
+        ("def late():\n    from ..cameras.rig import Rig", "cameras.rig"),
+    ],
+)
+def test_the_gate_sees_a_side_door(copy, line, door, monkeypatch):
+    path = copy / "vidsindy_lite" / "study" / "systems.py"
+    path.write_text(f"{path.read_text()}\n{line}\n")
+    monkeypatch.setitem(globals(), "ROOT", copy)
+    assert side_doors(path) == {door}
 
 
 def test_public_names_are_few_and_there():

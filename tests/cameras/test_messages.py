@@ -8,7 +8,7 @@ import pytest
 from helpers import trajectory
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import agreement, calibrate, learn_normal, synchronise, triangulate
+from vidsindy_lite.cameras import calibrate, learn_normal, synchronise, triangulate, unknowns
 
 NOISE = 0.3  # pixels
 
@@ -50,7 +50,7 @@ def test_outliers_that_cannot_be_told(monkeypatch):
     rig, tracks = filmed()
     tracks[0][::9] += 100
     assert vl.learn_cameras(tracks, rig.uncalibrated()).warnings == ()
-    monkeypatch.setattr(agreement, "_ROUNDS", 1)
+    monkeypatch.setattr(unknowns, "_ROUNDS", 1)
     (warning,) = vl.learn_cameras(tracks, rig.uncalibrated()).warnings
     assert "which frames hold outliers of a track cannot be told" in warning
 

@@ -1,5 +1,6 @@
 """Perspective cameras and lines of sight: projection, learning, reconstruction, bad rigs."""
 
+import re
 from dataclasses import replace
 
 import cv2
@@ -167,12 +168,12 @@ class TestRig:
         assert first != OrthographicCamera(position=(0, 0, 10), normal=(0, 0, 1))
         assert second == OrthographicCamera(position=(10, 0, 0), normal=(1, 0, 0))
 
-    def test_unknown_model(self, tmp_path):
+    @pytest.mark.parametrize("model", ["'fisheye'", "['perspective']"])
+    def test_unknown_model(self, tmp_path, model):
         path = tmp_path / "rig.toml"
-        path.write_text("[[camera]]\nmodel = 'fisheye'\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n")
-        with pytest.raises(
-            ValueError, match="camera 0: model: must be one of orthographic, perspective, got 'fi"
-        ):
+        path.write_text(f"[[camera]]\nmodel = {model}\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n")
+        message = f"camera 0: model: must be one of orthographic, perspective, got {model}"
+        with pytest.raises(ValueError, match=re.escape(message)):
             Rig.load(path)
 
     def test_parallel_views_from_two_places_are_a_rig(self):

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from vidsindy_lite.dynamics.collocation import Collocation, State, Status
-from vidsindy_lite.dynamics.grid import Segment
 from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.splines import Segment
 
 
 @pytest.fixture

@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics import search
 from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
-from vidsindy_lite.dynamics.grid import Segment
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import pose
-from vidsindy_lite.dynamics.splines import DEGREE
+from vidsindy_lite.dynamics.splines import DEGREE, Segment
 from vidsindy_lite.dynamics.trajectories import check_trajectories
 from vidsindy_lite.study import SYSTEMS, corruption
 
@@ -46,7 +44,7 @@ def fitted(duffing, dropped=None):
         active[law.terms.index(dropped), 1] = False
     origin, still = np.zeros(2), np.zeros(2, dtype=bool)
     state = State(curve, np.where(active, law.coefficients, 0.0), active, origin, still)
-    fit = search.fitted(collocation, state, tolerance=1e-4, max_steps=100)
+    fit = collocation.solve(state, tolerance=1e-4, max_steps=100)
     return problem, fit, problem.law(fit.state), np.full(law.coefficients.size, np.inf)
 
 

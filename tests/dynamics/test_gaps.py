@@ -4,8 +4,8 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics.gaps import gaps, join
-from vidsindy_lite.dynamics.grid import Segment
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.splines import Segment
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
 

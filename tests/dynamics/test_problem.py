@@ -1,12 +1,14 @@
 """A posed problem: standard units, gaps, prices, weights."""
 
+from dataclasses import replace
+from itertools import product
+
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.collocation import State, Status
+from vidsindy_lite.dynamics.collocation import Fit, State, Status
 from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
-from vidsindy_lite.dynamics.search import Fit
-from vidsindy_lite.dynamics.solver import _variants, residual_noise
+from vidsindy_lite.dynamics.solver import _candidate, _closed, _variants, residual_noise
 
 
 def posed(noise=0.0, seen=slice(None)):
@@ -90,3 +92,32 @@ def test_an_origin_comes_with_all_ways_of_putting_axes_home():
         ((0, 1, 7), (False, False, True)),
         ((0, 1, 2), (False, False, False)),
     }
+
+
+@pytest.mark.parametrize("moving", [(False, False), (True, False), (False, True), (True, True)])
+def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
+    problem = posed(0.1)
+    fit = fit_of(problem, (False, False))
+    linear = np.repeat(problem.exponents.sum(axis=1) <= 1, 2).reshape(-1, 2)
+    state = replace(fit.state, active=linear, coefficients=0.1 * linear, offset=np.zeros(2))
+    closed, law = _closed(problem, replace(fit, state=state), 1e2)
+    origin = np.where(moving, (0.3, -0.2), problem.home)
+    candidate = _candidate(problem, closed, law, origin, np.array(moving))
+
+    coefficients, information = law.at(origin)
+    estimate, penalties = coefficients.T.ravel(), np.tile(problem.penalties, 2)
+    costs = {}
+    for support in product([False, True], repeat=6):
+        out = np.zeros(12, dtype=bool)
+        out[linear.T.ravel()] = ~np.array(support)
+        # The rest of the law gives way to what is taken out.
+        covariance = np.linalg.inv(information)[np.ix_(out, out)]
+        misfit = estimate[out] @ np.linalg.solve(covariance, estimate[out])
+        costs[tuple(out)] = misfit + penalties[linear.T.ravel() & ~out].sum()
+    out = np.array(min(costs, key=costs.__getitem__))
+    assert (candidate.state.active.T.ravel() == linear.T.ravel() & ~out).all()
+    price = sum(moving) * OFFSET_PENALTY * problem.penalties[0]
+    expected = closed.collocation.objective(closed.state) + costs[tuple(out)] + price
+    assert candidate.criterion == pytest.approx(expected, rel=1e-9)
+    assert (candidate.state.moving == moving).all()
+    np.testing.assert_array_equal(candidate.state.offset, origin)

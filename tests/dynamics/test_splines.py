@@ -1,4 +1,4 @@
-"""Local B-spline basis against scipy."""
+"""Local B-spline basis against scipy; knots, nodes and matrices against dense algebra."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from vidsindy_lite.dynamics.splines import clamped_knots, design_matrix, local_basis
+from vidsindy_lite.dynamics.splines import (
+    Grid,
+    Segment,
+    clamped_knots,
+    design_matrix,
+    local_basis,
+    normal_band,
+    rows_from,
+)
 
 
 @given(st.integers(2, 15), st.integers(0, 2), st.integers(0, 1000))
@@ -39,3 +47,69 @@ def test_ends_are_interpolated():
 def test_bad_breakpoints_are_refused(breakpoints):
     with pytest.raises(ValueError, match="breakpoints: must be at least two increasing"):
         clamped_knots(breakpoints)
+
+
+def pieces():
+    rng = np.random.default_rng(0)
+    times = [np.sort(rng.uniform(low, high, 9)) for low, high in [(0.0, 2.0), (3.0, 4.5)]]
+    return [Segment.even(t, rng.normal(size=(9, 2)), 0.4, i) for i, t in enumerate(times)]
+
+
+@pytest.mark.parametrize("spacing", [0.3, 0.25, 5.0])
+def test_even_knots_are_as_far_apart_as_asked_for_or_closer(spacing):
+    t = np.array([2.0, 2.1, 3.0])
+    breakpoints = Segment.even(t, t[:, None], spacing, 0).breakpoints
+    gaps = np.diff(breakpoints)
+    assert breakpoints[[0, -1]].tolist() == [2.0, 3.0]
+    np.testing.assert_allclose(gaps, gaps[0])
+    assert gaps[0] <= spacing + 1e-12
+    assert 1 / (len(gaps) - 1) > spacing if len(gaps) > 1 else spacing >= 1
+
+
+def test_matrices_hold_the_segments_side_by_side():
+    segments = pieces()
+    grid = Grid.of(segments)
+    sizes = [len(s.breakpoints) + 2 for s in segments]
+    assert grid.starts.tolist() == [0, sizes[0], sum(sizes)]
+    assert grid.r == sum(sizes)
+    for rows, columns, segment, knots in zip(
+        (slice(0, 9), slice(9, 18)),
+        (slice(0, sizes[0]), slice(sizes[0], None)),
+        segments,
+        grid.knots,
+        strict=True,
+    ):
+        dense = grid.samples.toarray()[rows]
+        np.testing.assert_allclose(dense[:, columns], design_matrix(knots, segment.t))
+        assert dense.sum() == pytest.approx(9)
+
+
+def test_nodes_are_midpoints_and_ends():
+    segments = pieces()
+    grid = Grid.of(segments)
+    assert grid.nodes.shape[0] == grid.r - len(segments)
+    first = segments[0].breakpoints
+    nodes = np.concatenate([first[:1], (first[1:] + first[:-1]) / 2, first[-1:]])
+    k, r = len(nodes), len(first) + 2
+    knots = grid.knots[0]
+    np.testing.assert_allclose(grid.nodes.toarray()[:k, :r], design_matrix(knots, nodes))
+    np.testing.assert_allclose(grid.slopes.toarray()[:k, :r], design_matrix(knots, nodes, order=1))
+
+
+def test_node_weights_are_the_lengths_that_nodes_stand_for():
+    segments = [
+        Segment(np.arange(4.0), np.zeros((4, 1)), np.array([0.0, 1.0, 3.0])),
+        Segment(np.arange(3.0), np.zeros((3, 1)), np.array([0.0, 2.0])),
+    ]
+    widths = np.array([0.5, 1, 2, 1, 1, 2, 1])
+    np.testing.assert_allclose(Grid.of(segments).node_weights, 7 * widths / widths.sum())
+
+
+def test_the_band_is_that_of_the_normal_matrix():
+    rng = np.random.default_rng(1)
+    first = np.sort(rng.integers(0, 7, 20))
+    rows = rows_from(first, rng.normal(size=(20, 3)), 9)
+    assert (rows.toarray() != 0).sum() == 60
+    band, full = normal_band(rows), rows.toarray().T @ rows.toarray()
+    for lag in range(3):
+        np.testing.assert_allclose(band[lag, : 9 - lag], np.diag(full, -lag), atol=1e-12)

@@ -12,6 +12,7 @@ from vidsindy_lite.vision.background import (
     _largest_component,
     _median,
     _reduce,
+    _shape,
     track_blobs,
     view_distances,
     whole_views,
@@ -132,3 +133,17 @@ def test_a_target_cut_off_by_the_window_or_the_image():
     assert model.measure(frames[30], truth[30] + [9, 0], 9) is None
     assert model.measure(frames[30], truth[30], 16).inside
     assert not model.measure(frames[1], truth[1], 16).inside
+
+
+def test_shapes_are_told_by_complex_moments():
+    rng = np.random.default_rng(0)
+    alpha, u, v = rng.uniform(0, 1, (9, 7)), np.arange(7) - 2.6, np.arange(9) - 4.3
+    z = u + 1j * v[:, None]
+    c11, c20, c21, c30 = (
+        (alpha * z**p * z.conj() ** q).sum() for p, q in ((1, 1), (2, 0), (2, 1), (3, 0))
+    )
+    area = alpha.sum()
+    c11 = c11.real - area / 6  # less the extent of the pixels themselves
+    cube = c11**1.5 / np.sqrt(area)
+    expected = [np.log(c11 / area**2), abs(c20) / c11, abs(c21) / cube, abs(c30) / cube]
+    np.testing.assert_allclose(_shape(alpha, u, v), expected, rtol=1e-12)

@@ -15,7 +15,7 @@ from vidsindy_lite.__main__ import main
 from vidsindy_lite.vision import training
 from vidsindy_lite.vision.detector import LEAST, WEIGHTS, LearnedDetector, OnnxDetector, detections
 from vidsindy_lite.vision.network import STRIDE, Network, anchors, as_input, fused
-from vidsindy_lite.vision.rendering import render
+from vidsindy_lite.vision.rendering import LabelledFrame, render
 from vidsindy_lite.vision.scenery import BACKGROUNDS
 from vidsindy_lite.vision.scenes import SHAPES, Scene
 
@@ -247,3 +247,22 @@ def test_colours_reach_the_network_as_red_green_blue():
     assert planes[0, 0].min() == 1
     assert planes[0, 1:].max() == 0
     assert cv2.cvtColor(image[0], cv2.COLOR_BGR2RGB)[0, 0, 0] == 255
+
+
+def test_labels_of_a_batch_say_how_much_of_the_target_is_seen(monkeypatch):
+    shown = iter([(1.0, 1.0), (0.95, 1.0), (0.775, 0.5), (0.6, 0.0), (0.0, 0.0)])
+    wanted = []
+
+    def frame(rng, pool):
+        visible, presence = next(shown)
+        wanted.append(presence)
+        image = np.zeros((training.SIDE, training.SIDE, 3), np.uint8)
+        return LabelledFrame(image, np.array([20.0, 10.0]), visible), np.array([30.0, 40.0])
+
+    monkeypatch.setattr(training, "BATCH", 5)
+    monkeypatch.setattr(training, "training_frame", frame)
+    images, centres, sizes, presence = training._batch(0, 0, None)
+    assert images.shape == (5, 3, training.SIDE, training.SIDE)
+    np.testing.assert_allclose(presence, wanted, atol=1e-6)
+    np.testing.assert_allclose(centres, [[30, 40]] * 5)
+    np.testing.assert_allclose(sizes, [[20, 10]] * 5)

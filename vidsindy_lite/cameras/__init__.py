@@ -4,11 +4,9 @@
     models        the two models of camera: orthographic and perspective
     rig           the cameras that watch one scene, and their file
     triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
-    unknowns      what is unknown of a rig as one vector
-    agreement     orthographic views agree on one point: linear equations for the unknowns
+    unknowns      what is unknown of a rig: as one vector, and linear equations for it
     calibrate     tracks -> what is unknown of the cameras; eq4: the paper's own way, to compare
-    clock         tracks of several videos at the same instants
-    synchronise   tracks -> when each camera started
+    synchronise   tracks -> when each camera started; tracks at the same instants
     uncertainty   what errors of cameras, lags and codecs do to the path
     messages      all warnings
 
@@ -20,7 +18,6 @@ from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .models import Camera, OrthographicCamera, PerspectiveCamera
 from .rig import Rig, rig_template
-from .clock import align
-from .synchronise import DISAGREEMENT, Lags, disagreement, learn_lags, list_lags
+from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
 from .triangulate import reconstruct, residuals
 from .uncertainty import systematic_errors, trailing_errors

@@ -1,6 +1,6 @@
 """Calibration: scales, angles and positions of cameras, learned from tracks of one moving target.
 
-Orthographic views agree on one point if linear equations hold for what is unknown (`agreement`), so
+Orthographic views agree on one point if linear equations hold for what is unknown (`unknowns`), so
 no starting guess is needed; perspective ones are found from the known cameras, one epipolar
 constraint at a time. From there a search goes to the smallest reprojection error in pixels.
 
@@ -10,7 +10,7 @@ Paper: Section "Coordinates Transformation", Eq. (4), (5).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import null_space
@@ -18,7 +18,6 @@ from scipy.optimize import least_squares
 
 from ..arrays import Floats, Ints
 from ..checks import check_instance, check_integer
-from .agreement import agreement, outliers, solve
 from .geometry import PARALLEL
 from .messages import unconverged_cameras, undecided_outliers, unsettled_points
 from .models import Camera, all_orthographic, independent
@@ -33,17 +32,10 @@ from .triangulate import (
     reprojection,
     triangulate,
 )
-from .unknowns import Complex, Unknowns, calibrated, names
+from .unknowns import Unknowns, agreement, calibrated, names, outliers, solve
 
-_TOLERANCE = 1e-15  # relative, of the search for the smallest reprojection error
-
-
-@dataclass(frozen=True)
-class Fit:
-    """Cameras that were learned, and why they should not be trusted."""
-
-    cameras: tuple[Camera, ...]
-    warnings: tuple[str, ...] = ()
+# Relative, of the search for the smallest reprojection error.
+_TOLERANCES = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15}
 
 
 def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
@@ -88,8 +80,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     Paper: Eq. (4); by itself it is `learn_cameras_eq4`.
     """
     check_learnable(rig)
-    fit = fit_cameras(check_views(tracks, rig), Unknowns.of(rig))
-    return Rig(fit.cameras, fit.warnings)
+    return fit_cameras(check_views(tracks, rig), Unknowns.of(rig))
 
 
 def learn_normal(tracks: Sequence[Floats], rig: Rig, index: int) -> Rig:
@@ -123,13 +114,11 @@ def learn_normal(tracks: Sequence[Floats], rig: Rig, index: int) -> Rig:
     tilted = rig.cameras[index]
 
     def candidate(parameters: Floats) -> tuple[Camera, ...]:
-        cameras = list(rig.cameras)
-        cameras[index] = replace(tilted, normal=tilted.normal + parameters[:2] @ tilted.rows)
-        return replace(unknowns, cameras=tuple(cameras)).filled(parameters[2:])
+        normal = tilted.normal + parameters[:2] @ tilted.rows
+        cameras = (*rig.cameras[:index], replace(tilted, normal=normal), *rig.cameras[index + 1 :])
+        return replace(unknowns, cameras=cameras).filled(parameters[2:])
 
-    start = np.concatenate(([0.0, 0.0], unknowns.read(learned.cameras)))
-    fit = _closest(views, candidate, start)
-    return Rig(fit.cameras, fit.warnings)
+    return _closest(views, candidate, np.append([0.0, 0.0], unknowns.read(learned.cameras)))
 
 
 def check_learnable(rig: Rig) -> None:
@@ -147,15 +136,13 @@ def check_learnable(rig: Rig) -> None:
             f"others, got none of {len(rig.cameras)}"
         )
     loose = Unknowns.of(rig).loose
-    if not loose.size:
-        return
-    if not rig.is_orthographic:
+    if loose.size and not rig.is_orthographic:
         raise ValueError(
             "rig: all positions must be given if a camera is perspective, got none of "
             f"{names(loose)}"
         )
     placed = [camera for camera in rig.cameras if camera.is_placed]
-    if not independent(placed):
+    if loose.size and not independent(placed):
         raise ValueError(
             "rig: the positions of two cameras with independent normals must be given to learn "
             f"those of {names(loose)}, got {len(placed)}"
@@ -195,18 +182,16 @@ def calibration_errors(rig: Rig, truth: Rig) -> Floats:
     return np.array([(s / r - 1, np.angle(np.exp(1j * (a - b)))) for (s, a), (r, b) in known])
 
 
-def fit_cameras(views: Views, unknowns: Unknowns) -> Fit:
+def fit_cameras(views: Views, unknowns: Unknowns) -> Rig:
     """`learn_cameras` of views and a rig that were checked."""
     if not unknowns.any:
-        return Fit(unknowns.cameras)
+        return Rig(unknowns.cameras)
     if not all_orthographic(unknowns.cameras):
-        turned = _spread(views, unknowns)
-        fit = _closest(views, unknowns.filled, unknowns.vector(turned, np.zeros((0, 2))))
-        settled = intersect(fit.cameras, views.tracks)[1]
+        learned = _closest(views, unknowns.filled, unknowns.read(_spread(views, unknowns)))
+        _, settled = intersect(learned.cameras, views.tracks)
         if settled.all():
-            return fit
-        doubt = unsettled_points(int((~settled).sum()), views.frames)
-        return Fit(fit.cameras, (*fit.warnings, doubt))
+            return learned
+        return _doubted(learned, unsettled_points(int((~settled).sum()), views.frames))
 
     def annihilator(indices: Ints) -> Floats:
         """All columns that take the unknown point out."""
@@ -216,35 +201,30 @@ def fit_cameras(views: Views, unknowns: Unknowns) -> Fit:
     equations = agreement(views, unknowns, annihilator)
     wild, decided = outliers(equations, unknowns.scale)
     equations = equations.without(wild)
-    turned, offsets = solve(
-        equations.design, equations.target, unknowns, list(unknowns.turns), list(unknowns.loose)
-    )
+    start = unknowns.vector(*solve(equations.design, equations.target, unknowns))
     clean = Views.of([track[np.unique(equations.frames)] for track in views.tracks])
-    fit = _closest(clean, unknowns.filled, unknowns.vector(turned, offsets))
-    return fit if decided else Fit(fit.cameras, (*fit.warnings, undecided_outliers()))
+    learned = _closest(clean, unknowns.filled, start)
+    return learned if decided else _doubted(learned, undecided_outliers())
 
 
-def _closest(
-    views: Views, candidate: Callable[[Floats], tuple[Camera, ...]], start: Floats
-) -> Fit:
+def _doubted(rig: Rig, warning: str) -> Rig:
+    """A rig with one more warning."""
+    return replace(rig, warnings=(*rig.warnings, warning))
+
+
+def _closest(views: Views, candidate: Callable[[Floats], tuple[Camera, ...]], start: Floats) -> Rig:
     """The cameras `candidate(parameters)` of the smallest reprojection error in pixels."""
 
     def missed(parameters: Floats) -> Floats:
         return np.hstack(reprojection(views, candidate(parameters)))
 
     used = np.isfinite(missed(start))  # the same ones throughout
-    fit = least_squares(
-        lambda parameters: missed(parameters)[used],
-        start,
-        ftol=_TOLERANCE,
-        xtol=_TOLERANCE,
-        gtol=_TOLERANCE,
-    )
-    return Fit(candidate(fit.x), (unconverged_cameras(fit.nfev),) if fit.status == 0 else ())
+    fit = least_squares(lambda parameters: missed(parameters)[used], start, **_TOLERANCES)
+    return Rig(candidate(fit.x), (unconverged_cameras(fit.nfev),) if fit.status == 0 else ())
 
 
-def _spread(views: Views, unknowns: Unknowns) -> Complex:
-    """s exp(i theta) of the unknown cameras of any model: from the known ones, round by round.
+def _spread(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:
+    """Cameras of any model, the unknown ones learned from the known ones, round by round.
 
     Between two perspective cameras that are both unknown, the epipolar constraint is not linear; so
     a camera waits until one that shares frames with it is known.
@@ -254,8 +234,8 @@ def _spread(views: Views, unknowns: Unknowns) -> Complex:
         found, failed = {}, []
         for i in waiting:
             try:
-                turned, _ = solve(*_from_known(views, cameras, i), unknowns, [i], [])
-                found[i] = turned[0]
+                alone = replace(unknowns, turns=np.array([i]))
+                found[i] = solve(*_from_known(views, cameras, i), alone)[0][0]
             except ValueError as error:
                 failed.append(error)
         if not found:
@@ -266,17 +246,16 @@ def _spread(views: Views, unknowns: Unknowns) -> Complex:
             "rig: the lines of sight must meet in front of the perspective cameras, got none that "
             "do (does each normal point from the scene to its camera?)"
         )
-    known = [cameras[i].calibration for i in unknowns.turns]
-    return np.array([scale * np.exp(1j * angle) for scale, angle in known])
+    return cameras
 
 
 def _from_known(views: Views, cameras: Sequence[Camera], index: int) -> tuple[Floats, Floats]:
     """Linear equations for one unknown camera from all known ones."""
-    equations = [(np.zeros((0, 2)), np.zeros(0))]
     camera, track = cameras[index], views.tracks[index]
-    for known, other in zip(cameras, views.tracks, strict=True):
-        if known.is_calibrated:
-            lines = epipolar_lines(known, other, camera)
-            equations.append(epipolar_design(lines, camera, track))
-    design, target = zip(*equations, strict=True)
-    return np.vstack(design), np.concatenate(target)
+    equations = [
+        epipolar_design(epipolar_lines(known, other, camera), camera, track)
+        for known, other in zip(cameras, views.tracks, strict=True)
+        if known.is_calibrated
+    ]
+    design, target = map(np.concatenate, zip(*equations, strict=True))
+    return design, target

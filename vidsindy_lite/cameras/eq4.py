@@ -11,12 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .agreement import Equations, agreement, outliers, solve
 from .calibrate import check_learnable
 from .models import independent
 from .rig import Rig
 from .triangulate import check_views
-from .unknowns import Unknowns, calibrated, names
+from .unknowns import Equations, Unknowns, agreement, calibrated, names, outliers, solve
 
 
 def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:
@@ -44,7 +43,7 @@ def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:
     equations, unknowns = _equations(tracks, rig)
     if equations is None:
         return rig
-    turned, _ = solve(equations.design, equations.target, unknowns, list(unknowns.turns), [])
+    turned, _ = solve(equations.design, equations.target, unknowns)
     return Rig(calibrated(rig.cameras, unknowns.turns, turned))
 
 
@@ -71,7 +70,7 @@ def learn_cameras_lbfgs(tracks: Sequence[Floats], rig: Rig) -> Rig:
     equations, unknowns = _equations(tracks, rig)
     if equations is None:
         return rig
-    solve(equations.design, equations.target, unknowns, list(unknowns.turns), [])  # or an error
+    solve(equations.design, equations.target, unknowns)  # or an error
     import torch  # slow to import, and only this comparison needs it
 
     unit = np.abs(equations.design).mean()  # makes the unknowns of order one

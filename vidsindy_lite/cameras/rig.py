@@ -15,9 +15,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..checks import check_image_size, check_instance, check_integer, check_path, check_rows
+from ..checks import (
+    check_choice,
+    check_image_size,
+    check_instance,
+    check_integer,
+    check_path,
+    check_rows,
+)
 from .models import MODELS, Camera, OrthographicCamera, all_orthographic, independent
 
+_KEYS = ("model", *(part.name for part in fields(Camera)))  # of a table of a file
 _MOST = 100  # cameras of a template
 _HEAD = """\
 # Rig file: one [[camera]] table per video, in the order of the videos.
@@ -114,14 +122,12 @@ class Rig:
         half = (np.array(check_image_size(image_size, least=2)) - 1) / 2
         cameras = []
         for azimuth, elevation, roll in np.deg2rad([[20, 20, 6], [140, 15, -9], [260, 25, 14]]):
-            across = np.array([np.cos(azimuth), np.sin(azimuth), 0])
-            normal = np.cos(elevation) * across + np.sin(elevation) * np.array([0, 0, 1])
+            normal, upright = _looking_down(azimuth, elevation)
             camera = OrthographicCamera(
                 position=middle + reach * normal,
                 normal=normal,
                 scale=1.0,
-                # Without the roll, R^- e_z would be straight up in the image.
-                angle=np.arctan2(-np.cos(azimuth), -np.sin(azimuth)) + roll,
+                angle=upright + roll,
                 image_size=image_size,
             )
             extent = np.max(np.abs(camera.centred(camera.image(points))) / half)
@@ -201,12 +207,9 @@ class Rig:
         """
         if not check_integer("keep", keep) < len(self.cameras):
             raise ValueError(f"keep: must be an index of {len(self.cameras)} cameras, got {keep}")
-        return Rig(
-            tuple(
-                camera if i == keep else replace(camera, scale=None, angle=None)
-                for i, camera in enumerate(self.cameras)
-            )
-        )
+        cameras = [replace(camera, scale=None, angle=None) for camera in self.cameras]
+        cameras[keep] = self.cameras[keep]
+        return Rig(tuple(cameras))
 
 
 def rig_template(
@@ -236,16 +239,13 @@ def rig_template(
     """
     if check_integer("cameras", cameras, 2) > _MOST:
         raise ValueError(f"cameras: must be at most {_MOST}, got {cameras}")
-    if model not in MODELS:
-        raise ValueError(f"model: must be one of {', '.join(MODELS)}, got {model!r}")
+    check_choice("model", model, [*MODELS])
     width, height = check_image_size(image_size)
     parts = [_HEAD]
     for i in range(cameras):
         # Of two cameras, one is a third of a turn from the other: face to face both see the same.
         azimuth = 2 * np.pi * i / max(cameras, 3) + np.deg2rad(20)
-        elevation = np.deg2rad(20)
-        across = np.array([np.cos(azimuth), np.sin(azimuth), 0])
-        normal = np.cos(elevation) * across + [0, 0, np.sin(elevation)]
+        normal, upright = _looking_down(azimuth, np.deg2rad(20))
         lines = ["[[camera]]"]
         if model != "orthographic":
             lines.append(f'model = "{model}"')
@@ -255,10 +255,16 @@ def rig_template(
             f"image_size = [{width}, {height}]",
         ]
         if i == 0:
-            angle = np.arctan2(-np.cos(azimuth), -np.sin(azimuth))
-            lines += [_SCALES[model], _ANGLE.format(angle=angle)]
+            lines += [_SCALES[model], _ANGLE.format(angle=upright)]
         parts.append("\n".join(lines) + "\n")
     return "\n".join(parts)
+
+
+def _looking_down(azimuth: float, elevation: float) -> tuple[Floats, float]:
+    """Normal of a camera so high above the scene, and the angle at which R^- e_z is up in it."""
+    away = np.array([np.cos(azimuth), np.sin(azimuth), 0])
+    normal = np.cos(elevation) * away + [0, 0, np.sin(elevation)]
+    return normal, np.arctan2(-np.cos(azimuth), -np.sin(azimuth))
 
 
 def _vector(values: Floats) -> str:
@@ -268,31 +274,25 @@ def _vector(values: Floats) -> str:
 
 def _to_table(camera: Camera) -> dict[str, object]:
     """A camera as plain numbers under the keys of the file; None is left out."""
-    table: dict[str, object] = {}
-    if not isinstance(camera, OrthographicCamera):
-        table["model"] = camera.model
-    if camera.position is not None:
-        table["position"] = camera.position.tolist()
-    table["normal"] = camera.normal.tolist()
-    if camera.is_calibrated:
-        table |= {"scale": camera.scale, "angle": camera.angle}
-    return table | {"image_size": list(camera.image_size)}
+    known = {key: getattr(camera, key) for key in _KEYS}
+    if isinstance(camera, OrthographicCamera):
+        del known["model"]
+    return {key: np.asarray(value).tolist() for key, value in known.items() if value is not None}
 
 
 def _from_table(index: int, table: object) -> Camera:
     """A camera from a table of a file; errors say which."""
-    keys = ["model", *(part.name for part in fields(Camera))]
     try:
         if not isinstance(table, dict):
             raise ValueError(f"must be a table, got {table!r}")
         for key in table:
-            if key not in keys:
-                raise ValueError(f"{key}: must be one of {', '.join(keys)}")
+            if key not in _KEYS:
+                raise ValueError(f"{key}: must be one of {', '.join(_KEYS)}")
         if "normal" not in table:
             raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
-        model = table.get("model", OrthographicCamera.model)
-        if model not in MODELS:
-            raise ValueError(f"model: must be one of {', '.join(MODELS)}, got {model!r}")
-        return MODELS[model](**{key: value for key, value in table.items() if key != "model"})
+        known = dict(table)
+        model = known.pop("model", OrthographicCamera.model)
+        check_choice("model", model, [*MODELS])
+        return MODELS[model](**known)
     except ValueError as error:
         raise ValueError(f"camera {index}: {error}") from error

@@ -1,4 +1,8 @@
-"""When each camera started: the lags of the videos, learned from their tracks.
+"""When each camera started: the lags of the videos, and their tracks at the same instants.
+
+The frames of the first video are the clock. Camera i starts `lag` of them later and takes `rate`
+frames during each, so that the instant k of the clock is its frame (k - lag) * rate. Between two
+frames a track is interpolated, so lags need not be whole.
 
 Two cameras see one point only if they look at the same instant; otherwise their lines of sight miss
 each other, and no scale and angle can mend it. So the lags are found like the cameras, as those of
@@ -15,16 +19,16 @@ result says so.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import make_interp_spline
 
 from ..arrays import Bools, Floats
-from ..checks import check_tracks
+from ..checks import check_positive, check_tracks, check_vector
 from .calibrate import check_learnable, fit_cameras
-from .clock import Curve, aligned, check_lags, check_rates, curve
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
 from .models import Camera
 from .rig import Rig
@@ -45,6 +49,8 @@ PROBE = 0.05
 OUTLIER = 12.0
 """Medians of the residuals; one beyond that moves neither a lag nor its error."""
 
+_FARTHEST = 1e9  # frames by which a video may start later; and ...
+_FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _OVERLAP = 0.5  # share of the shorter of two videos that both must show
 _INSTANTS = 200  # at which the first step compares two views
 _PROMISING = 5  # lags of each camera that pass the first step
@@ -53,6 +59,10 @@ _STEPS = 10  # of one frame at most, from the best whole lags to the best ones
 _SETTLED = 1e-3  # frames
 _SHOWN = 3  # of the lags that fit equally well
 _ROUNDING = 1e-6  # pixels; residuals below that are none
+
+
+Curve = Callable[[Floats], Floats]
+"""A track as a function of the frame number, whole or not."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +99,38 @@ class Lags:
     def frame_at(self, i: int, instant: int) -> int:
         """Which frame of video i is closest to one of the first."""
         return int(np.rint((instant - self.frames[i]) * self.rates[i]))
+
+
+def align(
+    tracks: Sequence[Floats], lags: ArrayLike, rates: ArrayLike | None = None
+) -> tuple[Floats, ...]:
+    """Tracks of all videos at the instants of the first video's frames.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n_i, 2)
+        One per video, frame by frame; NaN = not seen.
+    lags : array_like, shape (m,)
+        By how many frames of the first video each one starts later; only differences count.
+    rates : array_like, shape (m,), optional
+        Frames of each video in one frame of the first; by default one.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n_0, 2)
+        NaN where a video has not begun, has ended, or does not show the target in the frames before
+        and after. At whole frames these are the tracks themselves.
+
+    Raises
+    ------
+    ValueError
+        If a track has a wrong shape or an infinite value, or there is not one finite lag, or
+        positive rate, per track, or one of them is absurdly large or small.
+    """
+    tracks = check_tracks(tracks)
+    shifts = _check_lags("lags", lags, len(tracks))
+    speeds = _check_rates(rates, len(tracks))
+    return _aligned([_curve(track) for track in tracks], shifts, speeds, len(tracks[0]))
 
 
 def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
@@ -145,8 +187,8 @@ def learn_lags(
     for i, track in enumerate(tracks):
         if not np.isfinite(track).all(axis=1).any():
             raise ValueError(f"tracks[{i}]: must show the target in some frame, got none")
-    first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
-    videos = _Videos.of(tracks, rig, check_rates(rates, len(tracks)))
+    first = _check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
+    videos = _Videos.of(tracks, rig, _check_rates(rates, len(tracks)))
     residual = videos.disagreement(first)
     if residual <= DISAGREEMENT:
         found = [_refined(videos, first)]
@@ -188,7 +230,7 @@ class _Videos:
         steps = np.concatenate([np.hypot(*np.diff(track, axis=0).T) for track in seen])
         speed = float(np.quantile(steps, _TRIMMED)) if len(steps) else 0.0
         lengths = np.array([float(len(track)) for track in tracks])
-        return cls(tuple(map(curve, tracks)), lengths, rates, Unknowns.of(rig), speed)
+        return cls(tuple(map(_curve, tracks)), lengths, rates, Unknowns.of(rig), speed)
 
     @property
     def ends(self) -> Floats:
@@ -199,7 +241,7 @@ class _Videos:
         """Reprojection residuals of the cameras that fit best, (n_0, 2 m); None if none do."""
         key = tuple(lags.tolist())
         if key not in self.tried:
-            tracks = aligned(self.curves, lags, self.rates, int(self.frames[0]))
+            tracks = _aligned(self.curves, lags, self.rates, int(self.frames[0]))
             self.tried[key] = _best_residuals(tracks, self.unknowns)
         return self.tried[key]
 
@@ -293,17 +335,12 @@ def _whole_lags(videos: _Videos) -> list[Floats]:
     """Whole lags at which all cameras agree as well as they can between two frames."""
     cameras = videos.unknowns.cameras
     known = next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
-    others = [i for i in range(len(cameras)) if i != known]
-    promising = {i: _pair_lags(videos, known, i) for i in others}
-    best = np.zeros(len(cameras))
-    best[others] = [promising[i][0] for i in others]
+    count = len(cameras)
+    promising = [[0.0] if i == known else _pair_lags(videos, known, i) for i in range(count)]
+    best = np.array([lags[0] for lags in promising])
     while True:
-        tried = [best]
-        for i in others:
-            for lag in promising[i]:
-                if lag != best[i]:
-                    tried.append(best.copy())
-                    tried[-1][i] = lag
+        others = [(i, lag) for i in range(count) for lag in promising[i] if lag != best[i]]
+        tried = [best, *(np.where(np.arange(count) == i, lag, best) for i, lag in others)]
         missed = np.array([videos.disagreement(lags) for lags in tried])
         winner = int(missed.argmin())
         if winner == 0:
@@ -354,3 +391,56 @@ def _pair_missed(
         missed = np.abs(design @ solution - target)
         fits = missed <= np.quantile(missed, _TRIMMED)
     return float(np.sqrt(np.mean(missed[fits] ** 2))) / known.calibration[0]
+
+
+def _aligned(
+    curves: Sequence[Curve], lags: Floats, rates: Floats, frames: int
+) -> tuple[Floats, ...]:
+    """What each curve shows at so many frames of the clock."""
+    clock = np.arange(frames)
+    return tuple(c((clock - lag) * r) for c, lag, r in zip(curves, lags, rates, strict=True))
+
+
+def _curve(track: Floats) -> Curve:
+    """A track as a function of the frame number, whole or not: a cubic spline through its frames.
+
+    Its values are NaN outside, and unless the target is seen in the frames before and after.
+    """
+    shown = np.asarray(np.isfinite(track).all(axis=1))
+    seen = np.flatnonzero(shown)
+    spline = make_interp_spline(seen, track[seen], k=min(3, len(seen) - 1)) if len(seen) else None
+
+    def at(frames: Floats) -> Floats:
+        inside = (frames >= 0) & (frames <= len(track) - 1)
+        frames = np.where(inside, frames, 0)
+        low, high = np.floor(frames).astype(int), np.ceil(frames).astype(int)
+        inside[inside] = shown[low[inside]] & shown[high[inside]]
+        values = np.full((len(frames), 2), np.nan)
+        whole = inside & (low == high)
+        values[whole] = track[low[whole]]
+        between = inside & (low != high)
+        if spline is not None and between.any():
+            values[between] = spline(frames[between])
+        return values
+
+    return at
+
+
+def _check_lags(name: str, lags: ArrayLike, count: int) -> Floats:
+    """One lag per video, counted from the first one's."""
+    checked = check_vector(name, lags, count)
+    far = np.abs(checked).max()
+    if far > _FARTHEST:
+        raise ValueError(f"{name}: must be at most {_FARTHEST:g} frames, got {far:g}")
+    return checked - checked[0]
+
+
+def _check_rates(given: ArrayLike | None, count: int) -> Floats:
+    """One rate per video, in units of the first one's."""
+    rates = np.ones(count) if given is None else check_vector("rates", given, count)
+    for rate in rates:
+        if not 1 / _FASTEST <= check_positive("rates", rate) <= _FASTEST:
+            raise ValueError(
+                f"rates: must be between {1 / _FASTEST:g} and {_FASTEST:g}, got {rate:g}"
+            )
+    return rates / rates[0]

@@ -327,9 +327,7 @@ def _gauss_newton(
         active = active[~(moved <= _SETTLED)]
         if not active.size:
             break
-    settled = np.ones(len(start), bool)
-    settled[active] = False
-    return point, settled
+    return point, ~np.isin(np.arange(len(start)), active)
 
 
 def _least_squares(left: Floats, right: Floats) -> Floats:

@@ -24,9 +24,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
-from .clock import align
 from .rig import Rig
-from .synchronise import OUTLIER, PROBE, Lags
+from .synchronise import OUTLIER, PROBE, Lags, align
 from .triangulate import Views, check_calibrated, check_views, reprojection, triangulate
 from .unknowns import Unknowns
 
@@ -34,9 +33,7 @@ _PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's widt
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 
 
-def systematic_errors(
-    tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: Lags
-) -> Floats:
+def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: Lags) -> Floats:
     """Errors of the reconstructed path that come from what was learned of cameras and lags.
 
     Parameters

@@ -1,12 +1,20 @@
-"""What is unknown of the cameras of a rig, as one vector that a search varies or an error moves.
+"""What is unknown of the cameras of a rig: as one vector, and linear equations for it.
 
-The vector holds log s + i theta of each camera that is not calibrated, then the in-plane offset of
-each without a position, over the width of what the calibrated cameras see: all of order one.
+The vector is what a search varies or an error moves. It holds log s + i theta of each camera that
+is not calibrated, then the in-plane offset of each without a position, over the width of what the
+calibrated cameras see: all of order one.
+
+The equations say that orthographic views agree on one point. The stacked in-plane coordinates of
+the views of a frame equal [R^-_1; R^-_2; ...] x. Columns Q with Q^T [R^-_1; ...] = 0 take the
+unknown point out, and what is left is linear in (s cos theta, s sin theta) of the cameras that are
+not calibrated and Delta_c of those without a position.
+
+Paper: Eq. (4), (5).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +23,14 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from .models import Camera
 from .rig import Rig
+from .triangulate import Views
 
 Complex = NDArray[np.complex128]
+
+# A frame that is missed by more than so many robust standard deviations holds an outlier.
+_OUTLIER = 8.0
+_ROUNDING = 1e-6  # pixels; missing by less is no disagreement
+_ROUNDS = 20  # of leaving outliers out
 
 
 @dataclass(frozen=True)
@@ -80,3 +94,112 @@ def calibrated(
 def names(indices: Iterable[int]) -> str:
     """Cameras as errors call them."""
     return " and ".join(f"cameras[{i}]" for i in indices)
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Linear equations design @ p = target, (k, p) and (k,), and the frame of each, (k,).
+
+    p holds (s cos theta, s sin theta) of the unknown cameras, then Delta_c of the loose ones,
+    divided by the half width of their image: so all of the design is in pixels.
+    """
+
+    design: Floats
+    target: Floats
+    frames: Ints
+
+    def without(self, frames: Ints) -> Equations:
+        """The equations of all other frames."""
+        rest = ~np.isin(self.frames, frames)
+        return Equations(self.design[rest], self.target[rest], self.frames[rest])
+
+
+def agreement(
+    views: Views, unknowns: Unknowns, annihilator: Callable[[Ints], Floats | None]
+) -> Equations:
+    """The equations of all groups of frames for whose cameras there are columns Q, (2 c, q)."""
+    width = 2 * (unknowns.turns.size + unknowns.loose.size)
+    parts = [(np.zeros((0, width)), np.zeros(0), np.zeros(0, dtype=int))]
+    for indices, frames in views.groups:
+        columns = annihilator(indices)
+        if columns is not None:
+            parts.append(_group(views, unknowns, indices, frames, columns))
+    return Equations(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _group(
+    views: Views, unknowns: Unknowns, indices: Ints, frames: Ints, columns: Floats
+) -> tuple[Floats, Floats, Ints]:
+    """Design, target and frames of the equations of one group of frames."""
+    turns_count, loose_count = unknowns.turns.size, unknowns.loose.size
+    design = np.zeros((len(frames), columns.shape[1], turns_count + loose_count, 2))
+    target = np.zeros(design.shape[:2])
+    turns, offsets = np.split(design, [turns_count], axis=2)
+    for i, block in zip(indices, np.split(columns, len(indices)), strict=True):
+        camera, pixels = unknowns.cameras[i], views.tracks[i][frames]
+        if camera.scale is not None:
+            target -= camera.scale * camera.turned(pixels) @ block
+        else:
+            # s T(theta) (X, Y) = [[X, Y], [Y, -X]] p
+            x, y = camera.centred(pixels).T
+            matrix = np.array([[x, y], [y, -x]])
+            turns[:, :, unknowns.turns == i] = np.einsum("abf,aq->fqb", matrix, block)[:, :, None]
+        if camera.is_placed:
+            target -= camera.offset @ block
+        else:
+            offsets[:, :, unknowns.loose == i] = camera.image_size[0] / 2 * block.T[:, None]
+    places = np.repeat(frames, target.shape[1])
+    return design.reshape(len(places), -1), target.ravel(), places
+
+
+def outliers(equations: Equations, scale: float) -> tuple[Ints, bool]:
+    """Frames with an equation that a least-squares fit to all the other frames misses by far.
+
+    Fit and frames are found in turn; the second result is whether they came to agree. The scale of
+    the misses is the median over all frames, so that leaving some out never makes others look
+    worse.
+    """
+    found = np.zeros(0, dtype=int)
+    for _ in range(_ROUNDS):
+        fits = equations.without(found)
+        solution = np.linalg.lstsq(fits.design, fits.target)[0]
+        missed = np.abs(equations.design @ solution - equations.target) / scale
+        limit = max(_OUTLIER * 1.4826 * np.median(missed), _ROUNDING) if len(missed) else 0.0
+        before, found = found, np.unique(equations.frames[missed > limit])
+        if np.array_equal(found, before):
+            return found, True
+    return found, False
+
+
+def solve(design: Floats, target: Floats, unknowns: Unknowns) -> tuple[Complex, Floats]:
+    """Least-squares s exp(i theta) and offsets, or an error that names what the tracks leave open.
+
+    The design is in pixels: a singular value over sqrt(n) is the motion, in pixels rms, that tells
+    one combination of the parameters. Noise on a target that does not move makes 0.6-1.4 times the
+    misfit of it, so twice the misfit is asked for.
+    """
+    turns, loose = unknowns.turns, unknowns.loose
+    wanted = "scale, angle and position" if len(loose) else "scale and angle"
+    asked = np.append(turns, loose)
+    if len(design) < design.shape[1]:
+        raise ValueError(
+            f"tracks: frames with common views must give at least {design.shape[1]} equations "
+            f"for {wanted} of {names(asked)}, got {len(design)}"
+        )
+    solution = np.linalg.lstsq(design, target)[0]
+    turned, offsets = solution[: 2 * len(turns)].view(complex), solution[2 * len(turns) :]
+    scale = np.mean(np.abs(turned)) if len(turns) else unknowns.scale
+    misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / scale if scale > 0 else np.inf
+    _, singular, right = np.linalg.svd(design, full_matrices=False)
+    motion = singular / np.sqrt(len(design))
+    weak = motion <= max(1e-9 * motion[0], 2 * misfit)
+    if weak.any():
+        share = np.linalg.norm(right[weak].reshape(weak.sum(), -1, 2), axis=(0, 2))
+        raise ValueError(
+            f"tracks: the target's motion must determine {wanted} of "
+            f"{names(asked[share > 0.1])}, got {motion[-1]:.2g} px rms of "
+            f"telling motion against a misfit of {misfit:.2g} px (a static target, a wrong "
+            "position or normal, videos in another order than the cameras, or of other motions)"
+        )
+    widths = [unknowns.cameras[i].image_size[0] for i in loose]
+    return turned, offsets.reshape(-1, 2) * np.reshape(widths, (-1, 1)) / 2

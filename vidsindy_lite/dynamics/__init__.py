@@ -1,14 +1,13 @@
 """A trajectory goes in, its law comes out.
 
 trajectories -> problem (smoothing: noise, gaps, units) -> solver -> discovery (diagnostics)
-solver: search (collocation on a grid of splines, selection of terms), origin, gaps
+solver: collocation on splines, selection of terms, origin, gaps
 law: polynomials, on a library of monomials; integrate solves it, cramer_rao bounds its errors
 """
 
 from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao
 from .discovery import Discovery
-from .grid import Segment
 from .integrate import runge_kutta_4
 from .library import monomial_exponents, monomial_gradients, monomials, variable_names
 from .origin import ShiftedLaw
@@ -17,5 +16,5 @@ from .problem import Units, term_penalties
 from .selection import closest_rival, subset_search
 from .smoothing import smooth
 from .solver import discover
-from .splines import DEGREE, clamped_knots, design_matrix, local_basis
+from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .trajectories import Trajectory, check_trajectory, cut, typical_step

@@ -19,9 +19,9 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from ..arrays import Bools, Floats, Ints
-from .grid import WIDTH, Grid, Segment, normal_band, rows_from
 from .library import monomials, shift_generators
 from .selection import RIDGE, equilibrated
+from .splines import WIDTH, Grid, Segment, normal_band, rows_from
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
@@ -79,19 +79,26 @@ class Status(Enum):
 
 
 @dataclass(frozen=True)
-class Solution:
-    """The end of a fit.
+class Fit:
+    """A state, on the data and knots to which it was fitted.
 
     Parameters
     ----------
     state : State
         The lowest point found.
+    collocation : Collocation
+        With the weights of the fit.
     status : Status
-        Whether it is a minimum.
+        Whether the state is a minimum.
+    criterion : float
+        Objective and penalties, where the fit compares laws (of a candidate that is not refined
+        yet, by the quadratic model); else NaN.
     """
 
     state: State
+    collocation: Collocation
     status: Status
+    criterion: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -103,7 +110,6 @@ class Linearisation:
     goes best with it; ``fall`` is what the curve gains by itself.
     """
 
-    objective: float
     fall: float
     columns: Ints
     information: Floats
@@ -203,11 +209,6 @@ class Collocation:
         information += np.eye(self.systematic.shape[-1])
         return weighted, information
 
-    def splines(self, control_points: Floats) -> list[tuple[Floats, Floats]]:
-        """Knots and control points of every segment."""
-        parts = np.split(control_points, self.grid.starts[1:-1])
-        return list(zip(self.grid.knots, parts, strict=True))
-
     def curve(self, control_points: Floats) -> Floats:
         """The curve at the samples, shape (n, d)."""
         return self.grid.samples @ control_points
@@ -273,12 +274,11 @@ class Collocation:
         gram = self._gram(unknowns - physics @ solved, solved, data_residual, sizes)
         solved = solved.reshape(-1, self.d, solved.shape[1])
         gram, solved = _without_systematic(gram, solved, 1 + len(columns))
-        objective = float((data_residual**2).sum(axis=0) @ self.data_weights)
-        objective += float((unknowns[:, 0] ** 2).sum())
-        objective += float(sizes @ sizes)
+        objective = (data_residual**2).sum(axis=0) @ self.data_weights
+        objective += (unknowns[:, 0] ** 2).sum()
+        objective += sizes @ sizes
         return Linearisation(
-            objective=objective,
-            fall=objective - float(gram[0, 0]),
+            fall=float(objective - gram[0, 0]),
             columns=columns,
             information=gram[1:, 1:],
             gradient=-gram[1:, 0],
@@ -344,7 +344,7 @@ class Collocation:
         return gram
 
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
-    def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> Solution:
+    def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> Fit:
         """Minimise the objective over the curve and the free coefficients and offsets.
 
         Gauss-Newton with step halving, and Levenberg-Marquardt damping where that fails.
@@ -372,7 +372,7 @@ class Collocation:
             if damping == 0.0 and promise < tolerance:
                 last = model.along(state, step, 1.0)
                 lower = self.objective(last) < value
-                return Solution(last if lower else state, Status.CONVERGED)
+                return Fit(last if lower else state, self, Status.CONVERGED)
             for fraction in (1.0, 0.3, 0.1):
                 trial = model.along(state, step, fraction)
                 trial_value = self.objective(trial)
@@ -381,11 +381,11 @@ class Collocation:
             else:
                 damping = max(10 * damping, 1e-6)
                 if damping > STRONGEST_DAMPING:
-                    return Solution(state, Status.STALLED)
+                    return Fit(state, self, Status.STALLED)
                 continue
             state, value = trial, trial_value
             damping = damping / 10 if damping > 1e-8 else 0.0
-        return Solution(state, Status.MAX_STEPS)
+        return Fit(state, self, Status.MAX_STEPS)
 
 
 def _without_systematic(gram: Floats, solved: Floats, size: int) -> tuple[Floats, Floats]:

@@ -33,11 +33,7 @@ class Bound:
 
 
 def cramer_rao(
-    system: PolynomialSystem,
-    t: Floats,
-    x0: Floats,
-    sigma: Floats,
-    moving: Bools | None = None,
+    system: PolynomialSystem, t: Floats, x0: Floats, sigma: Floats, moving: Bools | None = None
 ) -> Bound:
     """Cramer-Rao bound of the coefficients, with unknown initial condition and offset.
 

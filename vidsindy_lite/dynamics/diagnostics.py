@@ -5,18 +5,17 @@ A warning is a necessary sign of trouble, not a sufficient one: a law without on
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import Floats
-from .collocation import CLEANEST, Linearisation, State, Status
+from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .library import variable_names
 from .polynomials import PolynomialSystem
 from .problem import Problem
-from .search import Fit
-from .selection import closest_rival, equilibrated
+from .selection import closest_rival
 from .trajectories import Trajectory, typical_step
 
 MISFIT = 1.5
@@ -113,58 +112,53 @@ def _leaps(values: Floats, row: int) -> bool:
     return bool(abs(values[row] - middle) > OUTLIER * np.median(np.abs(beside - middle)))
 
 
-def _misfit(problem: Problem, fit: Fit) -> list[str]:
+def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
     residual = fit.collocation.data_weights**-0.5
     ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
     j = int(ratio.argmax())
-    if ratio[j] < MISFIT:
-        return []
-    return [
-        f"the curve misses the data of {variable_names(problem.d)[j]} by {ratio[j]:.1f} times the "
-        "noise estimated beforehand: the law may lie outside the library (raise the degree), or "
-        "the motion may not be autonomous"
-    ]
+    if not ratio[j] < MISFIT:
+        yield (
+            f"the curve misses the data of {variable_names(problem.d)[j]} by {ratio[j]:.1f} times "
+            "the noise estimated beforehand: the law may lie outside the library (raise the "
+            "degree), or the motion may not be autonomous"
+        )
 
 
-def _unfinished(fit: Fit) -> list[str]:
-    if fit.status is Status.CONVERGED:
-        return []
-    return [f"the last fit did not converge ({fit.status.value}): {ADVICE[fit.status]}"]
+def _unfinished(fit: Fit) -> Iterator[str]:
+    if fit.status is not Status.CONVERGED:
+        yield f"the last fit did not converge ({fit.status.value}): {ADVICE[fit.status]}"
 
 
-def _unmet(fit: Fit) -> list[str]:
+def _unmet(fit: Fit) -> Iterator[str]:
     residual = float(np.sqrt((fit.collocation.physics_residual(fit.state) ** 2).mean()))
-    if residual < UNMET:
-        return []
-    return [
-        f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit did "
-        "not converge; use more or cleaner samples, or another degree"
-    ]
+    if not residual < UNMET:
+        yield (
+            f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit "
+            "did not converge; use more or cleaner samples, or another degree"
+        )
 
 
-def _selection(problem: Problem, fit: Fit) -> list[str]:
+def _selection(problem: Problem, fit: Fit) -> Iterator[str]:
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
-        return []  # what is left is the error of the splines, not noise: it settles nothing
+        return  # what is left is the error of the splines, not noise: it settles nothing
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = fit.collocation.linearise(fit.state, np.arange(problem.exponents.size))
-    return [*_left_over(model, fit.state), *_near_tie(problem, fit.state, model)]
+    yield from _left_over(model, fit.state)
+    yield from _near_tie(problem, fit.state, model)
 
 
-def _left_over(model: Linearisation, state: State) -> list[str]:
+def _left_over(model: Linearisation, state: State) -> Iterator[str]:
     """Would all candidates together explain more than chance (Rao's score test)?"""
-    matrix, scale = equilibrated(model.information)
-    pull = scale * model.gradient
-    gain = float(pull @ np.linalg.solve(matrix, pull))
+    gain = float(model.gradient @ model.newton()[0])
     unused = int((~state.active).sum())
-    if not unused or chi2.sf(gain, unused) > CHANCE:
-        return []
-    return [
-        f"the terms left out explain more than chance (chi-square {gain:.0f} for {unused}): a term "
-        "may be missing, or the errors of the measurements depend on each other"
-    ]
+    if unused and not chi2.sf(gain, unused) > CHANCE:
+        yield (
+            f"the terms left out explain more than chance (chi-square {gain:.0f} for {unused}): a "
+            "term may be missing, or the errors of the measurements depend on each other"
+        )
 
 
-def _near_tie(problem: Problem, state: State, model: Linearisation) -> list[str]:
+def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[str]:
     law = problem.law(state)
     cost, dropped, added = closest_rival(
         model.information,
@@ -174,36 +168,32 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> list[str]
         state.active.T.ravel(),
     )
     if cost > NEAR_TIE:
-        return []
+        return
     out, into = (" and ".join(_place(law, k) for k in entries) for entries in (dropped, added))
     change = (
         f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
     )
     frame = "in its own frame, " if state.moving.any() else ""
-    return [
+    yield (
         f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
         "do not settle it: use a longer or cleaner trajectory"
-    ]
+    )
 
 
-def _standstill(law: PolynomialSystem) -> list[str]:
-    return [
-        f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
-        for name, moves in zip(law.names, np.any(law.support, axis=0).tolist(), strict=True)
-        if not moves
-    ]
+def _standstill(law: PolynomialSystem) -> Iterator[str]:
+    for j in np.flatnonzero(~law.support.any(axis=0)):
+        name = law.names[j]
+        yield f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
 
 
-def _narrow(law: PolynomialSystem, margins: Floats) -> list[str]:
-    close = np.flatnonzero(margins < NEAR_TIE).tolist()
-    if not close:
-        return []
-    kept = law.support.T.ravel()
+def _narrow(law: PolynomialSystem, margins: Floats) -> Iterator[str]:
+    close, kept = np.flatnonzero(margins < NEAR_TIE).tolist(), law.support.T.ravel()
     changes = ", ".join(f"{'without' if kept[k] else 'with'} {_place(law, k)}" for k in close)
-    return [
-        f"in the frame of the data another law fits almost as well: {changes} (criterion "
-        f"{margins[close].min():+.1f}); the standard errors do not count this in"
-    ]
+    if changes:
+        yield (
+            f"in the frame of the data another law fits almost as well: {changes} (criterion "
+            f"{margins[close].min():+.1f}); the standard errors do not count this in"
+        )
 
 
 def _place(law: PolynomialSystem, entry: int) -> str:
@@ -212,15 +202,13 @@ def _place(law: PolynomialSystem, entry: int) -> str:
     return f"{law.terms[term]} in d{law.names[equation]}/dt"
 
 
-def _sampling(trajectories: Sequence[Trajectory]) -> list[str]:
-    found = []
+def _sampling(trajectories: Sequence[Trajectory]) -> Iterator[str]:
     turns = sum(t[-1] - t[0] for t, _ in trajectories) / (2 * np.pi)
     if turns < TURNS and trajectories[0][1].shape[1] > 1:  # on a line nothing turns
-        found.append(
+        yield (
             f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "
             "indistinguishable on it; record longer"
         )
     step = typical_step(trajectories)
     if step > COARSE:
-        found.append(f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster")
-    return found
+        yield f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster"

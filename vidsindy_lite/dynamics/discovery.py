@@ -2,20 +2,76 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import BSpline
 
 from ..arrays import Floats, Ints
 from ..checks import check_array
+from .collocation import Fit
 from .diagnostics import diagnose
 from .library import shift_generators, shift_matrix, variable_names
 from .polynomials import PolynomialSystem
 from .problem import Problem, Units
-from .search import Fit, History, Step
 from .selection import inverse
 from .splines import DEGREE
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the history of a discovery.
+
+    Parameters
+    ----------
+    stage : str
+        What was done.
+    seconds : float
+        Time since the start.
+    physics_weight : float
+        Relative weight of the physics loss.
+    data_loss : float
+        Mean square residual of the data over the noise variance.
+    physics_loss : float
+        Mean square residual of the law in standard units.
+    terms : int
+        Number of active terms.
+    offset : ndarray, shape (d,)
+        Origin of the law in the data's frame.
+    """
+
+    stage: str
+    seconds: float
+    physics_weight: float
+    data_loss: float
+    physics_loss: float
+    terms: int
+    offset: Floats
+
+
+@dataclass(frozen=True)
+class History:
+    """The steps of a discovery so far, in the order of time."""
+
+    steps: list[Step] = field(default_factory=list)
+    began: float = field(default_factory=time.perf_counter)
+
+    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
+        """Add what a fit at a relative physics weight has reached."""
+        state, collocation = fit.state, fit.collocation
+        data = collocation.data_loss(state.control_points)
+        self.steps.append(
+            Step(
+                stage=stage,
+                seconds=time.perf_counter() - self.began,
+                physics_weight=weight,
+                data_loss=data / collocation.grid.x.size,
+                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
+                terms=int(state.active.sum()),
+                offset=problem.units.point(state.offset),
+            )
+        )
 
 
 @dataclass(frozen=True)
@@ -92,11 +148,9 @@ class Discovery:
         """
         if frame not in ("data", "native"):
             raise ValueError(f"frame: must be 'data' or 'native', got {frame!r}")
-        law, errors = (
-            (self.system, self.standard_errors)
-            if frame == "data"
-            else (self.native, self.native_standard_errors)
-        )
+        native = frame == "native"
+        law = self.native if native else self.system
+        errors = self.native_standard_errors if native else self.standard_errors
         lines = []
         for j, name in enumerate(law.names):
             rows = np.flatnonzero(law.coefficients[:, j])
@@ -155,8 +209,8 @@ def conclude(problem: Problem, fit: Fit, history: History) -> Discovery:
         warnings=diagnose(problem, fit, law, margins),
         history=tuple(history.steps),
         curves=tuple(
-            BSpline(knots * units.time, control * units.scale + units.centre, DEGREE)
-            for knots, control in collocation.splines(state.control_points)
+            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
+            for s in collocation.grid.splines(state.control_points)
         ),
     )
 

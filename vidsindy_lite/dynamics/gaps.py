@@ -7,15 +7,16 @@ took. A law found from the stretches between the gaps tells which.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
 from ..arrays import Floats
-from .grid import Segment
 from .integrate import runge_kutta_4
 from .library import monomials
 from .polynomials import PolynomialSystem
+from .splines import Segment
 from .trajectories import Trajectory
 
 Gap = tuple[int, float]
@@ -32,6 +33,7 @@ def gaps(segments: Sequence[Segment]) -> list[Gap]:
     return sorted(lengths, key=lengths.__getitem__)
 
 
+@dataclass(frozen=True)
 class Joined:
     """A curve made of splines, with the gaps between them crossed by a law.
 
@@ -44,9 +46,8 @@ class Joined:
         are blended linearly.
     """
 
-    def __init__(self, splines: Sequence[BSpline], law: PolynomialSystem) -> None:
-        self.splines = splines
-        self.law = law
+    splines: Sequence[BSpline]
+    law: PolynomialSystem
 
     def __call__(self, t: Floats) -> Floats:
         """Evaluate at increasing times, shape (n, d)."""

@@ -82,22 +82,17 @@ class ShiftedLaw:
                 break
         return origin
 
-    def _scores(self, origin: Floats) -> tuple[Floats, Floats, Floats]:
-        forth = shift_matrix(self.exponents, -origin)
-        estimate = (forth @ self.coefficients).T
-        covariance = forth @ self._covariances @ forth.T
-        variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300)
-        return estimate, covariance, estimate**2 / variance
-
     def smooth_count(self, origin: Floats, active: Bools, penalty: float) -> tuple[float, Floats]:
         """Smoothed number of significant terms at an origin, and its gradient.
 
         Each active term with score ``z`` (estimate over standard error) counts
         ``z^2 / (z^2 + penalty)``.
         """
-        estimate, covariance, score = self._scores(origin)
+        forth, mask = shift_matrix(self.exponents, -origin), active.T
+        estimate = (forth @ self.coefficients).T
+        covariance = forth @ self._covariances @ forth.T
         variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300)
-        mask = active.T
+        score = estimate**2 / variance
         value = (score / (score + penalty))[mask].sum()
         weight = penalty / (score + penalty) ** 2
         gradient = np.empty(self.d)
@@ -110,7 +105,7 @@ class ShiftedLaw:
 
 
 def sparse_origins(
-    algebra: ShiftedLaw,
+    law: ShiftedLaw,
     active: Bools,
     home: Floats,
     box: tuple[Floats, Floats],
@@ -126,7 +121,7 @@ def sparse_origins(
 
     Parameters
     ----------
-    algebra : ShiftedLaw
+    law : ShiftedLaw
         The estimated law.
     active : ndarray of bool, shape (l, d)
         Terms that count.
@@ -146,14 +141,14 @@ def sparse_origins(
     list of ndarray, shape (d,), best first
     """
     low, high = np.minimum(box[0], home), np.maximum(box[1], home)
-    starts = _starts(algebra, active, home, (low, high), rng)
-    counts = [algebra.smooth_count(start, active, penalty)[0] for start in starts]
+    starts = _starts(law, active, home, (low, high), rng)
+    counts = [law.smooth_count(start, active, penalty)[0] for start in starts]
     found: list[tuple[float, Floats]] = []
     for index in np.argsort(counts)[: 4 * keep]:
         if any(np.abs(starts[index] - origin).max() < 1e-3 for _, origin in found):
             continue
         result = minimize(
-            algebra.smooth_count, starts[index], args=(active, penalty), jac=True,
+            law.smooth_count, starts[index], args=(active, penalty), jac=True,
             method="L-BFGS-B", bounds=list(zip(low, high, strict=True)), options={"maxiter": 40},
         )  # fmt: skip
         found.append((float(result.fun), result.x))
@@ -166,7 +161,7 @@ def sparse_origins(
 
 
 def _starts(
-    algebra: ShiftedLaw,
+    law: ShiftedLaw,
     active: Bools,
     home: Floats,
     box: tuple[Floats, Floats],
@@ -175,13 +170,13 @@ def _starts(
     """Origins in the box near which a few coefficients drawn at random vanish."""
     low, high = box
     # Only what divides another term of its equation can vanish by a shift.
-    below = divides(algebra.exponents) & ~np.eye(len(algebra.exponents), dtype=bool)
+    below = divides(law.exponents) & ~np.eye(len(law.exponents), dtype=bool)
     droppable = np.argwhere((active & (below @ active)).T)
     starts = []
     for draw in range(DRAWS if len(droppable) else 0):
         origin = home if draw % 2 else rng.uniform(low, high)
-        size = min(1 + draw % algebra.d, len(droppable))
-        origin = algebra.vanish(origin, droppable[rng.permutation(len(droppable))[:size]])
+        size = min(1 + draw % law.d, len(droppable))
+        origin = law.vanish(origin, droppable[rng.permutation(len(droppable))[:size]])
         if np.isfinite(origin).all():
             starts.append(np.clip(origin, low, high))
     return starts

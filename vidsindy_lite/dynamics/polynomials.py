@@ -103,19 +103,19 @@ class PolynomialSystem:
             )
         names = tuple(equations)
         parsed = [
-            {term: _parse_term(term, names) for term in terms} for terms in equations.values()
+            (_parse_term(term, names), column, check_number(f"coefficient of {term}", value))
+            for column, terms in enumerate(given)
+            for term, value in terms.items()
         ]
-        highest = max((sum(e) for terms in parsed for e in terms.values()), default=0)
+        highest = max((sum(powers) for powers, _, _ in parsed), default=0)
         degree = highest if degree is None else check_integer("degree", degree)
         if highest > degree:
             raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
         exponents = monomial_exponents(len(names), degree)
         index = {tuple(e): row for row, e in enumerate(exponents)}
         coefficients = np.zeros(exponents.shape)
-        for column, (terms, values) in enumerate(zip(parsed, equations.values(), strict=True)):
-            for term, value in values.items():
-                number = check_number(f"coefficient of {term}", value)
-                coefficients[index[terms[term]], column] += number
+        for powers, column, value in parsed:
+            coefficients[index[powers], column] += value
         return cls(names, exponents, coefficients)
 
     @property
@@ -123,15 +123,11 @@ class PolynomialSystem:
         """Dimension of the state."""
         return len(self.names)
 
-    @property
-    def degree(self) -> int:
-        """Highest total degree of the library."""
-        return int(self.exponents.sum(axis=1).max(initial=0))
-
     @cached_property
     def terms(self) -> tuple[str, ...]:
         """Names of the monomials, e.g. ``("1", "x", "x^2", "xy")``."""
-        return tuple(_term_text(e, self.names) for e in self.exponents)
+        between = "" if all(len(name) == 1 for name in self.names) else " "
+        return tuple(_term_text(e, self.names, "{}^{}", between) for e in self.exponents)
 
     @property
     def support(self) -> Bools:
@@ -227,11 +223,11 @@ class PolynomialSystem:
 
     def latex(self, digits: int = 4) -> str:
         """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
-        terms = [_term_latex(e, self.names) for e in self.exponents]
+        names = tuple(map(_name_latex, self.names))
+        terms = [_term_text(e, names, "{}^{{{}}}", " ") for e in self.exponents]
         rows = (
-            rf"\dot{{{_name_latex(name)}}} &= "
-            + _sum_text(self.coefficients[:, j], terms, digits, r"\,")
-            for j, name in enumerate(self.names)
+            rf"\dot{{{name}}} &= " + _sum_text(self.coefficients[:, j], terms, digits, r"\,")
+            for j, name in enumerate(names)
         )
         return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
 
@@ -264,29 +260,19 @@ def _parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(exponents.values())
 
 
-def _term_text(exponents: Ints, names: tuple[str, ...]) -> str:
+def _term_text(exponents: Ints, names: tuple[str, ...], power: str, between: str) -> str:
+    """A monomial as text, given how a power is written and what stands between two factors."""
     factors = [
-        name if power == 1 else f"{name}^{power}"
-        for name, power in zip(names, exponents, strict=True)
-        if power
+        name if e == 1 else power.format(name, e)
+        for name, e in zip(names, exponents, strict=True)
+        if e
     ]
-    return ("" if all(len(name) == 1 for name in names) else " ").join(factors) or "1"
+    return between.join(factors) or "1"
 
 
 def _name_latex(name: str) -> str:
     letters = name.rstrip("0123456789")
     return name if letters == name else f"{letters}_{{{name[len(letters) :]}}}"
-
-
-def _term_latex(exponents: Ints, names: tuple[str, ...]) -> str:
-    return (
-        " ".join(
-            _name_latex(name) + (f"^{{{power}}}" if power > 1 else "")
-            for name, power in zip(names, exponents, strict=True)
-            if power
-        )
-        or "1"
-    )
 
 
 def _sum_text(coefficients: Floats, terms: Sequence[str], digits: int, times: str = " ") -> str:

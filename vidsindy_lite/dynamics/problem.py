@@ -15,11 +15,10 @@ from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
 from .collocation import CLEANEST, Collocation, State
-from .grid import Segment
 from .library import monomial_exponents, monomials, variable_names
 from .polynomials import PolynomialSystem
 from .smoothing import smooth
-from .splines import DEGREE, clamped_knots
+from .splines import DEGREE, Segment, clamped_knots
 from .trajectories import Trajectory, cut, typical_step
 
 FALSE_ALARM = 0.004

@@ -14,6 +14,8 @@ from ..arrays import Bools, Floats, Ints
 
 Change = tuple[float, Ints, Ints]
 """Change of the function, entries dropped, entries added."""
+NONE = np.array([], dtype=int)
+"""No entries."""
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
 PLATEAU = 1e-6
@@ -25,11 +27,7 @@ RIDGE = 1e-12
 
 
 def subset_search(
-    information: Floats,
-    gradient: Floats,
-    present: Floats,
-    penalty: Floats,
-    start: Bools,
+    information: Floats, gradient: Floats, present: Floats, penalty: Floats, start: Bools
 ) -> tuple[Bools, Floats, float]:
     """Minimise a quadratic function of ``c`` plus a penalty per non-zero entry, by local search.
 
@@ -72,11 +70,7 @@ def subset_search(
 
 
 def closest_rival(
-    information: Floats,
-    gradient: Floats,
-    present: Floats,
-    penalty: Floats,
-    support: Bools,
+    information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
 ) -> Change:
     """The single change of a support that costs least.
 
@@ -177,7 +171,6 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
 
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """A lower value reached by forcing one entry in, which may let several others go."""
-    none = np.array([], dtype=int)
     tableau = _Tableau.of(model, best)
     for i, entry in enumerate(tableau.outside):
         # Most newcomers change nothing for the others, which a rank-one update tells.
@@ -185,7 +178,7 @@ def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
             changes = _single_changes(model, tableau.joined(model, i))
             if not min(cost for cost, _, _ in changes) < -PLATEAU:
                 continue
-        trial = _descend(model.forced(entry), _changed(best.support, none, entry))
+        trial = _descend(model.forced(entry), _changed(best.support, NONE, entry))
         if trial.value + model.penalty[entry] < best.value - PLATEAU:
             return _descend(model, trial.support)
     return None
@@ -244,27 +237,20 @@ class _Tableau:
 
 def _single_changes(model: _Quadratic, tableau: _Tableau) -> list[Change]:
     """Best drop, add and swap."""
-    inside, outside, fitted, spread = (
-        tableau.inside,
-        tableau.outside,
-        tableau.fitted,
-        tableau.spread,
-    )
+    inside, outside, spread = tableau.inside, tableau.outside, tableau.spread
     response, left, room = tableau.response, tableau.left, tableau.room
-    none = np.array([], dtype=int)
-    penalty = model.penalty
-    loss = fitted**2 / spread - penalty[inside]
-    cost = penalty[outside] - _gain(left, room)
-    changes = [(np.inf, none, none)]
+    loss = tableau.fitted**2 / spread - model.penalty[inside]
+    cost = model.penalty[outside] - _gain(left, room)
+    changes = [(np.inf, NONE, NONE)]
     if len(inside):
-        changes.append((loss.min(), inside[[loss.argmin()]], none))
+        changes.append((loss.min(), inside[[loss.argmin()]], NONE))
     if len(outside):
-        changes.append((cost.min(), none, outside[[cost.argmin()]]))
+        changes.append((cost.min(), NONE, outside[[cost.argmin()]]))
     if len(inside) and len(outside):
         # A drop changes what the others leave over, and the room a newcomer has, by rank one.
-        swapped_left = left[:, None] + response * (fitted / spread)
+        swapped_left = left[:, None] + response * (tableau.fitted / spread)
         swapped_room = room[:, None] + response**2 / spread
-        swap = loss + penalty[outside][:, None] - _gain(swapped_left, swapped_room)
+        swap = loss + model.penalty[outside][:, None] - _gain(swapped_left, swapped_room)
         add, drop = np.unravel_index(swap.argmin(), swap.shape)
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
     return changes

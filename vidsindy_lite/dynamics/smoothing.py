@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import repeat
 
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..arrays import Floats
-from .grid import Grid, Segment, normal_band, rows_from
-from .splines import DEGREE, local_basis
+from .splines import WIDTH, Grid, Segment, basis, normal_band
 from .trajectories import Trajectory
 
 PROBES = 24
@@ -77,8 +75,7 @@ def smooth(stretches: Sequence[Trajectory], rng: np.random.Generator) -> Smooth:
         control[:, better] = solved[:, :d][:, better]
         # E |K e|^2 = variance tr(K K'), K = I - influence: holds where hardly anything is smoothed.
         noise[better] = np.sqrt(squares[better] / ((probes - fitted[:, d:]) ** 2).sum())
-    parts = np.split(control, grid.starts[1:-1])
-    return Smooth(tuple(map(BSpline, grid.knots, parts, repeat(DEGREE))), noise)
+    return Smooth(tuple(grid.splines(control)), noise)
 
 
 def _roughness(stretches: Sequence[Trajectory], grid: Grid) -> Floats:
@@ -87,14 +84,11 @@ def _roughness(stretches: Sequence[Trajectory], grid: Grid) -> Floats:
     Times are in units of the median time step. The second derivative is linear between two knots,
     so two Gauss points integrate its square.
     """
-    step = np.median(np.concatenate([np.diff(t) for t, _ in stretches]))
+    spans = np.concatenate([np.diff(t) for t, _ in stretches])
     total = np.zeros_like(grid.sample_band)
     for node in (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)):
-        firsts, bends = [], []
-        for knots, start, (t, _) in zip(grid.knots, grid.starts[:-1], stretches, strict=True):
-            span = np.diff(t)
-            first, bend = local_basis(knots, t[:-1] + node * span, order=2)
-            firsts.append(first + start)
-            bends.append(bend * np.sqrt(span / 2)[:, None])
-        total += normal_band(rows_from(np.concatenate(firsts), np.concatenate(bends), grid.r))
-    return total * step**3
+        times = [t[:-1] + node * np.diff(t) for t, _ in stretches]
+        bend = basis(grid.knots, grid.starts, times, order=2)
+        bend.data *= np.sqrt(spans / 2).repeat(WIDTH)
+        total += normal_band(bend)
+    return total * np.median(spans) ** 3

@@ -13,24 +13,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.stats import chi2
 from tqdm import tqdm
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..checks import check_integer
-from .collocation import CLEANEST, Collocation, State
-from .discovery import Discovery, conclude
+from .collocation import CLEANEST, Collocation, Fit, Linearisation, State
+from .discovery import Discovery, History, conclude
 from .gaps import Gap, gaps, join
 from .library import closure_mask, monomials, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .problem import Problem, fit_curves, pose
-from .search import Fit, History, fitted, select
 from .selection import inverse, subset_search
-from .splines import DEGREE
 from .trajectories import check_systematic, check_trajectories
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
@@ -43,6 +40,8 @@ NEEDLESS_START = 0.1
 """Chance that a second start, from terms of all degrees, is made though the first left nothing."""
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
+LONGEST_SEARCH = 10
+"""Most rounds of a subset search."""
 EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
 
@@ -101,37 +100,15 @@ def discover(
         found = candidates(problem, degree, rng, history)
         bar.update()
         fit = cheapest(problem, found, history)
-        bar.update()
-        fit = bridge(problem, fit, history)
-        bar.update()
-        fit = polish(problem, fit, history)
-        bar.update()
+        for stage in (bridge, polish):
+            bar.update()
+            fit = stage(problem, fit, history)
     return conclude(problem, fit, history)
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A support in a frame, with what the quadratic model says it costs."""
-
-    cost: float
-    state: State
-    collocation: Collocation
-
-
-@dataclass(frozen=True)
-class Closed:
-    """A law in the centred frame, with every term that a shift of it may contain."""
-
-    state: State
-    columns: Ints
-    law: ShiftedLaw
-    objective: float
-    collocation: Collocation
 
 
 def candidates(
     problem: Problem, degree: int, rng: np.random.Generator, history: History
-) -> list[Candidate]:
+) -> list[Fit]:
     """Supports worth refining, from all terms up to degree 2, and if need be from all terms."""
     collocation = problem.collocation(problem.segments())
     control = fit_curves(collocation, problem.curves)
@@ -156,7 +133,7 @@ def unpruned(
     active = np.repeat(rows[:, None], d, axis=1)
     state = State(control, coefficients, active, np.zeros(d), np.zeros(d, dtype=bool))
     for weight in FIRST_WEIGHTS:
-        fit = fitted(problem.weighted(collocation, weight), state, tolerance=1.0, max_steps=15)
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         state = fit.state
         history.add(f"unpruned, degree {degree}", problem, fit, weight)
     return fit
@@ -173,14 +150,14 @@ def _leaves_something_over(fit: Fit) -> bool:
 
 def _in_sparse_frames(
     problem: Problem, fit: Fit, rng: np.random.Generator, history: History
-) -> list[Candidate]:
+) -> list[Fit]:
     """Supports in the frames where the law is sparsest, by the quadratic model."""
     weight, stage = FIRST_WEIGHTS[-1], "subset search, centred frame"
-    fit = select(problem, fit.collocation, fit.state, weight, stage, history)
-    closed = _closed(problem, fit, weight)
+    fit = select(problem, fit, weight, stage, history)
+    closed, law = _closed(problem, fit, weight)
     x = fit.collocation.grid.x
     origins = sparse_origins(
-        closed.law, closed.state.active, problem.home, (x.min(axis=0), x.max(axis=0)),
+        law, closed.state.active, problem.home, (x.min(axis=0), x.max(axis=0)),
         problem.penalties.max(), keep=4, rng=rng,
     )  # fmt: skip
     variants = [
@@ -189,7 +166,7 @@ def _in_sparse_frames(
         for variant in _variants(origin, problem.home)
     ]
     unique = {tuple(np.round(origin, 2)): (origin, moving) for origin, moving in variants}
-    return [_candidate(problem, closed, *variant) for variant in unique.values()]
+    return [_candidate(problem, closed, law, *variant) for variant in unique.values()]
 
 
 def _variants(origin: Floats, home: Floats) -> list[tuple[Floats, Bools]]:
@@ -198,7 +175,7 @@ def _variants(origin: Floats, home: Floats) -> list[tuple[Floats, Bools]]:
     return [(np.where(mask, origin, home), np.array(mask)) for mask in masks]
 
 
-def _closed(problem: Problem, fit: Fit, weight: float) -> Closed:
+def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]:
     """The law in the centred frame, all terms of its shift closure fitted."""
     d, exponents = problem.d, problem.exponents
     state = State(
@@ -210,48 +187,92 @@ def _closed(problem: Problem, fit: Fit, weight: float) -> Closed:
     )
     collocation = problem.weighted(fit.collocation, weight)
     # A law exact in another frame has no firm minimum here: some steps are near enough.
-    state = collocation.solve(state, tolerance=0.1, max_steps=8).state
-    columns = np.flatnonzero(state.free())
+    closed = collocation.solve(state, tolerance=0.1, max_steps=8)
+    state, columns = closed.state, np.flatnonzero(closed.state.free())
     information = np.diag(np.where(state.free()[: exponents.size], 0.0, 1e30))
     information[np.ix_(columns, columns)] = collocation.linearise(state, columns).information
-    law = ShiftedLaw(exponents, state.coefficients, information)
-    return Closed(state, columns, law, collocation.objective(state), collocation)
+    return closed, ShiftedLaw(exponents, state.coefficients, information)
 
 
-def _candidate(problem: Problem, closed: Closed, origin: Floats, moving: Bools) -> Candidate:
+def _candidate(
+    problem: Problem, closed: Fit, law: ShiftedLaw, origin: Floats, moving: Bools
+) -> Fit:
     """The cheapest support at an origin, by the quadratic model around the closed law."""
-    coefficients, information = closed.law.at(origin)
-    columns = closed.columns
-    support, solution, value = subset_search(
+    coefficients, information = law.at(origin)
+    columns = np.flatnonzero(closed.state.free())
+    _, solution, value = subset_search(
         information[np.ix_(columns, columns)],
         np.zeros(len(columns)),
         coefficients.T.ravel()[columns],
         np.tile(problem.penalties, problem.d)[columns],
         np.ones(len(columns), dtype=bool),
     )
-    flat = np.zeros((2, problem.exponents.size))
-    flat[:, columns] = solution, support
-    coefficients, active = flat.reshape(2, problem.d, -1).transpose(0, 2, 1)
-    state = State(closed.state.control_points, coefficients, active != 0, origin.copy(), moving)
-    cost = closed.objective + value + problem.axis_penalty * moving.sum()
-    return Candidate(cost, state, closed.collocation)
+    flat = np.zeros(problem.exponents.size)
+    flat[columns] = solution
+    coefficients = flat.reshape(problem.d, -1).T
+    state = State(
+        closed.state.control_points, coefficients, coefficients != 0, origin.copy(), moving
+    )
+    objective = closed.collocation.objective(closed.state)
+    cost = objective + value + problem.axis_penalty * moving.sum()
+    return replace(closed, state=state, criterion=cost)
 
 
-def cheapest(problem: Problem, found: Sequence[Candidate], history: History) -> Fit:
+def select(problem: Problem, start: Fit, weight: float, stage: str, history: History) -> Fit:
+    """Alternate between the subset search and Gauss-Newton until the criterion stops falling.
+
+    The search runs over all terms, active or not, on the quadratic model with the curve
+    eliminated; its proposal is kept only if the true criterion falls after a refit.
+    """
+    weighted = problem.weighted(start.collocation, weight)
+
+    def refit(state: State) -> Fit:
+        fit = weighted.solve(state, tolerance=0.1)
+        return replace(fit, criterion=problem.criterion(weighted, fit.state))
+
+    best = refit(start.state)
+    history.add(stage, problem, best, weight)
+    size = problem.exponents.size
+    prices = np.append(np.tile(problem.penalties, problem.d), np.full(problem.d, -np.inf))
+    for _ in range(LONGEST_SEARCH):
+        state = best.state
+        columns = np.concatenate([np.arange(size), size + np.flatnonzero(state.moving)])
+        model = weighted.linearise(state, columns)
+        support, solution, _ = subset_search(
+            model.information, model.gradient, state.flat()[columns], prices[columns],
+            state.free()[columns],
+        )  # fmt: skip
+        if (support == state.free()[columns]).all():
+            break
+        trial = refit(_proposed(state, model, solution))
+        if not trial.criterion < best.criterion - 1e-6:
+            break
+        best = trial
+        history.add(stage, problem, best, weight)
+    return best
+
+
+def _proposed(state: State, model: Linearisation, solution: Floats) -> State:
+    """The state that the quadratic model promises for a solution of the subset search."""
+    flat = state.flat()
+    step = solution - flat[model.columns]
+    flat[model.columns] = solution
+    control = state.control_points + model.curve_step + model.curve_response @ step
+    moved = state.moved(control, flat)
+    return State(control, moved.coefficients, moved.coefficients != 0, moved.offset, state.moving)
+
+
+def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
     """Refine the cheapest candidates; the lowest criterion wins."""
-    ordered = sorted(found, key=lambda candidate: candidate.cost)
-    unique = list({_key(c.state): c for c in reversed(ordered)}.values())[::-1][:3]
-    starts = [(c.state, c.collocation) for c in unique]
-    stage = "subset search, own frame"
+    ordered = sorted(found, key=lambda fit: fit.criterion)
+    kept = list({_key(fit.state): fit for fit in reversed(ordered)}.values())[::-1][:3]
     for weight in SEARCH_WEIGHTS:
         refined = [
-            select(problem, collocation, state, weight, stage, history)
-            for state, collocation in starts
+            select(problem, fit, weight, "subset search, own frame", history) for fit in kept
         ]
         limit = min(fit.criterion for fit in refined) + problem.penalties.max()
-        kept = {_key(fit.state): fit for fit in refined if fit.criterion <= limit}
-        starts = [(fit.state, fit.collocation) for fit in kept.values()]
-    settled = [come_home(problem, fit, history) for fit in kept.values()]
+        kept = list({_key(fit.state): fit for fit in refined if fit.criterion <= limit}.values())
+    settled = [come_home(problem, fit, history) for fit in kept]
     return min(settled, key=lambda fit: fit.criterion)
 
 
@@ -268,15 +289,12 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
     state = fit.state
     if not state.moving.any():
         return fit
-    closed = _closed(problem, fit, FINAL_WEIGHT)
-    variants = [
-        _candidate(problem, closed, *variant) for variant in _variants(state.offset, problem.home)
-    ]
-    closest = min(variants, key=lambda candidate: candidate.cost)
-    if closest.cost < fit.criterion and closest.state.moving.sum() < state.moving.sum():
-        trial = select(
-            problem, closest.collocation, closest.state, FINAL_WEIGHT, "offset home", history
-        )
+    closed, law = _closed(problem, fit, FINAL_WEIGHT)
+    variants = _variants(state.offset, problem.home)
+    candidates = [_candidate(problem, closed, law, *variant) for variant in variants]
+    closest = min(candidates, key=lambda candidate: candidate.criterion)
+    if closest.criterion < fit.criterion and closest.state.moving.sum() < state.moving.sum():
+        trial = select(problem, closest, FINAL_WEIGHT, "offset home", history)
         if trial.criterion < fit.criterion:
             return trial
     return fit
@@ -295,8 +313,7 @@ def bridge(problem: Problem, fit: Fit, history: History) -> Fit:
             break
         before = fit.state.active
         fit = _bridge_group(problem, fit, open_gaps)
-        stage = "subset search, bridged"
-        fit = select(problem, fit.collocation, fit.state, FINAL_WEIGHT, stage, history)
+        fit = select(problem, fit, FINAL_WEIGHT, "subset search, bridged", history)
         fit = come_home(problem, fit, history)
         if (fit.state.active == before).all():
             break
@@ -306,8 +323,9 @@ def bridge(problem: Problem, fit: Fit, history: History) -> Fit:
 def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
     """The fit with these gaps crossed, or those of them that the data allow."""
     law = problem.law(fit.state).shift(fit.state.offset)
+    splines = fit.collocation.grid.splines(fit.state.control_points)
     joined, curves = join(
-        fit.collocation.segments, _splines(fit), group, problem.trajectories, law, problem.spacing
+        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing
     )
     bridged = problem.collocation(joined)
     trial = replace(fit.state, control_points=fit_curves(bridged, curves))
@@ -327,15 +345,15 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     """Refit with the law exact, on finer knots until that no longer matters."""
-    fit = fitted(problem.weighted(fit.collocation, FINAL_WEIGHT), fit.state, EXACT)
+    fit = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
     columns = np.flatnonzero(fit.state.free())
     for _ in range(3):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
         finer = problem.collocation(segments, residual_noise(fit))
-        control = fit_curves(finer, _splines(fit))
-        state = replace(fit.state, control_points=control)
-        fit = fitted(problem.weighted(finer, FINAL_WEIGHT), state, EXACT)
+        splines = fit.collocation.grid.splines(fit.state.control_points)
+        state = replace(fit.state, control_points=fit_curves(finer, splines))
+        fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))
         # Half the spacing, a sixteenth of the error: so much is left of what it just was.
@@ -344,8 +362,8 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
             break
     # A term that only made up for the error of coarser splines goes, and the noise, known
     # better now, may change what is worth its penalty.
-    fit = select(problem, fit.collocation, fit.state, FINAL_WEIGHT, "polish", history)
-    return fitted(fit.collocation, fit.state, EXACT)
+    fit = select(problem, fit, FINAL_WEIGHT, "polish", history)
+    return fit.collocation.solve(fit.state, EXACT)
 
 
 def residual_noise(fit: Fit) -> Floats:
@@ -354,8 +372,3 @@ def residual_noise(fit: Fit) -> Floats:
     residual, _ = fit.collocation.data_residual(fit.state.control_points)
     squares = (residual**2).sum(axis=0)
     return np.maximum(np.sqrt(squares / max(len(residual) - used, 1.0)), CLEANEST)
-
-
-def _splines(fit: Fit) -> list[BSpline]:
-    pieces = fit.collocation.splines(fit.state.control_points)
-    return [BSpline(knots, control, DEGREE) for knots, control in pieces]
