@@ -13,7 +13,14 @@ from vidsindy_lite.dynamics import (
     monomials,
 )
 from vidsindy_lite.study.metrics import score
-from vidsindy_lite.study.paper_ado import _curve, _Fit, _monomials, discover_paper, stridge
+from vidsindy_lite.study.paper_ado import (
+    PaperSettings,
+    _curve,
+    _Fit,
+    _monomials,
+    discover_paper,
+    stridge,
+)
 from vidsindy_lite.study.systems import SYSTEMS
 
 SHORT = {"pretraining": 200, "epochs": 100, "alternations": 2, "collocation_per_knot": 3}
@@ -44,7 +51,8 @@ def test_losses_are_those_of_the_paper():
     t, x = spiral()
     exponents = monomial_exponents(2, 2)
     rng = np.random.default_rng(0)
-    fit = _Fit(t, x, exponents, 80, 4, 1.0, rng)
+    settings = PaperSettings(knots_per_sample=80 / 149, collocation_per_knot=4)
+    fit = _Fit(t, x, exponents, settings, rng)
     coefficients = np.where(rng.random((6, 2)) < 0.5, rng.standard_normal((6, 2)), 0.0)
     offset = rng.standard_normal(2)
     fit.restart(coefficients)
@@ -67,7 +75,8 @@ def test_losses_are_those_of_the_paper():
 
 def test_collocation_covers_every_knot_span():
     t, x = spiral()
-    fit = _Fit(t, x, monomial_exponents(2, 1), 40, 5, 1.0, np.random.default_rng(0))
+    settings = PaperSettings(knots_per_sample=40 / 149, collocation_per_knot=5)
+    fit = _Fit(t, x, monomial_exponents(2, 1), settings, np.random.default_rng(0))
     assert fit.basis.shape == (40, 5, 4)
     np.testing.assert_allclose(fit.basis.sum(dim=2).cpu(), 1)
     np.testing.assert_allclose(fit.slopes.sum(dim=2).cpu(), 0, atol=1e-9)

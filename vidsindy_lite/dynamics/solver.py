@@ -160,12 +160,11 @@ def _in_sparse_frames(
         law, closed.state.active, problem.home, (x.min(axis=0), x.max(axis=0)),
         problem.penalties.max(), keep=4, rng=rng,
     )  # fmt: skip
-    variants = [
-        variant
-        for origin in [problem.home, *origins]
-        for variant in _variants(origin, problem.home)
-    ]
-    unique = {tuple(np.round(origin, 2)): (origin, moving) for origin, moving in variants}
+    unique = {
+        tuple(np.round(origin, 2)): (origin, moving)
+        for start in [problem.home, *origins]
+        for origin, moving in _variants(start, problem.home)
+    }
     return [_candidate(problem, closed, law, *variant) for variant in unique.values()]
 
 
@@ -259,7 +258,7 @@ def _proposed(state: State, model: Linearisation, solution: Floats) -> State:
     flat[model.columns] = solution
     control = state.control_points + model.curve_step + model.curve_response @ step
     moved = state.moved(control, flat)
-    return State(control, moved.coefficients, moved.coefficients != 0, moved.offset, state.moving)
+    return replace(moved, active=moved.coefficients != 0)
 
 
 def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
@@ -291,8 +290,8 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
         return fit
     closed, law = _closed(problem, fit, FINAL_WEIGHT)
     variants = _variants(state.offset, problem.home)
-    candidates = [_candidate(problem, closed, law, *variant) for variant in variants]
-    closest = min(candidates, key=lambda candidate: candidate.criterion)
+    priced = [_candidate(problem, closed, law, *variant) for variant in variants]
+    closest = min(priced, key=lambda candidate: candidate.criterion)
     if closest.criterion < fit.criterion and closest.state.moving.sum() < state.moving.sum():
         trial = select(problem, closest, FINAL_WEIGHT, "offset home", history)
         if trial.criterion < fit.criterion:

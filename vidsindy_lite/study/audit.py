@@ -192,7 +192,6 @@ def fit_coordinates(
     free_clock : bool
         Whether the unit of time is fitted, too.
     """
-    offset = np.asarray(offset, dtype=float)
     truth = native.shift(offset)
     norm, d = np.linalg.norm(truth.coefficients), native.d
     library = np.unique(np.concatenate([printed.exponents, truth.exponents]), axis=0)

@@ -19,6 +19,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 import pysindy
@@ -95,10 +96,7 @@ def stlsq(t: Floats, x: Floats, degree: int = 3, ridge: float = RIDGE) -> Polyno
     ----------
     S. L. Brunton, J. L. Proctor, J. N. Kutz, PNAS 113, 3932 (2016).
     """
-    library = pysindy.PolynomialLibrary(degree=degree)
-    return _discover(
-        t, x, library, lambda s: _difference_rows(s, library), lambda h: _least_squares(h, ridge)
-    )
+    return _discover(t, x, degree, _difference_rows, lambda h: _least_squares(h, ridge))
 
 
 def ensemble(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSystem:
@@ -115,14 +113,13 @@ def ensemble(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> Polynomial
     ----------
     U. Fasel, J. N. Kutz, B. W. Brunton, S. L. Brunton, Proc. R. Soc. A 478, 20210904 (2022).
     """
-    library = pysindy.PolynomialLibrary(degree=degree)
 
     def bagged(threshold: float) -> BaseOptimizer:
         # A new one for every fit: it would add the models of the last fit to those of this one.
         return pysindy.EnsembleOptimizer(_least_squares(threshold), bagging=True, n_models=20)
 
     with _numpy_seed(seed):
-        return _discover(t, x, library, lambda s: _difference_rows(s, library), bagged)
+        return _discover(t, x, degree, _difference_rows, bagged)
 
 
 def weak(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSystem:
@@ -141,13 +138,10 @@ def weak(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSyst
     ----------
     D. A. Messenger, D. M. Bortz, Multiscale Model. Simul. 19, 1474 (2021).
     """
-    library = pysindy.PolynomialLibrary(degree=degree)
     t, x = check_trajectory(t, x)
-    half_width = WEAK_WIDTH / 2 * (t[-1] - t[0])
+    rows = partial(_weak_rows, half_width=WEAK_WIDTH / 2 * (t[-1] - t[0]), total=len(t))
     with _numpy_seed(seed):
-        return _discover(
-            t, x, library, lambda s: _weak_rows(s, library, half_width, len(t)), _least_squares
-        )
+        return _discover(t, x, degree, rows, _least_squares)
 
 
 def model_a(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialSystem:
@@ -163,16 +157,8 @@ def model_a(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> PolynomialS
     seed : int
         Of the probes in the cross-validation.
     """
-    library = pysindy.PolynomialLibrary(degree=degree)
-    seed = check_integer("seed", seed)
-
-    def rows(segments: Sequence[Trajectory]) -> Rows:
-        splines = smooth(segments, np.random.default_rng(seed)).splines
-        curves = [spline(times) for spline, (times, _) in zip(splines, segments, strict=True)]
-        slopes = [spline(times, 1) for spline, (times, _) in zip(splines, segments, strict=True)]
-        return _terms(library, np.concatenate(curves)), np.concatenate(slopes)
-
-    return _discover(t, x, library, rows, _least_squares)
+    rows = partial(_spline_rows, seed=check_integer("seed", seed))
+    return _discover(t, x, degree, rows, _least_squares)
 
 
 BASELINES: dict[str, Callable[..., PolynomialSystem]] = {
@@ -187,21 +173,23 @@ BASELINES: dict[str, Callable[..., PolynomialSystem]] = {
 def _discover(
     t: Floats,
     x: Floats,
-    library: pysindy.PolynomialLibrary,
-    rows: Callable[[Sequence[Trajectory]], Rows],
+    degree: int,
+    rows: Callable[[Sequence[Trajectory], pysindy.PolynomialLibrary], Rows],
     optimizer: Callable[[float], BaseOptimizer],
 ) -> PolynomialSystem:
     """Choose a threshold on the last part of the record and fit all of it."""
-    record = check_trajectory(t, x)
-    library.fit(record[1])
-    split = int(TRAINING * len(record[0]))
-    first, last = (record[0][:split], record[1][:split]), (record[0][split:], record[1][split:])
-    step = LONGEST_STEP * typical_step([record])
-    everything, training, held_out = (rows(_segments(part, step)) for part in (record, first, last))
+    t, x = check_trajectory(t, x)
+    library = pysindy.PolynomialLibrary(degree=degree).fit(x)
+    split = int(TRAINING * len(t))
+    step = LONGEST_STEP * typical_step([(t, x)])
+    everything, training, held_out = (
+        rows(_segments((t[part], x[part]), step), library)
+        for part in (slice(None), slice(split), slice(split, None))
+    )
     errors = np.array([_error(_fit(optimizer(h), training), held_out) for h in THRESHOLDS])
     chosen = THRESHOLDS[np.flatnonzero(errors <= TOLERANCE * errors.min())[-1]]
     coefficients = _fit(optimizer(chosen), everything)
-    return PolynomialSystem(variable_names(record[1].shape[1]), library.powers_, coefficients)
+    return PolynomialSystem(variable_names(x.shape[1]), library.powers_, coefficients)
 
 
 def _segments(record: Trajectory, longest_step: float) -> list[Trajectory]:
@@ -237,14 +225,19 @@ def _fit(optimizer: BaseOptimizer, rows: Rows) -> Floats:
         return optimizer.fit(*rows).coef_.T
 
 
-def _terms(library: pysindy.PolynomialLibrary, x: Floats) -> Floats:
-    return np.asarray(library.transform(x))
-
-
 def _difference_rows(segments: Sequence[Trajectory], library: pysindy.PolynomialLibrary) -> Rows:
-    differences = pysindy.FiniteDifference()
+    curves, differences = [x for _, x in segments], pysindy.FiniteDifference()
     slopes = [differences(x, t) for t, x in segments]
-    return _terms(library, np.concatenate([x for _, x in segments])), np.concatenate(slopes)
+    return np.asarray(library.transform(np.concatenate(curves))), np.concatenate(slopes)
+
+
+def _spline_rows(
+    segments: Sequence[Trajectory], library: pysindy.PolynomialLibrary, seed: int
+) -> Rows:
+    splines = smooth(segments, np.random.default_rng(seed)).splines
+    curves = [spline(times) for spline, (times, _) in zip(splines, segments, strict=True)]
+    slopes = [spline(times, 1) for spline, (times, _) in zip(splines, segments, strict=True)]
+    return np.asarray(library.transform(np.concatenate(curves))), np.concatenate(slopes)
 
 
 def _weak_rows(

@@ -105,12 +105,10 @@ def film(
     paths, scenes = [], []
     for number, (camera, view) in enumerate(zip(rig.cameras, views, strict=True), start=1):
         draw, disturb = view.spawn(2)
+        scenes.append(Scene.random(np.random.default_rng(draw), **common))
+        paths.append(Path(folder) / f"{name}_{number}.mov")
         disturbance_seed = int(disturb.generate_state(1)[0])
-        scene = Scene.random(np.random.default_rng(draw), **common)
-        path = Path(folder) / f"{name}_{number}.mov"
-        render_video(path, camera.project(x), scene, seed=disturbance_seed)
-        paths.append(path)
-        scenes.append(scene)
+        render_video(paths[-1], camera.project(x), scenes[-1], seed=disturbance_seed)
     return Film(tuple(paths), rig, truth, t, x, tuple(scenes))
 
 

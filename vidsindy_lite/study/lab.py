@@ -81,15 +81,13 @@ def cameras(distance: float = 1.0) -> Rig:
     -------
     Rig
     """
+    places = (
+        (-80.0, 35.0, 1900.0, 1100.0, 3.0),
+        (40.0, 30.0, 2200.0, 1250.0, -5.0),
+        (160.0, 40.0, 2000.0, 1150.0, 8.0),
+    )
     return Rig(
-        tuple(
-            _camera(azimuth, elevation, distance * reach, distance * focal, roll)
-            for azimuth, elevation, reach, focal, roll in (
-                (-80.0, 35.0, 1900.0, 1100.0, 3.0),
-                (40.0, 30.0, 2200.0, 1250.0, -5.0),
-                (160.0, 40.0, 2000.0, 1150.0, 8.0),
-            )
-        )
+        tuple(_camera(a, e, distance * r, distance * f, roll) for a, e, r, f, roll in places)
     )
 
 
@@ -111,12 +109,11 @@ def random_cameras(rng: np.random.Generator) -> Rig:
         azimuths = np.sort(rng.uniform(0, 360, 3))
         if np.diff(azimuths, append=azimuths[0] + 360).min() >= 60:
             break
+    places = zip(rng.permutation(azimuths), rng.uniform(1200, 3000, 3), strict=True)
     return Rig(
         tuple(
             _camera(azimuth, rng.uniform(20, 50), reach, 0.575 * reach, rng.uniform(-10, 10))
-            for azimuth, reach in zip(
-                rng.permutation(azimuths), rng.uniform(1200, 3000, 3), strict=True
-            )
+            for azimuth, reach in places
         )
     )
 
@@ -229,8 +226,7 @@ def film_ball(rig: Rig, x: Floats, folder: str | Path, seed: int = 0) -> list[Fl
         for k, path in enumerate(x):
             centroids, shapes = camera.ball_image(path, RADIUS)
             file = Path(folder) / f"path_{k + 1}_camera_{i + 1}.mov"
-            # All clips of one camera show the same cloth.
-            number = len(rig.cameras) * seed + i
+            number = len(rig.cameras) * seed + i  # all clips of one camera show the same cloth
             render_video(file, centroids, scene, FPS, number, 2 / scene.size * shapes)
             parts.append(track(file).pixels)
         tracks.append(np.vstack(parts))

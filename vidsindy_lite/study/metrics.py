@@ -166,14 +166,8 @@ def coefficients_in(system: PolynomialSystem, library: Ints) -> Floats:
     ndarray, shape (l, d)
         Zero for monomials that the system does not have.
     """
-    rows = {tuple(powers): row for row, powers in enumerate(system.exponents)}
-    none = np.zeros(system.d)
-    return np.array(
-        [
-            system.coefficients[rows[tuple(powers)]] if tuple(powers) in rows else none
-            for powers in library
-        ]
-    )
+    rows = dict(zip(map(tuple, system.exponents), system.coefficients, strict=True))
+    return np.array([rows.get(tuple(powers), np.zeros(system.d)) for powers in library])
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ precision saves no more than a third of the time.
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -48,6 +49,13 @@ ROUGHNESS = 1e-4
 """Weight of the second differences in the first curve: enough to carry it across gaps."""
 REPORT = 50
 """Gradient steps between two entries of the history."""
+RIDGE = 1e-6
+"""Ridge penalty of `stridge`; columns and derivatives are scaled to a root mean square of 1."""
+THRESHOLD_STEP = 1e-2
+"""First threshold of `stridge` and its first step: root mean square of what a term contributes,
+over that of the derivative."""
+THRESHOLDS = 100
+"""Number of thresholds that `stridge` tries."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,14 +168,13 @@ def discover_paper(
     if not (np.ptp(x, axis=0) > 0).all():
         raise ValueError(f"x: every coordinate must move, got ranges {np.ptp(x, axis=0)}")
     rng = np.random.default_rng(check_integer("seed", seed))
-    spans = max(1, round(chosen.knots_per_sample * (len(t) - 1)))
-    fit = _Fit(t, x, exponents, spans, chosen.collocation_per_knot, chosen.physics_weight, rng)
+    fit = _Fit(t, x, exponents, chosen, rng)
     fit.descend(chosen.pretraining, chosen.learning_rate)
     for _ in range(chosen.alternations):
         before = fit.active
         curve, slope = fit.collocation()
         terms = monomials(curve, exponents)
-        fit.restart(stridge(terms, slope, rng, sparsity_weight=chosen.sparsity_weight))
+        fit.restart(stridge(terms, slope, rng, chosen.sparsity_weight))
         fit.descend(chosen.epochs, chosen.learning_rate)
         if (fit.active == before).all():
             break
@@ -178,42 +185,37 @@ class _Fit:
     """Spline, coefficients and offset in standardised units, with the paper's two losses."""
 
     def __init__(
-        self,
-        t: Floats,
-        x: Floats,
-        exponents: Ints,
-        spans: int,
-        per_span: int,
-        physics_weight: float,
+        self, t: Floats, x: Floats, exponents: Ints, settings: PaperSettings,
         rng: np.random.Generator,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.began = time.perf_counter()
         self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         self.exponents = exponents
-        self.physics_weight = physics_weight
+        self.physics_weight = settings.physics_weight
         self.history: list[dict[str, float]] = []
         self.iteration = 0
         centre, scale = x.mean(axis=0), x.std(axis=0)
+        spans = max(1, round(settings.knots_per_sample * (len(t) - 1)))
         breakpoints = np.linspace(t[0], t[-1], spans + 1)
         knots = clamped_knots(breakpoints)
         first, values = local_basis(knots, t)
         control = _first_curve(first, values, (x - centre) / scale, spans + DEGREE)
 
         # The same number in every span: random in time, and products become small and batched.
-        fractions = rng.uniform(size=(spans, per_span))
+        fractions = rng.uniform(size=(spans, settings.collocation_per_knot))
         random_times = breakpoints[:-1, None] + fractions * np.diff(breakpoints)[:, None]
-        _, basis = local_basis(knots, random_times.ravel())
-        slopes = local_basis(knots, random_times.ravel(), order=1)[1]
-        shape = (spans, per_span, DEGREE + 1)
-        slope = _curve(torch.tensor(slopes.reshape(shape)), torch.tensor(control)).numpy()
+        basis, slopes = (
+            local_basis(knots, random_times.ravel(), order)[1].reshape(*fractions.shape, DEGREE + 1)
+            for order in (0, 1)
+        )
+        slope = _curve(torch.tensor(slopes), torch.tensor(control)).numpy()
         self.units = Units(centre, scale, time=float(1 / slope.std(axis=0).mean()))
         self.data = self._tensor((x - centre) / scale)
-        self.sample_control = torch.tensor(
-            first[:, None] + np.arange(DEGREE + 1), device=self.device
-        )
+        touched = first[:, None] + np.arange(DEGREE + 1)
+        self.sample_control = torch.tensor(touched, device=self.device)
         self.sample_basis = self._tensor(values)[:, :, None]
-        self.basis = self._tensor(basis.reshape(shape))
-        self.slopes = self._tensor(slopes.reshape(shape) * self.units.time)
+        self.basis = self._tensor(basis)
+        self.slopes = self._tensor(slopes * self.units.time)
         self.control_points = self._tensor(control).requires_grad_()
         self.offset = self._tensor(np.zeros(x.shape[1])).requires_grad_()
         curve, slope = self.collocation()
@@ -231,11 +233,8 @@ class _Fit:
 
     def collocation(self) -> tuple[Floats, Floats]:
         """Curve without offset and its slope at the collocation times, each (k, d)."""
-        with torch.no_grad():
-            control = self.control_points
-            return _curve(self.basis, control).numpy(force=True), _curve(
-                self.slopes, control
-            ).numpy(force=True)
+        curve, slope = (_curve(b, self.control_points) for b in (self.basis, self.slopes))
+        return curve.numpy(force=True), slope.numpy(force=True)
 
     def losses(self) -> tuple[torch.Tensor, torch.Tensor]:
         """Data loss and physics loss (paper: Eqs. 9a and 9b)."""
@@ -294,13 +293,11 @@ def _curve(basis: torch.Tensor, control_points: torch.Tensor) -> torch.Tensor:
 
 def _monomials(x: torch.Tensor, exponents: Ints) -> torch.Tensor:
     """Monomials of points (n, d), shape (n, l): as `polynomials.monomials`, for autograd."""
-    columns = []
-    for powers in exponents:
-        factors = [x[:, i] for i, power in enumerate(powers) for _ in range(power)]
-        product = torch.ones_like(x[:, 0])
-        for factor in factors:
-            product = product * factor
-        columns.append(product)
+    variables, ones = np.arange(x.shape[1]), torch.ones_like(x[:, 0])
+    columns = [
+        math.prod((x[:, i] for i in np.repeat(variables, powers)), start=ones)
+        for powers in exponents
+    ]
     return torch.stack(columns, dim=1) if columns else x.new_zeros((len(x), 0))
 
 
@@ -320,13 +317,7 @@ def _first_curve(first: Ints, values: Floats, x: Floats, r: int) -> Floats:
 
 
 def stridge(
-    library: Floats,
-    derivative: Floats,
-    rng: np.random.Generator,
-    ridge: float = 1e-6,
-    sparsity_weight: float = 5e-3,
-    step: float = 1e-2,
-    trials: int = 100,
+    library: Floats, derivative: Floats, rng: np.random.Generator, sparsity_weight: float = 5e-3
 ) -> Floats:
     """Sequentially thresholded ridge regression with an adaptive threshold (paper: Eq. S8).
 
@@ -344,15 +335,8 @@ def stridge(
         Derivatives to explain, one column an equation, each treated alone.
     rng : numpy.random.Generator
         Draws the held-out rows.
-    ridge : float
-        Ridge penalty; columns and derivatives are scaled to a root mean square of 1.
     sparsity_weight : float
         Price of a term: what it has to save of the relative error of the derivative.
-    step : float
-        First threshold and its first step: root mean square of what a term contributes, over
-        that of the derivative.
-    trials : int
-        Number of thresholds tried.
 
     Returns
     -------
@@ -383,7 +367,7 @@ def stridge(
     size, speed = _root_mean_square(library), _root_mean_square(derivative)
     scaled = library / size
     columns = [
-        _stridge_column(scaled, target, training, held_out, ridge, sparsity_weight, step, trials)
+        _stridge_column(scaled, target, training, held_out, sparsity_weight)
         for target in (derivative / speed).T
     ]
     return np.stack(columns, axis=1) * speed / size[:, None]
@@ -396,14 +380,7 @@ def _root_mean_square(columns: Floats) -> Floats:
 
 
 def _stridge_column(
-    scaled: Floats,
-    target: Floats,
-    training: Ints,
-    held_out: Ints,
-    ridge: float,
-    price: float,
-    step: float,
-    trials: int,
+    scaled: Floats, target: Floats, training: Ints, held_out: Ints, price: float
 ) -> Floats:
     """Sparse coefficients of one equation, in scaled columns."""
     gram = scaled[training].T @ scaled[training] / len(training)
@@ -413,10 +390,10 @@ def _stridge_column(
         residual = target[held_out] - scaled[held_out] @ coefficients
         return float(np.sqrt((residual**2).mean())) + price * np.count_nonzero(coefficients)
 
-    best = _thresholded(gram, pull, ridge, 0.0)
-    lowest, threshold = loss(best), step
-    for _ in range(trials):
-        trial = _thresholded(gram, pull, ridge, threshold)
+    best = _thresholded(gram, pull, 0.0)
+    lowest, threshold, step = loss(best), THRESHOLD_STEP, THRESHOLD_STEP
+    for _ in range(THRESHOLDS):
+        trial = _thresholded(gram, pull, threshold)
         value = loss(trial)
         if value <= lowest:
             best, lowest = trial, value
@@ -431,13 +408,13 @@ def _stridge_column(
     return refit
 
 
-def _thresholded(gram: Floats, pull: Floats, ridge: float, threshold: float) -> Floats:
+def _thresholded(gram: Floats, pull: Floats, threshold: float) -> Floats:
     """Ridge regression; columns below the threshold are cut, again until none is."""
     support = np.ones(len(pull), dtype=bool)
     coefficients = np.zeros(len(pull))
     while support.any():
         inside = np.flatnonzero(support)
-        damped = gram[np.ix_(inside, inside)] + ridge * np.eye(len(inside))
+        damped = gram[np.ix_(inside, inside)] + RIDGE * np.eye(len(inside))
         coefficients[inside] = np.linalg.solve(damped, pull[inside])
         small = support & (np.abs(coefficients) < threshold)
         if not small.any():

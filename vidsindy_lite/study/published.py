@@ -105,13 +105,11 @@ class Misprint:
 
 def _law(equations: Mapping[str, Mapping[str, float | str]]) -> PolynomialSystem:
     """A law as it is printed; text is a fraction: "8/3"."""
-    return PolynomialSystem.from_terms(
-        {name: {term: _number(c) for term, c in terms.items()} for name, terms in equations.items()}
-    )
+    return PolynomialSystem.from_terms({name: _numbers(row) for name, row in equations.items()})
 
 
-def _number(printed: float | str) -> float:
-    return float(Fraction(printed))
+def _numbers(printed: Mapping[str, float | str]) -> dict[str, float]:
+    return {name: float(Fraction(value)) for name, value in printed.items()}
 
 
 def _score(row: Sequence) -> PublishedScore:
@@ -130,11 +128,7 @@ LAB = PublishedPosition(**{name: tuple(point) for name, point in _PRINTED["lab"]
 """Lab experiment; the origin is a corner of the table."""
 
 SYSTEMS_S1: dict[str, PublishedSystem] = {
-    name: PublishedSystem(
-        parameters={key: _number(value) for key, value in system["parameters"].items()},
-        x0=tuple(system["x0"]),
-        law=_law(system["law"]),
-    )
+    name: PublishedSystem(_numbers(system["parameters"]), tuple(system["x0"]), _law(system["law"]))
     for name, system in _PRINTED["table_S1"].items()
 }
 """Table S1 by system, in the printed order."""

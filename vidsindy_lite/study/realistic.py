@@ -175,10 +175,8 @@ def film_scene(rig: Rig, x: Floats, seed: int = 0) -> tuple[View, ...]:
     views = []
     for camera, stream in zip(rig.cameras, streams, strict=True):
         rng = np.random.default_rng(stream)
-        tree = _tree_before(camera, rng)
-        size = _SIZE * camera.image_size[0]
-        own = {"size": size, "trees": (tree,), "image_size": camera.image_size}
-        scene = Scene.random(rng, **common, **own)
+        own = {"trees": (_tree_before(camera, rng),), "image_size": camera.image_size}
+        scene = Scene.random(rng, **common, **own, size=_SIZE * camera.image_size[0])
         views.append(_view(camera.project(x), scene, int(rng.integers(2**31))))
     return tuple(views)
 

@@ -36,6 +36,7 @@ from ..stamp import PACKAGE, code_stamp, repository_root, write_file
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
+Function = Callable[[Task], Result]
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -45,7 +46,7 @@ class TaskError(RuntimeError):
 
 
 def sweep(
-    function: Callable[[Task], Result],
+    function: Function[Task, Result],
     tasks: Iterable[Task],
     *,
     jobs: int = 2,
@@ -101,7 +102,7 @@ def sweep(
     return [results[number] for number in range(len(tasks))]
 
 
-def remember(function: Callable[[Task], Result], task: Task) -> Result:
+def remember(function: Function[Task, Result], task: Task) -> Result:
     """Call a function for one task in this process, or read the stored result back.
 
     For a task that builds on the results of another sweep. While another process of this machine
@@ -124,9 +125,12 @@ def _check(function: Callable, tasks: list, jobs: int) -> None:
             f"results depend on, got {function!r}"
         )
     for task in tasks:
-        parameters = getattr(type(task), "__dataclass_params__", None)
-        # Hashable, hence without arrays: the repr of a large one leaves numbers out.
-        if not (parameters and parameters.frozen and _is_hashable(task)):
+        try:
+            hash(task)  # fails with arrays, and the repr of a large one leaves numbers out
+            frozen = type(task).__dataclass_params__.frozen
+        except (AttributeError, TypeError):
+            frozen = False
+        if not frozen:
             raise ValueError(
                 "tasks: each must be a frozen dataclass of numbers, text and tuples of them, "
                 f"got {task!r}"
@@ -135,15 +139,7 @@ def _check(function: Callable, tasks: list, jobs: int) -> None:
         raise ValueError(f"jobs: must be at least 1, got {jobs}")
 
 
-def _is_hashable(task: object) -> bool:
-    try:
-        hash(task)
-    except TypeError:
-        return False
-    return True
-
-
-def _remember(function: Callable[[Task], Result], task: Task, file: Path | None) -> Result:
+def _remember(function: Function[Task, Result], task: Task, file: Path | None) -> Result:
     if file is None:
         return function(task)
     from filelock import FileLock
@@ -158,7 +154,7 @@ def _remember(function: Callable[[Task], Result], task: Task, file: Path | None)
 
 
 def _call(
-    function: Callable[[Task], Result], number: int, task: Task, file: Path | None = None
+    function: Function[Task, Result], number: int, task: Task, file: Path | None = None
 ) -> tuple[int, Result]:
     try:
         return number, _remember(function, task, file)
@@ -169,17 +165,14 @@ def _call(
 
 
 def _here(
-    function: Callable[[Task], Result], todo: Mapping[int, Task], jobs: int, files: dict[int, Path]
+    function: Function[Task, Result], todo: Mapping[int, Task], jobs: int, files: dict[int, Path]
 ) -> Iterator[tuple[int, Result]]:
     """Numbers and results of the tasks as they come, from processes of this machine."""
     import cv2
     from joblib import Parallel, delayed, parallel_config
 
-    one_thread = {
-        "inner_max_num_threads": 1,  # of BLAS, OpenMP and torch; OpenCV has its own
-        "initializer": cv2.setNumThreads,
-        "initargs": (1,),
-    }
+    # One thread of BLAS, OpenMP and torch; OpenCV has its own.
+    one_thread = {"inner_max_num_threads": 1, "initializer": cv2.setNumThreads, "initargs": (1,)}
     with parallel_config("loky", n_jobs=jobs, **one_thread):
         # One task a batch: a result comes when it is there, not when its batch is.
         parallel = Parallel(return_as="generator_unordered", batch_size=1)
@@ -190,10 +183,7 @@ def _here(
 
 
 def _on_cluster(
-    function: Callable[[Task], Result],
-    todo: Mapping[int, Task],
-    address: str,
-    files: dict[int, Path],
+    function: Function[Task, Result], todo: Mapping[int, Task], address: str, files: dict[int, Path]
 ) -> Iterator[tuple[int, Result]]:
     """Numbers and results of the tasks as they come, from the workers of a Dask cluster.
 

@@ -67,7 +67,7 @@ def _benchmark(name: str, x0: tuple[float, ...], period: float, **equations: Ter
     return Benchmark(law.names, law.exponents, law.coefficients, name=name, x0=x0, period=period)
 
 
-_ALL = [
+SYSTEMS: dict[str, Benchmark] = {system.name: system for system in (
     _benchmark(
         "Lorenz", (-8, 7, 27), 1.50,
         x={"x": -10, "y": 10}, y={"x": 28, "xz": -1, "y": -1}, z={"xy": 1, "z": -8 / 3},
@@ -97,7 +97,5 @@ _ALL = [
         "WangSun", (1, 1, 0), 6.0,
         x={"x": 0.5, "yz": 1}, y={"x": -1, "y": -0.5, "xz": -1}, z={"z": -1, "xy": -1},
     ),
-]  # fmt: skip
-
-SYSTEMS: dict[str, Benchmark] = {system.name: system for system in _ALL}
+)}  # fmt: skip
 """The systems of Table S1 in their native frame, by name; periods as in ``dysts``."""

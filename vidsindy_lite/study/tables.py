@@ -7,7 +7,6 @@ the processor. So tables show medians and rates.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from .trials import CORRUPTIONS, TrialResult
@@ -39,26 +38,15 @@ def tabulate(results: Iterable[TrialResult]) -> DataFrame:
 
 
 def _row(result: TrialResult) -> dict[str, object]:
-    scored = result.score
-    return asdict(result.trial) | {
-        "exact": scored.exact,
-        "terms_found": scored.terms_found,
-        "false_positives": scored.false_positives,
-        "missing": scored.missing,
+    fields = vars(result) | vars(result.score) | vars(result.trial)  # "trial" is now its number
+    properties = {
+        "exact": result.score.exact,
+        "max_coefficient_error": result.score.max_coefficient_error,
         "wrong_terms": result.wrong_terms,
-        "l2": scored.l2,
-        "precision": scored.precision,
-        "recall": scored.recall,
-        "max_coefficient_error": scored.max_coefficient_error,
-        "native_exact": result.native_exact,
-        "status": result.status,
         "verdict": result.verdict,
-        "warnings": result.warnings,
-        "promised_l2": result.promised_l2,
-        "pulls": result.pulls,
-        "law": result.law,
-        "seconds": result.seconds,
     }
+    left_out = ("score", "sigma", "coefficient_errors")
+    return {name: fields[name] for name in fields if name not in left_out} | properties
 
 
 def by_condition(trials: DataFrame) -> DataFrame:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
@@ -232,11 +233,7 @@ def grid(
         for condition, values in levels.items()
         for level in values
     )
-    systems, trials, methods = list(systems), list(trials), list(methods)
     return [
         Trial(system, condition, level, trial, method, frames=frames)
-        for system in systems
-        for trial in trials
-        for condition, level in cases
-        for method in methods
+        for system, trial, (condition, level), method in product(systems, trials, cases, methods)
     ]

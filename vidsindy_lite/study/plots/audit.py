@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...arrays import Floats
+from .common import draw_against_first
 
 
 def plot_paths(
@@ -27,11 +28,8 @@ def plot_paths(
     """
     figure, axes = plt.subplots(figsize=(7, 4.8))
     right, up = columns
-    broad = {"lw": 5, "color": "0.8"}
-    for index, (label, path) in enumerate(paths.items()):
-        style = broad if index == 0 else {"lw": 1.2, "color": f"C{index - 1}"}
-        style |= {"ls": ("-", "-", "--", ":")[index]}
-        axes.plot(path[:, right], path[:, up], label=label, **style)
+    curves = {label: path[:, columns] for label, path in paths.items()}
+    draw_against_first(axes, curves, styles=("-", "-", "--", ":"))
     axes.set(xlabel=f"{names[right]} (scene units)", ylabel=f"{names[up]} (scene units)")
     axes.set_aspect("equal", adjustable="datalim")
     figure.legend(loc="outside upper center")
@@ -71,10 +69,10 @@ def plot_ratios(ratios: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
         Ratios by system, by where they come from and by term; those that are not positive, of
         terms that were not found, are left out.
     """
-    height = 0.23 * sum(len(next(iter(series.values()))) for series in ratios.values())
+    heights = [len(next(iter(series.values()))) for series in ratios.values()]
     figure, panels = plt.subplots(
-        len(ratios), 1, figsize=(7.5, height + 2), sharex=True, squeeze=False,
-        height_ratios=[len(next(iter(series.values()))) for series in ratios.values()],
+        len(ratios), 1, figsize=(7.5, 0.23 * sum(heights) + 2), sharex=True, squeeze=False,
+        height_ratios=heights,
     )  # fmt: skip
     for axes, (system, series) in zip(panels[:, 0], ratios.items(), strict=True):
         terms = list(next(iter(series.values())))

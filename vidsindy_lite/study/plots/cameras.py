@@ -11,7 +11,7 @@ from mpl_toolkits.mplot3d import Axes3D
 
 from ...arrays import Floats
 from ...cameras import Camera, Rig
-from .common import finish_space, space_axes
+from .common import SPACE, draw_against_first, finish_space, image_axes
 
 
 def plot_view_plane(camera: Camera, x: Floats) -> Figure:
@@ -24,7 +24,7 @@ def plot_view_plane(camera: Camera, x: Floats) -> Figure:
     x : ndarray, shape (n, 3)
         Curve, scene units.
     """
-    figure, axes = space_axes((7.5, 5.2))
+    figure, axes = plt.subplots(figsize=(7.5, 5.2), subplot_kw=SPACE)
     flat = _on_plane(camera, camera.project(x))
     axes.plot(*x.T, lw=1, label="3D trajectory")
     axes.plot(*flat.T, lw=1, label="its projection on the view plane")
@@ -90,10 +90,7 @@ def plot_in_plane(curves: Mapping[str, Floats]) -> Figure:
         In-plane coordinates by name, the first drawn as a broad line.
     """
     figure, axes = plt.subplots(figsize=(7, 4.8))
-    broad = {"lw": 5, "color": "0.8"}
-    for index, (name, curve) in enumerate(curves.items()):
-        style = broad if index == 0 else {"lw": 1.2, "color": f"C{index - 1}"}
-        axes.plot(*curve.T, label=name, **style)
+    draw_against_first(axes, curves)
     axes.set(xlabel="X' (scene units)", ylabel="Y' (scene units)", aspect="equal")
     figure.legend(loc="outside upper center")
     return figure
@@ -109,7 +106,7 @@ def plot_rig(rig: Rig, x: Floats) -> Figure:
     x : ndarray, shape (n, 3)
         Trajectory, scene units.
     """
-    figure, axes = space_axes((7.5, 5.5))
+    figure, axes = plt.subplots(figsize=(7.5, 5.5), subplot_kw=SPACE)
     axes.plot(*x.T, color="k", lw=0.8)
     for i, camera in enumerate(rig.cameras):
         seen = _on_plane(camera, camera.project(x))
@@ -130,11 +127,9 @@ def plot_tracks(tracks: Sequence[Floats], rig: Rig) -> Figure:
     """
     figure, panels = plt.subplots(1, len(tracks), figsize=(3.2 * len(tracks), 3.6))
     for i, (axes, track, camera) in enumerate(zip(panels, tracks, rig.cameras, strict=True)):
-        width, height = camera.image_size
         axes.plot(*track.T, color=f"C{i}", lw=0.8)
-        axes.set(title=f"camera {i + 1}", xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
-        axes.set(aspect="equal", xlabel="u (px)", xticks=(0, width // 2, width))
-        axes.set(yticks=(0, height // 2, height))
+        axes.set_title(f"camera {i + 1}")
+        image_axes(axes, camera.image_size)
         axes.spines[["top", "right"]].set_visible(True)
     panels[0].set_ylabel("v (px)")
     return figure

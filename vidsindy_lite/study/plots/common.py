@@ -1,26 +1,43 @@
-"""What several modules of figures need: axes in space, images, line styles."""
+"""What several modules of figures need: axes in space, axes of an image, curves, line styles."""
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
+from collections.abc import Mapping, Sequence
+
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d import Axes3D
 
+from ...arrays import Floats
+
 STYLES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (7, 2)), (0, (1, 1)))
+SPACE = {"projection": "3d", "proj_type": "ortho"}
 
 
-def space_axes(size: tuple[float, float]) -> tuple[Figure, Axes3D]:
-    figure = plt.figure(figsize=size)
-    axes = figure.add_subplot(projection="3d", proj_type="ortho")
-    return figure, axes
-
-
-def finish_space(axes: Axes3D, azimuth: float, elevation: float, zoom: float = 1.05) -> None:
+def finish_space(
+    axes: Axes3D, azimuth: float, elevation: float, zoom: float = 1.05, unit: str = "scene units"
+) -> None:
+    """The same scale along three labelled axes, seen from a direction in degrees."""
     extent = np.ptp([axes.get_xlim3d(), axes.get_ylim3d(), axes.get_zlim3d()], axis=1)
     axes.set_box_aspect(extent, zoom=zoom)  # one unit is equally long on all three axes
     axes.locator_params(nbins=5)
     for name in "xyz":
-        axes.set(**{f"{name}label": f"{name} (scene units)"})
+        axes.set(**{f"{name}label": f"{name} ({unit})"})
         getattr(axes, f"{name}axis").labelpad = 7
     axes.view_init(elev=elevation, azim=azimuth)
+
+
+def image_axes(axes: Axes, size: tuple[int, int]) -> None:
+    """The limits of an image of a width and a height, with three ticks on each side."""
+    width, height = size
+    axes.set(xlim=(-0.5, width - 0.5), xticks=(0, width // 2, width), xlabel="u (px)")
+    axes.set(ylim=(height - 0.5, -0.5), yticks=(0, height // 2, height), aspect="equal")
+
+
+def draw_against_first(
+    axes: Axes, curves: Mapping[str, Floats], styles: Sequence[str] = ("-",) * 4
+) -> None:
+    """Curves in a plane, (n, 2) by label, at most four; the first as a broad line below."""
+    for index, (label, curve) in enumerate(curves.items()):
+        style = {"lw": 1.2, "color": f"C{index - 1}"} if index else {"lw": 5, "color": "0.8"}
+        axes.plot(*curve.T, label=label, ls=styles[index], **style)

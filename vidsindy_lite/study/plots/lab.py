@@ -11,6 +11,7 @@ from matplotlib.ticker import LogLocator
 
 from ...arrays import Floats
 from ...cameras import Rig
+from .common import SPACE, finish_space
 
 
 def plot_table(
@@ -31,9 +32,8 @@ def plot_table(
     """
     figure = plt.figure(figsize=(10.5, 4.2), layout="compressed")
     panels = figure.subplot_mosaic(
-        [["above", "space"]], width_ratios=(1, 1.15),
-        per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}},
-    )  # fmt: skip
+        [["above", "space"]], width_ratios=(1, 1.15), per_subplot_kw={"space": SPACE}
+    )
     above, space = panels["above"], panels["space"]
     for path in x:
         space.plot(*path.T, color="k", lw=1.2)
@@ -44,14 +44,11 @@ def plot_table(
         space.plot(*place, f"C{i + 2}s", ms=8)
         space.text(*place + [0, 0, 130], f"$C_{i + 1}$", ha="center")
     space.plot([0, 750, 750, 0, 0], [0, 0, 750, 750, 0], 0, color="0.6", lw=0.8)
-    space.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     space.set_zlim3d(0, space.get_zlim3d()[1])
+    finish_space(space, azimuth=-65, elevation=25, zoom=1.12, unit="mm")
     space.locator_params(nbins=3)
     for axis in (space.xaxis, space.yaxis, space.zaxis):
         axis.labelpad = 8
-    extent = np.ptp([space.get_xlim3d(), space.get_ylim3d(), space.get_zlim3d()], axis=1)
-    space.set_box_aspect(extent, zoom=1.12)
-    space.view_init(elev=25, azim=-65)
     for k, path in enumerate(x):
         above.plot(*path[:, :2].T, color="0.75", lw=5, label="truth" if k == 0 else None)
     for i, (name, paths) in enumerate(found.items()):

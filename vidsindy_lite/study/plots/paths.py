@@ -9,9 +9,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...arrays import Bools, Floats
+from ...arrays import Floats
 from ...dynamics import Discovery, PolynomialSystem
-from .common import STYLES, finish_space
+from .common import SPACE, STYLES, finish_space
 
 
 def plot_sampling(t: Floats, x: Floats, samples: Mapping[str, tuple[Floats, Floats]]) -> Figure:
@@ -67,7 +67,7 @@ def plot_gaps(t: Floats, x: Floats, truth: Floats) -> Figure:
         "truth": (truth, {"color": "0.4", "ls": "--", "lw": 0.8}),
         "reconstructed": (x, {"color": "C0", "lw": 1.4}),
     }
-    return _over_time_and_in_space(t, curves, _missing(x), "hidden", "time units")
+    return _over_time_and_in_space(t, curves, "hidden", "time units")
 
 
 def plot_path(t: Floats, x: Floats, curve: Floats) -> Figure:
@@ -86,8 +86,7 @@ def plot_path(t: Floats, x: Floats, curve: Floats) -> Figure:
         "reconstructed": (x, {"color": "0.75", "lw": 4}),
         "curve that obeys the law": (curve, {"color": "C0", "lw": 1}),
     }
-    missing, unit = _missing(x), "units of the equations"
-    return _over_time_and_in_space(t, curves, missing, "not seen", unit)
+    return _over_time_and_in_space(t, curves, "not seen", "units of the equations")
 
 
 def plot_attractors(curves: Mapping[str, tuple[Floats, Floats]], columns: int = 4) -> Figure:
@@ -102,8 +101,7 @@ def plot_attractors(curves: Mapping[str, tuple[Floats, Floats]], columns: int = 
     columns = min(columns, len(curves))
     rows = -(-len(curves) // columns)
     size = (3.1 * columns, 3.3 * rows + 0.5) if columns > 1 else (6.5, 5)
-    space = {"projection": "3d", "proj_type": "ortho"}
-    figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False, subplot_kw=space)
+    figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False, subplot_kw=SPACE)
     for axes, (name, (truth, found)) in zip(grid.flat, curves.items(), strict=False):
         axes.plot(*truth.T, color="0.75", lw=3, label="truth")
         axes.plot(*found.T, color="C0", lw=0.8, label="discovered law")
@@ -133,37 +131,32 @@ def plot_coefficients(found: Discovery, truth: PolynomialSystem) -> Figure:
     truth : PolynomialSystem
         In the frame of the data.
     """
-    labels, values, errors, true = [], [], [], []
-    for equation, row in np.argwhere(truth.support.T):
-        index = found.terms.index(truth.terms[row])
-        labels.append(f"{truth.terms[row]} in d{truth.names[equation]}/dt")
-        values.append(found.coefficients[index, equation])
-        errors.append(found.standard_errors[index, equation])
-        true.append(truth.coefficients[row, equation])
-    values, errors, true = np.array([values, errors, true])
+    equations, rows = np.nonzero(truth.support.T)
+    terms = [truth.terms[row] for row in rows]
+    labels = [f"{term} in d{truth.names[j]}/dt" for term, j in zip(terms, equations, strict=True)]
+    place = [found.terms.index(term) for term in terms], equations
+    true, errors = truth.coefficients[rows, equations], found.standard_errors[place]
     figure, axes = plt.subplots(figsize=(7.5, 0.32 * len(labels) + 1.2))
-    place = -np.arange(len(labels))
+    heights = -np.arange(len(labels))
     axes.axvline(0, color="k", lw=0.8)
     scale = 1e6 / np.abs(true)
-    axes.errorbar((values - true) * scale, place, xerr=errors * scale, fmt="o")
-    axes.set_yticks(place, labels)
+    difference = found.coefficients[place] - true
+    axes.errorbar(difference * scale, heights, xerr=errors * scale, fmt="o")
+    axes.set_yticks(heights, labels)
     axes.set_xlabel("distance from the truth (millionths of the true coefficient)")
     axes.grid(axis="y", visible=False)
     return figure
 
 
 def _over_time_and_in_space(
-    t: Floats,
-    curves: Mapping[str, tuple[Floats, dict[str, Any]]],
-    missing: Bools,
-    word: str,
-    unit: str,
+    t: Floats, curves: Mapping[str, tuple[Floats, dict[str, Any]]], word: str, unit: str
 ) -> Figure:
-    """Curves by coordinate and in space, by label with their style; what is missing is shaded."""
+    """Curves over time and in space, by label, with their style; shaded where not reconstructed."""
+    missing = np.isnan(curves["reconstructed"][0]).any(axis=1)
     figure = plt.figure(figsize=(10.5, 4.7))
     panels = figure.subplot_mosaic(
         [["x", "space"], ["y", "space"], ["z", "space"]],
-        per_subplot_kw={"space": {"projection": "3d", "proj_type": "ortho"}}, width_ratios=(1.1, 1),
+        per_subplot_kw={"space": SPACE}, width_ratios=(1.1, 1),
     )  # fmt: skip
     space = panels["space"]
     for i, name in enumerate("xyz"):
@@ -182,8 +175,3 @@ def _over_time_and_in_space(
     finish_space(space, azimuth=-60, elevation=25, zoom=0.85)
     figure.legend(*space.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
-
-
-def _missing(x: Floats) -> Bools:
-    """Rows that are not known."""
-    return np.asarray(np.isnan(x).any(axis=1))

@@ -62,10 +62,10 @@ def plot_normal_matrix(matrix: Floats, curve: int, coefficients: int) -> Figure:
     shown = np.where(matrix != 0, kind, 0)
     colours = ("white", "C0", "C4", "C1")
     axes.imshow(shown, cmap=ListedColormap(colours), vmin=0, vmax=3, interpolation="nearest")
-    for edge in (curve, curve + coefficients):
-        axes.axhline(edge - 0.5, color="k", lw=0.8)
-        axes.axvline(edge - 0.5, color="k", lw=0.8)
     edges = np.array([0, curve, curve + coefficients, len(matrix)]) - 0.5
+    for edge in edges[1:-1]:
+        axes.axhline(edge, color="k", lw=0.8)
+        axes.axvline(edge, color="k", lw=0.8)
     names = ("control\npoints P", r"$\Lambda$", r"$\Delta$")
     axes.set_xticks((edges[1:] + edges[:-1]) / 2, names)
     axes.set_yticks((edges[1:] + edges[:-1]) / 2, names)
@@ -168,10 +168,9 @@ def plot_ranks(panels: Mapping[str, tuple[Floats, float | None]], true: Bools) -
     for axes, (name, (values, threshold)) in zip(grid, panels.items(), strict=True):
         kept = np.flatnonzero(values > 0)
         order = kept[np.argsort(-values[kept])]
-        rank = np.arange(1, len(order) + 1)
-        hit = true[order]
-        axes.plot(rank[hit], values[order][hit], "oC0", ms=7, label="true term")
-        axes.plot(rank[~hit], values[order][~hit], "xC1", ms=7, mew=2, label="false term")
+        rank, size, hit = np.arange(1, len(order) + 1), values[order], true[order]
+        axes.plot(rank[hit], size[hit], "oC0", ms=7, label="true term")
+        axes.plot(rank[~hit], size[~hit], "xC1", ms=7, mew=2, label="false term")
         if threshold is not None:
             axes.axhline(threshold, color="k", ls="--", lw=1, label="penalty of a linear term")
         axes.set(yscale="log", xlabel="rank", title=name, xlim=(0, len(values) + 1))

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ...arrays import Floats, Image
-from .common import STYLES
+from .common import STYLES, image_axes
 
 
 def plot_frames(
@@ -44,17 +44,14 @@ def plot_frames(
         height, width = image.shape[:2]
         _show(axes, image)
         axes.set_title(title, fontsize=11)
-        axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
-        axes.set(xticks=(0, 200, 400), yticks=(0, 200, 400))
+        axes.set(xlim=(-0.5, width - 0.5), xticks=(0, 200, 400), xlabel="u (px)")
+        axes.set(ylim=(height - 0.5, -0.5), yticks=(0, 200, 400), ylabel="v (px)")
         if tracks is not None:
             halo = withStroke(linewidth=2.4, foreground="white")
             axes.plot(*tracks[k].T, color="C0", lw=1.0, path_effects=[halo])
             if np.isfinite(tracks[k][indices[k]]).all():
                 _magnify(axes, image, tracks[k], indices[k])
-    for axes in grid[-1]:
-        axes.set_xlabel("u (px)")
-    for axes in grid[:, 0]:
-        axes.set_ylabel("v (px)")
+        axes.label_outer()
     return figure
 
 
@@ -79,14 +76,12 @@ def plot_views(
     figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False)
     halo = [withStroke(linewidth=3.5, foreground="white")]
     for axes, image, title, track in zip(grid.flat, images, titles, tracks, strict=False):
-        height, width = image.shape[:2]
         _show(axes, image)
         axes.plot(*track.T, color="white", lw=0.7)
         axes.plot(*track[index], "o", ms=22, mfc="none", mec="C0", mew=2, path_effects=halo)
         axes.set_title(title, fontsize=11)
-        axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
-        axes.set(xticks=(0, width // 2, width), yticks=(0, height // 2, height))
-        axes.set(xlabel="u (px)", ylabel="v (px)")
+        image_axes(axes, image.shape[1::-1])
+        axes.set_ylabel("v (px)")
     for axes in grid.flat[len(images) :]:
         axes.remove()
     return figure
@@ -118,10 +113,9 @@ def plot_tracker_steps(
         shown = axes.imshow(values, extent=extent, cmap="gray", interpolation="nearest", vmin=0)
         axes.grid(False)
         figure.colorbar(shown, ax=axes, shrink=0.72, pad=0.03)
+    panels[3].plot(*centroid, "+", color="C1", ms=16, mew=2)
     for axes, title in zip(panels, ("frame", "background", "difference", "coverage"), strict=True):
         axes.set_title(title)
-    panels[3].plot(*centroid, "+", color="C1", ms=16, mew=2)
-    for axes in panels:
         axes.set_xlabel("u (px)")
     panels[0].set_ylabel("v (px)")
     return figure
@@ -179,9 +173,7 @@ def plot_loss(loss: Sequence[float], steps: int) -> Figure:
     return figure
 
 
-def _show(
-    axes: Axes, image: Image, extent: tuple[float, float, float, float] | None = None
-) -> None:
+def _show(axes: Axes, image: Image, extent: tuple[float, ...] | None = None) -> None:
     """An image as a video reader gives it (blue-green-red)."""
     axes.imshow(image[..., ::-1].astype(np.uint8), extent=extent, interpolation="nearest")
     axes.grid(False)
@@ -197,9 +189,9 @@ def _magnify(axes: Axes, image: Image, track: Floats, index: int, reach: int = 2
     inside = [np.all(np.abs(seen - corner) < 1.1 * part, axis=1).sum() for corner in corners]
     right, bottom = corners[int(np.argmin(inside))]
     place = (right * (1 - part[0]), (1 - bottom) * (1 - part[1]), *part)
-    centre = track[index]
-    near: dict[str, Any] = {"xlim": (centre[0] - reach, centre[0] + reach)}
-    near |= {"ylim": (centre[1] + reach, centre[1] - reach), "xticks": (), "yticks": ()}
+    u, v = track[index]
+    near: dict[str, Any] = {"xlim": (u - reach, u + reach), "ylim": (v + reach, v - reach)}
+    near |= {"xticks": (), "yticks": ()}
     inset = axes.inset_axes(place, **near)
     _show(inset, image)
     inset.set(**near)
