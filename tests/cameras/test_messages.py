@@ -79,6 +79,7 @@ def test_lags_at_which_nothing_fits():
     assert found.errors.tolist() == [0, np.inf, np.inf]
     (warning,) = found.warnings
     assert "no lags of the videos make the views agree: (0, 0, 0) frames were taken" in warning
+    assert "which no cameras fit; check the rig" in warning
 
 
 def test_warnings_are_no_part_of_a_rig(tmp_path):

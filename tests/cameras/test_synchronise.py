@@ -178,6 +178,12 @@ def periodic(k):
     )
 
 
+def test_a_repeated_motion_is_told_with_known_cameras_too():
+    rig = vl.Rig.around(periodic(np.arange(61)))
+    found = learn_lags(filmed((periodic, rig), (150,) * 3, (0, 20, 5)), rig)
+    assert "the lags of the videos cannot be told: (" in found.warnings[0]
+
+
 @pytest.mark.slow
 def test_a_motion_that_repeats_itself_leaves_several_lags():
     rig = vl.Rig.around(periodic(np.arange(61)))
@@ -225,6 +231,16 @@ def test_no_lags_are_tried_twice(motion, monkeypatch):
     learn_lags(filmed(motion, (100,) * 3, (0, 0, 0)), vl.Rig([first, turned, third]))
     assert len(tried) > 10
     assert len(set(tried)) == len(tried)
+
+
+def test_a_slope_that_is_noise_tells_nothing(motion, monkeypatch):
+    # If a quarter of each squared slope is motion, the errors are twice those of motion alone.
+    tracks, errors = filmed(motion, (60,) * 3, (0, 0, 0)), {}
+    for share in (1, 0.25):
+        monkeypatch.setattr(synchrony, "_told", lambda *_, share=share: np.full(2, share))
+        errors[share] = learn_lags(tracks, motion[1]).errors
+    assert (errors[1][1:] > 0).all()
+    np.testing.assert_allclose(errors[0.25], 2 * errors[1], rtol=1e-9)
 
 
 @pytest.mark.slow
