@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from vidsindy_lite.dynamics.collocation import Collocation, State, Status
+from vidsindy_lite.dynamics.collocation import Collocation, State, Status, _without_systematic
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.splines import Segment
 
@@ -129,3 +129,12 @@ def test_a_fit_says_how_it_ended(problem, state):
     further = problem.solve(done.state, tolerance=-1.0, max_steps=1000)
     assert further.status is Status.STALLED
     assert problem.objective(further.state) <= problem.objective(done.state)
+
+
+def test_systematic_errors_are_eliminated_as_by_a_least_squares_fit():
+    rows, points = np.random.default_rng(0).normal(size=(2, 9, 5))
+    gram, solved = rows.T @ rows, points.reshape(3, 3, 5)
+    left, curve = _without_systematic(gram, solved, 3)
+    np.testing.assert_allclose(left, np.linalg.inv(np.linalg.inv(gram)[:3, :3]))
+    best = np.linalg.lstsq(rows[:, 3:], rows[:, :3], rcond=None)[0]
+    np.testing.assert_allclose(curve, solved[..., :3] - solved[..., 3:] @ best)

@@ -7,7 +7,7 @@ from scipy.stats import kstest
 from vidsindy_lite.dynamics import solver
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.problem import term_penalties
+from vidsindy_lite.dynamics.problem import pose, term_penalties
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
 
@@ -197,6 +197,13 @@ def test_history_tells_the_fit(lorenz):
     assert history[-1].terms == 7
     assert history[-1].physics_loss < 1e-4 * history[0].physics_loss
     assert all(a.seconds <= b.seconds for a, b in zip(history, history[1:], strict=False))
+
+
+def test_knots_are_halved_once_where_that_does_not_matter(lorenz):
+    _, t, x, found = lorenz
+    problem = pose([(t, x)], [np.empty((*x.shape, 0))], degree=3, seed=0)
+    spans = [len(segment.breakpoints) - 1 for segment in problem.segments()]
+    assert [len(np.unique(curve.t)) - 1 for curve in found.curves] == [2 * n for n in spans]
 
 
 # -- warnings --------------------------------------------------------------------------------------
