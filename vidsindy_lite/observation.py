@@ -112,12 +112,19 @@ def observe(
         a target is not found, if the given lags are clearly wrong, or if the cameras cannot be
         learned (see `learn_cameras`). What can be told before a video is tracked is.
     """
-    footage = _check_footage(paths, rig, t, lags, detector)
-    seen = _track_all(footage, detector, progress)
+    check_learnable(rig)
+    check_detector(detector)
+    files = _check_paths(paths, rig)
+    given = _check_lags(lags, len(files))
+    shots = _check_shots(files, rig)
+    times, rates = _clock(shots, t)
+    if given is not None:
+        _check_overlap(given, rates, shots, files)
+    videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
+    seen = [_track_one(path, shot.frames, detector) for path, shot in videos]
     tracks = [track.pixels for track in seen]
     doubts = [warning for track in seen for warning in track.warnings]
-    names = [path.name for path in footage.paths]
-    return _observed(tracks, rig, footage.t, footage.lags, footage.rates, names, doubts)
+    return _observed(tracks, rig, times, given, rates, [path.name for path in files], doubts)
 
 
 def observe_tracks(
@@ -146,15 +153,9 @@ def observe_tracks(
     """
     check_learnable(rig)
     raw = check_tracks(tracks, len(rig.cameras))
-    t = check_times(t)
-    if t.shape != (len(raw[0]),):
-        raise ValueError(
-            f"t: must have shape ({len(raw[0])},), one per row of tracks[0], got {t.shape}"
-        )
-    given = None if lags is None else check_vector("lags", lags, len(raw))
-    if given is not None:
-        given -= given[0]
-    return _observed(raw, rig, t, given, None, [f"tracks[{i}]" for i in range(len(raw))])
+    t = _check_clock(t, len(raw[0]), "row of tracks[0]")
+    names = [f"tracks[{i}]" for i in range(len(raw))]
+    return _observed(raw, rig, t, _check_lags(lags, len(raw)), None, names)
 
 
 def _observed(
@@ -188,35 +189,20 @@ def _observed(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Footage:
-    """Video files that fit a rig, their clock, and their lags if they are given."""
-
-    paths: list[Path]
-    shots: list[VideoInfo]
-    t: Floats
-    rates: Floats | None
-    lags: Floats | None
+def _check_clock(t: ArrayLike, frames: int, each: str) -> Floats:
+    """The time of each frame of the first video."""
+    times = check_times(t)
+    if times.shape != (frames,):
+        raise ValueError(f"t: must have shape ({frames},), one per {each}, got {times.shape}")
+    return times
 
 
-def _check_footage(
-    paths: Sequence[str | Path],
-    rig: Rig,
-    t: ArrayLike | None,
-    lags: Sequence[float] | None,
-    detector: str | os.PathLike,
-) -> _Footage:
-    """All that can be told before a video is tracked."""
-    check_learnable(rig)
-    check_detector(detector)
-    files = _check_paths(paths, rig)
-    given = None if lags is None else check_vector("lags", lags, len(files))
-    shots = _check_shots(files, rig)
-    times, rates = _clock(shots, t)
-    if given is not None:
-        given = given - given[0]
-        _check_overlap(given, rates, shots, files)
-    return _Footage(files, shots, times, rates, given)
+def _check_lags(lags: Sequence[float] | None, cameras: int) -> Floats | None:
+    """By how much each video starts later than the first, if that is given."""
+    if lags is None:
+        return None
+    given = check_vector("lags", lags, cameras)
+    return given - given[0]
 
 
 def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
@@ -249,13 +235,7 @@ def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
 def _clock(shots: Sequence[VideoInfo], t: ArrayLike | None) -> tuple[Floats, Floats | None]:
     """Time of each frame of the first video, and frames of each video in one frame of the first."""
     if t is not None:
-        times = check_times(t)
-        if times.shape != (shots[0].frames,):
-            raise ValueError(
-                f"t: must have shape ({shots[0].frames},), one per frame of the first video, "
-                f"got {times.shape}"
-            )
-        return times, None
+        return _check_clock(t, shots[0].frames, "frame of the first video"), None
     fps = np.array([shot.fps for shot in shots])
     if not (np.isfinite(fps) & (fps > 0)).all():
         raise ValueError(f"t: must be given if a file states no frame rate, got {fps.tolist()}")
@@ -276,13 +256,6 @@ def _check_overlap(
                 f"first ({shots[0].frames} frames), got {lag:g} for {path.name} ({shot.frames} "
                 "frames)"
             )
-
-
-def _track_all(footage: _Footage, detector: str | os.PathLike, progress: bool) -> list[Track]:
-    """The track of the target in each video."""
-    videos = list(zip(footage.paths, footage.shots, strict=True))
-    bar = tqdm(videos, desc="track", disable=not progress)
-    return [_track_one(path, shot.frames, detector) for path, shot in bar]
 
 
 def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
@@ -314,11 +287,7 @@ def _given(lags: Floats, learned: Lags) -> Lags:
 
 
 def _rig_warnings(
-    tracks: Sequence[Floats],
-    learned: Rig,
-    given: Rig,
-    names: Sequence[str],
-    lags: Lags,
+    tracks: Sequence[Floats], learned: Rig, given: Rig, names: Sequence[str], lags: Lags
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?"""
     missed = disagreement(tracks, learned)

@@ -1,7 +1,5 @@
 """From video files to equations: `observe`, then `discover` on the path that it reconstructs."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

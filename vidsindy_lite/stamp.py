@@ -15,9 +15,6 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
-
-__all__ = ["LIBRARIES", "PACKAGE", "code_stamp", "repository_root", "source_stamp", "write_file"]
 
 NAME = __name__.partition(".")[0]
 PACKAGE = Path(__file__).parent
@@ -31,6 +28,7 @@ BY_DEFINITION = tuple(
     f"{NAME}.{module}" for module in ("study.plots", "companion.artifacts", "companion.records")
 )
 WITHOUT_RESULTS = (f"{NAME}.companion", f"{NAME}.stamp")  # but for those above
+IMPORTS = (ast.Import, ast.ImportFrom)
 NO_DATA = {".py", ".pyc", ".checkpoint"}  # suffixes
 
 
@@ -88,7 +86,7 @@ def source_stamp(source: str, root: str | os.PathLike | None = None) -> str:
         part = _part(source, "", False, None)
     except SyntaxError:
         part = _Part("", frozenset({(NAME, ())}), frozenset())
-    return _digest(part, root, source)
+    return _digest(source, part, root)
 
 
 def code_stamp(function: Callable, root: str | os.PathLike | None = None) -> str:
@@ -107,39 +105,28 @@ def code_stamp(function: Callable, root: str | os.PathLike | None = None) -> str
         16 hexadecimal digits.
     """
     home, name = function.__module__, function.__qualname__
-    return _digest(_Part("", frozenset({(home, (name,))}), frozenset()), root, f"{home}.{name}")
+    return _digest(f"{home}.{name}", _Part("", frozenset({(home, (name,))}), frozenset()), root)
 
 
-def _digest(start: "_Part", root: str | os.PathLike | None, first: str) -> str:
+def _digest(first: str, start: "_Part", root: str | os.PathLike | None) -> str:
     parts, files = _reached(start)
     digest = hashlib.sha256(first.encode())
-    for node in sorted(parts, key=str):
+    for node in sorted(parts):
         digest.update(f"\0{node}\0{parts[node].meaning}".encode())
     for file in files:
         digest.update(b"\0" + file.relative_to(PACKAGE).as_posix().encode() + b"\0")
         digest.update(file.read_bytes())
     if root is not None:
-        digest.update("\0".join(_pins(Path(root) / "requirements.txt")).encode())
+        pins = (Path(root) / "requirements.txt").read_text("utf-8")
+        lines = re.findall(r"^[\w.-]+==[\w.+]+", pins, re.MULTILINE)
+        ours = sorted(line for line in lines if line.partition("==")[0] in LIBRARIES)
+        digest.update("\0".join(ours).encode())
     return digest.hexdigest()[:16]
-
-
-def _pins(requirements: Path) -> list[str]:
-    """The lines of requirements.txt on the libraries that results depend on."""
-    lines = re.findall(r"^[\w.-]+==[\w.+]+", requirements.read_text("utf-8"), re.MULTILINE)
-    return sorted(line for line in lines if line.partition("==")[0] in LIBRARIES)
 
 
 # -------------------------------------------------------------------------------- what is reached
 
-IMPORTS = (ast.Import, ast.ImportFrom)
-Reference = tuple[str, tuple[str, ...]]  # a module, and a dotted name in it
-
-
-class _Node(NamedTuple):
-    """A module, or one of its definitions."""
-
-    module: str
-    name: str | None = None
+Reference = tuple[str, tuple[str, ...]]  # a module, and a dotted name in it; none means all of it
 
 
 @dataclass(frozen=True)
@@ -151,79 +138,67 @@ class _Part:
     strings: frozenset[str]
 
 
-def _reached(start: _Part) -> tuple[dict[_Node, _Part], list[Path]]:
+def _reached(start: _Part) -> tuple[dict[Reference, _Part], list[Path]]:
     """The parts of the package that some code leads to, and their data files."""
-    parts: dict[_Node, _Part] = {}
+    parts: dict[Reference, _Part] = {}
     todo, strings = set(start.references), set(start.strings)
     seen: set[Reference] = set()
     beside: set[Path] = set()
     while todo:
         seen.add(reference := todo.pop())
-        for node in _nodes(*reference):
-            file = _file(node.module)
-            if file and node not in parts:
+        for module, names in _nodes(*reference):
+            file = _file(module)
+            if file and (module, names) not in parts:
                 source, is_front_door = file.read_text("utf-8"), file.name == "__init__.py"
-                parts[node] = _part(source, node.module, is_front_door, node.name)
-                todo |= parts[node].references - seen
-                strings |= parts[node].strings
+                part = _part(source, module, is_front_door, names[0] if names else None)
+                parts[module, names] = part
+                todo |= part.references - seen
+                strings |= part.strings
                 beside.add(file.with_suffix(""))
     text = "\n".join(strings)
+    files = [f for f in sorted(PACKAGE.rglob("*")) if f.suffix not in NO_DATA and f.is_file()]
+    # A file may be named as it is, or dotted, as matplotlib has it.
     return parts, [
-        file
-        for file in sorted(PACKAGE.rglob("*"))
-        if file.suffix not in NO_DATA and file.is_file()
-        if file.with_suffix("") in beside or _is_named(file, text)
+        f for f in files if f.with_suffix("") in beside or f.name in text or _dotted(f) in text
     ]
 
 
-def _is_named(file: Path, text: str) -> bool:
-    """Whether a text holds a data file's name, or its dotted one, as matplotlib has it."""
-    dotted = ".".join((NAME, *file.relative_to(PACKAGE).with_suffix("").parts))
-    return file.name in text or dotted in text
-
-
-def _nodes(module: str, names: tuple[str, ...]) -> Iterator[_Node]:
-    """What a dotted name in a module of the package counts as."""
-    file = _file(module)
-    if file is None or not names or file.name != "__init__.py":
-        yield from _whole(module) if not names else _one(module, names[0])
-        return
-    name, *rest = names
-    imported, defined = _top_level(file.read_text("utf-8"), module)
-    # `from . import room` in a front door leads to the module of that name, not to itself.
-    if targets := [t for t in imported.get(name, []) if t != (module, (name,))]:
-        for target, place in targets:
-            yield from _nodes(target, (*place, *rest))
-    elif name in defined:
-        yield _Node(module, name)
-    elif _file(f"{module}.{name}"):
-        yield from _nodes(f"{module}.{name}", tuple(rest))
-    else:
-        yield from _whole(module)
-
-
-def _one(module: str, name: str) -> Iterator[_Node]:
-    """A definition, or all of its module where definitions do not count for themselves."""
-    if _is_under(module, BY_DEFINITION):
-        yield _Node(module, name)
-    elif _file(module) and not _is_under(module, WITHOUT_RESULTS):
-        yield _Node(module)
-
-
-def _whole(module: str) -> Iterator[_Node]:
-    """A module, or every module of a folder."""
+def _nodes(module: str, names: tuple[str, ...]) -> Iterator[Reference]:
+    """The modules, or definitions of modules, that a dotted name in a module counts as."""
     file = _file(module)
     if file is None:
         return
-    for each in sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]:
-        parts = each.relative_to(PACKAGE).with_suffix("").parts
-        dotted = ".".join((NAME, *(part for part in parts if part != "__init__")))
-        if _is_under(dotted, BY_DEFINITION) or not _is_under(dotted, WITHOUT_RESULTS):
-            yield _Node(dotted)
+    if file.name != "__init__.py":
+        yield from _node(module, names[:1])
+        return
+    if names:
+        name, *rest = names
+        imported, defined = _top_level(file.read_text("utf-8"), module)
+        # `from . import room` in a front door leads to the module of that name, not to itself.
+        targets = [target for target in imported.get(name, []) if target != (module, (name,))]
+        if not targets and name in defined:
+            yield module, (name,)
+            return
+        if not targets and _file(f"{module}.{name}"):
+            targets = [(f"{module}.{name}", ())]
+        for target, place in targets:
+            yield from _nodes(target, (*place, *rest))
+        if targets:
+            return
+    for each in sorted(file.parent.rglob("*.py")):
+        yield from _node(_dotted(each), ())
 
 
-def _is_under(module: str, folders: Iterable[str]) -> bool:
-    return any(f"{module}.".startswith(f"{folder}.") for folder in folders)
+def _node(module: str, names: tuple[str, ...]) -> Iterator[Reference]:
+    """A definition, or all of its module where definitions do not count for themselves."""
+
+    def is_under(folders: Iterable[str]) -> bool:
+        return any(f"{module}.".startswith(f"{folder}.") for folder in folders)
+
+    if is_under(BY_DEFINITION):
+        yield module, names
+    elif not is_under(WITHOUT_RESULTS):
+        yield module, ()
 
 
 def _file(module: str) -> Path | None:
@@ -232,6 +207,12 @@ def _file(module: str) -> Path | None:
     place = PACKAGE.joinpath(*rest)
     files = (place / "__init__.py", place.parent / f"{place.name}.py")
     return next((file for file in files if first == NAME and file.is_file()), None)
+
+
+def _dotted(file: Path) -> str:
+    """The name of a module, or of another file as if it were one."""
+    parts = file.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join((NAME, *(part for part in parts if part != "__init__")))
 
 
 # ------------------------------------------------------------------------------ reading one source
@@ -250,19 +231,18 @@ def _part(source: str, module: str, is_front_door: bool, name: str | None) -> _P
         outer |= _imports((line for line in body if isinstance(line, IMPORTS)), package)
         # What binds no name works by itself, as a call or a condition does.
         body = [line for line in body if name in _binds(line) or not _binds(line)]
-    names = _Names()
-    for line in body:
-        names.visit(line)
-    inner = _imports(body, package)
-    bound = inner | {n: places for n, places in outer.items() if n in names.chains}
+    chains, inner = _chains(body), _imports(body, package)
+    bound = inner | {n: places for n, places in outer.items() if n in chains}
     references = {
         (place, (*first, *chain))
         for n, places in bound.items()
         for place, first in places
-        for chain in names.chains.get(n, {()})
+        for chain in chains.get(n, {()})
     }
     meaning = [_meaning(body), sorted((n, bound[n]) for n in bound.keys() - inner.keys())]
-    return _Part(repr(meaning), frozenset(references), frozenset(names.strings))
+    constants = (n.value for line in body for n in ast.walk(line) if isinstance(n, ast.Constant))
+    strings = frozenset(value for value in constants if isinstance(value, str))
+    return _Part(repr(meaning), frozenset(references), strings)
 
 
 @cache
@@ -290,28 +270,18 @@ def _imports(code: Iterable[ast.stmt], package: str) -> dict[str, list[Reference
     return found
 
 
-class _Names(ast.NodeVisitor):
-    """Collects names, each with the attributes asked of it ("a.b.c" is a: b, c), and strings."""
-
-    def __init__(self) -> None:
-        self.chains: dict[str, set[tuple[str, ...]]] = {}
-        self.strings: set[str] = set()
-
-    def visit_Attribute(self, node: ast.Attribute) -> None:
-        chain, base = [node.attr], node.value
-        while isinstance(base, ast.Attribute):
-            chain, base = [base.attr, *chain], base.value
-        if isinstance(base, ast.Name):
-            self.chains.setdefault(base.id, set()).add(tuple(chain))
-        else:
-            self.visit(base)
-
-    def visit_Name(self, node: ast.Name) -> None:
-        self.chains.setdefault(node.id, set()).add(())
-
-    def visit_Constant(self, node: ast.Constant) -> None:
-        if isinstance(node.value, str):
-            self.strings.add(node.value)
+def _chains(code: Iterable[ast.stmt]) -> dict[str, set[tuple[str, ...]]]:
+    """The names that some code uses, each with the attributes asked of it: "a.b.c" is a: b, c."""
+    found: dict[str, set[tuple[str, ...]]] = {}
+    within = set()  # a longer chain
+    for node in (node for line in code for node in ast.walk(line)):  # the longest come first
+        if isinstance(node, ast.Attribute):
+            within.add(node.value)
+        if isinstance(node, ast.Attribute | ast.Name) and node not in within:
+            name, *attributes = ast.unparse(node).split(".")
+            if all(map(str.isidentifier, [name, *attributes])):  # not that of a call or an item
+                found.setdefault(name, set()).add(tuple(attributes))
+    return found
 
 
 def _binds(line: ast.stmt) -> set[str]:

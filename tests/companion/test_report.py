@@ -186,7 +186,7 @@ t = np.linspace(0, 1, 20)
 x = np.column_stack((t, t**2, t**3))
 law = SimpleNamespace(curve=lambda t: x)
 figures = report._figures(SimpleNamespace(t=t, x=x, discovery=law), [])
-assert len(next(figures)[0]) > 1000
+assert len(next(figures)[1]) > 1000
 figures.close()
 print("interactive:", matplotlib.is_interactive())
 """

@@ -18,7 +18,6 @@ VIDSINDY_NOTEBOOK and VIDSINDY_STAMP. Without it, a cell that somebody runs by h
 build/interactive/figures: only the runner writes the committed ones.
 """
 
-import csv
 import html
 import io
 import os
@@ -32,21 +31,12 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from PIL import Image
 
 from ..stamp import LIBRARIES, repository_root, write_file
 from .records import RUN_TIMES, as_json, json_bytes, read_json, read_records
-
-__all__ = [
-    "Table",
-    "figures_folder",
-    "load_table",
-    "save_animation",
-    "save_figure",
-    "save_table",
-    "versions",
-]
 
 INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
@@ -123,11 +113,7 @@ class Table:
 
     def csv(self) -> str:
         """The table as comma-separated values; None is an empty cell."""
-        text = io.StringIO()
-        writer = csv.DictWriter(text, self.columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)
-        return text.getvalue()
+        return pd.DataFrame(self.rows, dtype=object).to_csv(index=False, lineterminator="\n")
 
     def markdown(self) -> str:
         """The table in Markdown, four significant digits."""

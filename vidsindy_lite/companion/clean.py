@@ -10,8 +10,6 @@ from nbformat import NotebookNode
 
 from .artifacts import with_palette
 
-__all__ = ["clean"]
-
 
 def clean(
     executed: NotebookNode, path: str | os.PathLike, profile: str, stamp: str

@@ -1,6 +1,5 @@
 """Two folders of figures, number by number: what a run on another machine or day has changed."""
 
-import html
 import json
 import math
 import os
@@ -11,14 +10,10 @@ from pathlib import Path
 from ..checks import check_path
 from .artifacts import SECONDS
 from .manifest import clear, sign
+from .pages import page
 from .records import RUN_TIMES
 
-__all__ = ["differences", "side_by_side"]
-
 SIDES = ("committed", "regenerated")
-PAGE = "index.html"
-
-_HEAD = "<!DOCTYPE html>\n<meta charset='utf-8'>\n<title>Differences</title>\n"
 
 # Of a number; and of the largest of its list, as what is zero but for rounding has no digits.
 TOLERANCE = 1e-3
@@ -88,18 +83,15 @@ def side_by_side(
             raise ValueError(f"output: must not hold or lie in what is compared, got '{output}'")
     found = differences(committed, regenerated)
     clear(output, "comparison")
-    page = []
+    pictures: dict[str, list[str]] = {name: [] for name in found}
     for side, folder in zip(SIDES, (committed, regenerated), strict=True):
         (output / side).mkdir(parents=True, exist_ok=True)
         for name in found:
             for file in Path(folder).glob(f"{name}.*"):
                 shutil.copy(file, output / side)
-    for name, place in found.items():
-        page.append(f"<h2>{name}</h2>\n<p>{html.escape(place)}</p>\n")
-        for side in SIDES:
-            if (output / side / f"{name}.png").exists():
-                page.append(f"<img src='{side}/{name}.png' alt='{side}' style='width: 49%'>\n")
-    (output / PAGE).write_text(_HEAD + "".join(page), encoding="utf-8")
+                pictures[name] += [side] if file.suffix == ".png" else []
+    index = page("compare.html", found=found, pictures=pictures)
+    (output / "index.html").write_text(index, "utf-8")
     sign(output)
     return found
 

@@ -19,12 +19,16 @@ from traitlets.config import Config
 
 from ..stamp import PACKAGE
 
-__all__ = ["NotebookError", "check_parameters", "execute"]
-
 CELL_TIMEOUT = 3600  # seconds; papermill's own default is to wait for ever
 ENGINE = "vidsindy_lite"  # under which papermill knows ours
-# The kernel warns on stderr that anyone on the machine could listen in otherwise.
-ENCRYPTED = Config(KernelManager={"transport_encryption": "auto"})
+SETTINGS: dict[str, Any] = {
+    "engine_name": ENGINE,
+    "kernel_name": "python3",
+    "startup_timeout": 120,
+    "progress_bar": False,
+    # The kernel warns on stderr that anyone on the machine could listen in otherwise.
+    "config": Config(KernelManager={"transport_encryption": "auto"}),
+}
 
 
 class NotebookError(RuntimeError):
@@ -88,22 +92,12 @@ def execute(
     try:
         with _kernel_environment(environment or {}):
             executed = papermill.execute_notebook(
-                jupytext.read(path),
-                None,
-                parameters=dict(parameters),
-                engine_name=ENGINE,
-                kernel_name="python3",
-                cwd=path.parent,
-                timeout=timeout,
-                startup_timeout=120,
-                progress_bar=False,
-                config=ENCRYPTED,
-            )
+                jupytext.read(path), None, dict(parameters),
+                cwd=path.parent, timeout=timeout, **SETTINGS,
+            )  # fmt: skip
     except PapermillExecutionError as error:
         traceback = strip_color("\n".join(error.traceback)) or f"{error.ename}: {error.evalue}"
-        raise NotebookError(
-            _cell_message(path, error.exec_count, error.source, traceback)
-        ) from None
+        raise _cell_error(path, error.exec_count, error.source, traceback) from None
     except (CellTimeoutError, DeadKernelError) as error:
         raise NotebookError(f"{path.stem}: {error}") from None
     except (RuntimeError, OSError) as error:
@@ -116,7 +110,7 @@ def execute(
             completed = cell.metadata.papermill.status == "completed"
             if not completed or cell.execution_count is None:
                 reason = "The run ended in this cell, before the end of the notebook."
-                raise NotebookError(_cell_message(path, cell.execution_count, cell.source, reason))
+                raise _cell_error(path, cell.execution_count, cell.source, reason)
     return executed
 
 
@@ -176,6 +170,6 @@ def _kernel_environment(environment: Mapping[str, str]) -> Iterator[None]:
         os.environ.update(before)
 
 
-def _cell_message(path: Path, count: int | None, source: str, what: str) -> str:
+def _cell_error(path: Path, count: int | None, source: str, what: str) -> NotebookError:
     shown = "\n".join(f"    {line}" for line in source.splitlines())
-    return f"{path.stem}, cell In [{count}]:\n\n{shown}\n\n{what}"
+    return NotebookError(f"{path.stem}, cell In [{count}]:\n\n{shown}\n\n{what}")

@@ -12,8 +12,6 @@ from ..stamp import write_file
 from .records import read_json
 from .registry import files_of
 
-__all__ = ["LEDGER", "enter", "seconds_if_current"]
-
 LEDGER = Path("build", "ledger.json")
 
 

@@ -5,8 +5,6 @@ from pathlib import Path
 
 from ..stamp import write_file
 
-__all__ = ["clear", "sign"]
-
 MANIFEST = "MANIFEST"  # in each such folder: after the title a line per file, digest and path
 TITLE = "Written by vidsindy_lite\n"
 

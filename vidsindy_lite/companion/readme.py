@@ -17,8 +17,6 @@ from ..study import LEAST
 from .artifacts import Table, load_table
 from .registry import load_run_times
 
-__all__ = ["fill", "write_readme"]
-
 PART = re.compile(r"(?<=^<!-- )(?!end )(\w+) -->\n.*?(?=<!-- end -->$)", re.DOTALL | re.MULTILINE)
 
 

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["RUN_TIMES", "as_json", "json_bytes", "read_json", "read_records"]
-
 RUN_TIMES = "run_times.json"  # of the notebooks, beside the records
 RECORD = {"id", "kind", "notebook", "stamp", "caption", "files"}  # what each has
 

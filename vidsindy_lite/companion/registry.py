@@ -6,16 +6,8 @@ from pathlib import Path
 
 from ..stamp import write_file
 from .artifacts import INDEX, as_table
+from .pages import page
 from .records import RUN_TIMES, json_bytes, read_json, read_records
-
-__all__ = [
-    "check_folder",
-    "files_of",
-    "load_run_times",
-    "prune",
-    "record_run_time",
-    "write_index",
-]
 
 # So that a regeneration adds little to the history, in bytes.
 LARGEST_FILE, LARGEST_FOLDER = 600_000, 10_000_000
@@ -44,22 +36,17 @@ def record_run_time(folder: str | os.PathLike, notebook: str, stamp: str, second
 def write_index(folder: str | os.PathLike) -> Path:
     """Write the folder's index page (README.md, which code hosts show) from the registry."""
     folder = Path(folder)
-    records, times = read_records(folder), _run_times(folder)
-    notebooks = sorted({record["notebook"] for record in records.values()} | set(times))
-    page = [
-        "# Figures and tables",
-        "Written by the notebooks (`make figures`); do not edit. Beside each image and table lie "
-        "its numbers. Run times are those of the first run of this code.",
-        "| notebook | run time | figures and tables |\n|---|---:|---|\n"
-        + "\n".join(_contents_line(notebook, records, times) for notebook in notebooks),
-    ]
-    for notebook in notebooks:
-        mine = [record for record in records.values() if record["notebook"] == notebook]
-        if mine:
-            page.append(f"## {_notebook_link(notebook)}")
-        for record in mine:
-            page += [f"### {record['id']}", _exhibit(record)]
-    write_file(folder / INDEX, ("\n\n".join(page) + "\n").encode())
+    records, times = read_records(folder), load_run_times(folder)
+    made: dict[str, list[dict]] = {
+        notebook: [record for record in records.values() if record["notebook"] == notebook]
+        for notebook in sorted({record["notebook"] for record in records.values()} | set(times))
+    }
+    tables = {
+        name: as_table(record)._repr_markdown_()
+        for name, record in records.items()
+        if record["kind"] == "table"
+    }
+    write_file(folder / INDEX, page("registry.md", made=made, times=times, tables=tables).encode())
     return folder / INDEX
 
 
@@ -149,28 +136,3 @@ def _too_large(folder: Path) -> list[str]:
     if (total := sum(sizes.values())) > LARGEST_FOLDER:
         problems.append(f"all files: {total} bytes, at most {LARGEST_FOLDER}")
     return problems
-
-
-def _notebook_link(notebook: str) -> str:
-    return f"[{notebook}](../notebooks/{notebook}.ipynb)"
-
-
-def _contents_line(notebook: str, records: dict, times: dict) -> str:
-    seconds = times.get(notebook, {}).get("seconds")
-    duration = "" if seconds is None else f"about {seconds:.0f} s" if seconds > 1 else "about 1 s"
-    ids = [r["id"] for r in records.values() if r["notebook"] == notebook]
-    links = ", ".join(f"[{artifact_id}](#{artifact_id.lower()})" for artifact_id in ids)
-    return f"| {_notebook_link(notebook)} | {duration} | {links} |"
-
-
-def _exhibit(record: dict) -> str:
-    artifact_id = record["id"]
-    if record["kind"] == "animation":
-        body = f"![{artifact_id}]({artifact_id}.gif)\n\n{record['caption']}"
-        return f"{body}\n\n[numbers]({artifact_id}.json)"
-    if record["kind"] == "figure":
-        body = f"![{artifact_id}]({artifact_id}.png)\n\n{record['caption']}"
-        drawing = f"[SVG]({artifact_id}.svg) · " if f"{artifact_id}.svg" in record["files"] else ""
-        return f"{body}\n\n{drawing}[numbers]({artifact_id}.json)"
-    links = f"[CSV]({artifact_id}.csv) · [numbers]({artifact_id}.json)"
-    return f"{as_table(record)._repr_markdown_()}\n{links}"

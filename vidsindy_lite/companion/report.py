@@ -15,7 +15,6 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-import jinja2
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,6 +26,7 @@ from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
 from ..study.plots import plot_path, plot_residuals, plot_rig, plot_views
 from ..vision import read_frame, video_info
+from .pages import page
 from .records import as_json
 
 PAGE, DATA, RIG = FILES = ("report.html", "result.json", "rig.toml")
@@ -176,43 +176,24 @@ def _law(found: Discovery, frame: str, origin: Floats, errors: Floats) -> dict[s
 
 def _page(found: VideoDiscovery, paths: Sequence[str | Path], content: Mapping[str, object]) -> str:
     """The report as one HTML page."""
-    loader = jinja2.FileSystemLoader(Path(__file__).parent)
-    pages = jinja2.Environment(
-        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, keep_trailing_newline=True
-    )
-    return pages.get_template(PAGE).render(
-        content, figures=_figures(found, paths), limit=DISAGREEMENT, data_file=DATA, rig_file=RIG
-    )
+    about = {"limit": DISAGREEMENT, "data_file": DATA, "rig_file": RIG}
+    return page("report.html", figures=_figures(found, paths), **about, **content)
 
 
 def _figures(found: VideoDiscovery, paths: Sequence[str | Path]) -> Iterator[tuple[str, str]]:
-    """The figures, each as a PNG in base64 with its caption, one after the other."""
+    """The figures one after the other, each a PNG in base64, by their names in the template."""
     # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
     # switched on meanwhile off again: so this comes first.
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        yield _figure(
-            plot_path(found.t, found.x, found.discovery.curve(found.t)),
-            "The reconstructed path (grey) and the curve that obeys the law (blue), over time and "
-            "in space. Where they part, the law does not hold.",
-        )
+        yield "path", _encoded(plot_path(found.t, found.x, found.discovery.curve(found.t)))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any():
-            yield _figure(
-                _first_look(found, paths, int(seen.argmax())),
-                "One instant in every video, with the whole track over it and a ring around the "
-                "target. The tracks should be whole and the rings on the same thing.",
-            )
+            yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
         if found.rig.is_orthographic:
-            yield _figure(
-                plot_rig(found.rig, found.x),
-                "The path (black) and what each camera sees of it, in its view plane.",
-            )
-        yield _figure(
-            plot_residuals(found.t, residuals(found.tracks, found.rig), DISAGREEMENT),
-            "By how many pixels the reconstructed target misses each track. Single high points are "
-            "jumps of a track; a level above the dashed line is a wrong rig or a wrong lag.",
-        )
+            yield "rig", _encoded(plot_rig(found.rig, found.x))
+        missed = residuals(found.tracks, found.rig)
+        yield "residuals", _encoded(plot_residuals(found.t, missed, DISAGREEMENT))
 
 
 def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:
@@ -224,9 +205,9 @@ def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int
     return plot_views(images, titles, found.tracks, instant)
 
 
-def _figure(figure: Figure, caption: str) -> tuple[str, str]:
+def _encoded(figure: Figure) -> str:
     """A figure as text, closed."""
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=110)
     plt.close(figure)
-    return base64.b64encode(image.getvalue()).decode(), caption
+    return base64.b64encode(image.getvalue()).decode()

@@ -14,9 +14,9 @@ import signal
 import sys
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -34,15 +34,6 @@ from .clean import clean
 from .execute import NotebookError, check_parameters, execute
 from .ledger import enter, seconds_if_current
 from .readme import write_readme
-
-__all__ = [
-    "Outcome",
-    "Report",
-    "find_notebooks",
-    "notebook_stamp",
-    "run",
-    "select_notebooks",
-]
 
 PROFILES = ("full", "quick")
 AT_ONCE = 2  # notebooks: most of them work on one core for most of their time
@@ -143,7 +134,7 @@ def run(
     Parameters
     ----------
     notebooks : iterable of str
-        As `select_notebooks` takes them; none means all.
+        As of `select_notebooks`.
     profile : {"full", "quick"}
         Handed to each notebook as its parameter `profile`.
     output : path, optional
@@ -151,8 +142,7 @@ def run(
         in the full profile and build/quick in the quick one. A notebook that fails leaves its
         executed half as it was.
     force : bool
-        Execute also what is up to date: executed here by the same code, with all its outputs in
-        place.
+        Execute also what is up to date: executed here by the same code, outputs in place.
     dask : str, optional
         Address of a Dask scheduler: what a notebook sweeps runs on its workers (see `sweep`).
     root : path, optional
@@ -165,18 +155,16 @@ def run(
     Raises
     ------
     ValueError
-        Before anything runs: on an unknown profile or notebook, on a notebook without the
-        parameter `profile`, or if the quick profile were to overwrite the repository's outputs.
+        Before anything runs: on an unknown profile or notebook, a notebook without the parameter
+        `profile`, or if the quick profile were to overwrite the repository's outputs.
     FileNotFoundError
         If there is no repository around the working directory.
     """
     root = repository_root() if root is None else Path(root).resolve()
     output = _output(profile, output, root)
-    chosen = select_notebooks(notebooks, root)
+    figures, chosen = output / "figures", select_notebooks(notebooks, root)
     for path in chosen:
         check_parameters(path, ["profile"])
-    figures = output / "figures"
-    figures.mkdir(parents=True, exist_ok=True)
     stamps: dict[str, str | None] = dict.fromkeys(path.stem for path in find_notebooks(root))
     registry.prune(figures, stamps)  # what a notebook left that has gone
     outcomes = {}
@@ -188,16 +176,9 @@ def run(
                 registry.prune(figures, stamps)  # what an earlier version of it left
                 registry.record_run_time(figures, task.path.stem, task.stamp, outcome.seconds)
                 enter(output, task.path, task.stamp, outcome.seconds)
-    registry.write_index(figures)
-    problems = registry.check_folder(figures, stamps)
-    if output == root and (root / "README.md").exists():
-        try:
-            write_readme(root)
-        except (ValueError, FileNotFoundError) as missing:
-            problems.append(f"README.md: {missing}")
-    in_order = tuple(outcomes[path] for path in chosen)
-    table, memory = _systems_table(figures, in_order), _largest_process()
-    return Report(in_order, tuple(problems), table, memory)
+    problems = _written_pages(figures, stamps, root)
+    done = tuple(outcomes[path] for path in chosen)
+    return Report(done, tuple(problems), _systems_table(figures, done), _largest_process())
 
 
 def notebook_stamp(path: str | os.PathLike, profile: str) -> str:
@@ -222,7 +203,7 @@ class _Task:
     stamp: str
     profile: str
     output: Path
-    environment: dict[str, str] = field(repr=False)
+    environment: dict[str, str]
 
 
 def _output(profile: str, output: str | os.PathLike | None, root: Path) -> Path:
@@ -237,6 +218,18 @@ def _output(profile: str, output: str | os.PathLike | None, root: Path) -> Path:
             f"output: the quick profile needs a folder of its own, got {str(output)!r}"
         )
     return output
+
+
+def _written_pages(figures: Path, stamps: Mapping[str, str | None], root: Path) -> list[str]:
+    """Write the index of the figures, with the repository's own the README; what is wrong."""
+    registry.write_index(figures)
+    problems = registry.check_folder(figures, stamps)
+    if figures == root / "figures" and (root / "README.md").exists():
+        try:
+            write_readme(root)
+        except (ValueError, FileNotFoundError) as missing:
+            problems.append(f"README.md: {missing}")
+    return problems
 
 
 def _outcomes(
@@ -301,13 +294,11 @@ def _executed(tasks: Sequence[_Task]) -> Iterator[tuple[_Task, Outcome]]:
 
 def _received(receiver: Connection, task: _Task, process: BaseProcess, started: float) -> Outcome:
     """What a process reports, or that it died before it could."""
-    try:
+    with suppress(EOFError):
         outcome = receiver.recv()
-    except EOFError:
-        outcome = None
-    process.join()
-    if outcome is not None:
+        process.join()
         return outcome
+    process.join()
     message = f"{task.path.stem}: the process that ran it died (exit code {process.exitcode})"
     return Outcome(task.path.stem, time.perf_counter() - started, message)
 

@@ -20,47 +20,8 @@ from pygments.formatters import HtmlFormatter
 
 from ..stamp import PACKAGE, repository_root, write_file
 from .manifest import clear, sign
+from .pages import page
 from .run import find_notebooks
-
-__all__ = ["build_site", "heading_anchor", "page_of"]
-
-PAGE = """\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<link rel="icon" href="data:,">
-<link rel="stylesheet" href="{top}site.css">
-{formulas}</head>
-<body>
-<nav><a href="{top}index.html">vidsindy_lite</a>
-<a href="{top}index.html#the-notebooks">notebooks</a>
-<a href="{top}figures/index.html">figures</a>
-<a href="{top}api/index.html">reference</a></nav>
-<main>
-{body}
-</main>
-</body>
-</html>
-"""
-
-
-# MathJax's own font, so that the pages look the same everywhere. Its style "@font-face" asks for
-# the page about:blank, which browsers refuse; assistive MathML for fonts that are not there.
-FORMULAS = """\
-<script type="text/x-mathjax-config">
-MathJax.Hub.Config({{
-  jax: ["input/TeX", "output/HTML-CSS"],
-  tex2jax: {{inlineMath: [["$", "$"]], displayMath: [["$$", "$$"]]}},
-  "HTML-CSS": {{availableFonts: [], webFont: "STIX-Web", linebreaks: {{automatic: true}},
-    styles: {{"@font-face": {{src: "local('serif')"}}}}}},
-  AssistiveMML: {{disabled: true}}, showMathMenu: false, messageStyle: "none",
-}});
-</script>
-<script src="{top}mathjax/MathJax.js?config=TeX-AMS-MML_HTMLorMML-full"></script>
-"""
 
 
 def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None) -> list[Path]:
@@ -143,8 +104,8 @@ class _Renderer(IPythonRenderer):
 
 
 def _html(markdown: str) -> str:
-    page = MarkdownWithMath(renderer=_Renderer(escape=False)).render(markdown)
-    return re.sub(r"(<table>.*?</table>)", r'<div class="wide">\1</div>', page, flags=re.DOTALL)
+    text = MarkdownWithMath(renderer=_Renderer(escape=False)).render(markdown)
+    return re.sub(r"(<table>.*?</table>)", r'<div class="wide">\1</div>', text, flags=re.DOTALL)
 
 
 def _notebook_body(path: Path) -> str:
@@ -165,12 +126,12 @@ def _write_reference(folder: Path) -> None:
     with warnings.catch_warnings():  # a room may bring its modules along
         warnings.filterwarnings("ignore", message="The module specification")
         pdoc.pdoc(*pages, output_directory=folder)
-    for page in folder.rglob("*.html"):  # a long name or signature scrolls, too
+    for path in folder.rglob("*.html"):  # a long name or signature scrolls, too
         narrow = "<style>main { overflow-x: auto; overflow-wrap: anywhere; }</style>\n</head>"
-        write_file(page, page.read_text("utf-8").replace("</head>", narrow).encode())
+        write_file(path, path.read_text("utf-8").replace("</head>", narrow).encode())
     lines = [
-        f"* [{name}]({page}): " + (import_module(name).__doc__ or "").split("\n\n")[0]
-        for name, page in pages.items()
+        f"* [{name}]({path}): " + (import_module(name).__doc__ or "").split("\n\n")[0]
+        for name, path in pages.items()
     ]
     _write_page(folder / "index.html", _html("# Reference\n\n" + "\n".join(lines)))
 
@@ -185,6 +146,5 @@ def reference_modules() -> list[str]:
 def _write_page(path: Path, body: str) -> None:
     title, *_ = re.findall(r"<h1[^>]*>(.*?)</h1>", body, re.DOTALL)
     top = "" if (path.parent / "site.css").exists() else "../"
-    formulas = FORMULAS.format(top=top) if "$" in body else ""
-    page = PAGE.format(title=re.sub(r"<[^>]*>", "", title), top=top, body=body, formulas=formulas)
-    write_file(path, page.encode())
+    title = re.sub(r"<[^>]*>", "", title)
+    write_file(path, page("site.html", title=title, top=top, body=body).encode())

@@ -8,8 +8,6 @@ Both turn an image into *predictions* of shape (5, n), one column per anchor: ce
 and height in pixels, confidence in [0, 1]. `detections` averages those that agree.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

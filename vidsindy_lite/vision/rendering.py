@@ -5,8 +5,6 @@ convention: u to the right, v down, pixel centres at integer coordinates, so tha
 top left pixel is (0, 0).
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path
