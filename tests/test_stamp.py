@@ -28,6 +28,13 @@ def test_written_file_replaces_the_old_one(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
+def test_a_file_that_cannot_be_replaced_leaves_nothing_beside(tmp_path):
+    (tmp_path / "taken" / "inside").mkdir(parents=True)
+    with pytest.raises(OSError):  # noqa: PT011  whatever the system calls it
+        write_file(tmp_path / "taken", b"new")
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
 # -------------------------------------------------------------------- a small package, edit by edit
 
 FILES = {

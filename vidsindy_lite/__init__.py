@@ -1,6 +1,9 @@
 """Governing equations of a moving target from the videos of several cameras.
 
     video files --vision--> pixel tracks --cameras--> path in space --dynamics--> equations
+                                                      and its errors
+    `------------------ observation ------------------'
+    `----------------------------------- pipeline ------------------------------------'
 
 `discover_from_videos` goes all the way; each room can be used by itself. The paper's world
 (benchmark systems, trials, baselines, scores) is `vidsindy_lite.study`, what turns the notebooks

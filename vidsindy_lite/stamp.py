@@ -1,4 +1,4 @@
-"""Stamps: hashes of what a result depends on. Beside them, where the repository is.
+"""Stamps: hashes of what a result depends on; where the repository is; files written in one step.
 
 The code of a notebook, or the function of a sweep, depends on the modules that it imports from the
 package, and on those that they import, imports inside functions included. An import through a front
@@ -59,8 +59,11 @@ def write_file(path: Path, content: bytes) -> None:
     """Replace a file in one step, so an interrupted run leaves the old one or the new one."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.{os.getpid()}")
-    beside.write_bytes(content)
-    beside.replace(path)
+    try:
+        beside.write_bytes(content)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 # ------------------------------------------------------------------------------------------- stamps

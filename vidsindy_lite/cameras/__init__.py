@@ -3,12 +3,13 @@
     geometry      rotations and planes
     models        the two models of camera: orthographic and perspective
     rig           the cameras that watch one scene, and their file
-    triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
     unknowns      what is unknown of a rig: as one vector, and linear equations for it
-    calibrate     tracks -> what is unknown of the cameras; eq4: the paper's own way, to compare
-    synchronise   tracks -> when each camera started; tracks at the same instants
-    uncertainty   what errors of cameras, lags and codecs do to the path
+ 1. synchronise   tracks -> when each camera started (`Lags`); tracks at the same instants
+ 2. calibrate     tracks -> the same `Rig`, with nothing unknown
+ 3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
+ 4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
     messages      all warnings
+    eq4           beside the way: calibration as the paper writes it, to compare
 
 The other rooms import from here alone.
 """

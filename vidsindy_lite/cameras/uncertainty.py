@@ -1,4 +1,4 @@
-"""How far the learned cameras and lags may be wrong, and the errors that this puts into the path.
+"""Systematic errors of the path, (k, n, 3), from cameras and lags that are learned but not exact.
 
 A wrong angle of 1e-4 turns the whole path by about as much: an error far below the noise of a
 frame, but shared by all frames, so that it does not average out. A law fitted to such a path has

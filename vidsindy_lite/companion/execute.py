@@ -102,8 +102,9 @@ def execute(
         raise NotebookError(f"{path.stem}: {error}") from None
     except (RuntimeError, OSError) as error:
         raise NotebookError(
-            f"{path.stem}: the kernel python3 did not start: {error}. What it wrote stands above; "
-            "`jupyter kernelspec list` shows which kernel has that name."
+            f"{path.stem}: could not be executed: {type(error).__name__}: {error}. If the kernel "
+            "python3 did not start, what it wrote stands above; `jupyter kernelspec list` shows "
+            "which kernel has that name."
         ) from error
     for cell in executed.cells:
         if cell.cell_type == "code" and cell.source.strip():

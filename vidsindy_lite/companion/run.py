@@ -37,7 +37,7 @@ from .readme import write_readme
 
 PROFILES = ("full", "quick")
 AT_ONCE = 2  # notebooks: most of them work on one core for most of their time
-SYSTEMS_TABLE = "table_systems"  # printed after a run that wrote it
+SYSTEMS_TABLE = "table_systems"  # printed after a run of its notebook, or if that is up to date
 
 
 @dataclass(frozen=True)
@@ -308,11 +308,12 @@ def _work(task: _Task, sender: Connection) -> None:
     error, started = None, time.perf_counter()
     try:
         executed = execute(task.path, {"profile": task.profile}, environment=task.environment)
-    except NotebookError as failure:
-        error = str(failure)
-    else:
         half = nbformat.writes(clean(executed, task.path, task.profile, task.stamp)) + "\n"
         write_file(task.output / "notebooks" / f"{task.path.stem}.ipynb", half.encode())
+    except NotebookError as failure:
+        error = str(failure)
+    except Exception as failure:  # such as a full disk: the other notebooks go on
+        error = f"{task.path.stem}: {type(failure).__name__}: {failure}"
     sender.send(Outcome(task.path.stem, time.perf_counter() - started, error))
 
 
@@ -363,7 +364,7 @@ def _largest_process() -> float | None:
 
 
 def _systems_table(figures: Path, outcomes: Sequence[Outcome]) -> artifacts.Table | None:
-    """The table of the systems, if this run wrote it."""
+    """The table of the systems, if its notebook ran or is up to date."""
     try:
         table = artifacts.load_table(SYSTEMS_TABLE, figures)
     except FileNotFoundError:

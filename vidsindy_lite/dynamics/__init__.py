@@ -1,8 +1,10 @@
 """A trajectory goes in, its law comes out.
 
 trajectories -> problem (smoothing: noise, gaps, units) -> solver -> discovery (diagnostics)
-solver: collocation on splines, selection of terms, origin, gaps
-law: polynomials, on a library of monomials; integrate solves it, cramer_rao bounds its errors
+solver: `discover`; its stages use collocation on splines, selection of terms, origin, gaps
+discovery: the result, with error bars from the last fit; diagnostics: all its warnings
+law: polynomials, on a library of monomials; integrate solves it
+beside the way: cramer_rao, the least errors that any estimate could have
 """
 
 from .collocation import Collocation, State, Status

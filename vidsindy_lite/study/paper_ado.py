@@ -1,6 +1,6 @@
 """The paper's own optimiser, as written: gradient descent alternating with STRidge (Eqs. S8-S9).
 
-It stands beside `ado.discover`, to show what the formulation gives with the optimiser that the
+It stands beside `dynamics.discover`, to show what the formulation gives with the optimiser that the
 paper describes. The formulation is the paper's: cubic B-splines with control points P and a
 learnable offset, data loss at the measured times (Eq. 9a), physics loss at many random
 collocation times (Eq. 9b), STRidge with an adaptive hard threshold for the coefficients, Adam on

@@ -3,7 +3,7 @@
 A task is a frozen dataclass that says all there is to say about it, its seed included, and what is
 done with it is a function of this package:
 
-    results = sweep(trial, [Trial("Lorenz", noise, seed) for noise in levels for seed in seeds])
+    results = sweep(run_trial, grid(["Lorenz"], {"noise": (0, 0.1, 0.2)}, range(5)))
 
 Each result goes to a file as soon as it is there, build/cache/<stamp>/<function>/<task>.pkl in the
 repository, or in place of build/cache the folder that the environment variable VIDSINDY_CACHE

@@ -5,8 +5,8 @@ gives what is left to one method:
 
     results = sweep(run_trial, grid(["Lorenz"], {"noise": (0, 0.1, 0.2)}, range(5)))
 
-The number of a trial seeds all that is random in it: scenes, noise, gaps, and the method. `tables`
-turns results into rows.
+The number of a trial seeds all that is random in it: scenes, noise, gaps, and the methods that draw
+numbers; ours runs with its default seed. `tables` turns results into rows.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ CONDITIONS = ("clean", *CORRUPTIONS)
 METHODS = ("ours", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
 """Ours, and the `baselines.BASELINES` by their names there."""
 RANDOM_METHODS = ("E-SINDy", "WeakSINDy", "Model-A")
-"""The methods that draw random numbers and take a seed."""
+"""The baselines that draw random numbers: the number of the trial is their seed."""
 SOURCES = ("videos", "whole pixels", "truth")
 """Where a path comes from: the tracks, the tracks rounded to whole pixels, or the simulation."""
 
