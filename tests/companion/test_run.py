@@ -365,7 +365,7 @@ def test_kernel_that_dies_at_start_is_a_failure(tiny, tmp_path):
     path = tiny.write("01_first", "x = 1")
     for command in (sys.executable, str(tmp_path / "no_python")):
         kernel.write_text(json.dumps({"argv": [command, "-c", "exit(1)"], "display_name": "x"}))
-        message = "01_first: could not be executed: .* kernel python3 did not start"
+        message = "01_first: could not be executed: .* If kernel python3 did not"
         with pytest.raises(NotebookError, match=message):
             execute(
                 path, {"profile": "quick"}, environment={"JUPYTER_PATH": str(tmp_path / "jupyter")}

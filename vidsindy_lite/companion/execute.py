@@ -102,9 +102,8 @@ def execute(
         raise NotebookError(f"{path.stem}: {error}") from None
     except (RuntimeError, OSError) as error:
         raise NotebookError(
-            f"{path.stem}: could not be executed: {type(error).__name__}: {error}. If the kernel "
-            "python3 did not start, what it wrote stands above; `jupyter kernelspec list` shows "
-            "which kernel has that name."
+            f"{path.stem}: could not be executed: {type(error).__name__}: {error}. If kernel "
+            "python3 did not start, what it wrote stands above; see `jupyter kernelspec list`."
         ) from error
     for cell in executed.cells:
         if cell.cell_type == "code" and cell.source.strip():
