@@ -427,7 +427,7 @@ panels = {
     "... after the search": (z_after, bar),
 }
 fig = plots.plot_ranks(panels, is_true)
-caption = "True and false terms mix in the order of size, also relative to their errors."
+caption = "By size, true and false terms mix; by size over error, the weakest true one is below its penalty."
 numbers = {name: values for name, (values, _) in panels.items()} | {"true": is_true}
 save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 

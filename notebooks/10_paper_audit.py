@@ -503,7 +503,7 @@ for name, law in (("NoseHoover", LAWS["PySINDy", "NoseHoover"]), ("WangSun", men
 
 # %%
 fig = plots.plot_ratios(ratios)
-caption = "PySINDy's coefficients over the true ones: the printed ones are those of a wrong clock."
+caption = "PySINDy's coefficients over the true ones (no symbol: not found): printed with a wrong clock."
 save_figure("audit_factor_ten", fig, caption=caption, numbers=ratios)
 
 # %% [markdown]

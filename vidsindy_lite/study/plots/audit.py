@@ -43,16 +43,16 @@ def plot_recomputed(differences: Mapping[str, float]) -> Figure:
     ----------
     differences : dict of str to float
         ``|recomputed - printed|`` over what rounding can make of it, by the name of the row;
-        what is less than 0.01 is drawn there.
+        what is less than 0.001 is drawn there.
     """
     figure, axes = plt.subplots(figsize=(7.5, 0.32 * len(differences) + 1.1))
     rows = np.arange(len(differences))[::-1]
-    values = np.maximum(list(differences.values()), 1e-2)
+    values = np.maximum(list(differences.values()), 1e-3)
     explained = values <= 1
-    axes.axvspan(0.8e-2, 1, color="0.92", zorder=0)
+    axes.axvspan(0.8e-3, 1, color="0.92", zorder=0)
     axes.plot(values[explained], rows[explained], "o", label="within the rounding of the print")
     axes.plot(values[~explained], rows[~explained], "s", label="not explained by rounding")
-    axes.set(xscale="log", xlim=(0.8e-2, 1e2), ylim=(-0.7, len(rows) - 0.3))
+    axes.set(xscale="log", xlim=(0.8e-3, 1e2), ylim=(-0.7, len(rows) - 0.3))
     axes.set_yticks(rows, list(differences))
     axes.set_xlabel("|recomputed - printed| / largest effect of rounding")
     axes.grid(axis="y", visible=False)

@@ -193,7 +193,7 @@ def plot_windows(thresholds: Floats, exact: Mapping[str, Bools]) -> Figure:
     figure, axes = plt.subplots(figsize=(8, 0.42 * len(exact) + 1.6))
     for row, good in enumerate(exact.values()):
         axes.axhline(-row, color="0.85", lw=1)
-        axes.plot(thresholds[good], np.full(good.sum(), -row), "s-C0", ms=5)
+        axes.plot(thresholds, np.where(good, -row, np.nan), "s-C0", ms=5)
         if not good.any():
             middle = np.sqrt(thresholds[0] * thresholds[-1])
             axes.text(
