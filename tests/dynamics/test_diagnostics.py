@@ -30,7 +30,7 @@ def fitted(duffing, dropped=None):
     """The problem in units in which it is standard already, and a fit with the support given."""
     law, t, x = duffing
     problem = replace(
-        pose([(t, x)], [np.empty((*x.shape, 0))], degree=3, seed=0),
+        pose([(t, x)], [np.empty((*x.shape, 0))], degree=3, rng=np.random.default_rng(0)),
         trajectories=[(t, x)],
         noise=np.full(2, NOISE),
     )

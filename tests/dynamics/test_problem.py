@@ -16,7 +16,7 @@ def posed(noise=0.0, seen=slice(None)):
     x = np.stack([3 + 2 * np.sin(t), 0.1 * np.cos(t)], axis=1)
     x += noise * np.array([2, 0.1]) * np.random.default_rng(0).normal(size=x.shape)
     t, x = t[seen], x[seen]
-    return pose([(t, x)], [np.ones((len(t), 2, 1))], degree=2, seed=0)
+    return pose([(t, x)], [np.ones((len(t), 2, 1))], degree=2, rng=np.random.default_rng(0))
 
 
 def fit_of(problem, moving=(True, False)):

@@ -201,7 +201,7 @@ def test_history_tells_the_fit(lorenz):
 
 def test_knots_are_halved_once_where_that_does_not_matter(lorenz):
     _, t, x, found = lorenz
-    problem = pose([(t, x)], [np.empty((*x.shape, 0))], degree=3, seed=0)
+    problem = pose([(t, x)], [np.empty((*x.shape, 0))], degree=3, rng=np.random.default_rng(0))
     spans = [len(segment.breakpoints) - 1 for segment in problem.segments()]
     assert [len(np.unique(curve.t)) - 1 for curve in found.curves] == [2 * n for n in spans]
 

@@ -149,7 +149,12 @@ class Problem:
         return PolynomialSystem(variable_names(self.d), self.exponents, state.coefficients)
 
 
-def pose(measured: list[Trajectory], systematic: list[Floats], degree: int, seed: int) -> Problem:
+def pose(
+    measured: list[Trajectory],
+    systematic: list[Floats],
+    degree: int,
+    rng: np.random.Generator,
+) -> Problem:
     """Pose the problem of a discovery: standard units, gaps, noise, prices.
 
     Raises
@@ -171,7 +176,6 @@ def pose(measured: list[Trajectory], systematic: list[Floats], degree: int, seed
         raise ValueError(f"x: every coordinate must move, got a constant column {still}")
     step = typical_step(measured)
     trajectories = [(t / step, (values - centre) / scale) for t, values in measured]
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
     stretches, curves, noise = _smoothed(trajectories, rng)
     speed = _rms_speed(curves)
     curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]

@@ -93,16 +93,19 @@ def discover(
     trajectories = check_trajectories(t, x)
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    starts, probes = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
+    )
     history = History()
-    problem = pose(trajectories, shared, degree, seed)
+    problem = pose(trajectories, shared, degree, probes)
     with tqdm(total=4, disable=not progress, desc="discover", leave=False) as bar:
-        found = candidates(problem, degree, rng, history)
+        found = candidates(problem, degree, starts, history)
         bar.update()
         fit = cheapest(problem, found, history)
+        bar.update()
         for stage in (bridge, polish):
-            bar.update()
             fit = stage(problem, fit, history)
+            bar.update()
     return conclude(problem, fit, history)
 
 
