@@ -191,6 +191,20 @@ def test_same_seed_same_result():
     assert (first.covariance == second.covariance).all()
 
 
+def test_the_progress_bar_reaches_its_end(monkeypatch):
+    bars = []
+
+    class Bar(solver.tqdm):
+        def close(self):
+            bars.append((self.n, self.total))
+            super().close()
+
+    monkeypatch.setattr(solver, "tqdm", Bar)
+    t = np.linspace(0, 12, 200)
+    discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
+    assert bars[0] == (4, 4)
+
+
 def test_history_tells_the_fit(lorenz):
     history = lorenz[-1].history
     assert history[0].terms == 30
