@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints  # noqa: F401  what `PolynomialSystem` hands down is annotated with
 from ..checks import check_integer, check_positive, check_vector
 from ..dynamics import PolynomialSystem
 
