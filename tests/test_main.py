@@ -117,7 +117,7 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
         (["--rig", "rig.toml", "--degree", "0"], "degree: must be an integer of at least 1"),
         (["--rig", "rig.toml", "--seed", "-1"], "seed: must be an integer of at least 0"),
         (["--rig", "rig.toml", "--out", "."], "out: must be a new folder"),
-        (["--rig", "rig.toml", "--out", "\udcff"], r"out: must be made of characters, got '\udcff'"),
+        (["--rig", "rig.toml", "--out", "\udcff"], r"must be made of characters, got '\udcff'"),
     ],
 )
 def test_bad_options_are_told_before_anything_is_tracked(here, capsys, options, message):
