@@ -147,7 +147,7 @@ class _Engine(Engine):
     ) -> None:
         """Execute the cells with papermill's options that are the client's, too."""
         chosen = {name: options[name] for name in ("timeout", "startup_timeout", "config")}
-        client = _Client(nb_man, kernel_name=kernel_name, **chosen)
+        client = _Client(nb_man, kernel_name=kernel_name, coalesce_streams=True, **chosen)
         client.execute(cwd=options["folder"], env=_kernel_environment(options["environment"]))
 
 

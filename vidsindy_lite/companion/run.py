@@ -10,16 +10,14 @@ its outputs are in place byte for byte (see `ledger`).
 """
 
 import os
-import signal
 import sys
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 
 import jupytext
 import nbformat
@@ -166,14 +164,13 @@ def run(
     stamps: dict[str, str | None] = dict.fromkeys(path.stem for path in find_notebooks(root))
     registry.prune(figures, stamps)  # what a notebook left that has gone
     outcomes = {}
-    with _ended_by_sigterm():
-        for task, outcome in _outcomes(chosen, profile, output, force, dask):
-            outcomes[task.path] = outcome
-            if outcome.error is None:
-                stamps[task.path.stem] = task.stamp
-                registry.prune(figures, stamps)  # what an earlier version of it left
-                registry.record_run_time(figures, task.path.stem, task.stamp, outcome.seconds)
-                enter(output, task.path, task.stamp, outcome.seconds)
+    for task, outcome in _outcomes(chosen, profile, output, force, dask):
+        outcomes[task.path] = outcome
+        if outcome.error is None:
+            stamps[task.path.stem] = task.stamp
+            registry.prune(figures, stamps)  # what an earlier version of it left
+            registry.record_run_time(figures, task.path.stem, task.stamp, outcome.seconds)
+            enter(output, task.path, task.stamp, outcome.seconds)
     problems = _written_pages(figures, stamps, root)
     done = tuple(outcomes[path] for path in chosen)
     return Report(done, tuple(problems), _systems_table(figures, done), _largest_process())
@@ -298,24 +295,6 @@ def _outcome(task: _Task) -> Outcome:
     except Exception as failure:  # such as a full disk: the other notebooks go on
         error = f"{task.path.stem}: {type(failure).__name__}: {failure}"
     return Outcome(task.path.stem, time.perf_counter() - started, error)
-
-
-@contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """SIGTERM ends a run as Ctrl-C does, instead of leaving kernels behind."""
-
-    def leave(number: int, frame: FrameType | None) -> None:
-        sys.exit(128 + number)
-
-    try:
-        before = signal.signal(signal.SIGTERM, leave)
-    except ValueError:  # not the main thread: whose signals are others' business
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _say(line: str) -> None:
