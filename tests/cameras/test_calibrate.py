@@ -535,6 +535,22 @@ def test_a_wrong_normal_is_learned_back(index):
     np.testing.assert_allclose(np.hstack(residuals(tracks, learned)), 0, atol=1e-4)
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_few_gross_outliers_do_not_bend_a_normal(known):
+    x, truth, tracks, rng = scene(5)
+    tracks = [track + 0.1 * rng.normal(size=track.shape) for track in tracks]
+    cameras = list(truth.cameras)
+    cameras[1] = replace(cameras[1], normal=rodrigues([1, 2, 3], 0.05) @ cameras[1].normal)
+    start = Rig(cameras) if known else Rig(cameras).uncalibrated()
+    clean = learn_normal(tracks, start, 1)
+    for i, frame in enumerate(rng.choice(500, 9, replace=False)):
+        tracks[i % 3][frame] += [(300, -200), (-30, 40)][i % 2]
+    found = learn_normal(tracks, start, 1)
+    for ours, theirs in zip(found.cameras, clean.cameras, strict=True):
+        np.testing.assert_allclose(ours.normal, theirs.normal, atol=3e-4)
+    assert np.abs(calibration_errors(found, clean)).max() < 3e-4
+
+
 class TestBadTracks:
     def test_masked_rows_are_not_seen(self, small):
         _, rig, tracks, _ = small

@@ -19,7 +19,7 @@ from vidsindy_lite.cameras import (
     list_lags,
 )
 from vidsindy_lite.cameras import synchronise as synchrony
-from vidsindy_lite.cameras.calibrate import fit_cameras
+from vidsindy_lite.cameras.calibrate import cameras_of_views
 
 NOISE = 0.05  # pixels
 
@@ -225,9 +225,9 @@ def test_no_lags_are_tried_twice(motion, monkeypatch):
 
     def watched(views, unknowns):
         tried.append(np.hstack(views.tracks).tobytes())
-        return fit_cameras(views, unknowns)
+        return cameras_of_views(views, unknowns)
 
-    monkeypatch.setattr(synchrony, "fit_cameras", watched)
+    monkeypatch.setattr(synchrony, "cameras_of_views", watched)
     learn_lags(filmed(motion, (100,) * 3, (0, 0, 0)), vl.Rig([first, turned, third]))
     assert len(tried) > 10
     assert len(set(tried)) == len(tried)

@@ -28,11 +28,11 @@ from scipy.interpolate import make_interp_spline
 
 from ..arrays import Bools, Floats
 from ..checks import check_positive, check_tracks, check_vector
-from .calibrate import check_learnable, fit_cameras
+from .calibrate import cameras_of_views, check_learnable
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
 from .models import Camera
 from .rig import Rig
-from .triangulate import Views, epipolar_design, epipolar_lines, reprojection, residuals
+from .triangulate import Views, epipolar_design, epipolar_lines, residuals, residuals_of_views
 from .unknowns import Unknowns
 
 DISAGREEMENT = 1.0
@@ -259,7 +259,7 @@ def _best_residuals(tracks: Sequence[Floats], unknowns: Unknowns) -> Floats | No
         return None
     views = Views.of(tracks)
     try:
-        return np.hstack(reprojection(views, fit_cameras(views, unknowns).cameras))
+        return np.hstack(residuals_of_views(views, cameras_of_views(views, unknowns).cameras))
     except ValueError:  # these lags leave too little in common, or nothing that agrees
         return None
 

@@ -53,6 +53,10 @@ class Views:
             ),
         )
 
+    def only(self, frames: Ints) -> Views:
+        """What was seen in these frames, each taken once."""
+        return Views.of([track[np.unique(frames)] for track in self.tracks])
+
     @property
     def frames(self) -> int:
         """Number of frames."""
@@ -88,7 +92,7 @@ def reconstruct(tracks: Sequence[Floats], rig: Rig) -> Floats:
     """
     views = check_views(tracks, rig)
     check_calibrated("rig", rig)
-    return triangulate(views, rig.cameras)
+    return points_of_views(views, rig.cameras)
 
 
 def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
@@ -115,7 +119,7 @@ def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
     """
     views = check_views(tracks, rig)
     check_calibrated("rig", rig)
-    return reprojection(views, rig.cameras)
+    return residuals_of_views(views, rig.cameras)
 
 
 def check_views(tracks: Sequence[Floats], rig: Rig) -> Views:
@@ -146,16 +150,16 @@ def check_calibrated(name: str, rig: Rig) -> None:
             )
 
 
-# What follows takes its arguments as they are.
+# What follows takes its arguments as they are; `..._of_views`, views that were checked.
 
 
-def reprojection(views: Views, cameras: Sequence[Camera]) -> list[Floats]:
+def residuals_of_views(views: Views, cameras: Sequence[Camera]) -> list[Floats]:
     """`residuals` of views that were checked."""
-    x = triangulate(views, cameras)
+    x = points_of_views(views, cameras)
     return [t - camera.image(x) for t, camera in zip(views.tracks, cameras, strict=True)]
 
 
-def triangulate(views: Views, cameras: Sequence[Camera]) -> Floats:
+def points_of_views(views: Views, cameras: Sequence[Camera]) -> Floats:
     """`reconstruct` of views that were checked; one linear solve if all are orthographic."""
     if not all_orthographic(cameras):
         return intersect(cameras, views.tracks)[0]
