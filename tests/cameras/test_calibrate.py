@@ -477,7 +477,7 @@ def test_calibration_errors(small):
     with pytest.raises(ValueError, match="must have as many cameras as truth, got 2 and 3"):
         calibration_errors(Rig(others), truth)
     with pytest.raises(
-        ValueError, match=r"truth: all cameras must be calibrated, got cameras\[1\]"
+        ValueError, match=r"truth: all cameras must be calibrated and placed, got cameras\[1\]"
     ):
         calibration_errors(truth, truth.uncalibrated())
 
@@ -710,7 +710,7 @@ class TestPosition:
         with pytest.raises(ValueError, match=message):
             learn_cameras(still, self.without(rig.uncalibrated(), 2))
         loose = self.without(rig, 1)
-        with pytest.raises(ValueError, match=r"got cameras\[1\] without; use learn_cameras"):
+        with pytest.raises(ValueError, match=r"got cameras\[1\] without position; use"):
             reconstruct(tracks, loose)
         with pytest.raises(ValueError, match="camera: position must be known, got None"):
             loose.cameras[1].project(x)

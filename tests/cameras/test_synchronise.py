@@ -322,7 +322,7 @@ def test_what_are_no_tracks(motion, wrong):
 def test_a_camera_that_never_sees_the_target(motion, blind):
     tracks = filmed(motion, (30,) * 3, (0, 0, 0))
     tracks[blind][::2, 0] = tracks[blind][1::2, 1] = np.nan  # half a pixel tells nothing
-    with pytest.raises(ValueError, match=rf"tracks\[{blind}\]: must show the target in some frame"):
+    with pytest.raises(ValueError, match=rf"tracks\[{blind}\]: must see the target in some frame"):
         learn_lags(tracks, motion[1])
 
 

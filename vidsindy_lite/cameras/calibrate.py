@@ -181,15 +181,13 @@ def calibration_errors(rig: Rig, truth: Rig) -> Floats:
     ValueError
         If the rigs differ in length or a camera is not calibrated.
     """
-    check_instance("rig", rig, Rig)
-    check_instance("truth", truth, Rig)
+    check_calibrated("rig", rig)
+    check_calibrated("truth", truth)
     if len(rig.cameras) != len(truth.cameras):
         raise ValueError(
             f"rig: must have as many cameras as truth, got {len(rig.cameras)} "
             f"and {len(truth.cameras)}"
         )
-    check_calibrated("rig", rig)
-    check_calibrated("truth", truth)
     pairs = zip(rig.cameras, truth.cameras, strict=True)
     known = ((a.calibration, b.calibration) for a, b in pairs)
     return np.array([(s / r - 1, np.angle(np.exp(1j * (a - b)))) for (s, a), (r, b) in known])

@@ -98,8 +98,8 @@ def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
         Scene units; what the trail of each camera, one standard deviation long, adds to the path.
         Zero where nothing can be reconstructed.
     """
-    views = check_views(tracks, rig)
     check_calibrated("rig", rig)
+    views = check_views(tracks, rig)
     x = points_of_views(views, rig.cameras)
     missed = np.hstack(residuals_of_views(views, rig.cameras))
     count = missed.shape[1]
