@@ -149,9 +149,9 @@ save_figure("tour_rig", fig, caption=caption, numbers={"t": found.t, "x": found.
 # %%
 error = trajectory_error(found.x, shot.x)
 pixel = np.mean([camera.scale for camera in shot.rig.cameras])
-print("rms error, scene units:", error.rmse.round(5))
+print("rms error, scene units:", error.round(5))
 print("one pixel, scene units:", pixel.round(3))
-assert error.rmse.max() < 0.1 * pixel
+assert error.max() < 0.1 * pixel
 
 # %%
 part = slice(400)  # four periods

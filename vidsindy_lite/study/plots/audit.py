@@ -1,7 +1,5 @@
 """Figures on the paper's own numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import matplotlib.pyplot as plt

@@ -1,7 +1,5 @@
 """Figures of view planes, rigs, calibration and reconstruction."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt

@@ -1,7 +1,5 @@
 """What several modules of figures need: axes in space, axes of an image, curves, line styles."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d import Axes3D

@@ -1,7 +1,5 @@
 """Figures of the lab experiment. All lengths are in millimetres."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import matplotlib.pyplot as plt

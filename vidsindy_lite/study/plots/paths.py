@@ -1,7 +1,5 @@
 """Figures of motions over time and in space, and of the laws behind them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of video frames and of what the tracker made of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
