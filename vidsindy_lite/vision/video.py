@@ -254,7 +254,8 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
     """Number of frames, frame rate and size of a video file.
 
     The number is what the file's header states, which is more than the frames that can be read if
-    the file was cut off later; where the header states none, the frames are counted.
+    the file was cut off later. Where the header states none (.mkv), the frames are counted, and of
+    a file without sound those that its duration promises are added.
 
     Parameters
     ----------
@@ -270,13 +271,21 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
         If the file is missing, empty, not a video, or holds no frame.
     """
     with _opened(path) as (container, stream):
-        image = _first(path, container, stream)
+        size = _first(path, container, stream).shape[1::-1]
         fps = float(stream.guessed_rate or 0)
-        seconds = (container.duration or 0) / 1e6
-        count = stream.frames or round(seconds * fps)
-        if count < 1:  # the file was cut off while it was written
-            count = 1 + sum(1 for _ in _decoded(container, stream))
-    return VideoInfo(count, fps, image.shape[1::-1])
+        count = stream.frames
+    return VideoInfo(count or _count(path, fps), fps, size)
+
+
+def _count(path: str | os.PathLike, fps: float) -> int:
+    """Number of frames in a file, and of those that were cut off its end."""
+    with _opened(path) as (container, stream):
+        times = [time for time, _ in _packets(container, stream)]
+        # The duration is that of the longest stream, which may be the sound.
+        if len(container.streams) > 1 or not container.duration or None in times:
+            return len(times)
+        after_last = container.duration / 1e6 - float(max(times) * stream.time_base)
+        return len(times) + max(round(after_last * fps) - 1, 0)
 
 
 def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Image]:
