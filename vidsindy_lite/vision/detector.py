@@ -11,7 +11,7 @@ and height in pixels, confidence in [0, 1]. `detections` averages those that agr
 import os
 import re
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -32,14 +32,6 @@ _GREY = 114  # of the margins of an image that has another aspect ratio than the
 
 Predictions = NDArray[np.float32]
 """Centre (u, v), width, height and confidence of each anchor, shape (5, n)."""
-
-
-class Detector(Protocol):
-    """What finds targets in a single frame."""
-
-    def predict(self, image: Image) -> Predictions:
-        """Predictions, (5, n), for an image (height, width, 3) uint8, blue-green-red."""
-        ...
 
 
 # --------------------------------------------------------------------------------------- detectors
@@ -158,9 +150,7 @@ class Detection(NamedTuple):
     confidence: float
 
 
-def detections(
-    predictions: Predictions, least: float = LEAST, most: int = 3
-) -> list[Detection]:
+def detections(predictions: Predictions, least: float = LEAST, most: int = 3) -> list[Detection]:
     """What the predictions show, the surest first.
 
     The most confident prediction is averaged with those that agree with it, which is where the

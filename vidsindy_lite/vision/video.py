@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 import numpy as np
 
 from ..arrays import Image
-from ..checks import check_instance, check_integer, check_number, check_path
+from ..checks import check_choice, check_instance, check_integer, check_number, check_path
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -110,8 +110,7 @@ def write_video(
     if codec is None and suffix not in LOSSLESS:
         raise ValueError(f"path: must end in .mov or .mkv unless codec is given, got '{path}'")
     codec = codec or LOSSLESS[suffix]
-    if codec not in CODECS:
-        raise ValueError(f"codec: must be one of {', '.join(CODECS)}, got {codec!r}")
+    check_choice("codec", codec, CODECS)
     if suffix not in CODECS[codec].suffixes:
         allowed = " or ".join(CODECS[codec].suffixes)
         raise ValueError(f"path: must end in {allowed} for {codec}, got '{path}'")
@@ -142,7 +141,7 @@ def _encode(
     """Write a file under its temporary name, and make sure that it holds all frames."""
     import av
 
-    frames, count = _checked(frames), 0
+    frames, count, held = _checked(frames), 0, 0
     first = next(frames, None)
     if first is None:
         raise ValueError("frames: at least one frame is needed, got none")
@@ -153,10 +152,10 @@ def _encode(
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "bgr24")))
                 count += 1
             container.mux(stream.encode(None))
-        with _opened(partial) as (written, stream):
-            held = len(_packets(written, stream))
-    except (av.FFmpegError, _NoVideo) as error:
+    except av.FFmpegError as error:
         raise OSError(f"path: cannot write {count} frames to '{path}': {error}") from error
+    with suppress(av.FFmpegError, ValueError), _opened(partial) as (written, stream):
+        held = len(_packets(written, stream))
     if held != count:
         raise OSError(f"path: cannot write {count} frames to '{path}', only {held} are in the file")
 
@@ -196,10 +195,6 @@ def _add_stream(
 
 
 # ----------------------------------------------------------------------------------------- reading
-
-
-class _NoVideo(ValueError):
-    """A file from which no frame can be read."""
 
 
 def read_video(path: str | os.PathLike) -> Iterator[Image]:
@@ -280,12 +275,13 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
 def _count(path: str | os.PathLike, fps: float) -> int:
     """Number of frames in a file, and of those that were cut off its end."""
     with _opened(path) as (container, stream):
-        times = [time for time, _ in _packets(container, stream)]
-        # The duration is that of the longest stream, which may be the sound.
-        if len(container.streams) > 1 or not container.duration or None in times:
-            return len(times)
+        packets = _packets(container, stream)
+        times = [time for time, _ in packets if time is not None]
+        # The duration of a file with sound may be that of the sound.
+        if len(container.streams) > 1 or not (container.duration and stream.time_base and times):
+            return len(packets)
         after_last = container.duration / 1e6 - float(max(times) * stream.time_base)
-        return len(times) + max(round(after_last * fps) - 1, 0)
+        return len(packets) + max(round(after_last * fps) - 1, 0)
 
 
 def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Image]:
@@ -327,18 +323,16 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
     if not path.is_file():
         raise FileNotFoundError(f"path: no such video file, got '{path}'")
     if path.stat().st_size == 0:
-        raise _NoVideo(f"path: must be a video file, got the empty file '{path}'")
+        raise ValueError(f"path: must be a video file, got the empty file '{path}'")
     try:
         # Absolute, as the part before a colon would be a protocol, e.g. of "12:30.mov".
         container = av.open(str(path.absolute()), metadata_errors="replace")
     except av.FFmpegError:
-        raise _NoVideo(
-            f"path: must be a video file that PyAV can read, got '{path}'"
-        ) from None
+        raise ValueError(f"path: must be a video file that PyAV can read, got '{path}'") from None
     with container:
         stream = container.streams.best("video")
         if stream is None:
-            raise _NoVideo(f"path: must be a video file, got '{path}', which holds none")
+            raise ValueError(f"path: must be a video file, got '{path}', which holds none")
         yield container, cast("VideoStream", stream)
 
 
@@ -360,7 +354,7 @@ def _first(path: str | os.PathLike, container: InputContainer, stream: VideoStre
     """The first frame of a file just opened, which must have one."""
     frame = next(_decoded(container, stream), None)
     if frame is None:
-        raise _NoVideo(f"path: must hold at least one frame, got none in '{path}'")
+        raise ValueError(f"path: must hold at least one frame, got none in '{path}'")
     return _image(frame)
 
 
