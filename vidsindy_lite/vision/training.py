@@ -25,7 +25,7 @@ from ..checks import check_integer, check_path
 from ..stamp import write_file
 from .detector import WEIGHTS
 from .network import STRIDE, Network, anchors, as_input
-from .rendering import LabelledFrame, render_labelled
+from .rendering import LabelledFrame, draw_frames
 from .scenery import BACKGROUNDS
 from .scenes import COLOURS, Box, Scene
 
@@ -84,7 +84,7 @@ def training_frame(
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     shape = turn * stretch @ turn.T
     seed, scenery = int(rng.integers(2**31)), _scenery(rng, pool)
-    drawn = next(render_labelled(centre[None], scene, seed, shape[None], scenery))
+    drawn = next(draw_frames(centre[None], scene, seed, shape[None], scenery))
     return drawn._replace(frame=_seen_by_a_camera(drawn.frame, rng)), centre
 
 
