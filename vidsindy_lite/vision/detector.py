@@ -15,9 +15,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Image
+from ..arrays import Floats, Floats32, Image
 from ..checks import check_path
 
 WEIGHTS = Path(__file__).with_name("detector.pt")
@@ -30,7 +29,7 @@ _AGREE = 0.25  # of the target's size: distance within which predictions speak o
 _WEAK = 0.5  # of the largest confidence: below, a prediction is not averaged
 _GREY = 114  # of the margins of an image that has another aspect ratio than the model's input
 
-Predictions = NDArray[np.float32]
+Predictions = Floats32
 """Centre (u, v), width, height and confidence of each anchor, shape (5, n)."""
 
 
@@ -87,22 +86,18 @@ class OnnxDetector:
     Parameters
     ----------
     path : path
-        The .onnx file.
+        The .onnx file, which is there.
 
     Raises
     ------
-    FileNotFoundError
-        If there is no such file.
     ValueError
         If OpenCV cannot read it, or its shapes are not those of a YOLO-v8 detection model.
     """
 
     def __init__(self, path: str | os.PathLike) -> None:
-        self.path = check_path("detector", path)
-        if not self.path.is_file():
-            raise FileNotFoundError(f"detector: no such file, got '{self.path}'")
+        self.path = path
         try:
-            self.network = cv2.dnn.readNetFromONNX(str(self.path), cv2.dnn.ENGINE_NEW)
+            self.network = cv2.dnn.readNetFromONNX(str(path), cv2.dnn.ENGINE_NEW)
         except cv2.error as error:
             raise ValueError(
                 f"detector: must be an ONNX file that OpenCV can run, got '{self.path}': {error}"

@@ -12,16 +12,14 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from ..arrays import Floats, Image, Ints
+from ..arrays import Floats, Floats32, Image, Ints
 from ..checks import check_array, check_instance, check_integer, check_rows
 from .scenery import BACKGROUNDS, bark, leaves, tree
 from .scenes import COLOURS, Scene
 from .video import write_video
-
-Floats32 = NDArray[np.float32]
 
 _SCANLINES = 16  # per row of pixels, when the target is drawn
 _NORMAL = ndtri((np.arange(2**16) + 0.5) / 2**16).astype(np.float32)  # quantiles, all as likely

@@ -1,7 +1,5 @@
 """What one camera sees: background, target, and the disturbances between them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Self

@@ -9,8 +9,6 @@ YOLO-v8; what such a detector sees in the single frames is linked here to one mo
 A frame gets NaN where the target is not seen, or not for sure.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -145,8 +143,7 @@ def _track_blobs(path: str | os.PathLike, model: BackgroundModel) -> Track:
 
 
 def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:
-    learned = name == "learned"
-    detector: LearnedDetector | OnnxDetector = LearnedDetector() if learned else OnnxDetector(name)
+    detector = LearnedDetector() if name == "learned" else OnnxDetector(name)
     sightings = [detections(detector.predict(frame)) for frame in read_video(path)]
     chain = link(sightings)
     pixels = np.array([d.centre if d else (np.nan, np.nan) for d in chain], float)

@@ -10,13 +10,10 @@ PyAV is imported by the functions that need it, since who works with tracks need
 
 from __future__ import annotations
 
-import math
 import os
-from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, cast
 
@@ -141,21 +138,20 @@ def _encode(
     """Write a file under its temporary name, and make sure that it holds all frames."""
     import av
 
-    frames, count, held = _checked(frames), 0, 0
-    first = next(frames, None)
-    if first is None:
-        raise ValueError("frames: at least one frame is needed, got none")
+    stream, count, held = None, 0, 0
     try:
         with av.open(str(partial.absolute()), "w") as container:
-            stream = _add_stream(container, codec, rate, first.shape[1::-1])
-            for frame in chain([first], frames):
+            for frame in _checked(frames):
+                stream = stream or _add_stream(container, codec, rate, frame.shape[1::-1])
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "bgr24")))
                 count += 1
+            if stream is None:
+                raise ValueError("frames: at least one frame is needed, got none")
             container.mux(stream.encode(None))
     except av.FFmpegError as error:
         raise OSError(f"path: cannot write {count} frames to '{path}': {error}") from error
-    with suppress(av.FFmpegError, ValueError), _opened(partial) as (written, stream):
-        held = len(_packets(written, stream))
+    with suppress(av.FFmpegError, ValueError), _opened(partial) as opened:
+        held = len(_packets(*opened))
     if held != count:
         raise OSError(f"path: cannot write {count} frames to '{path}', only {held} are in the file")
 
@@ -296,14 +292,14 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
         if len(set(times)) < len(packets):  # some old files do not say
             yield from (image for i, image in enumerate(_images(path)) if i in numbers)
             return
-        keys = sorted(time or 0 for time, is_key in packets if is_key)
+        keys = [time or 0 for time, is_key in packets if is_key]
         frames: Iterator[VideoFrame] = iter(())
-        now = -math.inf
+        now = -np.inf
         for number in numbers:
             if number >= len(times):
                 return
             time = times[number]
-            key = keys[max(bisect_right(keys, time) - 1, 0)]
+            key = max((key for key in keys if key <= time), default=min(keys, default=time))
             if key > now:
                 container.seek(key, stream=stream)
                 frames = _decoded(container, stream)
