@@ -172,7 +172,7 @@ def _train(options: argparse.Namespace) -> int:
 
     output = training.WEIGHTS if options.output is None else options.output
     steps = training.STEPS if options.steps is None else options.steps
-    record = training.train(output, options.seed, steps, progress=True)
+    record = training.train(output, options.seed, steps)
     print(f"{record['frames']} frames, loss {record['loss'][0]} to {record['loss'][-1]}: {output}")
     return 0
 

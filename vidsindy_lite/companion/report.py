@@ -24,7 +24,7 @@ from ..cameras import DISAGREEMENT, residuals
 from ..checks import check_path
 from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
-from ..study.plots import plot_path, plot_residuals, plot_rig, plot_views
+from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..vision import read_frame, video_info
 from .pages import page
 from .records import as_json
@@ -202,7 +202,7 @@ def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int
     places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
     images = [read_frame(path, frame) for path, frame in places]
     titles = [f"{_short(path.name)}, frame {frame}" for path, frame in places]
-    return plot_views(images, titles, found.tracks, instant)
+    return plot_frames(images, titles, found.tracks, instant)
 
 
 def _short(name: str) -> str:
