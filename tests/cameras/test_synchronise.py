@@ -19,7 +19,7 @@ from vidsindy_lite.cameras import (
     list_lags,
 )
 from vidsindy_lite.cameras import synchronise as synchrony
-from vidsindy_lite.cameras.calibrate import fit_cameras
+from vidsindy_lite.cameras.calibrate import cameras_of_views
 
 NOISE = 0.05  # pixels
 
@@ -225,9 +225,9 @@ def test_no_lags_are_tried_twice(motion, monkeypatch):
 
     def watched(views, unknowns):
         tried.append(np.hstack(views.tracks).tobytes())
-        return fit_cameras(views, unknowns)
+        return cameras_of_views(views, unknowns)
 
-    monkeypatch.setattr(synchrony, "fit_cameras", watched)
+    monkeypatch.setattr(synchrony, "cameras_of_views", watched)
     learn_lags(filmed(motion, (100,) * 3, (0, 0, 0)), vl.Rig([first, turned, third]))
     assert len(tried) > 10
     assert len(set(tried)) == len(tried)
@@ -322,7 +322,7 @@ def test_what_are_no_tracks(motion, wrong):
 def test_a_camera_that_never_sees_the_target(motion, blind):
     tracks = filmed(motion, (30,) * 3, (0, 0, 0))
     tracks[blind][::2, 0] = tracks[blind][1::2, 1] = np.nan  # half a pixel tells nothing
-    with pytest.raises(ValueError, match=rf"tracks\[{blind}\]: must show the target in some frame"):
+    with pytest.raises(ValueError, match=rf"tracks\[{blind}\]: must see the target in some frame"):
         learn_lags(tracks, motion[1])
 
 

@@ -13,12 +13,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import null_space
 from scipy.optimize import least_squares
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..checks import check_instance, check_integer
-from .geometry import PARALLEL
 from .messages import unconverged_cameras, undecided_outliers, unsettled_points
 from .models import Camera, all_orthographic, independent
 from .rig import Rig
@@ -29,10 +27,10 @@ from .triangulate import (
     epipolar_design,
     epipolar_lines,
     intersect,
-    reprojection,
-    triangulate,
+    points_of_views,
+    residuals_of_views,
 )
-from .unknowns import Unknowns, agreement, calibrated, names, outliers, solve
+from .unknowns import Unknowns, agreement, calibrated, names, solve
 
 # Relative, of the search for the smallest reprojection error.
 _TOLERANCES = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15}
@@ -79,8 +77,8 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     -----
     Paper: Eq. (4); by itself it is `learn_cameras_eq4`.
     """
-    check_learnable(rig)
-    return fit_cameras(check_views(tracks, rig), Unknowns.of(rig))
+    unknowns = check_learnable(rig)
+    return cameras_of_views(check_views(tracks, rig), unknowns)
 
 
 def learn_normal(tracks: Sequence[Floats], rig: Rig, index: int) -> Rig:
@@ -106,23 +104,36 @@ def learn_normal(tracks: Sequence[Floats], rig: Rig, index: int) -> Rig:
     ValueError
         See `learn_cameras`.
     """
-    check_learnable(rig)
+    unknowns = check_learnable(rig)
     if not check_integer("index", index) < len(rig.cameras):
         raise ValueError(f"index: must be below {len(rig.cameras)}, the cameras, got {index}")
-    views, unknowns = check_views(tracks, rig), Unknowns.of(rig)
-    learned = fit_cameras(views, unknowns)
-    tilted = rig.cameras[index]
+    views = check_views(tracks, rig)
+    learned = cameras_of_views(views, unknowns)
+    for _ in range(2):  # where a normal is wrong, small outliers hide behind what it misses
+        learned = _tilted(views, unknowns, learned, index)
+    return learned
+
+
+def _tilted(views: Views, unknowns: Unknowns, learned: Rig, index: int) -> Rig:
+    """The closest cameras if the normal of one is unknown, too, from those that are learned.
+
+    Left out are the frames in which these, if they are orthographic, contradict each other.
+    """
+    if learned.is_orthographic:
+        views = views.only(agreement(views, Unknowns.of(learned))[0].frames)
+    before = learned.cameras[index]
 
     def candidate(parameters: Floats) -> tuple[Camera, ...]:
-        normal = tilted.normal + parameters[:2] @ tilted.rows
-        cameras = (*rig.cameras[:index], replace(tilted, normal=normal), *rig.cameras[index + 1 :])
-        return replace(unknowns, cameras=cameras).filled(parameters[2:])
+        cameras = list(unknowns.cameras)
+        normal = before.normal + parameters[:2] @ before.rows
+        cameras[index] = replace(cameras[index], normal=normal)
+        return replace(unknowns, cameras=tuple(cameras)).filled(parameters[2:])
 
     return _closest(views, candidate, np.append([0.0, 0.0], unknowns.read(learned.cameras)))
 
 
-def check_learnable(rig: Rig) -> None:
-    """That this is a rig with enough known of its cameras to learn the rest.
+def check_learnable(rig: Rig) -> Unknowns:
+    """What is unknown of a rig, if enough is known of its cameras to learn the rest.
 
     Raises
     ------
@@ -135,7 +146,8 @@ def check_learnable(rig: Rig) -> None:
             "rig: at least one camera must be calibrated (scale and angle given) to learn the "
             f"others, got none of {len(rig.cameras)}"
         )
-    loose = Unknowns.of(rig).loose
+    unknowns = Unknowns.of(rig)
+    loose = unknowns.unplaced
     if loose.size and not rig.is_orthographic:
         raise ValueError(
             "rig: all positions must be given if a camera is perspective, got none of "
@@ -147,6 +159,7 @@ def check_learnable(rig: Rig) -> None:
             "rig: the positions of two cameras with independent normals must be given to learn "
             f"those of {names(loose)}, got {len(placed)}"
         )
+    return unknowns
 
 
 def calibration_errors(rig: Rig, truth: Rig) -> Floats:
@@ -168,55 +181,40 @@ def calibration_errors(rig: Rig, truth: Rig) -> Floats:
     ValueError
         If the rigs differ in length or a camera is not calibrated.
     """
-    check_instance("rig", rig, Rig)
-    check_instance("truth", truth, Rig)
+    check_calibrated("rig", rig)
+    check_calibrated("truth", truth)
     if len(rig.cameras) != len(truth.cameras):
         raise ValueError(
             f"rig: must have as many cameras as truth, got {len(rig.cameras)} "
             f"and {len(truth.cameras)}"
         )
-    check_calibrated("rig", rig)
-    check_calibrated("truth", truth)
     pairs = zip(rig.cameras, truth.cameras, strict=True)
     known = ((a.calibration, b.calibration) for a, b in pairs)
     return np.array([(s / r - 1, np.angle(np.exp(1j * (a - b)))) for (s, a), (r, b) in known])
 
 
-def fit_cameras(views: Views, unknowns: Unknowns) -> Rig:
-    """`learn_cameras` of views and a rig that were checked."""
+def cameras_of_views(views: Views, unknowns: Unknowns) -> Rig:
+    """`learn_cameras` of views and unknowns that were checked."""
     if not unknowns.any:
         return Rig(unknowns.cameras)
-    if not all_orthographic(unknowns.cameras):
+    if all_orthographic(unknowns.cameras):
+        equations, decided = agreement(views, unknowns)
+        start = unknowns.vector(*solve(equations.design, equations.target, unknowns))
+        learned = _closest(views.only(equations.frames), unknowns.filled, start)
+        doubts = () if decided else (undecided_outliers(),)
+    else:
         learned = _closest(views, unknowns.filled, unknowns.read(_spread(views, unknowns)))
         _, settled = intersect(learned.cameras, views.tracks)
-        if settled.all():
-            return learned
-        return _doubted(learned, unsettled_points(int((~settled).sum()), views.frames))
-
-    def annihilator(indices: Ints) -> Floats:
-        """All columns that take the unknown point out."""
-        rows = [unknowns.cameras[i].rows for i in indices]
-        return null_space(np.vstack(rows).T, rcond=PARALLEL)
-
-    equations = agreement(views, unknowns, annihilator)
-    wild, decided = outliers(equations, unknowns.scale)
-    equations = equations.without(wild)
-    start = unknowns.vector(*solve(equations.design, equations.target, unknowns))
-    clean = Views.of([track[np.unique(equations.frames)] for track in views.tracks])
-    learned = _closest(clean, unknowns.filled, start)
-    return learned if decided else _doubted(learned, undecided_outliers())
-
-
-def _doubted(rig: Rig, warning: str) -> Rig:
-    """A rig with one more warning."""
-    return replace(rig, warnings=(*rig.warnings, warning))
+        left = int((~settled).sum())
+        doubts = (unsettled_points(left, views.frames),) if left else ()
+    return replace(learned, warnings=learned.warnings + doubts)
 
 
 def _closest(views: Views, candidate: Callable[[Floats], tuple[Camera, ...]], start: Floats) -> Rig:
     """The cameras `candidate(parameters)` of the smallest reprojection error in pixels."""
 
     def missed(parameters: Floats) -> Floats:
-        return np.hstack(reprojection(views, candidate(parameters)))
+        return np.hstack(residuals_of_views(views, candidate(parameters)))
 
     used = np.isfinite(missed(start))  # the same ones throughout
     fit = least_squares(lambda parameters: missed(parameters)[used], start, **_TOLERANCES)
@@ -230,18 +228,18 @@ def _spread(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:
     a camera waits until one that shares frames with it is known.
     """
     cameras = unknowns.cameras
-    while waiting := [i for i in unknowns.turns if not cameras[i].is_calibrated]:
+    while waiting := [i for i in unknowns.uncalibrated if not cameras[i].is_calibrated]:
         found, failed = {}, []
         for i in waiting:
             try:
-                alone = replace(unknowns, turns=np.array([i]))
+                alone = replace(unknowns, uncalibrated=np.array([i]))
                 found[i] = solve(*_from_known(views, cameras, i), alone)[0][0]
             except ValueError as error:
                 failed.append(error)
         if not found:
             raise failed[0]
         cameras = calibrated(cameras, found, found.values())
-    if not np.isfinite(triangulate(views, cameras)).any():
+    if not np.isfinite(points_of_views(views, cameras)).any():
         raise ValueError(
             "rig: the lines of sight must meet in front of the perspective cameras, got none that "
             "do (does each normal point from the scene to its camera?)"

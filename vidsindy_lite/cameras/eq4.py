@@ -6,16 +6,17 @@ R^-_known pinv(R^-_unknown) y_unknown = y_known, in the frames in which all came
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from .calibrate import check_learnable
-from .models import independent
+from .models import Camera, independent
 from .rig import Rig
 from .triangulate import check_views
-from .unknowns import Equations, Unknowns, agreement, calibrated, names, outliers, solve
+from .unknowns import Complex, Equations, Unknowns, agreement, calibrated, names, solve
 
 
 def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:
@@ -40,11 +41,7 @@ def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:
     ValueError
         See `learn_cameras`.
     """
-    equations, unknowns = _equations(tracks, rig)
-    if equations is None:
-        return rig
-    turned, _ = solve(equations.design, equations.target, unknowns)
-    return Rig(calibrated(rig.cameras, unknowns.turns, turned))
+    return _learned(tracks, rig, _closed)
 
 
 def learn_cameras_lbfgs(tracks: Sequence[Floats], rig: Rig) -> Rig:
@@ -67,17 +64,61 @@ def learn_cameras_lbfgs(tracks: Sequence[Floats], rig: Rig) -> Rig:
     ValueError
         See `learn_cameras`.
     """
-    equations, unknowns = _equations(tracks, rig)
-    if equations is None:
+    return _learned(tracks, rig, _descended)
+
+
+def _learned(
+    tracks: Sequence[Floats], rig: Rig, method: Callable[[Equations, Unknowns], Complex]
+) -> Rig:
+    """The rig with s exp(i theta) by a method, from Eq. (4) in all frames without outliers."""
+    unknowns, views = check_learnable(rig), check_views(tracks, rig)
+    if not unknowns.any:
         return rig
-    solve(equations.design, equations.target, unknowns)  # or an error
+    if unknowns.unplaced.size:
+        raise ValueError(
+            f"rig: Eq. (4) needs all positions, got none of {names(unknowns.unplaced)}; use "
+            "learn_cameras"
+        )
+    if not rig.is_orthographic:
+        raise ValueError("rig: Eq. (4) needs orthographic cameras, got a perspective one")
+    others = [rig.cameras[i] for i in unknowns.uncalibrated]
+    if not independent(others):
+        raise ValueError(
+            "rig: Eq. (4) needs two independent normals among the uncalibrated cameras, got "
+            f"{[camera.normal.tolist() for camera in others]}; use learn_cameras"
+        )
+    common = tuple(group for group in views.groups if len(group[0]) == len(rig.cameras))
+    equations, _ = agreement(replace(views, groups=common), unknowns, _prediction)
+    return Rig(calibrated(rig.cameras, unknowns.uncalibrated, method(equations, unknowns)))
+
+
+def _prediction(cameras: Sequence[Camera]) -> Floats:
+    """Columns Q of Eq. (4): R^-_known pinv(R^-_unknown) y_unknown - y_known = 0."""
+    known, unknown = (
+        np.vstack([c.rows for c in cameras if c.is_calibrated == flag]) for flag in (True, False)
+    )
+    flags = np.repeat([c.is_calibrated for c in cameras], 2)
+    columns = np.zeros((len(flags), len(known)))
+    columns[~flags] = (known @ np.linalg.pinv(unknown)).T
+    columns[flags] = -np.eye(len(known))
+    return columns
+
+
+def _closed(equations: Equations, unknowns: Unknowns) -> Complex:
+    """s exp(i theta) by linear least squares."""
+    return solve(equations.design, equations.target, unknowns)[0]
+
+
+def _descended(equations: Equations, unknowns: Unknowns) -> Complex:
+    """s exp(i theta) by L-BFGS."""
+    _closed(equations, unknowns)  # or an error
     import torch  # slow to import, and only this comparison needs it
 
     unit = np.abs(equations.design).mean()  # makes the unknowns of order one
     design = torch.tensor(equations.design / unit)
     target = torch.tensor(equations.target / (unit * unknowns.scale))
-    scale = torch.ones(unknowns.turns.size, dtype=torch.float64, requires_grad=True)
-    angle = torch.zeros(unknowns.turns.size, dtype=torch.float64, requires_grad=True)
+    start = torch.tensor([[1.0, 0.0]] * unknowns.uncalibrated.size, dtype=torch.float64)
+    scale, angle = (column.clone().requires_grad_() for column in start.T)
     optimiser = torch.optim.LBFGS(
         [scale, angle],
         max_iter=500,
@@ -94,41 +135,4 @@ def learn_cameras_lbfgs(tracks: Sequence[Floats], rig: Rig) -> Rig:
         return value
 
     optimiser.step(loss)
-    turned = unknowns.scale * scale.detach().numpy() * np.exp(1j * angle.detach().numpy())
-    return Rig(calibrated(rig.cameras, unknowns.turns, turned))
-
-
-def _equations(tracks: Sequence[Floats], rig: Rig) -> tuple[Equations | None, Unknowns]:
-    """Eq. (4) in all frames without outliers; None if nothing is unknown."""
-    check_learnable(rig)
-    views = check_views(tracks, rig)
-    unknowns = Unknowns.of(rig)
-    if not unknowns.any:
-        return None, unknowns
-    if unknowns.loose.size:
-        raise ValueError(
-            f"rig: Eq. (4) needs all positions, got none of {names(unknowns.loose)}; use "
-            "learn_cameras"
-        )
-    if not rig.is_orthographic:
-        raise ValueError("rig: Eq. (4) needs orthographic cameras, got a perspective one")
-    others = [rig.cameras[i] for i in unknowns.turns]
-    if not independent(others):
-        raise ValueError(
-            "rig: Eq. (4) needs two independent normals among the uncalibrated cameras, got "
-            f"{[camera.normal.tolist() for camera in others]}; use learn_cameras"
-        )
-
-    def prediction(indices: Ints) -> Floats | None:
-        """Columns Q of Eq. (4): R^-_known pinv(R^-_unknown) y_unknown - y_known = 0."""
-        if len(indices) < len(rig.cameras):
-            return None
-        known = np.vstack([c.rows for c in rig.cameras if c.is_calibrated])
-        flags = np.repeat([not c.is_calibrated for c in rig.cameras], 2)
-        columns = np.zeros((len(flags), len(known)))
-        columns[flags] = (known @ np.linalg.pinv(np.vstack([c.rows for c in others]))).T
-        columns[~flags] = -np.eye(len(known))
-        return columns
-
-    equations = agreement(views, unknowns, prediction)
-    return equations.without(outliers(equations, unknowns.scale)[0]), unknowns
+    return unknowns.scale * scale.detach().numpy() * np.exp(1j * angle.detach().numpy())

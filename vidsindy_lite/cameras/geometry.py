@@ -99,9 +99,8 @@ def plane_projection(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:
     ValueError
         If `x` does not end in an axis of length 3, or the normal is not a finite non-zero vector.
     """
-    x = _points("x", x)
-    unit = unit_vector("normal", normal)
-    return x - signed_distance(x, normal, d)[..., None] * unit
+    distance = signed_distance(x, normal, d)
+    return check_array("x", x) - distance[..., None] * unit_vector("normal", normal)
 
 
 def signed_distance(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:
@@ -125,9 +124,10 @@ def signed_distance(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:
     ValueError
         If `x` does not end in an axis of length 3, or the normal is not a finite non-zero vector.
     """
-    x = _points("x", x)
-    unit = unit_vector("normal", normal)
-    return x @ unit + float(d) / np.linalg.norm(normal)
+    points = check_array("x", x)
+    if points.ndim == 0 or points.shape[-1] != 3:
+        raise ValueError(f"x: must have shape (..., 3), got {points.shape}")
+    return points @ unit_vector("normal", normal) + float(d) / np.linalg.norm(normal)
 
 
 def plane_through(p1: ArrayLike, p2: ArrayLike, p3: ArrayLike) -> tuple[Floats, float]:
@@ -158,14 +158,6 @@ def plane_through(p1: ArrayLike, p2: ArrayLike, p3: ArrayLike) -> tuple[Floats, 
         raise ValueError(f"p1, p2, p3: must not lie on one line, got {p1}, {p2}, {p3}")
     normal = unit_vector("normal", normal)
     return normal, -float(normal @ p1)
-
-
-def _points(name: str, x: ArrayLike) -> Floats:
-    """Real numbers of shape (..., 3)."""
-    points = check_array(name, x)
-    if points.ndim == 0 or points.shape[-1] != 3:
-        raise ValueError(f"{name}: must have shape (..., 3), got {points.shape}")
-    return points
 
 
 def unit_vector(name: str, value: ArrayLike) -> Floats:

@@ -161,10 +161,11 @@ class Rig:
             content = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: must be a TOML file: {error}") from error
-        tables = content.pop("camera", None)
-        if content or not isinstance(tables, list):
-            found = sorted([*content, "camera"] if tables is not None else content)
-            raise ValueError(f"{path}: must hold [[camera]] tables and nothing else, got {found}")
+        tables = content.get("camera")
+        if len(content) != 1 or not isinstance(tables, list):
+            raise ValueError(
+                f"{path}: must hold [[camera]] tables and nothing else, got {sorted(content)}"
+            )
         try:
             return cls(tuple(_from_table(i, table) for i, table in enumerate(tables)))
         except ValueError as error:

@@ -28,11 +28,18 @@ from scipy.interpolate import make_interp_spline
 
 from ..arrays import Bools, Floats
 from ..checks import check_positive, check_tracks, check_vector
-from .calibrate import check_learnable, fit_cameras
+from .calibrate import cameras_of_views, check_learnable
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
 from .models import Camera
 from .rig import Rig
-from .triangulate import Views, epipolar_design, epipolar_lines, reprojection, residuals
+from .triangulate import (
+    Views,
+    check_seen,
+    epipolar_design,
+    epipolar_lines,
+    residuals,
+    residuals_of_views,
+)
 from .unknowns import Unknowns
 
 DISAGREEMENT = 1.0
@@ -182,21 +189,15 @@ def learn_lags(
         If the rig has no calibrated camera, there is not one track, rate and lag per camera, a
         track has a wrong shape, or a track never shows the target.
     """
-    check_learnable(rig)
-    tracks = check_tracks(tracks, len(rig.cameras))
-    for i, track in enumerate(tracks):
-        if not np.isfinite(track).all(axis=1).any():
-            raise ValueError(f"tracks[{i}]: must show the target in some frame, got none")
+    unknowns, tracks = check_learnable(rig), check_seen(tracks, rig)
     first = _check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
-    videos = _Videos.of(tracks, rig, _check_rates(rates, len(tracks)))
+    videos = _Videos.of(tracks, unknowns, _check_rates(rates, len(tracks)))
     residual = videos.disagreement(first)
-    if residual <= DISAGREEMENT:
-        found = [_refined(videos, first)]
-    else:
-        found = [_refined(videos, lags) for lags in _whole_lags(videos)]
-    found = sorted((s for s in found if s.agree), key=lambda s: s.residual)
+    tried = [first] if residual <= DISAGREEMENT else _whole_lags(videos)
+    refined = [_refined(videos, lags) for lags in tried]
+    found = sorted((s for s in refined if s.agree), key=lambda s: s.residual)
     if not found:
-        return _untold(videos, first, residual, no_lags(list_lags(first), residual))
+        return _untold(videos, first, no_lags(list_lags(first), residual))
     alike = [s for s in found if s.residual <= max(ALIKE * found[0].residual, FINE)]
     best = min(alike, key=lambda s: np.abs(s.frames).sum())
     warnings = list(best.warnings)
@@ -224,13 +225,13 @@ class _Videos:
     tried: dict[tuple[float, ...], Floats | None] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, tracks: Sequence[Floats], rig: Rig, rates: Floats) -> _Videos:
-        """Of tracks, a rig and rates that were checked."""
+    def of(cls, tracks: Sequence[Floats], unknowns: Unknowns, rates: Floats) -> _Videos:
+        """Of tracks, unknowns and rates that were checked."""
         seen = [track[np.isfinite(track).all(axis=1)] for track in tracks]
         steps = np.concatenate([np.hypot(*np.diff(track, axis=0).T) for track in seen])
         speed = float(np.quantile(steps, _TRIMMED)) if len(steps) else 0.0
         lengths = np.array([float(len(track)) for track in tracks])
-        return cls(tuple(map(_curve, tracks)), lengths, rates, Unknowns.of(rig), speed)
+        return cls(tuple(map(_curve, tracks)), lengths, rates, unknowns, speed)
 
     @property
     def ends(self) -> Floats:
@@ -259,7 +260,7 @@ def _best_residuals(tracks: Sequence[Floats], unknowns: Unknowns) -> Floats | No
         return None
     views = Views.of(tracks)
     try:
-        return np.hstack(reprojection(views, fit_cameras(views, unknowns).cameras))
+        return np.hstack(residuals_of_views(views, cameras_of_views(views, unknowns).cameras))
     except ValueError:  # these lags leave too little in common, or nothing that agrees
         return None
 
@@ -272,12 +273,12 @@ def _trimmed(residual: Floats) -> float:
 
 def _refined(videos: _Videos, whole: Floats) -> Lags:
     """The lags of the smallest reprojection error near whole ones."""
-    lags, size = np.array(whole, float), np.inf
+    lags = whole.copy()
     shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
     for _ in range(_STEPS):
         parts = [videos.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)]
         if any(part is None for part in parts):
-            return _untold(videos, lags, videos.disagreement(lags))
+            return _untold(videos, lags)
         tried = np.array(parts)
         here, ahead, behind = tried[0], *np.split(tried[1:], 2)
         used = np.isfinite(tried).all(axis=0)
@@ -292,7 +293,7 @@ def _refined(videos: _Videos, whole: Floats) -> Lags:
     noise = max(np.mean((here[used] + slope @ step) ** 2), _ROUNDING**2)
     told = _told(videos, lags, used, noise, np.sum(slope**2, axis=0))
     if not told.all():
-        return _untold(videos, np.array(whole, float), videos.disagreement(whole))
+        return _untold(videos, whole)
     information = slope.T @ slope / noise * np.sqrt(np.outer(told, told))
     errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information)))))
     # Schwarz's criterion: a fraction is one more unknown per video.
@@ -304,10 +305,10 @@ def _refined(videos: _Videos, whole: Floats) -> Lags:
     return Lags(lags, videos.rates, errors, videos.disagreement(lags), warnings)
 
 
-def _untold(videos: _Videos, lags: Floats, residual: float, *warnings: str) -> Lags:
+def _untold(videos: _Videos, lags: Floats, *warnings: str) -> Lags:
     """Lags of which the tracks tell nothing; that of the first video is zero in any case."""
     errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-    return Lags(lags, videos.rates, errors, residual, warnings)
+    return Lags(lags, videos.rates, errors, videos.disagreement(lags), warnings)
 
 
 def _told(videos: _Videos, lags: Floats, used: Bools, noise: float, slopes: Floats) -> Floats:
@@ -408,19 +409,15 @@ def _curve(track: Floats) -> Curve:
     """
     shown = np.asarray(np.isfinite(track).all(axis=1))
     seen = np.flatnonzero(shown)
-    spline = make_interp_spline(seen, track[seen], k=min(3, len(seen) - 1)) if len(seen) else None
+    if not seen.size:
+        return lambda frames: np.full((len(frames), 2), np.nan)
+    spline = make_interp_spline(seen, track[seen], k=min(3, len(seen) - 1))
 
     def at(frames: Floats) -> Floats:
-        inside = (frames >= 0) & (frames <= len(track) - 1)
-        frames = np.where(inside, frames, 0)
-        low, high = np.floor(frames).astype(int), np.ceil(frames).astype(int)
-        inside[inside] = shown[low[inside]] & shown[high[inside]]
-        values = np.full((len(frames), 2), np.nan)
-        whole = inside & (low == high)
-        values[whole] = track[low[whole]]
-        between = inside & (low != high)
-        if spline is not None and between.any():
-            values[between] = spline(frames[between])
+        within = np.clip(frames, 0, len(track) - 1)
+        low, high = np.floor(within).astype(int), np.ceil(within).astype(int)
+        values = np.where((low == high)[:, None], track[low], spline(within))
+        values[~((frames == within) & shown[low] & shown[high])] = np.nan
         return values
 
     return at

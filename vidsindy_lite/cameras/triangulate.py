@@ -53,6 +53,10 @@ class Views:
             ),
         )
 
+    def only(self, frames: Ints) -> Views:
+        """What was seen in these frames, each taken once."""
+        return Views.of([track[np.unique(frames)] for track in self.tracks])
+
     @property
     def frames(self) -> int:
         """Number of frames."""
@@ -86,9 +90,8 @@ def reconstruct(tracks: Sequence[Floats], rig: Rig) -> Floats:
     ValueError
         If the tracks do not match the rig or a camera is not calibrated.
     """
-    views = check_views(tracks, rig)
     check_calibrated("rig", rig)
-    return triangulate(views, rig.cameras)
+    return points_of_views(check_views(tracks, rig), rig.cameras)
 
 
 def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
@@ -113,49 +116,52 @@ def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
     ValueError
         If the tracks do not match the rig or a camera is not calibrated.
     """
-    views = check_views(tracks, rig)
     check_calibrated("rig", rig)
-    return reprojection(views, rig.cameras)
+    return residuals_of_views(check_views(tracks, rig), rig.cameras)
+
+
+def check_seen(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
+    """That there is one track per camera of the rig, each of which sees the target."""
+    check_instance("rig", rig, Rig)
+    checked = check_tracks(tracks, len(rig.cameras))
+    for i, track in enumerate(checked):
+        if np.isnan(track).any(axis=1).all():
+            raise ValueError(f"tracks[{i}]: must see the target in some frame, got only NaN rows")
+    return checked
 
 
 def check_views(tracks: Sequence[Floats], rig: Rig) -> Views:
-    """That there is one track per camera of the rig, of equal length, each seeing the target."""
-    check_instance("rig", rig, Rig)
-    tracks = check_tracks(tracks, len(rig.cameras))
-    lengths = [len(track) for track in tracks]
+    """That the tracks fit the rig, and each other in length."""
+    checked = check_seen(tracks, rig)
+    lengths = [len(track) for track in checked]
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
-    for i, track in enumerate(tracks):
-        if np.isnan(track).any(axis=1).all():
-            raise ValueError(f"tracks[{i}]: must see the target in some frame, got only NaN rows")
-    return Views.of(tracks)
+    return Views.of(checked)
 
 
 def check_calibrated(name: str, rig: Rig) -> None:
     """That scale, angle and position of all cameras are known."""
+    check_instance(name, rig, Rig)
     for i, camera in enumerate(rig.cameras):
-        if not camera.is_calibrated:
-            raise ValueError(
-                f"{name}: all cameras must be calibrated, got cameras[{i}] without scale and "
-                "angle; use learn_cameras first"
-            )
-        if not camera.is_placed:
-            raise ValueError(
-                f"{name}: all cameras must have a position, got cameras[{i}] without; use "
-                "learn_cameras first"
-            )
+        known = {"scale and angle": camera.is_calibrated, "position": camera.is_placed}
+        for what, given in known.items():
+            if not given:
+                raise ValueError(
+                    f"{name}: all cameras must be calibrated and placed, got cameras[{i}] without "
+                    f"{what}; use learn_cameras first"
+                )
 
 
-# What follows takes its arguments as they are.
+# What follows takes its arguments as they are; `..._of_views`, views that were checked.
 
 
-def reprojection(views: Views, cameras: Sequence[Camera]) -> list[Floats]:
+def residuals_of_views(views: Views, cameras: Sequence[Camera]) -> list[Floats]:
     """`residuals` of views that were checked."""
-    x = triangulate(views, cameras)
+    x = points_of_views(views, cameras)
     return [t - camera.image(x) for t, camera in zip(views.tracks, cameras, strict=True)]
 
 
-def triangulate(views: Views, cameras: Sequence[Camera]) -> Floats:
+def points_of_views(views: Views, cameras: Sequence[Camera]) -> Floats:
     """`reconstruct` of views that were checked; one linear solve if all are orthographic."""
     if not all_orthographic(cameras):
         return intersect(cameras, views.tracks)[0]

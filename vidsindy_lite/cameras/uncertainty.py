@@ -26,7 +26,7 @@ import numpy as np
 from ..arrays import Floats
 from .rig import Rig
 from .synchronise import OUTLIER, PROBE, Lags, align
-from .triangulate import Views, check_calibrated, check_views, reprojection, triangulate
+from .triangulate import Views, check_calibrated, check_views, points_of_views, residuals_of_views
 from .unknowns import Unknowns
 
 _PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width
@@ -65,7 +65,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
             shifted[moving] += shift
             views = Views.of(align(tracks, shifted, lags.rates))
         cameras = unknowns.filled(start + change[: len(start)])
-        return np.hstack((*reprojection(views, cameras), triangulate(views, cameras)))
+        return np.hstack((*residuals_of_views(views, cameras), points_of_views(views, cameras)))
 
     here = both(0 * steps)
     tried = [(both(e) - both(-e)) / (2 * h) for e, h in zip(np.diag(steps), steps, strict=True)]
@@ -98,10 +98,10 @@ def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
         Scene units; what the trail of each camera, one standard deviation long, adds to the path.
         Zero where nothing can be reconstructed.
     """
-    views = check_views(tracks, rig)
     check_calibrated("rig", rig)
-    x = triangulate(views, rig.cameras)
-    missed = np.hstack(reprojection(views, rig.cameras))
+    views = check_views(tracks, rig)
+    x = points_of_views(views, rig.cameras)
+    missed = np.hstack(residuals_of_views(views, rig.cameras))
     count = missed.shape[1]
     missed = np.abs(missed[np.isfinite(missed)])
     noise = 1.4826 * np.median(missed) * np.sqrt(count / (count - 3)) if missed.size else 0.0
@@ -112,7 +112,7 @@ def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
         length = np.sqrt((step**2).sum(axis=1, keepdims=True) + noise**2)
         trail = _TRAIL * noise * np.nan_to_num(step / np.maximum(length, 1e-300))
         moved = replace(views, tracks=(*views.tracks[:i], track - trail, *views.tracks[i + 1 :]))
-        modes.append(triangulate(moved, rig.cameras) - x)
+        modes.append(points_of_views(moved, rig.cameras) - x)
     return np.nan_to_num(np.array(modes))
 
 

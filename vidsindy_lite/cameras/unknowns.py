@@ -19,8 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import null_space
 
 from ..arrays import Floats, Ints
+from .geometry import PARALLEL
 from .models import Camera
 from .rig import Rig
 from .triangulate import Views
@@ -35,14 +37,14 @@ _ROUNDS = 20  # of leaving outliers out
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Which cameras are not calibrated (`turns`) and which not placed (`loose`), and their units.
+    """Which cameras of a rig are not calibrated and which not placed, as indices, and their units.
 
     `scale` is the mean scale of the calibrated cameras, `width` the mean width of what they see.
     """
 
     cameras: tuple[Camera, ...]
-    turns: Ints
-    loose: Ints
+    uncalibrated: Ints
+    unplaced: Ints
     scale: float
     width: float
 
@@ -61,7 +63,7 @@ class Unknowns:
     @property
     def any(self) -> bool:
         """Whether anything is unknown."""
-        return bool(self.turns.size or self.loose.size)
+        return bool(self.uncalibrated.size or self.unplaced.size)
 
     def vector(self, turned: Complex, offsets: Floats) -> Floats:
         """The vector of s exp(i theta), (u,), and offsets, (v, 2)."""
@@ -69,18 +71,18 @@ class Unknowns:
 
     def read(self, learned: Sequence[Camera]) -> Floats:
         """The vector of cameras of which nothing is unknown."""
-        pairs = [learned[i].calibration for i in self.turns]
+        pairs = [learned[i].calibration for i in self.uncalibrated]
         turned = np.array([scale * np.exp(1j * angle) for scale, angle in pairs], complex)
-        offsets = np.array([learned[i].offset for i in self.loose])
+        offsets = np.array([learned[i].offset for i in self.unplaced])
         return self.vector(turned, offsets.reshape(-1, 2))
 
     def filled(self, vector: Floats) -> tuple[Camera, ...]:
         """The cameras with all that is unknown taken from a vector."""
-        logs, offsets = np.split(vector, [2 * self.turns.size])
+        logs, offsets = np.split(vector, [2 * self.uncalibrated.size])
         cameras = list(self.cameras)
-        for i, offset in zip(self.loose, offsets.reshape(-1, 2) * self.width, strict=True):
+        for i, offset in zip(self.unplaced, offsets.reshape(-1, 2) * self.width, strict=True):
             cameras[i] = cameras[i].placed(offset)
-        return calibrated(cameras, self.turns, np.exp(logs.copy().view(complex)))
+        return calibrated(cameras, self.uncalibrated, np.exp(logs.copy().view(complex)))
 
 
 def calibrated(
@@ -100,41 +102,47 @@ def names(indices: Iterable[int]) -> str:
 class Equations:
     """Linear equations design @ p = target, (k, p) and (k,), and the frame of each, (k,).
 
-    p holds (s cos theta, s sin theta) of the unknown cameras, then Delta_c of the loose ones,
-    divided by the half width of their image: so all of the design is in pixels.
+    p holds (s cos theta, s sin theta) of the cameras that are not calibrated, then Delta_c of those
+    not placed, divided by the half width of their image: so all of the design is in pixels.
     """
 
     design: Floats
     target: Floats
     frames: Ints
 
-    def without(self, frames: Ints) -> Equations:
-        """The equations of all other frames."""
-        rest = ~np.isin(self.frames, frames)
-        return Equations(self.design[rest], self.target[rest], self.frames[rest])
+
+def annihilator(cameras: Sequence[Camera]) -> Floats:
+    """All columns Q that take the unknown point out of the views of these cameras."""
+    return null_space(np.vstack([camera.rows for camera in cameras]).T, rcond=PARALLEL)
 
 
 def agreement(
-    views: Views, unknowns: Unknowns, annihilator: Callable[[Ints], Floats | None]
-) -> Equations:
-    """The equations of all groups of frames for whose cameras there are columns Q, (2 c, q)."""
-    width = 2 * (unknowns.turns.size + unknowns.loose.size)
+    views: Views,
+    unknowns: Unknowns,
+    columns: Callable[[Sequence[Camera]], Floats] = annihilator,
+) -> tuple[Equations, bool]:
+    """The equations of all frames without outliers, and whether it could be told which these are.
+
+    `columns(cameras)` are the Q, (2 c, q), of c cameras that see the target in the same frames.
+    """
+    width = 2 * (unknowns.uncalibrated.size + unknowns.unplaced.size)
     parts = [(np.zeros((0, width)), np.zeros(0), np.zeros(0, dtype=int))]
     for indices, frames in views.groups:
-        columns = annihilator(indices)
-        if columns is not None:
-            parts.append(_group(views, unknowns, indices, frames, columns))
-    return Equations(*map(np.concatenate, zip(*parts, strict=True)))
+        block = columns([unknowns.cameras[i] for i in indices])
+        design, target = _group(views, unknowns, indices, frames, block)
+        places = np.repeat(frames, target.shape[1])
+        parts.append((design.reshape(len(places), width), target.ravel(), places))
+    every = Equations(*map(np.concatenate, zip(*parts, strict=True)))
+    return _without_outliers(every, unknowns.scale)
 
 
 def _group(
     views: Views, unknowns: Unknowns, indices: Ints, frames: Ints, columns: Floats
-) -> tuple[Floats, Floats, Ints]:
-    """Design, target and frames of the equations of one group of frames."""
-    turns_count, loose_count = unknowns.turns.size, unknowns.loose.size
-    design = np.zeros((len(frames), columns.shape[1], turns_count + loose_count, 2))
+) -> tuple[Floats, Floats]:
+    """Design, (f, q, p / 2, 2), and target, (f, q), of the equations of one group of frames."""
+    first = unknowns.uncalibrated.size  # of the cameras that are not placed
+    design = np.zeros((len(frames), columns.shape[1], first + unknowns.unplaced.size, 2))
     target = np.zeros(design.shape[:2])
-    turns, offsets = np.split(design, [turns_count], axis=2)
     for i, block in zip(indices, np.split(columns, len(indices)), strict=True):
         camera, pixels = unknowns.cameras[i], views.tracks[i][frames]
         if camera.scale is not None:
@@ -142,33 +150,33 @@ def _group(
         else:
             # s T(theta) (X, Y) = [[X, Y], [Y, -X]] p
             x, y = camera.centred(pixels).T
-            matrix = np.array([[x, y], [y, -x]])
-            turns[:, :, unknowns.turns == i] = np.einsum("abf,aq->fqb", matrix, block)[:, :, None]
+            slope = np.einsum("abf,aq->fqb", np.array([[x, y], [y, -x]]), block)
+            design[:, :, np.searchsorted(unknowns.uncalibrated, i)] = slope
         if camera.is_placed:
             target -= camera.offset @ block
         else:
-            offsets[:, :, unknowns.loose == i] = camera.image_size[0] / 2 * block.T[:, None]
-    places = np.repeat(frames, target.shape[1])
-    return design.reshape(len(places), -1), target.ravel(), places
+            place = first + np.searchsorted(unknowns.unplaced, i)
+            design[:, :, place] = camera.image_size[0] / 2 * block.T
+    return design, target
 
 
-def outliers(equations: Equations, scale: float) -> tuple[Ints, bool]:
-    """Frames with an equation that a least-squares fit to all the other frames misses by far.
+def _without_outliers(every: Equations, scale: float) -> tuple[Equations, bool]:
+    """The frames of which a least-squares fit to them misses no equation by far.
 
     Fit and frames are found in turn; the second result is whether they came to agree. The scale of
     the misses is the median over all frames, so that leaving some out never makes others look
     worse.
     """
-    found = np.zeros(0, dtype=int)
+    kept = every
     for _ in range(_ROUNDS):
-        fits = equations.without(found)
-        solution = np.linalg.lstsq(fits.design, fits.target)[0]
-        missed = np.abs(equations.design @ solution - equations.target) / scale
+        solution = np.linalg.lstsq(kept.design, kept.target)[0]
+        missed = np.abs(every.design @ solution - every.target) / scale
         limit = max(_OUTLIER * 1.4826 * np.median(missed), _ROUNDING) if len(missed) else 0.0
-        before, found = found, np.unique(equations.frames[missed > limit])
-        if np.array_equal(found, before):
-            return found, True
-    return found, False
+        good = ~np.isin(every.frames, every.frames[missed > limit])
+        before, kept = kept, Equations(every.design[good], every.target[good], every.frames[good])
+        if np.array_equal(kept.frames, before.frames):
+            return kept, True
+    return kept, False
 
 
 def solve(design: Floats, target: Floats, unknowns: Unknowns) -> tuple[Complex, Floats]:
@@ -178,7 +186,7 @@ def solve(design: Floats, target: Floats, unknowns: Unknowns) -> tuple[Complex, 
     one combination of the parameters. Noise on a target that does not move makes 0.6-1.4 times the
     misfit of it, so twice the misfit is asked for.
     """
-    turns, loose = unknowns.turns, unknowns.loose
+    turns, loose = unknowns.uncalibrated, unknowns.unplaced
     wanted = "scale, angle and position" if len(loose) else "scale and angle"
     asked = np.append(turns, loose)
     if len(design) < design.shape[1]:
