@@ -7,6 +7,7 @@ import pytest
 
 from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
+from vidsindy_lite.dynamics.persistence import follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.dynamics.splines import DEGREE, Segment
@@ -45,7 +46,8 @@ def fitted(duffing, dropped=None):
     origin, still = np.zeros(2), np.zeros(2, dtype=bool)
     state = State(curve, np.where(active, law.coefficients, 0.0), active, origin, still)
     fit = collocation.solve(state, tolerance=1e-4, max_steps=100)
-    return problem, fit, problem.law(fit.state), np.full(law.coefficients.size, np.inf)
+    margins = np.full(law.coefficients.size, np.inf)
+    return problem, fit, follow(problem, fit), problem.law(fit.state), margins
 
 
 def told(duffing, dropped=None):
@@ -61,18 +63,18 @@ def test_a_missing_term_is_noticed(duffing):
 
 
 def test_a_narrow_decision_in_the_frame_of_the_data_is_told(duffing):
-    problem, fit, law, _ = fitted(duffing)
+    problem, fit, path, law, _ = fitted(duffing)
     margins = np.full(law.coefficients.size, 100.0)
-    assert diagnose(problem, fit, law, margins) == ()
+    assert diagnose(problem, fit, path, law, margins) == ()
     margins[[law.terms.index("1"), len(law.terms) + law.terms.index("x^3")]] = 3.0, 1.5
-    (warning,) = diagnose(problem, fit, law, margins)
+    (warning,) = diagnose(problem, fit, path, law, margins)
     assert "with 1 in dx/dt, without x^3 in dy/dt (criterion +1.5)" in warning
 
 
 def test_a_coordinate_that_lost_its_law_is_told(duffing):
-    problem, fit, _, _ = fitted(duffing)
+    problem, fit, path, _, _ = fitted(duffing)
     law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
-    (warning,) = diagnose(problem, fit, law, np.full(law.coefficients.size, 100.0))
+    (warning,) = diagnose(problem, fit, path, law, np.full(law.coefficients.size, 100.0))
     assert "no term was found for dy/dt" in warning
 
 
@@ -133,8 +135,8 @@ def test_noise_and_gaps_are_no_outliers(law):
     [(Status.MAX_STEPS, "use cleaner samples"), (Status.STALLED, "may be indistinguishable")],
 )
 def test_a_fit_that_did_not_converge_is_named_with_advice(duffing, status, words):
-    problem, fit, law, margins = fitted(duffing)
+    problem, fit, path, law, margins = fitted(duffing)
     assert fit.status is Status.CONVERGED
-    (warning,) = diagnose(problem, replace(fit, status=status), law, margins)
+    (warning,) = diagnose(problem, replace(fit, status=status), path, law, margins)
     assert warning.startswith(f"the last fit did not converge ({status.value})")
     assert words in warning

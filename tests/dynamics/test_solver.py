@@ -202,7 +202,7 @@ def test_the_progress_bar_reaches_its_end(monkeypatch):
     monkeypatch.setattr(solver, "tqdm", Bar)
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
-    assert bars[0] == (4, 4)
+    assert bars[0] == (3, 3)
 
 
 def test_history_tells_the_fit(lorenz):

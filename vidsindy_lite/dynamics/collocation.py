@@ -69,6 +69,10 @@ class State:
             self, control_points=control_points, coefficients=coefficients, offset=offset
         )
 
+    def of_terms(self, active: Bools) -> State:
+        """The same with these terms and no others."""
+        return replace(self, active=active, coefficients=np.where(active, self.coefficients, 0.0))
+
 
 class Status(Enum):
     """How a fit ended."""

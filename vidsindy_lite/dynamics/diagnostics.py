@@ -10,9 +10,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .library import variable_names
+from .persistence import Path, Plateau
 from .polynomials import PolynomialSystem
 from .problem import Problem
 from .selection import closest_rival
@@ -26,7 +27,7 @@ TURNS = 1.5
 """Turns of the motion that a trajectory should cover."""
 COARSE = 1.0
 """Longest typical time step, in time scales of the motion (about 6 to a turn)."""
-RESOLVED = 1e-3
+RESOLVED = 1e-2
 """Residual, relative to the spread of the data, below which a misfit does not matter."""
 OUTLIER = 30.0
 """Distance of a sample from those around it, over how far nine samples in ten are from the median,
@@ -36,6 +37,8 @@ GUARD, REACH = 2, 8
 are compared with what is none."""
 CHANCE = 1e-4
 """Probability below which what the left-out terms explain together is no chance."""
+RIVAL = 0.5
+"""Width of another plateau, over that of the law's own, from which on the law is contested."""
 UNMET = 1e-2
 """Root mean square residual of the law along the curve, relative to the speed."""
 ADVICE = {
@@ -47,7 +50,9 @@ ADVICE = {
 """What to do about a fit that ended so."""
 
 
-def diagnose(problem: Problem, fit: Fit, law: PolynomialSystem, margins: Floats) -> tuple[str, ...]:
+def diagnose(
+    problem: Problem, fit: Fit, path: Path, law: PolynomialSystem, margins: Floats
+) -> tuple[str, ...]:
     """Reasons not to trust a law.
 
     Parameters
@@ -56,6 +61,8 @@ def diagnose(problem: Problem, fit: Fit, law: PolynomialSystem, margins: Floats)
         The data, and the noise as it was estimated before any law was known.
     fit : Fit
         The final fit, its noise re-estimated from the residual.
+    path : Path
+        On which its terms were chosen.
     law : PolynomialSystem
         The law in the frame of the data.
     margins : ndarray, shape (l d,)
@@ -67,7 +74,7 @@ def diagnose(problem: Problem, fit: Fit, law: PolynomialSystem, margins: Floats)
         *_misfit(problem, fit),
         *_unfinished(fit),
         *_unmet(fit),
-        *_selection(problem, fit),
+        *_selection(problem, fit, path),
         *_sampling(problem.trajectories),
         *_standstill(law),
         *_narrow(law, margins),
@@ -138,13 +145,44 @@ def _unmet(fit: Fit) -> Iterator[str]:
         )
 
 
-def _selection(problem: Problem, fit: Fit) -> Iterator[str]:
+def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
+    yield from _contested(problem.law(fit.state), path)
+    chosen = [
+        _own(plateaus, terms)
+        for plateaus, terms in zip(path.plateaus, fit.state.active.T, strict=True)
+    ]
+    if max(plateau.low for plateau in chosen) > path.lowest:
+        return  # weaker errors than those tolerated say nothing about the law
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = fit.collocation.linearise(fit.state, np.arange(problem.exponents.size))
     yield from _left_over(model, fit.state)
     yield from _near_tie(problem, fit.state, model)
+
+
+def _own(plateaus: Sequence[Plateau], terms: Bools) -> Plateau:
+    """The plateau of an equation's law; the lowest if it is not on the path."""
+    same = [plateau for plateau in plateaus if (plateau.terms == terms).all()]
+    return max(same, key=lambda plateau: plateau.decades) if same else plateaus[0]
+
+
+def _contested(law: PolynomialSystem, path: Path) -> Iterator[str]:
+    """Is the plateau of an equation's law hardly wider than that of another?"""
+    for widest, *others in path.ranked():
+        if others and others[0].decades > RIVAL * widest.decades:
+            rival = others[0]
+            changed = np.flatnonzero(rival.terms != widest.terms)
+            change = ", ".join(
+                f"{'with' if rival.terms[k] else 'without'} {law.terms[k]}"
+                for k in changed.tolist()
+            )
+            yield (
+                f"d{law.names[widest.equation]}/dt is settled by how large an error is tolerated: "
+                f"it stays the same from {widest.low:.1g} to {widest.high:.1g} of the spread of "
+                f"the data, and {change} from {rival.low:.1g} to {rival.high:.1g}; use cleaner "
+                "samples or a longer trajectory"
+            )
 
 
 def _left_over(model: Linearisation, state: State) -> Iterator[str]:

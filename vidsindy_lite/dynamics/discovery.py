@@ -13,6 +13,7 @@ from ..checks import check_array
 from .collocation import Fit
 from .diagnostics import diagnose
 from .library import shift_generators, shift_matrix, variable_names
+from .persistence import Path, Plateau
 from .polynomials import PolynomialSystem
 from .problem import Problem, Units
 from .selection import inverse
@@ -96,6 +97,9 @@ class Discovery:
         Estimated standard deviation of the measurement noise, in units of the data.
     warnings : tuple of str
         Why the law should not be trusted, with advice; empty if nothing was found.
+    path : tuple of tuple of Plateau
+        Of each equation, its laws in the native frame over the tolerated error, from the errors
+        that the law leaves up to the spread of the data; the widest is the law.
     history : tuple of Step
         How the fit went.
     curves : tuple of scipy.interpolate.BSpline
@@ -110,6 +114,7 @@ class Discovery:
     offset_errors: Floats
     noise: Floats
     warnings: tuple[str, ...]
+    path: tuple[tuple[Plateau, ...], ...]
     history: tuple[Step, ...]
     curves: tuple[BSpline, ...]
 
@@ -174,7 +179,7 @@ class Discovery:
         return "\n".join([self.equations(), *(f"warning: {text}" for text in self.warnings)])
 
 
-def conclude(problem: Problem, fit: Fit, history: History) -> Discovery:
+def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discovery:
     """Turn the last fit into a `Discovery` in the units of the data.
 
     Parameters
@@ -184,6 +189,8 @@ def conclude(problem: Problem, fit: Fit, history: History) -> Discovery:
         be told from zero.
     fit : Fit
         At a physics weight at which the law holds exactly.
+    path : Path
+        On which the law was chosen.
     history : History
         Passed on.
     """
@@ -206,7 +213,8 @@ def conclude(problem: Problem, fit: Fit, history: History) -> Discovery:
         native_covariance=covariance[: l * d, : l * d],
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
         noise=collocation.data_weights**-0.5 * units.scale,
-        warnings=diagnose(problem, fit, law, margins),
+        warnings=diagnose(problem, fit, path, law, margins),
+        path=path.plateaus,
         history=tuple(history.steps),
         curves=tuple(
             BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)

@@ -98,6 +98,14 @@ def closest_rival(
     return min(rivals, key=lambda rival: rival[0])
 
 
+def minimiser(information: Floats, gradient: Floats, present: Floats, support: Bools) -> Floats:
+    """Minimiser of the function of `subset_search` on a support, zero elsewhere, shape (m,)."""
+    model = _Quadratic.of(information, gradient, present, np.zeros(len(present)))
+    fit, solution = model.fit(support), np.zeros(len(present))
+    solution[fit.inside] = fit.fitted * model.scale[fit.inside]
+    return solution
+
+
 @dataclass(frozen=True)
 class _Fit:
     """A quadratic function at its minimum on a support, all in scaled entries."""

@@ -21,11 +21,13 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from ..checks import check_integer
-from .collocation import CLEANEST, Collocation, Fit, Linearisation, State
+from .collocation import Collocation, Fit, State
 from .discovery import Discovery, History, conclude
+from .errors import effective_noise
 from .gaps import Gap, gaps, join
 from .library import closure_mask, monomials, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
+from .persistence import LARGEST, TOLERATED, Path, Plateau, follow, typical
 from .problem import Problem, fit_curves, pose
 from .selection import inverse, subset_search
 from .trajectories import check_systematic, check_trajectories
@@ -44,6 +46,12 @@ LONGEST_SEARCH = 10
 """Most rounds of a subset search."""
 EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
+CONSISTENT = 1.5
+"""Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
+LONGEST_CLIMB, LONGEST_DESCENT = 4, 3
+"""Most searches at larger errors, and most laws at smaller ones."""
+MOST_HALVINGS = 4
+"""Most halvings of the knot spans."""
 
 
 def discover(
@@ -98,15 +106,32 @@ def discover(
     )
     history = History()
     problem = pose(trajectories, shared, degree, probes)
-    with tqdm(total=4, disable=not progress, desc="discover", leave=False) as bar:
-        found = candidates(problem, degree, starts, history)
+    with tqdm(total=3, disable=not progress, desc="discover", leave=False) as bar:
+        fit = search(problem, degree, starts, history)
         bar.update()
-        fit = cheapest(problem, found, history)
+        fit = polish(problem, fit, history)
         bar.update()
-        for stage in (bridge, polish):
-            fit = stage(problem, fit, history)
-            bar.update()
-    return conclude(problem, fit, history)
+        fit, path = settle(problem, fit, history)
+        bar.update()
+    return conclude(problem, fit, path, history)
+
+
+def search(problem: Problem, degree: int, rng: np.random.Generator, history: History) -> Fit:
+    """The terms that make the motion: the cheapest law at a tolerated error.
+
+    If the law leaves larger errors than were tolerated, or errors that last, the search is made
+    again and tolerates them.
+    """
+    tolerated = np.maximum(problem.noise, TOLERATED)
+    for _ in range(LONGEST_CLIMB):
+        tolerant = replace(problem, noise=tolerated)
+        found = candidates(tolerant, degree, rng, history)
+        fit = bridge(tolerant, cheapest(tolerant, found, history), history)
+        left = effective_noise(fit)
+        if (left <= CONSISTENT * tolerated).all() or (tolerated >= LARGEST).all():
+            break
+        tolerated = np.maximum(tolerated, np.minimum(left, LARGEST))
+    return fit
 
 
 def candidates(
@@ -246,22 +271,13 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
         )  # fmt: skip
         if (support == state.free()[columns]).all():
             break
-        trial = refit(_proposed(state, model, solution))
+        promised = model.along(state, solution - state.flat()[columns], 1.0)
+        trial = refit(replace(promised, active=promised.coefficients != 0))
         if not trial.criterion < best.criterion - 1e-6:
             break
         best = trial
         history.add(stage, problem, best, weight)
     return best
-
-
-def _proposed(state: State, model: Linearisation, solution: Floats) -> State:
-    """The state that the quadratic model promises for a solution of the subset search."""
-    flat = state.flat()
-    step = solution - flat[model.columns]
-    flat[model.columns] = solution
-    control = state.control_points + model.curve_step + model.curve_response @ step
-    moved = state.moved(control, flat)
-    return replace(moved, active=moved.coefficients != 0)
 
 
 def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
@@ -346,13 +362,13 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
 
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
-    """Refit with the law exact, on finer knots until that no longer matters."""
+    """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
     fit = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
     columns = np.flatnonzero(fit.state.free())
-    for _ in range(3):
+    for _ in range(MOST_HALVINGS):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
-        finer = problem.collocation(segments, residual_noise(fit))
+        finer = problem.collocation(segments, effective_noise(fit))
         splines = fit.collocation.grid.splines(fit.state.control_points)
         state = replace(fit.state, control_points=fit_curves(finer, splines))
         fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
@@ -362,15 +378,51 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
         error = np.abs(fit.state.flat()[columns] - before) / 15
         if (error < np.maximum(0.1 * spread, SPLINE_ERROR)).all():
             break
-    # A term that only made up for the error of coarser splines goes, and the noise, known
-    # better now, may change what is worth its penalty.
-    fit = select(problem, fit, FINAL_WEIGHT, "polish", history)
-    return fit.collocation.solve(fit.state, EXACT)
+    history.add("polish", problem, fit, FINAL_WEIGHT)
+    return fit
 
 
-def residual_noise(fit: Fit) -> Floats:
-    """Standard deviation of the data residual, less the freedom that the fit used up."""
-    used = fit.state.free().sum() / len(fit.state.moving) + len(fit.collocation.segments)
-    residual, _ = fit.collocation.data_residual(fit.state.control_points)
-    squares = (residual**2).sum(axis=0)
-    return np.maximum(np.sqrt(squares / max(len(residual) - used, 1.0)), CLEANEST)
+def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
+    """The law with the widest plateau in each equation, and the path on which it lies.
+
+    Where the path could hold a wider plateau still below the errors that a law leaves, the richer
+    law there is fitted, and the path followed from that.
+    """
+    deepest, path = fit, follow(problem, fit)
+    for _ in range(LONGEST_DESCENT):
+        trial = _refitted(problem, path, _deeper(problem, path), history)
+        if trial is None:
+            break
+        deepest, path = trial, follow(problem, trial, path.level)
+    best = [widest for widest, *_ in path.ranked()]
+    for known in (fit, deepest):
+        if not _changed(known, best):
+            return known, path
+    return _refitted(problem, path, best, history) or fit, path
+
+
+def _deeper(problem: Problem, path: Path) -> list[Plateau]:
+    """The widest plateaus, or the lowest where a wider one may be out of sight."""
+    unseen = np.log10(path.lowest / typical(problem.noise))
+    return [
+        lowest if lowest.decades + unseen > widest.decades else widest
+        for (widest, *_), (lowest, *_) in zip(path.ranked(), path.plateaus, strict=True)
+    ]
+
+
+def _refitted(
+    problem: Problem, path: Path, goal: Sequence[Plateau], history: History
+) -> Fit | None:
+    """The law of these plateaus; none if it is that of the path, or leaves errors beyond them."""
+    changed = _changed(path.fit, goal)
+    if not changed:
+        return None
+    active = np.stack([plateau.terms for plateau in goal], axis=1)
+    fit = polish(problem, replace(path.fit, state=path.restricted(active)), history)
+    largest = max(plateau.low for plateau in changed)
+    return fit if typical(effective_noise(fit)) <= CONSISTENT * largest else None
+
+
+def _changed(fit: Fit, goal: Sequence[Plateau]) -> list[Plateau]:
+    """The plateaus whose terms are not those of a fit."""
+    return [p for p in goal if (p.terms != fit.state.active[:, p.equation]).any()]

@@ -1,0 +1,53 @@
+"""Errors that last for several samples count for what they leave uncertain."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from vidsindy_lite.dynamics.errors import inflation
+
+
+def lasting(n, correlation, rng):
+    """An autoregressive error of first order, variance 1."""
+    return lfilter([np.sqrt(1 - correlation**2)], [1, -correlation], rng.standard_normal(n))
+
+
+def test_independent_errors_are_not_inflated():
+    errors = np.random.default_rng(0).standard_normal((3000, 4))
+    np.testing.assert_array_equal(inflation([errors]), 1.0)
+
+
+@pytest.mark.parametrize("correlation", [0.3, 0.8, 0.95])
+def test_autoregressive_errors_are_inflated_as_theory_says(correlation):
+    error = lasting(200_000, correlation, np.random.default_rng(1))
+    expected = (1 + correlation) / (1 - correlation)
+    assert inflation([error[:, None]])[0] == pytest.approx(expected, rel=0.1)
+
+
+def test_a_mean_of_lasting_errors_is_as_uncertain_as_they_say():
+    error = lasting(400_000, 0.9, np.random.default_rng(2)).reshape(400, 1000)
+    expected = error.mean(axis=1).var() * 1000
+    assert inflation([error.reshape(-1, 1)])[0] == pytest.approx(expected, rel=0.25)
+
+
+def test_errors_that_alternate_are_not_inflated():
+    error = lasting(3000, -0.8, np.random.default_rng(3))
+    assert inflation([error[:, None]])[0] == 1.0
+
+
+def test_nothing_lasts_from_one_stretch_into_the_next():
+    rng = np.random.default_rng(4)
+    # Each stretch has its own level: within it errors never end, between two they are unrelated.
+    stretches = [np.full((20, 1), level) for level in rng.choice([-1.0, 1.0], 500)]
+    together = np.concatenate(stretches)
+    assert inflation(stretches)[0] == pytest.approx(20, rel=0.1)
+    assert inflation([together])[0] == pytest.approx(20, rel=0.3)
+    assert inflation([piece[:1] for piece in stretches])[0] == 1.0
+
+
+def test_each_coordinate_has_its_own_inflation():
+    rng = np.random.default_rng(5)
+    errors = np.stack([rng.standard_normal(50_000), lasting(50_000, 0.8, rng)], axis=1)
+    white, slow = inflation([errors])
+    assert white == 1.0
+    assert slow == pytest.approx(9, rel=0.15)

@@ -1,0 +1,64 @@
+"""How large the errors of the data are, as a fitted curve leaves them, and how long they last."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import Floats
+from .collocation import CLEANEST, Fit
+
+CHANCE = 4.0
+"""Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent."""
+
+
+def residual_noise(fit: Fit) -> Floats:
+    """Standard deviation of the errors of single samples, (d,)."""
+    return np.maximum(_spread(fit), CLEANEST)
+
+
+def _spread(fit: Fit) -> Floats:
+    """Standard deviation of the data residual, less the freedom that the fit used up."""
+    used = fit.state.free().sum() / len(fit.state.moving) + len(fit.collocation.segments)
+    residual, _ = fit.collocation.data_residual(fit.state.control_points)
+    squares = (residual**2).sum(axis=0)
+    return np.sqrt(squares / max(len(residual) - used, 1.0))
+
+
+def effective_noise(fit: Fit) -> Floats:
+    """Standard deviation of white noise that would leave a slow signal as uncertain, (d,).
+
+    Errors that last for several samples do not average out: their variance counts times the sum
+    of their autocorrelations (`inflation`).
+    """
+    residual, _ = fit.collocation.data_residual(fit.state.control_points)
+    ends = np.cumsum([len(segment.t) for segment in fit.collocation.segments])[:-1]
+    lasting = np.sqrt(inflation(np.split(residual, ends)))
+    return np.maximum(_spread(fit) * lasting, CLEANEST)
+
+
+def inflation(pieces: Sequence[Floats]) -> Floats:
+    """Variance of a mean of errors over what it were if they were independent, at least 1, (d,).
+
+    The sum of the autocorrelations over all lags, as long as those of neighbouring lags together
+    are positive (Geyer 1992, initial positive sequence); 1 where the first lag is no more than
+    chance.
+
+    Parameters
+    ----------
+    pieces : sequence of ndarray, shape (n_i, d)
+        Errors of successive samples, of mean zero.
+    """
+    size = 2 * max(len(piece) for piece in pieces)
+    powers = [np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces]
+    covariances = np.fft.irfft(np.sum(powers, axis=0), size, axis=0)[: size // 2]
+    result = np.ones(covariances.shape[1])
+    limit = CHANCE / np.sqrt(sum(map(len, pieces)))
+    for j, covariance in enumerate(covariances.T):
+        if covariance[1:].any() and covariance[1] > limit * covariance[0]:
+            even = len(covariance) // 2 * 2
+            pairs = covariance[:even].reshape(-1, 2).sum(axis=1) / covariance[0]
+            positive = len(pairs) if (pairs > 0).all() else int((pairs <= 0).argmax())
+            result[j] = max(2 * pairs[:positive].sum() - 1, 1.0)
+    return result

@@ -1,0 +1,139 @@
+"""Which law persists while more and more error is tolerated.
+
+A smooth error of a thousandth (of an integrator, of a lens) is a small change of the law: terms
+that no noise model refuses, each worth its price. Raise the error that is tolerated, and the law
+changes at every step until only the terms remain that the motion needs; then it stays the same
+over a wide range. So each equation has a *path* of laws over the tolerated error, and the widest
+plateau, in decades, is the law.
+
+To tolerate an error ``s`` times that of the data is to divide the quadratic model of the fit by
+``s^2``: the whole path is a matter of small algebra.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats
+from .collocation import Fit, Linearisation, State
+from .errors import effective_noise, residual_noise
+from .problem import Problem
+from .selection import minimiser, subset_search
+
+TOLERATED = 0.03
+"""Error that a first search tolerates, relative to the spread of the data: finer terms come after
+those that make the motion."""
+LARGEST = 1.0
+"""Largest error on a path: that of no law at all."""
+STEP = 0.1
+"""Decades between two laws of a path."""
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """A range of tolerated errors over which the law of one equation has the same terms.
+
+    Parameters
+    ----------
+    equation : int
+        Column of the coefficients.
+    low, high : float
+        Tolerated errors, relative to the spread of the data.
+    terms : ndarray of bool, shape (l,)
+        Which terms the equation has, in the law's own frame.
+    """
+
+    equation: int
+    low: float
+    high: float
+    terms: Bools
+
+    @property
+    def decades(self) -> float:
+        """Width of the range in decades."""
+        return float(np.log10(self.high / self.low))
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The laws of all equations around a fit, from the errors that it leaves up to no law at all.
+
+    Parameters
+    ----------
+    fit : Fit
+        Around which the laws are found.
+    model : Linearisation
+        Its quadratic model in all terms.
+    level : float
+        Errors that have to be tolerated: a plateau that begins above them is no law of these data.
+    plateaus : tuple of tuple of Plateau
+        Of each equation, from the smallest tolerated error up.
+    """
+
+    fit: Fit
+    model: Linearisation
+    level: float
+    plateaus: tuple[tuple[Plateau, ...], ...]
+
+    @property
+    def lowest(self) -> float:
+        """The smallest tolerated error."""
+        return self.plateaus[0][0].low
+
+    def ranked(self) -> list[list[Plateau]]:
+        """The plateaus of each equation that begin at or below the level, the widest first."""
+        return [
+            sorted((p for p in path if p.low <= self.level), key=lambda p: -p.decades)
+            for path in self.plateaus
+        ]
+
+    def restricted(self, active: Bools) -> State:
+        """The state that the quadratic model promises for other terms, (l, d)."""
+        support = np.append(active.T.ravel(), self.fit.state.moving[self.fit.state.moving])
+        present = self.fit.state.flat()[self.model.columns]
+        solution = minimiser(self.model.information, self.model.gradient, present, support)
+        return self.model.along(self.fit.state, solution - present, 1.0).of_terms(active)
+
+
+def follow(problem: Problem, fit: Fit, level: float = TOLERATED) -> Path:
+    """The path of laws around a fit at a physics weight at which the law holds exactly.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its prices.
+    fit : Fit
+        Around which.
+    level : float
+        Errors that have to be tolerated, if they are larger than those that the fit leaves.
+    """
+    size = problem.exponents.size
+    columns = np.concatenate([np.arange(size), size + np.flatnonzero(fit.state.moving)])
+    model = fit.collocation.linearise(fit.state, columns)
+    prices = np.append(np.tile(problem.penalties, problem.d), np.full(len(columns) - size, -np.inf))
+    present, support = fit.state.flat()[columns], fit.state.free()[columns]
+    own = typical(fit.collocation.data_weights**-0.5)
+    lowest = min(typical(residual_noise(fit)), LARGEST / 10**STEP)
+    count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
+    levels = np.geomspace(lowest, LARGEST, count + 1)
+    paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
+    for low, high in zip(levels[:-1].tolist(), levels[1:].tolist(), strict=True):
+        share = (own / low) ** 2
+        support, _, _ = subset_search(
+            share * model.information, share * model.gradient, present, prices, support
+        )
+        for j, terms in enumerate(support[:size].reshape(problem.d, -1)):
+            if paths[j] and (paths[j][-1].terms == terms).all():
+                low_here = paths[j].pop().low
+            else:
+                low_here = low
+            paths[j].append(Plateau(j, low_here, high, terms))
+    level = max(level, lowest, typical(effective_noise(fit)))
+    return Path(fit, model, level, tuple(map(tuple, paths)))
+
+
+def typical(noise: Floats) -> float:
+    """One number for the errors of all coordinates: their geometric mean."""
+    return float(np.exp(np.log(noise).mean()))
