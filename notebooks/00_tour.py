@@ -189,7 +189,9 @@ for name, value, error in zip("xyz", law.offset, law.offset_errors, strict=True)
 
 # %%
 fig = plots.plot_coefficients(law, shot.truth)
-caption = "Distance of each coefficient from the truth, in millionths of it; bars: one standard error."
+caption = (
+    "Distance of each coefficient from the truth, in millionths of it; bars: one standard error."
+)
 numbers = {
     "found": law.coefficients, "standard error": law.standard_errors,
     "truth": shot.truth.coefficients,

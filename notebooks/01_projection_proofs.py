@@ -192,7 +192,9 @@ rows = [
     {"rotation": "R takes n to e_z", "shift of the image": "below 1e-12"},
     {"rotation": "as in the text: e_z to n", "shift of the image": f"{spread[1]:.1f}"},
 ]
-caption = "How far the image moves while the plane moves along its normal through all D (scene units)."
+caption = (
+    "How far the image moves while the plane moves along its normal through all D (scene units)."
+)
 save_table("projection_shift", rows, caption=caption)
 
 # %%

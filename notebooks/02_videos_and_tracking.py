@@ -122,7 +122,10 @@ fast = SYSTEMS["Tsucs2"]
 t, x = fast.trajectory(24_000, samples_per_period=1000)
 t, x = t[20_000:], x[20_000:, 0]  # four periods, after the first swing
 samples = {
-    f"{round(rate, 1):g} frames per period: {name}": (t[:: round(1000 / rate)], x[:: round(1000 / rate)])
+    f"{round(rate, 1):g} frames per period: {name}": (
+        t[:: round(1000 / rate)],
+        x[:: round(1000 / rate)],
+    )
     for name, rate in (("25 per time unit", 25 * fast.period), ("as here", SAMPLES_PER_PERIOD))
 }
 fig = plots.plot_sampling(t, x, samples)
@@ -210,7 +213,9 @@ clip = list(read_video(shot.paths[0]))
 again = write_video(Path(folder.name) / "again.mkv", clip)
 lossy = write_video(Path(folder.name) / "lossy.mp4", clip, codec="mp4v")
 for path in (shot.paths[0], again, lossy):
-    change = max(np.abs(a.astype(int) - b).max() for a, b in zip(clip, read_video(path), strict=True))
+    change = max(
+        np.abs(a.astype(int) - b).max() for a, b in zip(clip, read_video(path), strict=True)
+    )
     print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB, pixels off by up to {change} of 255")
 assert all(np.array_equal(a, b) for a, b in zip(clip, read_video(again), strict=True))
 
@@ -324,7 +329,9 @@ save_table("videos_tracker", rows, caption="The tracker against the known truth.
 
 # %%
 fig = plots.plot_track_errors(errors)
-caption = "Share of frames in which the tracked position is closer to the truth than a given distance."
+caption = (
+    "Share of frames in which the tracked position is closer to the truth than a given distance."
+)
 save_figure("videos_tracker_errors", fig, caption=caption, numbers=errors)
 
 # %% [markdown]
@@ -404,7 +411,11 @@ for name, (background, shifts, brightness) in cases.items():
     path = write_video(Path(folder.name) / "restless.mov", clip)
     last.append(read_frame(path, centre))
     found[name] = {way: track(path, way) for way in ("background", "learned", "auto")}
-    print(f"{name}: auto takes {found[name]['auto'].detector}", *found[name]["auto"].warnings, sep="\n  ")
+    print(
+        f"{name}: auto takes {found[name]['auto'].detector}",
+        *found[name]["auto"].warnings,
+        sep="\n  ",
+    )
 
 # %%
 rows = []
@@ -461,7 +472,9 @@ assert error < 1
 
 # %%
 fig = plots.plot_gaps(shot.t, x, shot.x)
-caption = "The reconstructed path of SprottF behind two posts; shaded: fewer than two cameras see it."
+caption = (
+    "The reconstructed path of SprottF behind two posts; shaded: fewer than two cameras see it."
+)
 save_figure("figure_S3", fig, caption=caption, numbers={"t": shot.t, "x": x, "truth": shot.x})
 
 # %% [markdown]

@@ -354,9 +354,13 @@ assert (mine.status == "ok").all()
 both = pd.concat((results[results.trial == seed], coarse))
 both["source"] = both.source.replace("videos", "as tracked")
 fig = plots.plot_methods(both)
-caption = "Relative error of each method on each system, one trial; open symbols: the terms are wrong."
+caption = (
+    "Relative error of each method on each system, one trial; open symbols: the terms are wrong."
+)
 numbers = {
-    f"{method}, {source}": {name: significant(l2, 3, LEAST) for name, l2 in zip(g.system, g.l2, strict=True)}
+    f"{method}, {source}": {
+        name: significant(l2, 3, LEAST) for name, l2 in zip(g.system, g.l2, strict=True)
+    }
     for (source, method), g in both.groupby(["source", "method"], sort=False)
 }
 save_figure("discovery_methods", fig, caption=caption, numbers=numbers)
@@ -368,7 +372,9 @@ save_figure("discovery_methods", fig, caption=caption, numbers=numbers)
 # a false one found. The weak form depends on its random windows; this is one draw.*
 
 # %%
-print(both.groupby(["source", "method"], sort=False).exact.agg(rate).unstack(sort=False).to_string())
+print(
+    both.groupby(["source", "method"], sort=False).exact.agg(rate).unstack(sort=False).to_string()
+)
 error = coarse.groupby("method").l2.median()
 assert all(error[method] > 2 * error["ours"] for method in baselines.BASELINES)
 

@@ -169,7 +169,9 @@ paper = {
     c: {rate / 100: ABLATION[name, rate, "Ours"].l2 for rate in (10, 20)}
     for c, name in printed.items()
 }
-caption = "SprottF: error and wrong terms, medians and middle half of the trials; stars: paper's Table 2."
+caption = (
+    "SprottF: error and wrong terms, medians and middle half of the trials; stars: paper's Table 2."
+)
 robustness("fig_3", caption, ours[ours.system == "SprottF"], paper)
 
 # %% [markdown]
@@ -203,7 +205,9 @@ robustness("figure_S4", caption, pysindy)
 # there and derivatives are local; a difference of neighbours amplifies noise.*
 
 # %%
-noisy = results[(results.condition == "noise") & (results.system == "SprottF") & (results.level > 0)]
+noisy = results[
+    (results.condition == "noise") & (results.system == "SprottF") & (results.level > 0)
+]
 print(noisy.groupby(["level", "method"]).exact.agg(rate).unstack().to_string())
 hits = noisy.groupby("method").exact.sum()
 assert hits["PySINDy"] < hits["ours"] / 2
@@ -458,7 +462,9 @@ rows = [
     }
     for (name, group), values in zip(groups.items(), pulled.values(), strict=True)
 ]  # fmt: skip
-caption = "Errors in units of their standard errors, and as what the error bars promise; exact laws."
+caption = (
+    "Errors in units of their standard errors, and as what the error bars promise; exact laws."
+)
 save_table("study_pulls", rows, caption=caption)
 
 # %%
@@ -498,8 +504,7 @@ save_figure("study_verdicts_figure", fig, caption=caption, numbers=verdicts)
 mine = table[table.method == "ours"]  # each trial once
 counts = mine.verdict.value_counts()
 rows = [
-    {"law": law}
-    | {s: f"{counts.get(f'{law}, {s}', 0) / len(mine):.0%}" for s in ("ok", "suspect")}
+    {"law": law} | {s: f"{counts.get(f'{law}, {s}', 0) / len(mine):.0%}" for s in ("ok", "suspect")}
     for law in ("exact", "wrong")
 ]
 caption = f"Law and status in {len(mine)} trials of our method."

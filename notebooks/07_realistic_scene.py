@@ -164,16 +164,22 @@ assert off < 0.01
 # %%
 gap = np.isnan(first.path).any(axis=1)
 alone = [np.isnan(view.track.pixels).any(axis=1).mean() for view in first.views]
-print(f"no position in {gap.mean():.0%} of the frames; single cameras: {', '.join(f'{a:.0%}' for a in alone)}")
+print(
+    f"no position in {gap.mean():.0%} of the frames; single cameras: {', '.join(f'{a:.0%}' for a in alone)}"
+)
 error = np.sqrt(np.nanmean((first.path - first.x) ** 2, axis=0))
-print(f"rms error of the path: {error.round(4)} scene units, spread: {first.x.std(axis=0).round(2)}")
+print(
+    f"rms error of the path: {error.round(4)} scene units, spread: {first.x.std(axis=0).round(2)}"
+)
 assert 0 < gap.mean() < np.mean(alone)
 assert (error < 0.01 * first.x.std(axis=0)).all()
 
 # %%
 fig = plots.plot_gaps(first.t, first.path, first.x)
 caption = "The reconstructed path of the realistic scene; shaded: fewer than two cameras see it."
-save_figure("fig_4b", fig, caption=caption, numbers={"t": first.t, "path": first.path, "truth": first.x})
+save_figure(
+    "fig_4b", fig, caption=caption, numbers={"t": first.t, "path": first.path, "truth": first.x}
+)
 
 # %% [markdown]
 # *Fig. 4b: the reconstructed path over time and in space, with the truth (dashed). Shaded: no two cameras
@@ -186,13 +192,27 @@ save_figure("fig_4b", fig, caption=caption, numbers={"t": first.t, "path": first
 # pieces obey carries the curve across ([notebook 04](04_spline_ado.ipynb)).
 
 # %%
-print(f"native frame, offset {first.found.offset.round(4)}:", first.found.equations("native"), sep="\n")
-print("\nin the frame of the cameras:", first.found.equations(), "\ntruth:", first.truth.text(), sep="\n")
+print(
+    f"native frame, offset {first.found.offset.round(4)}:",
+    first.found.equations("native"),
+    sep="\n",
+)
+print(
+    "\nin the frame of the cameras:",
+    first.found.equations(),
+    "\ntruth:",
+    first.truth.text(),
+    sep="\n",
+)
 
 # %%
 fig = plots.plot_coefficients(first.found, first.truth)
-caption = "Distance of each coefficient from the truth, in millionths of it; bars: one standard error."
-save_figure("scene_coefficients", fig, caption=caption, numbers={"pulls": pulls(first.found, first.truth)})
+caption = (
+    "Distance of each coefficient from the truth, in millionths of it; bars: one standard error."
+)
+save_figure(
+    "scene_coefficients", fig, caption=caption, numbers={"pulls": pulls(first.found, first.truth)}
+)
 
 # %% [markdown]
 # *How far each coefficient is from the truth, with its standard error. They lean together, for a small
@@ -209,7 +229,11 @@ rows = [
     }
     for n, trial in zip(trials, runs, strict=True)
 ]  # fmt: skip
-save_table("scene_equations", rows, caption="Laws discovered from the realistic scene, by trial; 0.001 (e-2) is 0.001 or less.")
+save_table(
+    "scene_equations",
+    rows,
+    caption="Laws discovered from the realistic scene, by trial; 0.001 (e-2) is 0.001 or less.",
+)
 
 # %%
 for n, trial in zip(trials, runs, strict=True):

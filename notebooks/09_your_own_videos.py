@@ -91,6 +91,7 @@ def shoot(name, folder, suffix=".avi", codec="MJPG", trial=0):
     rig.uncalibrated(keep=0).save(folder / "rig.toml")
     return truth, t, rig
 
+
 # %%
 home = TemporaryDirectory()
 folders = {name: Path(home.name) / name for name in names}

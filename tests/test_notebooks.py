@@ -195,8 +195,12 @@ def test_there_are_notebooks():
 @pytest.mark.parametrize(
     "gate",
     [
-        anatomy_problems, import_problems, story_problems,
-        pair_problems, freshness_problems, output_problems,
+        anatomy_problems,
+        import_problems,
+        story_problems,
+        pair_problems,
+        freshness_problems,
+        output_problems,
     ],
 )
 def test_notebook(path, gate):
@@ -405,7 +409,7 @@ def test_output_gate_fails_on_a_large_notebook(pair):
 
 
 def test_output_gate_fails_on_a_figure_that_is_not_shown(pair):
-    edit(pair.with_suffix(".ipynb"), '"x + 1"', '"save_figure(\'waves\', figure)"')
+    edit(pair.with_suffix(".ipynb"), '"x + 1"', "\"save_figure('waves', figure)\"")
     assert output_problems(pair) == ["cell 3 saves a figure that nobody sees"]
 
 

@@ -59,15 +59,22 @@ def write_red_detector(path, size, batch=1, rows=5):
     n = (width // STRIDE) * (height // STRIDE)
     weight = np.ones((1, 3, STRIDE, STRIDE), np.float32) * 20 / STRIDE**2
     weight[0, 1:] *= -0.5  # red, green, blue: the more red than other
-    v, u = np.mgrid[STRIDE / 2:height:STRIDE, STRIDE / 2:width:STRIDE].reshape(2, n)
-    boxes = np.stack([u, v, *np.full((rows - 3, n), BOX)])[None, :rows - 1].astype(np.float32)
+    v, u = np.mgrid[STRIDE / 2 : height : STRIDE, STRIDE / 2 : width : STRIDE].reshape(2, n)
+    boxes = np.stack([u, v, *np.full((rows - 3, n), BOX)])[None, : rows - 1].astype(np.float32)
     constants = {
-        "weight": weight, "bias": np.array([-5], np.float32), "boxes": boxes,
+        "weight": weight,
+        "bias": np.array([-5], np.float32),
+        "boxes": boxes,
         "shape": np.array([1, 1, n]),
     }
     nodes = [
-        _node("Conv", ["images", "weight", "bias"], "red", strides=[STRIDE] * 2,
-              kernel_shape=[STRIDE] * 2),
+        _node(
+            "Conv",
+            ["images", "weight", "bias"],
+            "red",
+            strides=[STRIDE] * 2,
+            kernel_shape=[STRIDE] * 2,
+        ),
         _node("Sigmoid", ["red"], "sure"),
         _node("Reshape", ["sure", "shape"], "confidence"),
         _node("Concat", ["boxes", "confidence"], "output0", axis=1),

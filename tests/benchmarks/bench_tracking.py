@@ -82,7 +82,8 @@ def test_unseen_random_scenes(tmp_path):
         print(
             f"\n{scene.background:7s} {scene.shape:9s} {scene.size:4.1f} px {scene.colour:7s} "
             f"kept {np.isfinite(error).mean():.4f} median {np.nanmedian(error):.4f} "
-            f"max {np.nanmax(error):.4f} px", end="",
+            f"max {np.nanmax(error):.4f} px",
+            end="",
         )
     for error in errors:
         assert np.isfinite(error).mean() >= 0.99

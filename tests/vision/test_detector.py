@@ -54,9 +54,9 @@ def test_predictions_that_agree_are_averaged():
 
 
 def test_the_surest_comes_first_and_the_unsure_not_at_all():
-    predictions = np.array([
-        column(300, 50, 20, 0.6), column(100, 50, 20, 0.8), column(200, 90, 20, LEAST - 0.01)
-    ]).T
+    predictions = np.array(
+        [column(300, 50, 20, 0.6), column(100, 50, 20, 0.8), column(200, 90, 20, LEAST - 0.01)]
+    ).T
     assert [d.centre[0] for d in detections(predictions)] == [100, 300]
     assert [d.centre[0] for d in detections(predictions, most=1)] == [100]
     assert [d.centre[0] for d in detections(predictions, least=0.3)] == [100, 300, 200]

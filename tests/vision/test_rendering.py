@@ -27,13 +27,17 @@ def drawn_centroid_and_area(frame, empty, colour):
     contrast = np.array(COLOURS[colour], float) - empty
     alpha = ((frame.astype(float) - empty) * contrast).sum(-1) / (contrast**2).sum(-1)
     area = alpha.sum()
-    return np.array([alpha.sum(0) @ np.arange(alpha.shape[1]),
-                     alpha.sum(1) @ np.arange(alpha.shape[0])]) / area, area
+    return np.array(
+        [alpha.sum(0) @ np.arange(alpha.shape[1]), alpha.sum(1) @ np.arange(alpha.shape[0])]
+    ) / area, area
 
 
 @settings(max_examples=40, deadline=None)
 @given(
-    shape=st.sampled_from(SHAPES), size=st.floats(8, 40), u=st.floats(35, 60), v=st.floats(35, 45),
+    shape=st.sampled_from(SHAPES),
+    size=st.floats(8, 40),
+    u=st.floats(35, 60),
+    v=st.floats(35, 45),
     seed=st.integers(0, 2**20),
 )
 def test_drawn_centroid_and_area(shape, size, u, v, seed):
@@ -141,7 +145,7 @@ def test_a_tree_hides_what_is_behind_it_and_nothing_else(seed):
     empty, full = render([[np.nan, np.nan], [63.5, 47.5]], scene, seed)
     hidden = (full == empty).all(axis=-1)[27:69, 43:84]  # well inside the disc
     assert 0.2 < hidden.mean() < 1
-    inside = np.s_[box[1]:box[1] + box[3], box[0]:box[0] + box[2]]
+    inside = np.s_[box[1] : box[1] + box[3], box[0] : box[0] + box[2]]
     bare = next(render([[np.nan, np.nan]], replace(scene, trees=()), seed))
     changed = (bare != empty).any(axis=-1)
     assert changed[inside].sum() == changed.sum() > 0
@@ -191,13 +195,27 @@ def test_render_video_writes_what_render_yields(tmp_path):
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("background", "moon"), ("shape", "cube"), ("colour", "teal"), ("size", 2),
+        ("background", "moon"),
+        ("shape", "cube"),
+        ("colour", "teal"),
+        ("size", 2),
         ("size", np.nan),
-        ("turns", np.inf), ("tumbling", -1), ("size_variation", 0.9), ("noise_variance", -0.1),
-        ("shape_seed", -1), ("shape_seed", 1.5), ("size", True), ("turns", "many"),
-        ("image_size", 512), ("image_size", (10, 10)), ("image_size", (512,)),
-        ("occluders", ((1, 2, 3),)), ("occluders", ((500, 0, 50, 50),)),
-        ("occluders", ((0, 0, 1, 50),)), ("trees", ((1, 2, 3),)), ("trees", ((0, 500, 50, 50),)),
+        ("turns", np.inf),
+        ("tumbling", -1),
+        ("size_variation", 0.9),
+        ("noise_variance", -0.1),
+        ("shape_seed", -1),
+        ("shape_seed", 1.5),
+        ("size", True),
+        ("turns", "many"),
+        ("image_size", 512),
+        ("image_size", (10, 10)),
+        ("image_size", (512,)),
+        ("occluders", ((1, 2, 3),)),
+        ("occluders", ((500, 0, 50, 50),)),
+        ("occluders", ((0, 0, 1, 50),)),
+        ("trees", ((1, 2, 3),)),
+        ("trees", ((0, 500, 50, 50),)),
     ],
 )
 def test_scene_rejects(field, value):

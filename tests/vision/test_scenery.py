@@ -42,15 +42,14 @@ LOOKS = {
 }
 # Is there tree at pixels [7::15, 3::12] of a rectangle of 120 x 160, seed 7?
 TREE = (
-        "0 0 0 0 0 0 1 1 0 0 0 0 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 1 0 1 1 1 1 1 1 1 1 1 1 0 1 "
-        "1 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 0 0 0 0 1 1 1 1 1 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 "
-        "1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0"
+    "0 0 0 0 0 0 1 1 0 0 0 0 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 1 0 1 1 1 1 1 1 1 1 1 1 0 1 "
+    "1 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 0 0 0 0 1 1 1 1 1 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 "
+    "1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0"
 )
 # Mean and standard deviation of the training frames of seeds 0 to 23.
 FRAMES = (
-        "195 141 206 93 144 85 57 94 129 88 67 125 238 132 138 128 135 162 118 158 113 94 "
-        "131 152",
-        "55 80 45 63 77 41 35 58 36 31 33 30 23 69 65 67 60 45 68 44 36 58 43 70",
+    "195 141 206 93 144 85 57 94 129 88 67 125 238 132 138 128 135 162 118 158 113 94 131 152",
+    "55 80 45 63 77 41 35 58 36 31 33 30 23 69 65 67 60 45 68 44 36 58 43 70",
 )
 
 
@@ -74,9 +73,9 @@ def test_a_tree_stands_where_it_did():
 
 def test_training_frames_look_as_they_did():
     kinds = enumerate(training.SEEN_BACKGROUNDS)
-    pool = np.stack([
-        scenery.BACKGROUNDS[kind](np.random.default_rng(i), (512, 512)) for i, kind in kinds
-    ])
+    pool = np.stack(
+        [scenery.BACKGROUNDS[kind](np.random.default_rng(i), (512, 512)) for i, kind in kinds]
+    )
     frames = [training.training_frame(np.random.default_rng(k), pool)[0].frame for k in range(24)]
     mean, spread = ([stat(frame) for frame in frames] for stat in (np.mean, np.std))
     np.testing.assert_allclose(mean, numbers(FRAMES[0]), atol=1)

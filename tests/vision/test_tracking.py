@@ -26,9 +26,9 @@ def winding_path(n=150, size=SIZE, margin=28):
     """A smooth path over the whole image, 4 to 9 pixels a frame."""
     t = np.linspace(0, 1, n)
     middle = (np.array(size) - 1) / 2
-    return middle + (middle - margin) * np.column_stack([
-        np.sin(2 * np.pi * 2 * t * n / 150), np.sin(2 * np.pi * 3 * t * n / 150 + 0.7)
-    ])
+    return middle + (middle - margin) * np.column_stack(
+        [np.sin(2 * np.pi * 2 * t * n / 150), np.sin(2 * np.pi * 3 * t * n / 150 + 0.7)]
+    )
 
 
 def errors(path, truth):
@@ -63,9 +63,7 @@ def test_random_scenes(tmp_path, seed):
 @pytest.mark.parametrize("seed", range(2))
 def test_image_noise(tmp_path, seed):
     truth = winding_path(100)
-    scene = Scene.random(
-        seed, size=18, noise_variance=0.01, size_variation=0.2, image_size=SIZE
-    )
+    scene = Scene.random(seed, size=18, noise_variance=0.01, size_variation=0.2, image_size=SIZE)
     path = render_video(tmp_path / "clip.mov", truth, scene, seed=seed)
     difference = track(path).pixels - truth
     assert np.isfinite(difference[:, 0]).mean() >= 0.97
@@ -98,7 +96,11 @@ def test_grey_video(tmp_path):
 def test_a_hidden_target_is_not_seen_and_a_partly_hidden_one_not_trusted(tmp_path, post, variance):
     truth = winding_path(200)
     scene = Scene(
-        "bricks", size=22, size_variation=0.1, noise_variance=variance, occluders=(post,),
+        "bricks",
+        size=22,
+        size_variation=0.1,
+        noise_variance=variance,
+        occluders=(post,),
         image_size=SIZE,
     )
     error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=4), truth)
@@ -173,7 +175,7 @@ def test_an_occluder_of_the_colour_of_the_target(tmp_path):
 
     def frames():
         for frame in render(truth, Scene("sky", size=22, image_size=SIZE), 3):
-            frame[:, post[0]:post[0] + post[2]] = COLOURS["red"]
+            frame[:, post[0] : post[0] + post[2]] = COLOURS["red"]
             yield frame
 
     error = errors(write_video(tmp_path / "clip.mov", frames()), truth)

@@ -225,7 +225,11 @@ def read_by_opencv(path):
 
 
 ALL = [
-    ("a.mov", None), ("a.mkv", None), ("a.avi", "FFV1"), ("a.mp4", "mp4v"), ("a.avi", "MJPG"),
+    ("a.mov", None),
+    ("a.mkv", None),
+    ("a.avi", "FFV1"),
+    ("a.mp4", "mp4v"),
+    ("a.avi", "MJPG"),
     ("a.mkv", "MJPG"),
 ]
 
@@ -264,7 +268,7 @@ def hold_upright(path, quarters):
     matrix = data.index(b"tkhd") + 4 + 40
     c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][quarters]
     for place, value in ((0, c), (1, s), (3, -s), (4, c)):
-        data[matrix + 4 * place:matrix + 4 * place + 4] = struct.pack(">i", value << 16)
+        data[matrix + 4 * place : matrix + 4 * place + 4] = struct.pack(">i", value << 16)
     path.write_bytes(data)
 
 
@@ -353,7 +357,7 @@ def test_a_file_that_is_cut_off_ends_there(tmp_path, name, codec):
     path = write_video(tmp_path / name, drawn(), codec=codec)
     data, whole = path.read_bytes(), list(read_video(path))
     for share in (0.02, 0.3, 0.6, 0.9, 0.999):
-        path.write_bytes(data[:int(share * len(data))])
+        path.write_bytes(data[: int(share * len(data))])
         try:
             read = list(read_video(path))
         except ValueError:
@@ -367,7 +371,7 @@ def test_damage_ends_a_file_or_is_refused(tmp_path, name, codec):
     path = write_video(tmp_path / name, drawn(), codec=codec)
     data = bytearray(path.read_bytes())
     middle = len(data) // 2
-    data[middle:middle + 500] = np.random.default_rng(0).bytes(500)
+    data[middle : middle + 500] = np.random.default_rng(0).bytes(500)
     path.write_bytes(data)
     try:
         count = len(list(read_video(path)))

@@ -205,9 +205,7 @@ def with_palette(png: bytes) -> bytes:
     """A PNG with 256 colours, a third of the size; as it was if that is not smaller."""
     image, small = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
     # Colours that lie far apart first: white stays white, and small symbols keep their own.
-    reduced = image.quantize(
-        256, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE
-    )
+    reduced = image.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE)
     reduced.save(small, "PNG", optimize=True)
     return min(png, small.getvalue(), key=len)
 

@@ -95,10 +95,12 @@ def _beside_the_paper(table: Table, keys: list[str]) -> str:
     groups: dict[tuple, list[str]] = {}
     methods = dict.fromkeys(row["method"] for row in table.rows)  # in the order of every group
     for row in table.rows:
-        groups.setdefault(tuple(row[key] for key in keys), []).extend([
-            _cell(row["l2 (e-2)"], row["false positives"], row["terms found"]),
-            _cell(row["paper: l2 (e-2)"], row["paper: false positives"]),
-        ])
+        groups.setdefault(tuple(row[key] for key in keys), []).extend(
+            [
+                _cell(row["l2 (e-2)"], row["false positives"], row["terms found"]),
+                _cell(row["paper: l2 (e-2)"], row["paper: false positives"]),
+            ]
+        )
     names = [name for method in methods for name in (method, f"{method}, paper")]
     head = [*(key.removesuffix(" (%)") for key in keys), *names]
     lines = [head, ["---"] * len(keys) + ["---:"] * len(names)]

@@ -1,7 +1,8 @@
 """A trajectory goes in, its law comes out.
 
 trajectories -> problem (smoothing: noise, gaps, units) -> solver -> discovery (diagnostics)
-solver: `discover`; its stages use collocation on splines, selection of terms, origin, gaps
+solver: `discover`; its stages use collocation on splines, selection of terms, origin, gaps, errors
+that last, and persistence: which law stays the same while more error is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings
 law: polynomials, on a library of monomials; integrate solves it
 beside the way: cramer_rao, the least errors that any estimate could have
@@ -13,6 +14,7 @@ from .discovery import Discovery
 from .integrate import runge_kutta_4
 from .library import monomial_exponents, monomial_gradients, monomials, variable_names
 from .origin import ShiftedLaw
+from .persistence import Plateau
 from .polynomials import PolynomialSystem
 from .problem import Units, term_penalties
 from .selection import closest_rival, subset_search

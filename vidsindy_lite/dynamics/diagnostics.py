@@ -10,10 +10,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from ..arrays import Bools, Floats
+from ..arrays import Floats
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
+from .errors import residual_noise
 from .library import variable_names
-from .persistence import Path, Plateau
+from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
 from .selection import closest_rival
@@ -120,7 +121,7 @@ def _leaps(values: Floats, row: int) -> bool:
 
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
-    residual = fit.collocation.data_weights**-0.5
+    residual = residual_noise(fit)
     ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
     j = int(ratio.argmax())
     if not ratio[j] < MISFIT:
@@ -147,11 +148,7 @@ def _unmet(fit: Fit) -> Iterator[str]:
 
 def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), path)
-    chosen = [
-        _own(plateaus, terms)
-        for plateaus, terms in zip(path.plateaus, fit.state.active.T, strict=True)
-    ]
-    if max(plateau.low for plateau in chosen) > path.lowest:
+    if max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest:
         return  # weaker errors than those tolerated say nothing about the law
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
@@ -159,12 +156,6 @@ def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
     model = fit.collocation.linearise(fit.state, np.arange(problem.exponents.size))
     yield from _left_over(model, fit.state)
     yield from _near_tie(problem, fit.state, model)
-
-
-def _own(plateaus: Sequence[Plateau], terms: Bools) -> Plateau:
-    """The plateau of an equation's law; the lowest if it is not on the path."""
-    same = [plateau for plateau in plateaus if (plateau.terms == terms).all()]
-    return max(same, key=lambda plateau: plateau.decades) if same else plateaus[0]
 
 
 def _contested(law: PolynomialSystem, path: Path) -> Iterator[str]:

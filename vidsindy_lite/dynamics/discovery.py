@@ -201,7 +201,11 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
-    moved, moved_covariance, margins = _pruned(moved, moved_covariance, problem.penalties)
+    # What the frame of the data needs is decided at the error at which the terms were chosen.
+    tolerated = max(plateau.low for plateau in path.of(state.active)) / path.own
+    moved, moved_covariance, margins = _pruned(
+        moved, moved_covariance, problem.penalties * max(tolerated, 1.0) ** 2
+    )
     if not state.moving.any():
         margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
     law = PolynomialSystem(names, exponents, moved)

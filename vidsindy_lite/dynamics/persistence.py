@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats
-from .collocation import Fit, Linearisation, State
+from .collocation import CLEANEST, Fit, Linearisation, State
 from .errors import effective_noise, residual_noise
 from .problem import Problem
 from .selection import minimiser, subset_search
@@ -25,6 +25,9 @@ from .selection import minimiser, subset_search
 TOLERATED = 0.03
 """Error that a first search tolerates, relative to the spread of the data: finer terms come after
 those that make the motion."""
+SMOOTH = 0.1
+"""Where errors are smooth, a plateau may begin here: terms below are as likely made by the errors.
+Independent errors average out, and whatever they do not explain is a term."""
 LARGEST = 1.0
 """Largest error on a path: that of no law at all."""
 STEP = 0.1
@@ -78,6 +81,11 @@ class Path:
     plateaus: tuple[tuple[Plateau, ...], ...]
 
     @property
+    def own(self) -> float:
+        """The errors that the fit was weighted with."""
+        return typical(self.fit.collocation.data_weights**-0.5)
+
+    @property
     def lowest(self) -> float:
         """The smallest tolerated error."""
         return self.plateaus[0][0].low
@@ -89,6 +97,17 @@ class Path:
             for path in self.plateaus
         ]
 
+    def of(self, active: Bools) -> list[Plateau]:
+        """The plateau of each equation of a law, the lowest if the path does not hold it."""
+        return [
+            max(
+                (p for p in path if (p.terms == terms).all()),
+                key=lambda plateau: plateau.decades,
+                default=path[0],
+            )
+            for path, terms in zip(self.plateaus, active.T, strict=True)
+        ]
+
     def restricted(self, active: Bools) -> State:
         """The state that the quadratic model promises for other terms, (l, d)."""
         support = np.append(active.T.ravel(), self.fit.state.moving[self.fit.state.moving])
@@ -97,7 +116,7 @@ class Path:
         return self.model.along(self.fit.state, solution - present, 1.0).of_terms(active)
 
 
-def follow(problem: Problem, fit: Fit, level: float = TOLERATED) -> Path:
+def follow(problem: Problem, fit: Fit, level: float = 0.0) -> Path:
     """The path of laws around a fit at a physics weight at which the law holds exactly.
 
     Parameters
@@ -130,7 +149,9 @@ def follow(problem: Problem, fit: Fit, level: float = TOLERATED) -> Path:
             else:
                 low_here = low
             paths[j].append(Plateau(j, low_here, high, terms))
-    level = max(level, lowest, typical(effective_noise(fit)))
+    single, lasting = residual_noise(fit), effective_noise(fit)
+    smooth = bool((lasting > single).any() or (single <= CLEANEST).all())
+    level = max(level, lowest, typical(lasting), SMOOTH if smooth else 0.0)
     return Path(fit, model, level, tuple(map(tuple, paths)))
 
 

@@ -6,7 +6,9 @@ curve eliminated (`collocation`), a search over supports in the small algebra th
 (`selection`), the offset as the origin in which the law is sparsest (`origin`), and a physics
 weight that is raised until the law holds exactly. Nothing is set by hand per system.
 
-The stages, in order: `pose` (`problem`), `unpruned`, `candidates`, `cheapest`, `bridge`, `polish`.
+The stages, in order: `pose` (`problem`), `search` (`candidates`, `cheapest`, `bridge`) at a
+tolerated error, `polish` at the errors that are left, `settle` on the law that persists
+(`persistence`).
 """
 
 from __future__ import annotations
@@ -50,6 +52,8 @@ CONSISTENT = 1.5
 """Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
 LONGEST_CLIMB, LONGEST_DESCENT = 4, 3
 """Most searches at larger errors, and most laws at smaller ones."""
+RICHEST = 2.0
+"""Most terms of a law that refines another, over the terms of that."""
 MOST_HALVINGS = 4
 """Most halvings of the knot spans."""
 
@@ -382,6 +386,13 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     return fit
 
 
+def at_own_noise(fit: Fit) -> Fit:
+    """The same fit, weighted with the errors that it leaves."""
+    collocation = fit.collocation
+    weighted = collocation.weighted(effective_noise(fit) ** -2, collocation.physics_weights)
+    return weighted.solve(fit.state, EXACT)
+
+
 def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
     """The law with the widest plateau in each equation, and the path on which it lies.
 
@@ -413,12 +424,19 @@ def _deeper(problem: Problem, path: Path) -> list[Plateau]:
 def _refitted(
     problem: Problem, path: Path, goal: Sequence[Plateau], history: History
 ) -> Fit | None:
-    """The law of these plateaus; none if it is that of the path, or leaves errors beyond them."""
+    """The law of these plateaus; none if it is that of the path, too rich, or leaves too much."""
     changed = _changed(path.fit, goal)
     if not changed:
         return None
     active = np.stack([plateau.terms for plateau in goal], axis=1)
-    fit = polish(problem, replace(path.fit, state=path.restricted(active)), history)
+    if active.sum() > RICHEST * path.fit.state.active.sum():
+        return None
+    state, collocation = path.restricted(active), path.fit.collocation
+    for weight in SEARCH_WEIGHTS:
+        collocation = problem.weighted(collocation, weight)
+        state = collocation.solve(state, tolerance=1.0, max_steps=10).state
+    fit = at_own_noise(collocation.solve(state, EXACT))
+    history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     largest = max(plateau.low for plateau in changed)
     return fit if typical(effective_noise(fit)) <= CONSISTENT * largest else None
 

@@ -92,9 +92,9 @@ def _remove_ghosts(background: Image, samples: Image, floor: float) -> None:
         left, top = max(left - _BORDER, 0), max(top - _BORDER, 0)
         place = (labels[top:bottom, left:right] == k).astype(np.uint8)
         place = np.asarray(cv2.dilate(place, np.ones((3, 3), np.uint8)))
-        window = np.s_[_COARSE * top:_COARSE * bottom, _COARSE * left:_COARSE * right]
+        window = np.s_[_COARSE * top : _COARSE * bottom, _COARSE * left : _COARSE * right]
         view = background[window]
-        mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[:view.shape[0], :view.shape[1]]
+        mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]]
         inside = mask > 0
         expected = cv2.inpaint(view, mask, 3, cv2.INPAINT_TELEA)[inside].astype(float)
         looks = [_median(samples[g][:, *window])[inside] for g in (group, ~group)]
@@ -115,7 +115,7 @@ def _background_motion(changes: list[Floats32], floor: float) -> float:
             continue
         left, top, width, height, area = found[1]
         if area < _TOO_LARGE * differs.size:
-            v, u = np.ogrid[:differs.shape[0], :differs.shape[1]]
+            v, u = np.ogrid[: differs.shape[0], : differs.shape[1]]
             differs &= np.hypot(u - left - width / 2, v - top - height / 2) > _NEAR
         shares.append(differs.sum() / area)
     return float(np.median(shares)) if shares else 0.0
@@ -202,7 +202,7 @@ class BackgroundModel:
         """First pixel, the one after the last, and the slices, of the square around a place."""
         low = np.clip(np.floor(centre - half).astype(int), 0, self.size - 1)
         high = np.clip(np.ceil(centre + half).astype(int) + 1, low + 1, self.size)
-        return low, high, np.s_[low[1]:high[1], low[0]:high[0]]
+        return low, high, np.s_[low[1] : high[1], low[0] : high[0]]
 
     def _difference(self, frame: Image, window: Window) -> tuple[Floats32, Floats32]:
         """Signed difference from the background, and its (smoothed) square summed over colours."""

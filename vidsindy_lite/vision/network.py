@@ -45,7 +45,7 @@ class _Split(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         x = self.enter(x)
-        tail = x[:, x.shape[1] // 2:]
+        tail = x[:, x.shape[1] // 2 :]
         return self.leave(torch.cat([x, tail + self.pair(tail)], dim=1))
 
 

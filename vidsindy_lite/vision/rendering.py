@@ -69,7 +69,7 @@ def _blend(frame: Image, visible: Floats32, polygon: Floats, colour: Floats32) -
     if left >= right or top >= bottom:
         return 0.0
     window = np.s_[top:bottom, left:right]
-    a = alpha[top - corner[1]:bottom - corner[1], left - corner[0]:right - corner[0]]
+    a = alpha[top - corner[1] : bottom - corner[1], left - corner[0] : right - corner[0]]
     a = (a * visible[window])[..., None]
     frame[window] = np.rint(frame[window] * (1 - a) + a * colour)
     return float(a.sum() / alpha.sum())
@@ -210,7 +210,7 @@ def render_restless(
     across, down = (np.array([width, height]) + corners.max(axis=0)).tolist()
     large = BACKGROUNDS[scene.background](np.random.default_rng(seed), (across, down))
     for place, (u, v), factor in zip(track, corners, light, strict=True):
-        view = cv2.convertScaleAbs(large[v:v + height, u:u + width], alpha=factor)
+        view = cv2.convertScaleAbs(large[v : v + height, u : u + width], alpha=factor)
         scenery = np.asarray(view, np.uint8)
         yield next(draw_frames(place[None], scene, seed, np.eye(2)[None], scenery)).frame
 
@@ -259,12 +259,12 @@ def _surroundings(
     drawn = BACKGROUNDS[scene.background](rng, scene.image_size) if scenery is None else scenery
     background, visible = drawn.copy(), np.ones(drawn.shape[:2], np.float32)
     for left, top, width, height in scene.occluders:
-        window = np.s_[top:top + height, left:left + width]
+        window = np.s_[top : top + height, left : left + width]
         texture = bark if height >= width else leaves
         background[window] = texture(rng, (width, height))
         visible[window] = 0
     for left, top, width, height in scene.trees:
-        window = np.s_[top:top + height, left:left + width]
+        window = np.s_[top : top + height, left : left + width]
         image, here = tree(rng, (width, height))
         background[window][here] = image[here]
         visible[window][here] = 0

@@ -118,7 +118,12 @@ def _plain(rng: np.random.Generator, size: Size) -> Image:
 
 
 BACKGROUNDS: dict[str, Callable[[np.random.Generator, Size], Image]] = {
-    "plain": _plain, "sky": _sky, "hills": _hills, "sea": _sea, "wood": _wood, "bricks": _bricks,
+    "plain": _plain,
+    "sky": _sky,
+    "hills": _hills,
+    "sea": _sea,
+    "wood": _wood,
+    "bricks": _bricks,
 }
 """What draws each background: a source of random numbers and (width, height) to an image."""
 

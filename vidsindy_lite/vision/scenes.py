@@ -78,8 +78,11 @@ class Scene:
         check_choice("shape", self.shape, SHAPES)
         check_choice("colour", self.colour, COLOURS)
         for name, low, high in [
-            ("size", 4, 100), ("turns", -np.inf, np.inf), ("tumbling", 0, np.inf),
-            ("size_variation", 0, 0.5), ("noise_variance", 0, 0.1),
+            ("size", 4, 100),
+            ("turns", -np.inf, np.inf),
+            ("tumbling", 0, np.inf),
+            ("size_variation", 0, 0.5),
+            ("noise_variance", 0, 0.1),
         ]:
             if not low <= check_number(name, getattr(self, name)) <= high:
                 raise ValueError(f"{name}: must be in [{low}, {high}], got {getattr(self, name)}")

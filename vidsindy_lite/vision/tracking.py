@@ -168,10 +168,13 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
         One entry a frame.
     """
     # One row a sighting: frame, centre, size, gain.
-    rows = np.array([
-        (i, *d.centre, d.size.mean(), d.confidence - _GAIN)
-        for i, seen in enumerate(sightings) for d in seen
-    ]).reshape(-1, 5)
+    rows = np.array(
+        [
+            (i, *d.centre, d.size.mean(), d.confidence - _GAIN)
+            for i, seen in enumerate(sightings)
+            for d in seen
+        ]
+    ).reshape(-1, 5)
     frame, centre, size, value = rows[:, 0], rows[:, 1:3], rows[:, 3], rows[:, 4].copy()
     before = np.full(len(rows), -1)
     old, oldest = -1, 0  # the best end of a chain that is longer ago than the memory

@@ -104,7 +104,7 @@ def _scenery(rng: np.random.Generator, pool: Image) -> Image:
     for _ in range(rng.choice(4, p=(0.55, 0.15, 0.15, 0.15))):
         if rng.random() < 0.5:
             left, top, width, height = _rectangle(rng)
-            part = np.s_[top:top + height, left:left + width]
+            part = np.s_[top : top + height, left : left + width]
             image[part] = _background(rng, pool)[part]
         else:
             image = np.asarray(cv2.add(image, _tiles(rng), dtype=cv2.CV_8U), np.uint8)
@@ -115,7 +115,7 @@ def _background(rng: np.random.Generator, pool: Image) -> Image:
     """A piece of a background, sometimes magnified or reduced, in colours of its own."""
     size = round(SIDE * np.exp(rng.uniform(np.log(0.5), np.log(_POOLED / SIDE))))
     left, top = rng.integers(0, _POOLED - size + 1, 2)
-    image = pool[rng.integers(len(pool))][top:top + size, left:left + size]
+    image = pool[rng.integers(len(pool))][top : top + size, left : left + size]
     resized = cv2.resize(image, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
     # Its colours are mixed, muted: the target's are the vivid ones.
     mix = np.eye(3) + rng.uniform(-0.25, 0.25, (3, 3))
@@ -276,7 +276,7 @@ def _resume(checkpoint: Path, parts: dict[str, Any]) -> list[float]:
 def _training_log(seed: int, losses: list[float], parameters: int) -> dict[str, Any]:
     """What the training was, as it goes into a JSON file."""
     block = max(len(losses) // _CURVE, 1)
-    means = [np.mean(losses[i:i + block]) for i in range(0, len(losses), block)]
+    means = [np.mean(losses[i : i + block]) for i in range(0, len(losses), block)]
     return {
         "seed": seed,
         "steps": len(losses),

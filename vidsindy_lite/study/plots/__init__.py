@@ -15,5 +15,5 @@ from .paths import plot_path, plot_sampling
 from .robustness import plot_methods, plot_pull_distribution, plot_pulls, plot_robustness
 from .robustness import plot_shares, plot_verdicts
 from .solver import plot_basis, plot_collocation, plot_errors_and_bound, plot_histories
-from .solver import plot_normal_matrix, plot_origin_map, plot_ranks, plot_windows
+from .solver import plot_normal_matrix, plot_origin_map, plot_plateaus, plot_ranks, plot_windows
 from .videos import plot_confidence, plot_frames, plot_loss, plot_track_errors, plot_tracker_steps

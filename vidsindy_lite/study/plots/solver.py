@@ -7,8 +7,10 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from ...arrays import Bools, Floats
+from ...dynamics import Plateau
 
 Pair = tuple[Floats, Floats]
 
@@ -239,6 +241,37 @@ def plot_origin_map(
     legend = axes.legend(loc="lower right", frameon=True, facecolor="0.25", edgecolor="none")
     for text in legend.get_texts():
         text.set_color("white")
+    return figure
+
+
+# ------------------------------------------------------------------------------------ path of laws
+
+
+def plot_plateaus(path: Sequence[Sequence[Plateau]], names: Sequence[str]) -> Figure:
+    """Number of terms of each equation over the error that is tolerated.
+
+    Parameters
+    ----------
+    path : sequence of sequence of Plateau
+        Of each equation; see `Discovery.path`. The widest plateau is drawn broad.
+    names : sequence of str
+        Of the variables.
+    """
+    figure, panels = plt.subplots(
+        1, len(path), figsize=(2.9 * len(path), 2.8), sharex=True, sharey=True, squeeze=False
+    )
+    for axes, plateaus, name in zip(panels[0], path, names, strict=True):
+        edges = [plateaus[0].low, *(plateau.high for plateau in plateaus)]
+        counts = [int(plateau.terms.sum()) for plateau in plateaus]
+        axes.stairs(counts, edges, color="0.4", baseline=None, label="all laws")
+        widest = max(plateaus, key=lambda plateau: plateau.decades)
+        axes.hlines(
+            widest.terms.sum(), widest.low, widest.high, color="C1", lw=5, label="widest plateau"
+        )
+        axes.set(xscale="log", xlabel="tolerated error / spread", title=f"d{name}/dt")
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    panels[0, 0].set(ylabel="terms", ylim=(0, None))
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
 
