@@ -359,11 +359,12 @@ def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
     lags = np.arange(np.ceil(margin - videos.ends[other]), videos.ends[known] - margin + 1)
     frames = np.arange(0, videos.frames[known], max(1, int(shortest // _INSTANTS)))
     first, second = videos.unknowns.cameras[known], videos.unknowns.cameras[other]
-    placed = [c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second)]
-    lines = epipolar_lines(placed[0], videos.curves[known](frames), placed[1])
+    placed = first.is_placed and second.is_placed
+    near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
+    lines = epipolar_lines(near, videos.curves[known](frames), far)
     instants, rate = frames / videos.rates[known], videos.rates[other]
-    at = videos.curves[other]
-    missed = np.array([_pair_missed(first, second, lines, at((instants - k) * rate)) for k in lags])
+    theirs = [videos.curves[other]((instants - k) * rate) for k in lags]
+    missed = np.array([_pair_missed(second, placed, lines, pixels) for pixels in theirs])
     padded = np.concatenate(([np.inf], missed, [np.inf]))
     dips = (missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed)
     ranked = sorted(np.flatnonzero(dips), key=lambda k: missed[k])
@@ -371,18 +372,18 @@ def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
 
 
 def _pair_missed(
-    known: Camera, other: Camera, lines: tuple[Floats, Floats], theirs: Floats
+    other: Camera, placed: bool, lines: tuple[Floats, Floats], theirs: Floats
 ) -> float:
-    """How badly two views agree at best, in pixels of the first; one instant in ten is left out.
+    """By how much its pixels miss the epipolar lines of a known camera at best, scene units rms.
 
-    `lines` are the epipolar lines of the first view's pixels, `theirs` the pixels of the second.
+    `placed` says whether both positions are known. One instant in ten is left out.
     """
     design, target = epipolar_design(lines, other, theirs)
     if other.is_calibrated:
         scale, angle = other.calibration
         turned = scale * np.array([np.cos(angle), np.sin(angle)])
         design, target = design[:, :0], target - design @ turned
-    if not (known.is_placed and other.is_placed):  # the offset adds the same to all equations
+    if not placed:  # the offset adds the same to all equations
         design = np.column_stack((design, np.ones(len(design))))
     fits = np.ones(len(target), bool)
     for _ in range(2):
@@ -391,7 +392,7 @@ def _pair_missed(
         solution = np.linalg.lstsq(design[fits], target[fits])[0]
         missed = np.abs(design @ solution - target)
         fits = missed <= np.quantile(missed, _TRIMMED)
-    return float(np.sqrt(np.mean(missed[fits] ** 2))) / known.calibration[0]
+    return float(np.sqrt(np.mean(missed[fits] ** 2)))
 
 
 def _aligned(
