@@ -222,7 +222,7 @@ class _Videos:
     rates: Floats
     unknowns: Unknowns
     speed: float  # pixels in a frame
-    tried: dict[tuple[float, ...], Floats | None] = field(default_factory=dict)
+    tried: dict[tuple[float, ...], Floats] = field(default_factory=dict)
 
     @classmethod
     def of(cls, tracks: Sequence[Floats], unknowns: Unknowns, rates: Floats) -> _Videos:
@@ -238,8 +238,8 @@ class _Videos:
         """Durations on the clock."""
         return self.frames / self.rates
 
-    def residuals(self, lags: Floats) -> Floats | None:
-        """Reprojection residuals of the cameras that fit best, (n_0, 2 m); None if none do."""
+    def residuals(self, lags: Floats) -> Floats:
+        """Reprojection residuals of the cameras that fit best, (n_0, 2 m); NaN if none do."""
         key = tuple(lags.tolist())
         if key not in self.tried:
             tracks = _aligned(self.curves, lags, self.rates, int(self.frames[0]))
@@ -249,20 +249,20 @@ class _Videos:
     def disagreement(self, lags: Floats) -> float:
         """The worst camera's, pixels; infinite where no cameras fit."""
         missed = self.residuals(lags)
-        if missed is None:
+        if np.isnan(missed).all():
             return np.inf
         return max(_trimmed(part) for part in np.split(missed, len(self.curves), axis=1))
 
 
-def _best_residuals(tracks: Sequence[Floats], unknowns: Unknowns) -> Floats | None:
-    """Residuals of the cameras that fit aligned tracks best; None if none do."""
-    if not all(np.isfinite(track).any() for track in tracks):
-        return None
-    views = Views.of(tracks)
-    try:
-        return np.hstack(residuals_of_views(views, cameras_of_views(views, unknowns).cameras))
-    except ValueError:  # these lags leave too little in common, or nothing that agrees
-        return None
+def _best_residuals(tracks: Sequence[Floats], unknowns: Unknowns) -> Floats:
+    """Residuals of the cameras that fit aligned tracks best, (n, 2 m); NaN if none do."""
+    if all(np.isfinite(track).any() for track in tracks):
+        views = Views.of(tracks)
+        try:
+            return np.hstack(residuals_of_views(views, cameras_of_views(views, unknowns).cameras))
+        except ValueError:  # these lags leave too little in common, or nothing that agrees
+            pass
+    return np.full_like(np.hstack(tracks), np.nan)
 
 
 def _trimmed(residual: Floats) -> float:
@@ -276,12 +276,11 @@ def _refined(videos: _Videos, whole: Floats) -> Lags:
     lags = whole.copy()
     shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
     for _ in range(_STEPS):
-        parts = [videos.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)]
-        if any(part is None for part in parts):
-            return _untold(videos, lags)
-        tried = np.array(parts)
+        tried = np.array([videos.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)])
         here, ahead, behind = tried[0], *np.split(tried[1:], 2)
         used = np.isfinite(tried).all(axis=0)
+        if not used.any():
+            return _untold(videos, lags)
         limit = max(OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
         used &= np.abs(np.where(used, here, 0)) <= limit
         slope = (ahead - behind)[:, used].T / (2 * PROBE)
@@ -319,17 +318,13 @@ def _told(videos: _Videos, lags: Floats, used: Bools, noise: float, slopes: Floa
     """
     shares = []
     for one, slope in zip(np.eye(len(lags))[1:], slopes, strict=True):
-        parts = [videos.residuals(lags + shift) for shift in (0 * one, one, -one)]
-        if any(part is None for part in parts):  # a frame beside, nothing fits at all
-            shares.append(1.0)
-            continue
-        tried = np.array(parts)
+        tried = np.array([videos.residuals(lags + shift) for shift in (0 * one, one, -one)])
         both = used & np.isfinite(tried).all(axis=0)
         here, ahead, behind = (np.sum(part[both] ** 2) for part in tried)
         chance = 2 * noise * np.sqrt(2 * both.sum())  # two standard deviations of such a sum
         rise = ((ahead + behind) / 2 - here - chance) / slope
-        shares.append(float(np.clip(rise, 0, 1)))
-    return np.array(shares)
+        shares.append(rise if both.any() else 1.0)  # a frame beside, nothing fits at all
+    return np.clip(shares, 0, 1)
 
 
 def _whole_lags(videos: _Videos) -> list[Floats]:
