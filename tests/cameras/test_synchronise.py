@@ -195,6 +195,16 @@ def test_calibrated_rig_and_outliers(motion):
         track[20 + i :: 50] += 60  # jumps of the tracker, in up to six frames of a hundred
     found = learn_lags(tracks, motion[1])
     np.testing.assert_allclose(found.frames, (0, 7, -4), atol=0.02)
+    assert found.errors.max() < 0.01
+
+
+def test_lags_count_from_the_first_video_whichever_camera_is_known(motion):
+    tracks = filmed(motion, (150, 150, 150), (0, 7, 12), noise=0.0)
+    found = synchrony._whole_lags(
+        synchrony._Videos.of(tracks, Unknowns.of(motion[1].uncalibrated(2)), np.ones(3))
+    )
+    assert [0, 7, 12] in [lags.tolist() for lags in found]
+    assert all(lags[0] == 0 for lags in found)
 
 
 @pytest.mark.slow

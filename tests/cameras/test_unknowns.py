@@ -1,10 +1,14 @@
 """Linear equations for what is unknown of a rig: outliers and weak motion, on numbers by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from helpers import trajectory
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import unknowns as module
+from vidsindy_lite.cameras.triangulate import Views
 from vidsindy_lite.cameras.unknowns import Equations, Unknowns, solve
 
 
@@ -72,3 +76,42 @@ def test_exact_motion_must_be_more_than_rounding(unknown):
     np.testing.assert_allclose(turned, [3 + 4j], rtol=1e-6)
     with pytest.raises(ValueError, match=r"must determine scale and angle of cameras\[1\]"):
         solve(*motion(100.0, 5e-8, 0.0), unknown)
+
+
+@pytest.fixture
+def loose():
+    """Four cameras around a path, its pixels, and the rig with some scales and positions gone."""
+    x = trajectory(np.random.default_rng(2), 60)
+    first, second, third = vl.Rig.around(x, image_size=(400, 300)).cameras
+    truth = vl.Rig([first, second, third, replace(third, normal=(0, 1, 1), scale=2 * third.scale)])
+    tracks = [camera.project(x) for camera in truth.cameras]
+    cameras = list(truth.uncalibrated(1).cameras)
+    cameras[0], cameras[2] = (replace(cameras[i], position=None) for i in (0, 2))
+    return truth, tracks, Unknowns.of(vl.Rig(cameras))
+
+
+def test_the_equations_of_exact_tracks_have_the_exact_solution(loose):
+    truth, tracks, unknowns = loose
+    tracks[3][::2] = np.nan
+    equations, decided = module.agreement(Views.of(tracks), unknowns)
+    assert decided
+    # Of c views, 2 c numbers less the 3 of the point.
+    assert len(equations.target) == 30 * 5 + 30 * 3
+    turned, offsets = solve(equations.design, equations.target, unknowns)
+    expected = [c.scale * np.exp(1j * c.angle) for c in truth.cameras]
+    np.testing.assert_allclose(turned, [expected[i] for i in (0, 2, 3)], rtol=1e-9)
+    np.testing.assert_allclose(offsets, [truth.cameras[i].offset for i in (0, 2)], rtol=1e-9)
+
+
+def test_the_vector_by_hand_and_back(loose):
+    truth, _, unknowns = loose
+    vector = unknowns.read(truth.cameras)
+    assert vector.shape == (10,)
+    first, second, third, fourth = truth.cameras
+    turns = [part for c in (first, third, fourth) for part in (np.log(c.scale), c.angle)]
+    np.testing.assert_allclose(vector[:6], turns, rtol=1e-12)
+    width = 400 * second.scale
+    np.testing.assert_allclose(vector[6:], np.append(first.offset, third.offset) / width)
+    for camera, true in zip(unknowns.filled(vector), truth.cameras, strict=True):
+        np.testing.assert_allclose(camera.calibration, true.calibration, rtol=1e-12)
+        np.testing.assert_allclose(camera.offset, true.offset, rtol=1e-9)
