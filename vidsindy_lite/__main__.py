@@ -3,6 +3,7 @@
 import argparse
 import inspect
 import re
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -171,7 +172,7 @@ def _train(options: argparse.Namespace) -> int:
 
     output = training.WEIGHTS if options.output is None else options.output
     steps = training.STEPS if options.steps is None else options.steps
-    record = training.train(output, options.seed, steps, progress=True)
+    record = training.train(output, options.seed, steps)
     print(f"{record['frames']} frames, loss {record['loss'][0]} to {record['loss'][-1]}: {output}")
     return 0
 
@@ -314,4 +315,6 @@ COMMANDS = {
 
 
 if __name__ == "__main__":
+    # As Ctrl-C does, SIGTERM lets a command clean up: a run leaves no kernels behind.
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
     sys.exit(main())

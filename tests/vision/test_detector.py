@@ -153,8 +153,6 @@ def test_an_onnx_model_sees_frames_of_any_size(tmp_path, size):
 
 
 def test_bad_onnx_files(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"detector: no such file, got '.*none.onnx'"):
-        OnnxDetector(tmp_path / "none.onnx")
     text = tmp_path / "text.onnx"
     text.write_text("no protocol buffer")
     with pytest.raises(ValueError, match="detector: must be an ONNX file that OpenCV can run"):
@@ -180,7 +178,7 @@ def small(monkeypatch):
 
 @pytest.mark.slow
 def test_training_goes_on_where_it_was_stopped(small, tmp_path, monkeypatch, capsys):
-    whole = training.train(tmp_path / "whole.pt", seed=3, steps=5, progress=False)
+    whole = training.train(tmp_path / "whole.pt", seed=3, steps=5)
     step, batch = [], training._batch
 
     def stopped(seed, number, pool):
@@ -191,7 +189,7 @@ def test_training_goes_on_where_it_was_stopped(small, tmp_path, monkeypatch, cap
 
     monkeypatch.setattr(training, "_batch", stopped)
     with pytest.raises(KeyboardInterrupt):
-        training.train(tmp_path / "parts.pt", seed=3, steps=5, progress=False)
+        training.train(tmp_path / "parts.pt", seed=3, steps=5)
     assert not (tmp_path / "parts.pt").exists()
     command = ["train-detector", "--seed", "3", "--steps", "5", "--output"]
     assert main([*command, str(tmp_path / "parts.pt")]) == 0
@@ -205,7 +203,7 @@ def test_training_goes_on_where_it_was_stopped(small, tmp_path, monkeypatch, cap
 
 def test_a_checkpoint_of_another_training_is_not_used(small, tmp_path):
     for seed in (1, 2):
-        training.train(tmp_path / f"{seed}.pt", seed=seed, steps=2, progress=False)
+        training.train(tmp_path / f"{seed}.pt", seed=seed, steps=2)
     weights = [torch.load(tmp_path / f"{s}.pt", weights_only=True)["where.1.bias"] for s in (1, 2)]
     assert not torch.equal(*weights)
 

@@ -167,6 +167,35 @@ def test_frames_are_counted_where_the_header_states_no_number(tmp_path):
     assert video_info(cut).frames == len(list(read_video(cut)))
 
 
+@pytest.mark.parametrize("seconds", [0.5, 3.0])
+def test_frames_of_a_file_with_sound_are_not_those_of_the_sound(tmp_path, seconds):
+    path = tmp_path / "clip.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("ffv1", 25)
+        stream.width, stream.height = SMALL
+        stream.pix_fmt = "bgr0"
+        sound = container.add_stream("pcm_s16le", rate=8000, layout="mono")
+        for frame in drawn(30):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "bgr24")))
+        container.mux(stream.encode(None))
+        silence = np.zeros((1, int(8000 * seconds)), np.int16)
+        heard = av.AudioFrame.from_ndarray(silence, "s16", "mono")
+        heard.sample_rate = 8000
+        container.mux(sound.encode(heard))
+        container.mux(sound.encode(None))
+    assert video_info(path) == (30, 25, SMALL)
+    assert len(list(read_video(path))) == 30
+
+
+def test_frames_of_changing_duration_are_counted_and_those_that_are_cut_off(tmp_path):
+    times = np.cumsum(np.random.default_rng(0).integers(5, 60, 50))
+    path = write_at(tmp_path / "clip.mkv", times, drawn(50))
+    assert video_info(path).frames == 50
+    path = write_video(tmp_path / "clip.mkv", drawn(50))
+    path.write_bytes(path.read_bytes()[:-1000])
+    assert video_info(path).frames == 50 > len(list(read_video(path)))
+
+
 def test_broken_files_print_nothing(tmp_path, capfd):
     whole = write_video(tmp_path / "clip.mkv", [np.zeros((64, 64, 3), np.uint8)] * 50)
     cut, text = tmp_path / "cut.mkv", tmp_path / "text.mkv"

@@ -14,8 +14,6 @@ than the target. It also has another *shape*, whereas whole views are alike up t
 that is how `view_distances` tells the one from the other.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -26,7 +24,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial.distance import cdist
 
-from ..arrays import Bools, Floats, Image, Ints
+from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .video import pick_frames, video_info
 
 _SAMPLES = 21  # frames whose median is the background
@@ -42,7 +40,8 @@ _BLIND = 0.1  # share of the target's outline that may lie on background of the 
 _ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
 _VIEWS = 200  # views among which the commonest one is sought
 
-Floats32 = NDArray[np.float32]
+_DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
+
 Window = tuple[slice, slice]
 
 
@@ -89,14 +88,13 @@ def _remove_ghosts(background: Image, samples: Image, floor: float) -> None:
         if group.all() or not group.any():
             continue
         left, top, width, height = stats[k, :4]
-        rows = slice(max(top - _BORDER, 0), top + height + _BORDER)
-        columns = slice(max(left - _BORDER, 0), left + width + _BORDER)
-        place = cv2.dilate((labels[rows, columns] == k).astype(np.uint8), np.ones((3, 3), np.uint8))
-        window = np.s_[
-            rows.start * _COARSE:rows.stop * _COARSE, columns.start * _COARSE:columns.stop * _COARSE
-        ]
+        right, bottom = left + width + _BORDER, top + height + _BORDER
+        left, top = max(left - _BORDER, 0), max(top - _BORDER, 0)
+        place = (labels[top:bottom, left:right] == k).astype(np.uint8)
+        place = np.asarray(cv2.dilate(place, np.ones((3, 3), np.uint8)))
+        window = np.s_[_COARSE * top:_COARSE * bottom, _COARSE * left:_COARSE * right]
         view = background[window]
-        mask = np.kron(place, np.ones((_COARSE, _COARSE), np.uint8))[:view.shape[0], :view.shape[1]]
+        mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[:view.shape[0], :view.shape[1]]
         inside = mask > 0
         expected = cv2.inpaint(view, mask, 3, cv2.INPAINT_TELEA)[inside].astype(float)
         looks = [_median(samples[g][:, *window])[inside] for g in (group, ~group)]
@@ -112,17 +110,14 @@ def _background_motion(changes: list[Floats32], floor: float) -> float:
     shares = []
     for change in changes:
         differs = np.linalg.norm(change, axis=-1) > floor
-        found = _largest_component(differs.astype(np.uint8))
+        found = _largest_component(differs)
         if found is None:
             continue
-        largest = found[1]
-        area = largest[cv2.CC_STAT_AREA]
-        far = differs
+        left, top, width, height, area = found[1]
         if area < _TOO_LARGE * differs.size:
-            left, top, width, height = largest[:4]
             v, u = np.ogrid[:differs.shape[0], :differs.shape[1]]
-            far = differs & (np.hypot(u - left - width / 2, v - top - height / 2) > _NEAR)
-        shares.append(far.sum() / area)
+            differs &= np.hypot(u - left - width / 2, v - top - height / 2) > _NEAR
+        shares.append(differs.sum() / area)
     return float(np.median(shares)) if shares else 0.0
 
 
@@ -191,24 +186,17 @@ class BackgroundModel:
 
     def _learn_target(self, samples: Image) -> None:
         """Colour and area of the target: the medians over the sampled frames."""
-        looks = []
-        for frame in samples:
-            near = self.search(frame)
-            look = near and self._look(frame, *near)
-            if look:
-                looks.append(look)
-        if not looks:
-            self.area = 0.0
+        looks = [self._look(frame, *near) for frame in samples if (near := self.search(frame))]
+        seen = [look for look in looks if look]
+        if not seen:
             return
-        colour = np.median([look[0] for look in looks], axis=0)
-        self.area = float(np.median([look[1] for look in looks]))
+        colour = np.median([look[0] for look in seen], axis=0)
+        self.area = float(np.median([look[1] for look in seen]))
         self.contrast = (colour - self.background).astype(np.float32)
-        self.square = np.einsum("ijk,ijk->ij", self.contrast, self.contrast)
+        self.square = _dot(self.contrast, self.contrast)
         self.blind = self.square < max(self.floor**2, 0.1 * np.median(self.square))
         self.coarse_contrast = (colour - self.coarse_background).astype(np.float32)
-        self.coarse_square = np.einsum(
-            "ijk,ijk->ij", self.coarse_contrast, self.coarse_contrast
-        )
+        self.coarse_square = _dot(self.coarse_contrast, self.coarse_contrast)
 
     def _window(self, centre: Floats, half: float) -> tuple[Ints, Ints, Window]:
         """First pixel, the one after the last, and the slices, of the square around a place."""
@@ -220,52 +208,46 @@ class BackgroundModel:
         """Signed difference from the background, and its (smoothed) square summed over colours."""
         change = frame[window].astype(np.float32) - self.background[window]
         smooth = cv2.GaussianBlur(change, (0, 0), self.blur) if self.blur else change
-        return change, np.einsum("ijk,ijk->ij", smooth, smooth)
+        return change, _dot(np.asarray(smooth), np.asarray(smooth))
 
     def _look(self, frame: Image, centre: Floats, half: float) -> tuple[Floats, float] | None:
         """Colour and rough area of what differs most from the background near `centre`."""
         _, _, window = self._window(centre, half)
         _, energy = self._difference(frame, window)
-        mask = (energy > max(self.floor**2, 0.2 * energy.max())).astype(np.uint8)
-        found = _largest_component(mask)
+        found = _largest_component(energy > max(self.floor**2, 0.2 * energy.max()))
         if found is None:
             return None
         label, stats = found
-        core = (_erode(label) > 0) if _erode(label).any() else label > 0
-        return np.median(frame[window][core], axis=0), stats[cv2.CC_STAT_AREA]
+        core = _erode(label) if _erode(label).any() else label
+        return np.median(frame[window][core > 0], axis=0), stats[cv2.CC_STAT_AREA]
 
     def search(self, frame: Image) -> tuple[Floats, float] | None:
         """Centre and half width of the part of the whole frame where the target seems to be."""
         change = _reduce(frame) - self.coarse_background
-        energy = np.einsum("ijk,ijk->ij", change, change)
         weight = None
         if self.contrast is not None:
-            match = np.einsum("ijk,ijk->ij", change, self.coarse_contrast)
+            match = _dot(change, self.coarse_contrast)
             weight = np.clip(match / (self.coarse_square + self.coarse_floor**2), 0, 1)
-        found = _largest_component((energy > self.coarse_floor**2).astype(np.uint8), weight)
+        found = _largest_component(_dot(change, change) > self.coarse_floor**2, weight)
         if found is None:
             return None
-        stats = found[1]
-        box = stats[[cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP, cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
-        centre = _COARSE * (box[:2] + (box[2:] - 1) / 2) + (_COARSE - 1) / 2
-        return centre, _COARSE * (box[2:].max() / 2 + 1) + 2 * _RING
+        corner, extent = found[1][:2], found[1][2:4]
+        centre = _COARSE * (corner + (extent - 1) / 2) + (_COARSE - 1) / 2
+        return centre, _COARSE * (extent.max() / 2 + 1) + 2 * _RING
 
     def measure(self, frame: Image, centre: Floats, half: float) -> Blob | None:
         """The target within `half` pixels of `centre`, if it is there."""
+        if self.contrast is None:  # no target was found in the samples
+            return None
         low, high, window = self._window(centre, half)
-        assert self.contrast is not None  # else nobody asks
         change, energy = self._difference(frame, window)
         square = self.square[window]
-        mask = energy > np.maximum(self.floor**2, 0.1 * square)
-        found = _largest_component(mask.astype(np.uint8))
-        if found is None:
+        found = _largest_component(energy > np.maximum(self.floor**2, 0.1 * square))
+        if found is None or not 0.2 < found[1][cv2.CC_STAT_AREA] / self.area < 5:
             return None
         label, stats = found
-        if not 0.2 < stats[cv2.CC_STAT_AREA] / self.area < 5:
-            return None
         near = cv2.dilate(label, _DISC) > 0
-        match = np.einsum("ijk,ijk->ij", change, self.contrast[window])
-        alpha = match / (square + self.floor**2 / 9)
+        alpha = _dot(change, self.contrast[window]) / (square + self.floor**2 / 9)
         alpha[_erode(label) > 0] = 1
         alpha[~near] = 0
         area = float(alpha.sum())
@@ -273,9 +255,7 @@ class BackgroundModel:
             return None
         u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
         centre = np.array([alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v]) / area
-        corner = stats[[cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP]]
-        extent = stats[[cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
-        first, last = low + corner, low + corner + extent - 1
+        first, last = low + stats[:2], low + stats[:2] + stats[2:4] - 1
         if ((first == low) & (low > 0)).any() or ((last == high - 1) & (high < self.size)).any():
             return None  # cut off by the window
         inside = bool((first > 0).all() and (last < self.size - 1).all())
@@ -287,20 +267,22 @@ class BackgroundModel:
         return Blob(low + centre, area, inside, shape)
 
 
-_DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
-
-
 def _erode(label: Image) -> Image:
     """A mask without its rim of `_RING` pixels."""
     eroded = cv2.erode(label, _DISC, borderType=cv2.BORDER_CONSTANT, borderValue=0)
     return np.asarray(eroded, np.uint8)
 
 
+def _dot(a: Floats32, b: Floats32) -> Floats32:
+    """Scalar product of the colours of each pixel."""
+    return np.einsum("ijk,ijk->ij", a, b)
+
+
 def _largest_component(
-    mask: Image, weight: Floats32 | None = None
+    mask: Bools, weight: Floats32 | None = None
 ) -> tuple[Image, NDArray[np.int32]] | None:
-    """Mask and statistics of the connected component of largest area or weight."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    """Mask of the connected component of largest area or weight; left, top, width, height, area."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     if count < 2:
         return None
     total = stats[:, cv2.CC_STAT_AREA]
@@ -335,14 +317,13 @@ def track_blobs(model: BackgroundModel, frames: Iterable[Image]) -> Iterator[Blo
     position, velocity, age = None, np.zeros(2), 0
     for frame in frames:
         blob = None
-        if model.contrast is not None:
-            if position is not None and age < 3:
-                radius = np.sqrt(model.area / np.pi)
-                half = 2 * radius + 8 + 0.5 * np.abs(velocity).max()
-                blob = model.measure(frame, position + (age + 1) * velocity, half)
-            if blob is None:
-                near = model.search(frame)
-                blob = near and model.measure(frame, *near)
+        if position is not None and age < 3:
+            radius = np.sqrt(model.area / np.pi)
+            half = 2 * radius + 8 + 0.5 * np.abs(velocity).max()
+            blob = model.measure(frame, position + (age + 1) * velocity, half)
+        if blob is None:
+            near = model.search(frame)
+            blob = near and model.measure(frame, *near)
         if blob is None or blob.shape is None:
             age += 1
         else:

@@ -11,13 +11,12 @@ and height in pixels, confidence in [0, 1]. `detections` averages those that agr
 import os
 import re
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Image
+from ..arrays import Floats, Floats32, Image
 from ..checks import check_path
 
 WEIGHTS = Path(__file__).with_name("detector.pt")
@@ -30,16 +29,8 @@ _AGREE = 0.25  # of the target's size: distance within which predictions speak o
 _WEAK = 0.5  # of the largest confidence: below, a prediction is not averaged
 _GREY = 114  # of the margins of an image that has another aspect ratio than the model's input
 
-Predictions = NDArray[np.float32]
+Predictions = Floats32
 """Centre (u, v), width, height and confidence of each anchor, shape (5, n)."""
-
-
-class Detector(Protocol):
-    """What finds targets in a single frame."""
-
-    def predict(self, image: Image) -> Predictions:
-        """Predictions, (5, n), for an image (height, width, 3) uint8, blue-green-red."""
-        ...
 
 
 # --------------------------------------------------------------------------------------- detectors
@@ -95,22 +86,18 @@ class OnnxDetector:
     Parameters
     ----------
     path : path
-        The .onnx file.
+        The .onnx file, which is there.
 
     Raises
     ------
-    FileNotFoundError
-        If there is no such file.
     ValueError
         If OpenCV cannot read it, or its shapes are not those of a YOLO-v8 detection model.
     """
 
     def __init__(self, path: str | os.PathLike) -> None:
-        self.path = check_path("detector", path)
-        if not self.path.is_file():
-            raise FileNotFoundError(f"detector: no such file, got '{self.path}'")
+        self.path = path
         try:
-            self.network = cv2.dnn.readNetFromONNX(str(self.path), cv2.dnn.ENGINE_NEW)
+            self.network = cv2.dnn.readNetFromONNX(str(path), cv2.dnn.ENGINE_NEW)
         except cv2.error as error:
             raise ValueError(
                 f"detector: must be an ONNX file that OpenCV can run, got '{self.path}': {error}"
@@ -158,9 +145,7 @@ class Detection(NamedTuple):
     confidence: float
 
 
-def detections(
-    predictions: Predictions, least: float = LEAST, most: int = 3
-) -> list[Detection]:
+def detections(predictions: Predictions, least: float = LEAST, most: int = 3) -> list[Detection]:
     """What the predictions show, the surest first.
 
     The most confident prediction is averaged with those that agree with it, which is where the

@@ -4,8 +4,6 @@ Of the family of YOLO-v8, with decoupled heads for *what* (the confidence) and *
 size). Only this module and `training` import torch.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import torch

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from ..arrays import Floats, Image, Ints
-from ..checks import check_array, check_instance, check_integer
+from ..arrays import Floats, Floats32, Image, Ints
+from ..checks import check_array, check_instance, check_integer, check_rows
 from .scenery import BACKGROUNDS, bark, leaves, tree
 from .scenes import COLOURS, Scene
 from .video import write_video
@@ -60,15 +60,9 @@ def coverage(polygon: Floats) -> tuple[Floats, Ints]:
     return np.abs(np.cumsum(change.reshape(height, width), axis=1)), corner
 
 
-def _blend(
-    frame: Image,
-    background: Image,
-    visible: NDArray[np.float32],
-    alpha: Floats,
-    corner: Ints,
-    colour: NDArray[np.float32],
-) -> float:
-    """Blend the target into `frame` in place; its area that can be seen, in pixels."""
+def _blend(frame: Image, visible: Floats32, polygon: Floats, colour: Floats32) -> float:
+    """Draw a polygon into `frame` in place; the share of its area that can be seen."""
+    alpha, corner = coverage(polygon)
     height, width = visible.shape
     left, top = np.maximum(corner, 0)
     right, bottom = np.minimum(corner + alpha.shape[::-1], (width, height))
@@ -77,8 +71,8 @@ def _blend(
     window = np.s_[top:bottom, left:right]
     a = alpha[top - corner[1]:bottom - corner[1], left - corner[0]:right - corner[0]]
     a = (a * visible[window])[..., None]
-    frame[window] = np.rint(background[window] * (1 - a) + a * colour)
-    return float(a.sum())
+    frame[window] = np.rint(frame[window] * (1 - a) + a * colour)
+    return float(a.sum() / alpha.sum())
 
 
 def _poses(scene: Scene, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -142,11 +136,7 @@ class LabelledFrame(NamedTuple):
 
 
 def render_labelled(
-    track: ArrayLike,
-    scene: Scene,
-    seed: int = 0,
-    shapes: ArrayLike | None = None,
-    scenery: Image | None = None,
+    track: ArrayLike, scene: Scene, seed: int = 0, shapes: ArrayLike | None = None
 ) -> Iterator[LabelledFrame]:
     """Frames as of `render`, with what a detector has to find in them.
 
@@ -154,8 +144,6 @@ def render_labelled(
     ----------
     track, scene, seed, shapes
         See `render`.
-    scenery : ndarray, shape (height, width, 3), uint8, optional
-        An image in the place of the scene's background; occluders are drawn over it.
 
     Yields
     ------
@@ -164,50 +152,30 @@ def render_labelled(
     Raises
     ------
     ValueError
-        As of `render`, or if `scenery` is no image of the scene's size.
+        As of `render`.
     """
     check_instance("scene", scene, Scene)
     seed = check_integer("seed", seed)
     track = _check_track(track)
-    shapes = _check_shapes(shapes, len(track))
-    if scenery is not None:
-        scenery = np.asarray(scenery)
-        if scenery.shape != (*scene.image_size[::-1], 3) or scenery.dtype != np.uint8:
-            raise ValueError(
-                f"scenery: must be uint8 of the scene's image size {scene.image_size}, "
-                f"got {scenery.dtype} of shape {scenery.shape}"
-            )
-    return _frames(track, scene, seed, shapes, scenery)
+    maps = np.broadcast_to(np.eye(2), (len(track), 2, 2)) if shapes is None else np.array(shapes)
+    if maps.shape != (len(track), 2, 2) or not np.isfinite(maps).all():
+        raise ValueError(
+            f"shapes: must be finite, of shape ({len(track)}, 2, 2), got shape {maps.shape} and "
+            f"{np.sum(~np.isfinite(maps))} other values"
+        )
+    return draw_frames(track, scene, seed, maps)
 
 
 def _check_track(track: ArrayLike) -> Floats:
     """At least one row of pixels, finite or NaN."""
-    track = check_array("track", track)
-    if track.ndim != 2 or track.shape[1] != 2 or len(track) == 0:
-        raise ValueError(f"track: must have shape (n, 2) with n >= 1, got {track.shape}")
-    if np.isinf(track).any():
-        count = np.isinf(track).sum()
-        raise ValueError(f"track: must be finite or NaN, got {count} infinite values")
+    track = check_rows("track", track, 2)
+    if not len(track):
+        raise ValueError("track: must have shape (n, 2) with n >= 1, got (0, 2)")
     return track
 
 
-def _check_shapes(shapes: ArrayLike | None, n: int) -> Floats:
-    """Linear maps of the outline in n frames; without any, the outline as it is."""
-    maps = np.broadcast_to(np.eye(2), (n, 2, 2)) if shapes is None else np.array(shapes)
-    if maps.shape != (n, 2, 2) or not np.isfinite(maps).all():
-        raise ValueError(
-            f"shapes: must be finite, of shape ({n}, 2, 2), got shape {maps.shape} and "
-            f"{np.sum(~np.isfinite(maps))} other values"
-        )
-    return maps
-
-
 def render_restless(
-    track: ArrayLike,
-    scene: Scene,
-    shifts: ArrayLike,
-    light: ArrayLike | None = None,
-    seed: int = 0,
+    track: ArrayLike, scene: Scene, shifts: ArrayLike, light: ArrayLike | None = None, seed: int = 0
 ) -> Iterator[Image]:
     """Frames as of `render`, of a scene whose background moves and whose light changes.
 
@@ -243,14 +211,26 @@ def render_restless(
     large = BACKGROUNDS[scene.background](np.random.default_rng(seed), (across, down))
     for place, (u, v), factor in zip(track, corners, light, strict=True):
         view = cv2.convertScaleAbs(large[v:v + height, u:u + width], alpha=factor)
-        labelled = render_labelled(place[None], scene, seed, scenery=np.asarray(view, np.uint8))
-        yield next(labelled).frame
+        scenery = np.asarray(view, np.uint8)
+        yield next(draw_frames(place[None], scene, seed, np.eye(2)[None], scenery)).frame
 
 
-def _frames(
-    track: Floats, scene: Scene, seed: int, shapes: Floats, scenery: Image | None
+def draw_frames(
+    track: Floats, scene: Scene, seed: int, shapes: Floats, scenery: Image | None = None
 ) -> Iterator[LabelledFrame]:
-    """The frames of `render_labelled`, once its arguments are known to be good."""
+    """The frames of `render_labelled`, whose arguments are good.
+
+    Parameters
+    ----------
+    track, scene, seed, shapes
+        See `render`.
+    scenery : ndarray, shape (height, width, 3), uint8, optional
+        An image in the place of the scene's background; occluders are drawn over it.
+
+    Yields
+    ------
+    LabelledFrame
+    """
     spawned = np.random.SeedSequence(seed).spawn(3)
     layout, motion, noise = (np.random.default_rng(s) for s in spawned)
     background, visible = _surroundings(scene, layout, scenery)
@@ -263,9 +243,8 @@ def _frames(
         if np.isfinite(centre).all():
             turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
             polygon = centre + scale * outline @ turn @ shape.T
-            alpha, corner = coverage(polygon)
             extent = np.ptp(polygon, axis=0)
-            seen = _blend(frame, background, visible, alpha, corner, colour) / alpha.sum()
+            seen = _blend(frame, visible, polygon, colour)
         if scene.noise_variance > 0:
             # Takes less than half the time of normal numbers; grey levels are coarser by far.
             grain = grains[noise.integers(0, len(grains), frame.shape, np.uint16)]
@@ -275,22 +254,20 @@ def _frames(
 
 def _surroundings(
     scene: Scene, rng: np.random.Generator, scenery: Image | None
-) -> tuple[Image, NDArray[np.float32]]:
+) -> tuple[Image, Floats32]:
     """The image without the target, and which of its pixels are behind the target (1 or 0)."""
-    width, height = scene.image_size
-    if scenery is None:
-        background = BACKGROUNDS[scene.background](rng, scene.image_size)
-    else:
-        background = scenery.copy()
-    visible = np.ones((height, width), np.float32)
-    for left, top, w, h in scene.occluders:
-        texture = bark if h >= w else leaves
-        background[top:top + h, left:left + w] = texture(rng, (w, h))
-        visible[top:top + h, left:left + w] = 0
-    for left, top, w, h in scene.trees:
-        image, here = tree(rng, (w, h))
-        background[top:top + h, left:left + w][here] = image[here]
-        visible[top:top + h, left:left + w][here] = 0
+    drawn = BACKGROUNDS[scene.background](rng, scene.image_size) if scenery is None else scenery
+    background, visible = drawn.copy(), np.ones(drawn.shape[:2], np.float32)
+    for left, top, width, height in scene.occluders:
+        window = np.s_[top:top + height, left:left + width]
+        texture = bark if height >= width else leaves
+        background[window] = texture(rng, (width, height))
+        visible[window] = 0
+    for left, top, width, height in scene.trees:
+        window = np.s_[top:top + height, left:left + width]
+        image, here = tree(rng, (width, height))
+        background[window][here] = image[here]
+        visible[window][here] = 0
     return background, visible
 
 

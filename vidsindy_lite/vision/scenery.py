@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Image
+from ..arrays import Bools, Floats32, Image
 
 Size = tuple[int, int]
 """Width and height in pixels."""
@@ -19,7 +19,7 @@ Size = tuple[int, int]
 
 def _texture(
     rng: np.random.Generator, size: Size, cells: tuple[int, ...], stretch: Size = (1, 1)
-) -> NDArray[np.float32]:
+) -> Floats32:
     """Smooth random field in [0, 1], (height, width); `cells` of noise per axis, coarse first."""
     width, height = size
     field = np.zeros((height, width), np.float32)
@@ -42,7 +42,7 @@ def _sky(rng: np.random.Generator, size: Size) -> Image:
     row = np.linspace(0, 1, height, dtype=np.float32)[:, None]
     clouds = np.clip(_texture(rng, size, (3, 6, 12, 24), stretch=(1, 2)) * 2.2 - 1.0, 0, 1)
     light = 150 + 45 * row + 25 * clouds
-    return _paint(light, np.broadcast_to(48 - 34 * row, light.shape), -40 + 28 * row + 0 * light)
+    return _paint(light, 48 - 34 * row, -40 + 28 * row)
 
 
 def _hills(rng: np.random.Generator, size: Size) -> Image:
@@ -73,7 +73,7 @@ def _sea(rng: np.random.Generator, size: Size) -> Image:
     far = _texture(rng, (width, height - horizon), (6, 12), stretch=(1, 8))
     near = _texture(rng, (width, height - horizon), (4, 8, 16), stretch=(1, 4))
     light = 132 - 22 * depth + 30 * ((1 - depth) * far + depth * near - 0.5)
-    image[horizon:] = _paint(light, 26 + 0 * light, -44 + 0 * light)
+    image[horizon:] = _paint(light, 26, -44)
     return image
 
 
@@ -89,7 +89,7 @@ def _wood(rng: np.random.Generator, size: Size) -> Image:
         grain = np.sin(2 * np.pi * 6 * field) + 0.8 * (_texture(rng, plank, (8, 16), (1, 3)) - 0.5)
         light = rng.uniform(118, 140) + 9 * grain
         light[:2] -= 35
-        image[top:bottom] = _paint(light, -34 + 0 * light, 36 + 0 * light)
+        image[top:bottom] = _paint(light, -34, 36)
     return image
 
 

@@ -1,7 +1,5 @@
 """What one camera sees: background, target, and the disturbances between them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Self
@@ -9,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..arrays import Floats
-from ..checks import check_image_size, check_integer, check_number
+from ..checks import check_choice, check_image_size, check_integer, check_number
 from .scenery import BACKGROUNDS, Size
 
 SHAPES = ("disc", "polygon", "irregular")
@@ -76,12 +74,9 @@ class Scene:
     image_size: Size = (512, 512)
 
     def __post_init__(self) -> None:
-        for name, allowed in [
-            ("background", BACKGROUNDS), ("shape", SHAPES), ("colour", COLOURS),
-        ]:
-            value = getattr(self, name)
-            if value not in allowed:
-                raise ValueError(f"{name}: must be one of {', '.join(allowed)}, got {value!r}")
+        check_choice("background", self.background, BACKGROUNDS)
+        check_choice("shape", self.shape, SHAPES)
+        check_choice("colour", self.colour, COLOURS)
         for name, low, high in [
             ("size", 4, 100), ("turns", -np.inf, np.inf), ("tumbling", 0, np.inf),
             ("size_variation", 0, 0.5), ("noise_variance", 0, 0.1),
@@ -121,27 +116,27 @@ class Scene:
     def outline(self) -> Floats:
         """Outline of the target at rest, (m, 2) pixels: centroid at 0, area that of the disc."""
         rng = np.random.default_rng(self.shape_seed)
-        if self.shape == "disc":
-            angle = np.linspace(0, 2 * np.pi, 128, endpoint=False)
-            radius = np.ones_like(angle)
-        elif self.shape == "polygon":
+        angle = np.linspace(0, 2 * np.pi, 128, endpoint=False)
+        if self.shape == "polygon":
             m = int(rng.integers(3, 7))
             angle = 2 * np.pi * (np.arange(m) + rng.uniform(-0.2, 0.2, m)) / m
-            radius = np.ones(m)
-        else:
-            angle = np.linspace(0, 2 * np.pi, 128, endpoint=False)
+        points = np.column_stack([np.cos(angle), np.sin(angle)])
+        if self.shape == "irregular":
             order = np.arange(2, 6)
             amplitude = rng.uniform(0.3, 1, order.size) * 0.35 / order
             phase = rng.uniform(0, 2 * np.pi, order.size)
             radius = 1 + np.cos(np.outer(angle, order) + phase) @ amplitude
-        points = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-        area, centroid = _area_and_centroid(points)
+            points *= radius[:, None]
+        # Area and centroid by the shoelace formula.
+        x, y = points.T
+        x1, y1 = np.roll(points, -1, axis=0).T
+        cross = x * y1 - x1 * y
+        area = cross.sum() / 2
+        centroid = np.array([((x + x1) * cross).sum(), ((y + y1) * cross).sum()]) / (6 * area)
         return (points - centroid) * np.sqrt(np.pi * self.size**2 / 4 / area)
 
 
-def _check_rectangles(
-    name: str, rectangles: Iterable[Box], size: Size
-) -> tuple[Box, ...]:
+def _check_rectangles(name: str, rectangles: Iterable[Box], size: Size) -> tuple[Box, ...]:
     """Boxes of whole pixels that lie in the image."""
     boxes: tuple[Any, ...] = tuple(tuple(rectangle) for rectangle in rectangles)
     for rectangle in boxes:
@@ -154,12 +149,3 @@ def _check_rectangles(
         if rectangle[0] + rectangle[2] > size[0] or rectangle[1] + rectangle[3] > size[1]:
             raise ValueError(f"{name}: must lie in the {size} image, got {rectangle}")
     return boxes
-
-
-def _area_and_centroid(polygon: Floats) -> tuple[float, Floats]:
-    """Area and area centroid of a simple polygon (m, 2), by the shoelace formula."""
-    x, y = polygon.T
-    x1, y1 = np.roll(polygon, -1, axis=0).T
-    cross = x * y1 - x1 * y
-    area = cross.sum() / 2
-    return area, np.array([((x + x1) * cross).sum(), ((y + y1) * cross).sum()]) / (6 * area)

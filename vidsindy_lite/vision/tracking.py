@@ -9,8 +9,6 @@ YOLO-v8; what such a detector sees in the single frames is linked here to one mo
 A frame gets NaN where the target is not seen, or not for sure.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +18,7 @@ import numpy as np
 
 from ..arrays import Floats
 from .background import BackgroundModel, sample_frames, track_blobs, view_distances, whole_views
-from .detector import Detection, Detector, LearnedDetector, OnnxDetector, detections
+from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .video import read_video
 
 DETECTORS = ("auto", "background", "learned")
@@ -89,7 +87,7 @@ def track(path: str | os.PathLike, detector: str | os.PathLike = "auto") -> Trac
     """
     check_detector(detector)
     if detector not in ("auto", "background"):
-        return _link_detections(path, _detector(detector), str(detector))
+        return _link_detections(path, detector)
     model = BackgroundModel(sample_frames(path))
     found = _track_blobs(path, model)
     name, doubts = Path(path).name, []
@@ -104,7 +102,7 @@ def track(path: str | os.PathLike, detector: str | os.PathLike = "auto") -> Trac
             f"{model.background_motion:.1f} times its area changes in a typical frame"
         )
         if detector == "auto":
-            found = _surer(found, _link_detections(path, _detector("learned"), "learned"))
+            found = _surer(found, _link_detections(path, "learned"))
     return replace(found, warnings=tuple(doubts))
 
 
@@ -136,11 +134,6 @@ def check_detector(name: str | os.PathLike) -> None:
         raise FileNotFoundError(f"detector: no such file, got '{name}'")
 
 
-def _detector(name: str | os.PathLike) -> Detector:
-    """The detector of that name."""
-    return LearnedDetector() if name == "learned" else OnnxDetector(name)
-
-
 def _track_blobs(path: str | os.PathLike, model: BackgroundModel) -> Track:
     blobs = list(track_blobs(model, read_video(path)))
     distance = view_distances(blobs)
@@ -149,12 +142,13 @@ def _track_blobs(path: str | os.PathLike, model: BackgroundModel) -> Track:
     return Track(centroids, np.exp(-distance), "background")
 
 
-def _link_detections(path: str | os.PathLike, detector: Detector, name: str) -> Track:
+def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:
+    detector = LearnedDetector() if name == "learned" else OnnxDetector(name)
     sightings = [detections(detector.predict(frame)) for frame in read_video(path)]
     chain = link(sightings)
     pixels = np.array([d.centre if d else (np.nan, np.nan) for d in chain], float)
     confidence = np.array([d.confidence if d else 0.0 for d in chain])
-    return Track(pixels, confidence, name)
+    return Track(pixels, confidence, str(name))
 
 
 def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:

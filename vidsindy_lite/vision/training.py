@@ -4,8 +4,6 @@ Every step draws its frames and augmentations from the seed and its own number, 
 that was interrupted goes on exactly as if it had not been.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os
@@ -16,16 +14,16 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch.nn import functional
+from torch.optim import lr_scheduler
 from tqdm import trange
 
-from ..arrays import Floats, Image
+from ..arrays import Floats, Floats32, Image
 from ..checks import check_integer, check_path
 from ..stamp import write_file
 from .detector import WEIGHTS
 from .network import STRIDE, Network, anchors, as_input
-from .rendering import LabelledFrame, render_labelled
+from .rendering import LabelledFrame, draw_frames
 from .scenery import BACKGROUNDS
 from .scenes import COLOURS, Box, Scene
 
@@ -49,9 +47,7 @@ _CURVE = 100  # points of the loss curve in the log
 # ------------------------------------------------------------------------------------------ frames
 
 
-def training_frame(
-    rng: np.random.Generator, pool: Image
-) -> tuple[LabelledFrame, Floats]:
+def training_frame(rng: np.random.Generator, pool: Image) -> tuple[LabelledFrame, Floats]:
     """One random frame, its labels, and the centroid of the target, (2,), NaN without target.
 
     Scenes, colours and occluders are random, targets stretched, frames disturbed as by a camera.
@@ -77,14 +73,14 @@ def training_frame(
     if rng.random() < _ABSENT:
         centre = np.full(2, np.nan)
     elif occluders and rng.random() < 0.5:  # near an edge of an occluder, where it is hard
-        left, top, width, height = occluders[-1]
-        centre = np.array([left, top]) + rng.uniform(-0.3, 1.3, 2) * [width, height]
+        box = np.array(occluders[-1])
+        centre = box[:2] + rng.uniform(-0.3, 1.3, 2) * box[2:]
     stretch = np.exp(rng.uniform(-0.35, 0.35) * np.array([1, -1]))
     angle = rng.uniform(0, np.pi)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     shape = turn * stretch @ turn.T
     seed, scenery = int(rng.integers(2**31)), _scenery(rng, pool)
-    drawn = next(render_labelled(centre[None], scene, seed, shape[None], scenery))
+    drawn = next(draw_frames(centre[None], scene, seed, shape[None], scenery))
     return drawn._replace(frame=_seen_by_a_camera(drawn.frame, rng)), centre
 
 
@@ -127,7 +123,7 @@ def _background(rng: np.random.Generator, pool: Image) -> Image:
     return np.asarray(cv2.transform(resized, mix.astype(np.float32)), np.uint8)
 
 
-def _tiles(rng: np.random.Generator) -> NDArray[np.float32]:
+def _tiles(rng: np.random.Generator) -> Floats32:
     """Brightness of tiles: a grid of random pitch, turned at random, (SIDE, SIDE, 3)."""
     v, u = np.mgrid[:SIDE, :SIDE].astype(np.float32)
     angle = rng.uniform(0, np.pi)
@@ -142,8 +138,7 @@ def _seen_by_a_camera(frame: Image, rng: np.random.Generator) -> Image:
     """Another white balance, colours exchanged, blur, or a lossy codec."""
     frame = frame[..., rng.permutation(3)] if rng.random() < 0.5 else frame
     if rng.random() < 0.1:
-        grey = cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
-        frame = np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)
+        frame = np.stack([cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)] * 3, axis=-1)
     gain = rng.uniform(0.8, 1.2) * rng.uniform(0.9, 1.1, 3)
     frame = np.clip(frame * gain + rng.uniform(-15, 15), 0, 255).astype(np.uint8)
     if rng.random() < 0.2:
@@ -208,12 +203,12 @@ def _batch(seed: int, step: int, pool: Image) -> tuple[torch.Tensor, ...]:
 
 
 def train(
-    weights: str | os.PathLike = WEIGHTS, seed: int = 0, steps: int = STEPS, progress: bool = True
+    weights: str | os.PathLike = WEIGHTS, seed: int = 0, steps: int = STEPS
 ) -> dict[str, Any]:
     """Train the detector and write its weights, with the log of the training beside them.
 
     Interrupted, it goes on from its last checkpoint (a file beside the weights) when it is called
-    again with the same seed and number of steps.
+    again with the same seed and number of steps. A terminal shows how far it is.
 
     Parameters
     ----------
@@ -222,8 +217,6 @@ def train(
     seed : int
     steps : int
         Batches of 16 frames.
-    progress : bool
-        Show a progress bar.
 
     Returns
     -------
@@ -234,17 +227,15 @@ def train(
     seed, steps = check_integer("seed", seed), check_integer("steps", steps, 1)
     with torch.random.fork_rng():
         torch.manual_seed(seed)
-        network = Network().train()
-        network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        network = Network().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-3)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, _RATE, total_steps=steps + 1, pct_start=_WARMING
-    )
+    schedule = lr_scheduler.OneCycleLR(optimiser, _RATE, steps + 1, pct_start=_WARMING)
     parts = {"network": network, "optimiser": optimiser, "schedule": schedule}
-    checkpoint = weights.with_suffix(".checkpoint")
-    done, losses = _resume(checkpoint, parts, seed, steps)
+    checkpoint = weights.with_suffix(f".{seed}_of_{steps}.checkpoint")
+    losses = _resume(checkpoint, parts)
     pool = background_pool(np.random.default_rng(seed))
-    bar = trange(done, steps, initial=done, total=steps, unit="step", disable=not progress)
+    done = len(losses)
+    bar = trange(done, steps, initial=done, total=steps, unit="step", disable=None)
     for step in bar:
         images, *labels = _batch(seed, step, pool)
         loss = detection_loss(network(images), *labels)
@@ -257,8 +248,7 @@ def train(
         if (step + 1) % _CHECKPOINT == 0:
             bar.set_postfix(loss=f"{np.mean(losses[-_CHECKPOINT:]):.3f}")
             state = {name: part.state_dict() for name, part in parts.items()}
-            state |= {"seed": seed, "steps": steps, "losses": losses}
-            _save(checkpoint, state)
+            _save(checkpoint, state | {"losses": losses})
     _save(weights, network.state_dict())
     log = _training_log(seed, losses, sum(p.numel() for p in network.parameters()))
     write_file(weights.with_suffix(".json"), (json.dumps(log, indent=1) + "\n").encode())
@@ -273,18 +263,14 @@ def _save(path: Path, state: dict[str, Any]) -> None:
     write_file(path, memory.getvalue())
 
 
-def _resume(
-    checkpoint: Path, parts: dict[str, Any], seed: int, steps: int
-) -> tuple[int, list[float]]:
-    """Number of steps done and their losses; the parts are brought to where they were."""
+def _resume(checkpoint: Path, parts: dict[str, Any]) -> list[float]:
+    """Losses of the steps done before; the parts are brought to where they were."""
     if not checkpoint.is_file():
-        return 0, []
+        return []
     state = torch.load(checkpoint, weights_only=True)
-    if (state["seed"], state["steps"]) != (seed, steps):
-        return 0, []
     for name, part in parts.items():
         part.load_state_dict(state[name])
-    return len(state["losses"]), state["losses"]
+    return state["losses"]
 
 
 def _training_log(seed: int, losses: list[float], parameters: int) -> dict[str, Any]:

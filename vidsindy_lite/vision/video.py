@@ -10,20 +10,17 @@ PyAV is imported by the functions that need it, since who works with tracks need
 
 from __future__ import annotations
 
-import math
 import os
-from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
 from ..arrays import Image
-from ..checks import check_instance, check_integer, check_number, check_path
+from ..checks import check_choice, check_instance, check_integer, check_number, check_path
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -110,8 +107,7 @@ def write_video(
     if codec is None and suffix not in LOSSLESS:
         raise ValueError(f"path: must end in .mov or .mkv unless codec is given, got '{path}'")
     codec = codec or LOSSLESS[suffix]
-    if codec not in CODECS:
-        raise ValueError(f"codec: must be one of {', '.join(CODECS)}, got {codec!r}")
+    check_choice("codec", codec, CODECS)
     if suffix not in CODECS[codec].suffixes:
         allowed = " or ".join(CODECS[codec].suffixes)
         raise ValueError(f"path: must end in {allowed} for {codec}, got '{path}'")
@@ -142,21 +138,20 @@ def _encode(
     """Write a file under its temporary name, and make sure that it holds all frames."""
     import av
 
-    frames, count = _checked(frames), 0
-    first = next(frames, None)
-    if first is None:
-        raise ValueError("frames: at least one frame is needed, got none")
+    stream, count, held = None, 0, 0
     try:
         with av.open(str(partial.absolute()), "w") as container:
-            stream = _add_stream(container, codec, rate, first.shape[1::-1])
-            for frame in chain([first], frames):
+            for frame in _checked(frames):
+                stream = stream or _add_stream(container, codec, rate, frame.shape[1::-1])
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "bgr24")))
                 count += 1
+            if stream is None:
+                raise ValueError("frames: at least one frame is needed, got none")
             container.mux(stream.encode(None))
-        with _opened(partial) as (written, stream):
-            held = len(_packets(written, stream))
-    except (av.FFmpegError, _NoVideo) as error:
+    except av.FFmpegError as error:
         raise OSError(f"path: cannot write {count} frames to '{path}': {error}") from error
+    with suppress(av.FFmpegError, ValueError), _opened(partial) as opened:
+        held = len(_packets(*opened))
     if held != count:
         raise OSError(f"path: cannot write {count} frames to '{path}', only {held} are in the file")
 
@@ -196,10 +191,6 @@ def _add_stream(
 
 
 # ----------------------------------------------------------------------------------------- reading
-
-
-class _NoVideo(ValueError):
-    """A file from which no frame can be read."""
 
 
 def read_video(path: str | os.PathLike) -> Iterator[Image]:
@@ -254,7 +245,8 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
     """Number of frames, frame rate and size of a video file.
 
     The number is what the file's header states, which is more than the frames that can be read if
-    the file was cut off later; where the header states none, the frames are counted.
+    the file was cut off later. Where the header states none (.mkv), the frames are counted, and of
+    a file without sound those that its duration promises are added.
 
     Parameters
     ----------
@@ -270,13 +262,22 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
         If the file is missing, empty, not a video, or holds no frame.
     """
     with _opened(path) as (container, stream):
-        image = _first(path, container, stream)
+        size = _first(path, container, stream).shape[1::-1]
         fps = float(stream.guessed_rate or 0)
-        seconds = (container.duration or 0) / 1e6
-        count = stream.frames or round(seconds * fps)
-        if count < 1:  # the file was cut off while it was written
-            count = 1 + sum(1 for _ in _decoded(container, stream))
-    return VideoInfo(count, fps, image.shape[1::-1])
+        count = stream.frames
+    return VideoInfo(count or _count(path, fps), fps, size)
+
+
+def _count(path: str | os.PathLike, fps: float) -> int:
+    """Number of frames in a file, and of those that were cut off its end."""
+    with _opened(path) as (container, stream):
+        packets = _packets(container, stream)
+        times = [time for time, _ in packets if time is not None]
+        # The duration of a file with sound may be that of the sound.
+        if len(container.streams) > 1 or not (container.duration and stream.time_base and times):
+            return len(packets)
+        after_last = container.duration / 1e6 - float(max(times) * stream.time_base)
+        return len(packets) + max(round(after_last * fps) - 1, 0)
 
 
 def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Image]:
@@ -291,14 +292,14 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
         if len(set(times)) < len(packets):  # some old files do not say
             yield from (image for i, image in enumerate(_images(path)) if i in numbers)
             return
-        keys = sorted(time or 0 for time, is_key in packets if is_key)
+        keys = [time or 0 for time, is_key in packets if is_key]
         frames: Iterator[VideoFrame] = iter(())
-        now = -math.inf
+        now = -np.inf
         for number in numbers:
             if number >= len(times):
                 return
             time = times[number]
-            key = keys[max(bisect_right(keys, time) - 1, 0)]
+            key = max((key for key in keys if key <= time), default=min(keys, default=time))
             if key > now:
                 container.seek(key, stream=stream)
                 frames = _decoded(container, stream)
@@ -318,18 +319,16 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
     if not path.is_file():
         raise FileNotFoundError(f"path: no such video file, got '{path}'")
     if path.stat().st_size == 0:
-        raise _NoVideo(f"path: must be a video file, got the empty file '{path}'")
+        raise ValueError(f"path: must be a video file, got the empty file '{path}'")
     try:
         # Absolute, as the part before a colon would be a protocol, e.g. of "12:30.mov".
         container = av.open(str(path.absolute()), metadata_errors="replace")
     except av.FFmpegError:
-        raise _NoVideo(
-            f"path: must be a video file that PyAV can read, got '{path}'"
-        ) from None
+        raise ValueError(f"path: must be a video file that PyAV can read, got '{path}'") from None
     with container:
         stream = container.streams.best("video")
         if stream is None:
-            raise _NoVideo(f"path: must be a video file, got '{path}', which holds none")
+            raise ValueError(f"path: must be a video file, got '{path}', which holds none")
         yield container, cast("VideoStream", stream)
 
 
@@ -351,7 +350,7 @@ def _first(path: str | os.PathLike, container: InputContainer, stream: VideoStre
     """The first frame of a file just opened, which must have one."""
     frame = next(_decoded(container, stream), None)
     if frame is None:
-        raise _NoVideo(f"path: must hold at least one frame, got none in '{path}'")
+        raise ValueError(f"path: must hold at least one frame, got none in '{path}'")
     return _image(frame)
 
 
