@@ -147,3 +147,97 @@ def test_shapes_are_told_by_complex_moments():
     cube = c11**1.5 / np.sqrt(area)
     expected = [np.log(c11 / area**2), abs(c20) / c11, abs(c21) / cube, abs(c30) / cube]
     np.testing.assert_allclose(_shape(alpha, u, v), expected, rtol=1e-12)
+
+
+# ---------------------------------------------------------- squares on a plain ground: all is known
+
+
+GROUND, TARGET = (90, 100, 110), (20, 40, 220)
+
+
+def squares(*boxes, colour=TARGET):
+    """A frame with squares (left, top, side), on whole pixels."""
+    frame = np.full((SIZE[1], SIZE[0], 3), GROUND, np.uint8)
+    for left, top, side in boxes:
+        frame[max(top, 0):top + side, max(left, 0):left + side] = colour
+    return frame
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """A model that has seen a square of 16 pixels in 20 places."""
+    return BackgroundModel(np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)]))
+
+
+def test_what_is_learned_of_a_square(plain):
+    np.testing.assert_array_equal(plain.background, squares())
+    assert plain.area == 16**2
+    np.testing.assert_array_equal(plain.contrast[0, 0], np.subtract(TARGET, GROUND))
+    assert plain.noise == plain.camera_motion == plain.background_motion == 0
+
+
+def test_search_finds_the_middle_of_a_square_and_looks_a_little_beyond_it(plain):
+    centre, half = plain.search(squares((40, 24, 16)))
+    np.testing.assert_array_equal(centre, [47.5, 31.5])
+    assert half == 4 * (4 / 2 + 1) + 4  # half its width, a coarse pixel, the ring on both sides
+    centre, half = plain.search(squares((80, 60, 8)))
+    np.testing.assert_array_equal(centre, [83.5, 63.5])
+    assert half == 4 * (2 / 2 + 1) + 4
+    assert plain.search(squares()) is None
+
+
+def test_search_prefers_what_has_the_colour_of_the_target(plain):
+    frame = squares((20, 12, 28), colour=(160, 160, 0))  # larger, of the opposite colour
+    frame[60:76, 80:96] = TARGET
+    np.testing.assert_array_equal(plain.search(frame)[0], [87.5, 67.5])
+    faint = np.rint(0.9 * np.array(GROUND) + 0.1 * np.array(TARGET))
+    frame[12:40, 20:48] = faint  # a little of its colour on a larger area
+    np.testing.assert_array_equal(plain.search(frame)[0], [87.5, 67.5])
+
+
+@pytest.mark.parametrize(("left", "top"), [(40, 24), (33, 51), (1, 30), (30, 1), (111, 30), (30, 79)])
+def test_a_square_is_measured_exactly(plain, left, top):
+    blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
+    np.testing.assert_allclose(blob.centroid, [left + 7.5, top + 7.5], atol=1e-3)
+    assert blob.area == pytest.approx(16**2, rel=1e-3)
+    assert blob.inside
+
+
+def test_a_pixel_half_covered_counts_half(plain):
+    frame = squares((40, 24, 16))
+    frame[24:40, 55] = np.add(TARGET, GROUND) / 2
+    blob = plain.measure(frame, np.array([47.5, 31.5]), 14)
+    assert blob.area == pytest.approx(15.5 * 16, rel=1e-3)
+    # In one row: 15 whole pixels around 47, half a one at 55.
+    np.testing.assert_allclose(blob.centroid, [(15 * 47 + 0.5 * 55) / 15.5, 31.5], atol=1e-2)
+
+
+@pytest.mark.parametrize(("left", "top"), [(0, 30), (30, 0), (112, 30), (30, 80), (-4, 30)])
+def test_a_square_at_the_border_of_the_image_may_go_on_beyond_it(plain, left, top):
+    blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
+    assert not blob.inside
+
+
+@pytest.mark.parametrize("off", [(9, 0), (-9, 0), (0, 9), (0, -9)])
+def test_a_square_across_the_border_of_the_window_is_not_measured(plain, off):
+    frame = squares((40, 40, 16))
+    assert plain.measure(frame, np.array([47.5, 47.5]) + off, 17) is not None
+    assert plain.measure(frame, np.array([47.5, 47.5]) + off, 14) is None
+
+
+@pytest.mark.parametrize(("side", "is_target"), [(6, False), (8, True), (32, True), (40, False)])
+def test_what_has_five_times_the_area_of_the_target_or_a_fifth_is_none(plain, side, is_target):
+    found = plain.measure(squares((30, 30, side)), np.full(2, 30 + (side - 1) / 2), 30)
+    assert (found is not None) == is_target
+
+
+def test_a_target_beside_ground_of_its_own_colour_has_no_shape():
+    frames = np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)])
+    frames[:, :, 56:60] = np.add(TARGET, 3)  # a stripe, on which the target cannot be told
+    model = BackgroundModel(frames)
+    frame = squares((40, 40, 16))
+    frame[:, 56:60] = np.add(TARGET, 3)
+    assert model.measure(frame, np.array([47.5, 47.5]), 14).shape is None
+    frame = squares((20, 40, 16))
+    frame[:, 56:60] = np.add(TARGET, 3)
+    assert model.measure(frame, np.array([27.5, 47.5]), 14).shape is not None
