@@ -1,5 +1,7 @@
 """The parts of the background model by themselves, on arrays whose answer is known."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -195,7 +197,9 @@ def test_search_prefers_what_has_the_colour_of_the_target(plain):
     np.testing.assert_array_equal(plain.search(frame)[0], [87.5, 67.5])
 
 
-@pytest.mark.parametrize(("left", "top"), [(40, 24), (33, 51), (1, 30), (30, 1), (111, 30), (30, 79)])
+@pytest.mark.parametrize(
+    ("left", "top"), [(40, 24), (33, 51), (1, 30), (30, 1), (111, 30), (30, 79)]
+)
 def test_a_square_is_measured_exactly(plain, left, top):
     blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
     np.testing.assert_allclose(blob.centroid, [left + 7.5, top + 7.5], atol=1e-3)
@@ -216,6 +220,17 @@ def test_a_pixel_half_covered_counts_half(plain):
 def test_a_square_at_the_border_of_the_image_may_go_on_beyond_it(plain, left, top):
     blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
     assert not blob.inside
+
+
+def test_a_window_holds_all_pixels_near_a_place_and_at_least_one(plain):
+    low, high, window = plain._window(np.array([50.0, 40.0]), 10.0)
+    assert (low.tolist(), high.tolist()) == ([40, 30], [61, 51])
+    assert window == np.s_[30:51, 40:61]
+    low, high, _ = plain._window(np.array([3.5, 94.2]), 5.0)
+    assert (low.tolist(), high.tolist()) == ([0, 89], [10, 96])
+    for place, corner in (((-30.0, -30.0), [0, 0]), ((500.0, 500.0), [127, 95])):
+        low, high, _ = plain._window(np.array(place), 5.0)
+        assert (low.tolist(), (high - low).tolist()) == (corner, [1, 1])
 
 
 @pytest.mark.parametrize("off", [(9, 0), (-9, 0), (0, 9), (0, -9)])
@@ -241,3 +256,39 @@ def test_a_target_beside_ground_of_its_own_colour_has_no_shape():
     frame = squares((20, 40, 16))
     frame[:, 56:60] = np.add(TARGET, 3)
     assert model.measure(frame, np.array([27.5, 47.5]), 14).shape is not None
+
+
+# ---------------------------------------------------------------------------------------- following
+
+
+class Seen:
+    """A model of a target in even motion, which notes where it is looked for."""
+
+    area = np.pi * 5**2
+    motion = np.array([[10.0 + 3 * i, 20.0 - 2 * i] for i in range(20)])
+
+    def __init__(self, hidden):
+        self.hidden, self.near, self.anywhere = hidden, {}, []
+
+    def search(self, number):
+        self.anywhere.append(number)
+        return self.motion[number], None
+
+    def measure(self, number, centre, half):
+        if half is not None:
+            self.near[number] = (centre, half)
+        whole = blob(inside=number % 2 == 0)  # a view across the border counts, too
+        return None if number in self.hidden else replace(whole, centroid=self.motion[number])
+
+
+def test_a_target_is_looked_for_where_its_motion_leads():
+    model = Seen(hidden=(4, 5, 9, 10, 11, 12))
+    found = list(track_blobs(model, range(20)))
+    assert [i for i, one in enumerate(found) if one is None] == [4, 5, 9, 10, 11, 12]
+    # Anywhere: at first, where it is not at its place, and at once after three such frames.
+    assert model.anywhere == [0, 4, 5, 9, 10, 11, 12, 13]
+    assert sorted(set(range(20)) - set(model.near)) == [0, 12, 13]
+    for number, (centre, half) in model.near.items():
+        still = number == 1  # one frame shows no motion
+        np.testing.assert_allclose(centre, model.motion[0 if still else number])
+        assert half == pytest.approx(2 * 5 + 8 + (0 if still else 0.5 * 3))
