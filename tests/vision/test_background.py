@@ -15,12 +15,14 @@ from vidsindy_lite.vision.background import (
     _median,
     _reduce,
     _shape,
+    sample_frames,
     track_blobs,
     view_distances,
     whole_views,
 )
 from vidsindy_lite.vision.rendering import render
 from vidsindy_lite.vision.scenes import Scene
+from vidsindy_lite.vision.video import write_video
 
 SIZE = (128, 96)
 
@@ -256,6 +258,38 @@ def test_a_target_beside_ground_of_its_own_colour_has_no_shape():
     frame = squares((20, 40, 16))
     frame[:, 56:60] = np.add(TARGET, 3)
     assert model.measure(frame, np.array([27.5, 47.5]), 14).shape is not None
+
+
+@pytest.mark.parametrize(("left", "top"), [(40, 24), (37, 51), (0, 0), (112, 80)])
+def test_a_square_that_stays_in_most_samples_is_no_background(left, top):
+    stays = [squares((left, top, 16))] * 13
+    leaves = [squares((76 + i, 4 + i, 16)) for i in range(0, 16, 2)]
+    model = BackgroundModel(np.array(stays + leaves))
+    np.testing.assert_array_equal(model.background, squares())
+    assert model.area == 16**2
+
+
+def test_what_moves_away_for_a_few_samples_is_background():
+    lamp = squares((40, 24, 16), colour=(250, 250, 250))
+    dark = squares((4, 60, 16))  # the target, and the lamp is off
+    model = BackgroundModel(np.array([lamp] * 20 + [dark]))
+    np.testing.assert_array_equal(model.background, lamp)
+
+
+@pytest.mark.parametrize(("distance", "counts"), [(1, 1), (2, 1), (3, 0)])
+def test_faint_coverage_counts_up_to_two_pixels_beyond_the_outline(plain, distance, counts):
+    frame = squares((40, 24, 16))
+    frame[24:40, 55 + distance] = np.rint(np.array(GROUND) + 0.06 * np.subtract(TARGET, GROUND))
+    blob = plain.measure(frame, np.array([47.5, 31.5]), 14)
+    assert blob.area == pytest.approx(16**2 + counts * 16 * 0.06, abs=0.3)
+
+
+def test_samples_are_spread_from_the_first_frame_to_the_last(tmp_path):
+    for n in (50, 21, 3):
+        frames = [np.full((64, 64, 3), 4 * i, np.uint8) for i in range(n)]
+        samples = sample_frames(write_video(tmp_path / "clip.mov", frames))
+        numbers = samples[:, 0, 0, 0] // 4
+        np.testing.assert_array_equal(numbers, np.unique(np.linspace(0, n - 1, 21).round()))
 
 
 # ---------------------------------------------------------------------------------------- following
