@@ -278,10 +278,12 @@ def test_what_moves_away_for_a_few_samples_is_background():
 
 @pytest.mark.parametrize(("distance", "counts"), [(1, 1), (2, 1), (3, 0)])
 def test_faint_coverage_counts_up_to_two_pixels_beyond_the_outline(plain, distance, counts):
-    frame = squares((40, 24, 16))
-    frame[24:40, 55 + distance] = np.rint(np.array(GROUND) + 0.06 * np.subtract(TARGET, GROUND))
-    blob = plain.measure(frame, np.array([47.5, 31.5]), 14)
-    assert blob.area == pytest.approx(16**2 + counts * 16 * 0.06, abs=0.3)
+    faint = np.rint(np.array(GROUND) + 0.06 * np.subtract(TARGET, GROUND))
+    for beside in (np.s_[24:40, 55 + distance], np.s_[39 + distance, 40:56]):
+        frame = squares((40, 24, 16))
+        frame[beside] = faint
+        blob = plain.measure(frame, np.array([47.5, 31.5]), 14)
+        assert blob.area == pytest.approx(16**2 + counts * 16 * 0.06, abs=0.3)
 
 
 def test_samples_are_spread_from_the_first_frame_to_the_last(tmp_path):
