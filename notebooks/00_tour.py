@@ -149,9 +149,9 @@ save_figure("tour_rig", fig, caption=caption, numbers={"t": found.t, "x": found.
 # %%
 error = trajectory_error(found.x, shot.x)
 pixel = np.mean([camera.scale for camera in shot.rig.cameras])
-print("rms error, scene units:", error.rmse.round(5))
+print("rms error, scene units:", error.round(5))
 print("one pixel, scene units:", pixel.round(3))
-assert error.rmse.max() < 0.1 * pixel
+assert error.max() < 0.1 * pixel
 
 # %%
 part = slice(400)  # four periods
@@ -189,7 +189,7 @@ for name, value, error in zip("xyz", law.offset, law.offset_errors, strict=True)
 
 # %%
 fig = plots.plot_coefficients(law, shot.truth)
-caption = "Each coefficient's distance from the truth, with its standard error, in millionths."
+caption = "Distance of each coefficient from the truth, in millionths of it; bars: one standard error."
 numbers = {
     "found": law.coefficients, "standard error": law.standard_errors,
     "truth": shot.truth.coefficients,

@@ -280,7 +280,7 @@ curves = {
     "image + signed distances": on_image + camera.offset,
     "image + unsigned distances": on_image + np.abs(camera.offset),
 }
-fig = plots.plot_in_plane(curves)
+fig = plots.plot_in_plane(curves, ("X'", "Y'"))
 caption = "Only signed distances put the image back where the trajectory is in the plane."
 save_figure("projection_offset_signs", fig, caption=caption, numbers=curves)
 

@@ -122,7 +122,7 @@ fast = SYSTEMS["Tsucs2"]
 t, x = fast.trajectory(24_000, samples_per_period=1000)
 t, x = t[20_000:], x[20_000:, 0]  # four periods, after the first swing
 samples = {
-    f"{rate:.3g} frames per period: {name}": (t[:: round(1000 / rate)], x[:: round(1000 / rate)])
+    f"{round(rate, 1):g} frames per period: {name}": (t[:: round(1000 / rate)], x[:: round(1000 / rate)])
     for name, rate in (("25 per time unit", 25 * fast.period), ("as here", SAMPLES_PER_PERIOD))
 }
 fig = plots.plot_sampling(t, x, samples)
@@ -259,7 +259,7 @@ assert np.linalg.norm(centroid - truth[middle]) < 0.05
 
 # %%
 fig = plots.plot_tracker_steps(frame, behind, coverage, (left, top), centroid)
-caption = "From the frame to the centroid (cross): background, difference, coverage."
+caption = "From the frame to the centroid (cross): background, difference (grey levels), coverage."
 save_figure("videos_tracker_steps", fig, caption=caption, numbers={"coverage": coverage})
 
 # %% [markdown]

@@ -528,7 +528,7 @@ assert np.abs(best - offset[:2]).max() <= 1
 axes = {"x_axis": x_axis, "y_axis": y_axis, "count": counts}
 path = spline(np.linspace(t[0], t[399], 1200))[:, :2]
 fig = plots.plot_origin_map(**axes, data=path, best=best, truth=offset[:2])
-caption = "Number of significant terms against the origin: fewest at (10, 10), the true one."
+caption = "Smoothed number of significant terms, by origin: fewest at (10, 10), the true one."
 save_figure("solver_origin", fig, caption=caption, numbers=axes)
 
 # %% [markdown]
@@ -693,7 +693,7 @@ def pendulum(noise):
 
 
 rows = [pendulum(noise) for noise in ((0.01, 0.05, 0.2) if full else (0.05,))]
-caption = "A pendulum that swings nearly round: no polynomial is right, but several fit."
+caption = "A pendulum that swings nearly round: no polynomial is right, yet some fit."
 assert all(row["status"] == "suspect" or row["data loss"] < 1.1 for row in rows)
 save_table("solver_pendulum", rows, caption=caption)
 

@@ -191,7 +191,7 @@ print("\nin the frame of the cameras:", first.found.equations(), "\ntruth:", fir
 
 # %%
 fig = plots.plot_coefficients(first.found, first.truth)
-caption = "Errors of the coefficients of the realistic scene, with their standard errors."
+caption = "Distance of each coefficient from the truth, in millionths of it; bars: one standard error."
 save_figure("scene_coefficients", fig, caption=caption, numbers={"pulls": pulls(first.found, first.truth)})
 
 # %% [markdown]

@@ -313,16 +313,18 @@ assert 5 * np.max(tracking) < np.max(shifts) < 0.1
 
 # %% [markdown]
 # As the ball's radius is known, the difference can be computed once the ball's place is, and taken off:
-# `learn_from_ball` learns, corrects and learns again. At the other end, a detector that gives **whole
+# `observe_ball` observes, corrects and observes again. At the other end, a detector that gives **whole
 # pixels** (a box, say) costs more than everything else together.
 
 # %%
 rounded = [np.round(track) for track in tracks]
+coarse = observe_tracks(rounded, start, t, lags=(0, 0, 0))
+centred = lab.observe_ball(tracks, start)
 results = {
     "orthographic": (flat, by_flat),
-    "perspective, whole pixels": (coarse := learn_cameras(rounded, start), reconstruct(rounded, coarse)),
+    "perspective, whole pixels": (coarse.rig, coarse.x),
     "perspective": (learned, by_pinhole),
-    "perspective, ball's centre": lab.learn_from_ball(tracks, start),
+    "perspective, ball's centre": (centred.rig, centred.x),
 }
 
 # %%

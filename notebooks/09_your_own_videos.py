@@ -233,7 +233,7 @@ save_figure("own_path", fig, caption=caption, numbers={"t": t, "x": x, "curve": 
 # %% [markdown]
 # ### The tracks
 #
-# Look at the tracks before you look at the law: are the rings on the same thing? The frames are those of
+# Look at the tracks before you look at the law: do the squares show the same thing? The frames are those of
 # one instant, so their numbers differ.
 
 # %%
@@ -242,12 +242,12 @@ lags = np.array([camera["lag"] for camera in result["cameras"]])
 instant = 10
 places = [(path, instant - round(lag)) for path, lag in zip("abc", lags, strict=True)]
 images = [read_frame(folders[shown] / f"{p}.avi", n) for p, n in places]
-fig = plots.plot_views(images, [f"{p}.avi, frame {n}" for p, n in places], tracks, instant)
-caption = "One instant in the three videos, each with the whole track."
+fig = plots.plot_frames(images, [f"{p}.avi, frame {n}" for p, n in places], tracks, instant)
+caption = "One instant in the three videos, each with the whole track and the target magnified."
 save_figure("own_views", fig, caption=caption, numbers=dict(zip("abc", tracks, strict=True)))
 
 # %% [markdown]
-# *One instant in the three videos, with the whole track and a ring around the target. Compression has
+# *One instant in the three videos, with the whole track, and the target magnified. Compression has
 # softened the edges.*
 
 # %% [markdown]

@@ -172,13 +172,13 @@ paths = {
     "the text's rotation throughout: half a turn": half_turn,
 }  # fmt: skip
 paths = {label: path[:400] for label, path in paths.items()}
-fig = plots.plot_paths(paths, "xyz", columns=(0, 2))
+fig = plots.plot_in_plane({label: path[:, [0, 2]] for label, path in paths.items()}, "xz")
 caption = "With the rotation of the text the path is lost, or turned by half a turn about z."
 save_figure("audit_rotation", fig, caption=caption, numbers=paths)
 
 # %% [markdown]
 # *The path from the side. With the rotation of the text and cameras as they stand (blue), the three views
-# do not meet in one point; with everything measured by that rule (dashed), the world is turned about z.*
+# do not meet in one point; with everything measured by that rule (vermilion), the world is turned about z.*
 
 # %% [markdown]
 # The same holds for the independence of D: the coefficient of D in $x_{rp}, y_{rp}$ is
@@ -656,7 +656,7 @@ paths = {
     "truth": native + REFERENCE_OFFSET,
     "in the coordinates that the printed law implies": fit.offset + fit.scale * native,
 }
-fig = plots.plot_paths(paths, "xyz", columns=(1, 2))
+fig = plots.plot_in_plane({label: path[:, 1:] for label, path in paths.items()}, "yz")
 caption = "NoseHoover, true and in the coordinates of the printed law: they do not coincide."
 save_figure("audit_nose_hoover_path", fig, caption=caption, numbers=paths)
 

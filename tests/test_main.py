@@ -117,12 +117,28 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
         (["--rig", "rig.toml", "--degree", "0"], "degree: must be an integer of at least 1"),
         (["--rig", "rig.toml", "--seed", "-1"], "seed: must be an integer of at least 0"),
         (["--rig", "rig.toml", "--out", "."], "out: must be a new folder"),
+        (["--rig", "rig.toml", "--out", "\udcff"], r"must be made of characters, got '\udcff'"),
     ],
 )
 def test_bad_options_are_told_before_anything_is_tracked(here, capsys, options, message):
     assert main(["discover", *VIDEOS, *options]) == 2
     shown = capsys.readouterr().err
     assert f"error: {message}" in shown or message in shown
+    assert "track:" not in shown
+
+
+@pytest.mark.parametrize("fps", [31, 15])
+def test_one_rate_is_not_given_for_files_that_state_others(here, capsys, fps):
+    frames = list(vl.read_video(here / "c.avi"))
+    vl.write_video(here / "other.avi", frames, fps=fps, codec="MJPG")
+    videos = ["a.avi", "b.avi", "other.avi"]
+    assert main(["discover", *videos, "--rig", "rig.toml", "--fps", "30"]) == 2
+    message = (
+        "error: t: may be given, as --fps may, only for videos of one frame rate, got files that "
+        f"state 30, 30, {fps}: leave it out, so that the rate of each file counts, or convert"
+    )
+    shown = capsys.readouterr().err
+    assert message in shown
     assert "track:" not in shown
 
 

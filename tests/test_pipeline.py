@@ -197,6 +197,7 @@ def test_a_target_that_never_moves_is_named(shot, tmp_path):
         ({"paths": "a.mkv"}, {}, "paths: must be a list of files, .* got 'a.mkv'"),
         ({"paths": None}, {}, "paths: must be a list of files, .* got None"),
         ({"paths": ["a.mkv", None, "c.mkv"]}, {}, r"paths\[1\]: must be the name of a file"),
+        ({"paths": ["\udcff.mkv"] * 3}, {}, r"paths\[0\]: must be made of characters, got"),
         ({}, {"degree": 0}, "degree: must be an integer of at least 1, got 0"),
         ({}, {"degree": 2.0}, "degree: must be an integer of at least 1, got 2.0"),
         ({}, {"degree": True}, "degree: must be an integer of at least 1, got True"),

@@ -1,6 +1,8 @@
 """Where the repository is, files in one step, and stamps that follow what a result depends on."""
 
+import ast
 import shutil
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -219,6 +221,32 @@ def test_an_edit_of_the_solver_makes_those_stale_that_discover(clone):
     stale = {key for key, value in stamps(clone).items() if value != before[key]}
     assert stale >= DISCOVER
     assert not {"01", "03", "08"} & stale
+
+
+NO_MATTER = {"tqdm", "joblib", "filelock", "distributed", "jinja2"}  # how it is run, not what
+
+
+def test_every_pinned_library_that_results_come_from_counts():
+    written = {"artifacts.py", "records.py"}  # of the companion, these alone make results
+    sources = [
+        path
+        for path in stamp.PACKAGE.rglob("*.py")
+        if path.parent.name != "companion" or path.name in written
+    ]
+    tops = {
+        name.partition(".")[0]
+        for path in sources
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        for name in (
+            [alias.name for alias in node.names] if isinstance(node, ast.Import)
+            else [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level
+            else []
+        )
+    }  # fmt: skip
+    pins = (ROOT / "requirements.txt").read_text("utf-8")
+    homes = packages_distributions()
+    used = {home for top in tops for home in homes.get(top, []) if f"\n{home}==" in pins}
+    assert used - NO_MATTER == set(stamp.LIBRARIES)
 
 
 def test_another_numpy_makes_all_stale(clone):

@@ -3,6 +3,7 @@
 import argparse
 import inspect
 import re
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -314,4 +315,6 @@ COMMANDS = {
 
 
 if __name__ == "__main__":
+    # As Ctrl-C does, SIGTERM lets a command clean up: a run leaves no kernels behind.
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
     sys.exit(main())

@@ -30,10 +30,15 @@ def check_instance(name: str, value: object, kind: type) -> None:
 
 
 def check_path(name: str, value: str | os.PathLike) -> Path:
-    """The name of one file or folder."""
+    """The name of one file or folder, which can be shown."""
     if not isinstance(value, str | os.PathLike):
         raise ValueError(f"{name}: must be the name of a file, got {value!r:.60}")
-    return Path(value)
+    path = Path(value)
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{name}: must be made of characters, got {value!r:.60}") from None
+    return path
 
 
 def check_choice(name: str, value: str, known: Iterable[str]) -> None:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,7 @@ from .checks import check_path, check_times, check_tracks, check_vector
 from .vision import Track, VideoInfo, check_detector, track, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
+_SAME_RATE = 0.01  # relative difference of frame rates that are the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,16 +116,15 @@ def observe(
     check_learnable(rig)
     check_detector(detector)
     files = _check_paths(paths, rig)
-    given = _check_lags(lags, len(files))
     shots = _check_shots(files, rig)
+    names = [path.name for path in files]
     times, rates = _clock(shots, t)
-    if given is not None:
-        _check_overlap(given, rates, shots, files)
+    given = _check_lags(lags, [shot.frames for shot in shots], rates, names)
     videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
     seen = [_track_one(path, shot.frames, detector) for path, shot in videos]
     tracks = [track.pixels for track in seen]
     doubts = [warning for track in seen for warning in track.warnings]
-    return _observed(tracks, rig, times, given, rates, [path.name for path in files], doubts)
+    return _observed(tracks, rig, times, given, rates, names, doubts)
 
 
 def observe_tracks(
@@ -155,7 +155,9 @@ def observe_tracks(
     raw = check_tracks(tracks, len(rig.cameras))
     t = _check_clock(t, len(raw[0]), "row of tracks[0]")
     names = [f"tracks[{i}]" for i in range(len(raw))]
-    return _observed(raw, rig, t, _check_lags(lags, len(raw)), None, names)
+    rates = np.ones(len(raw))
+    given = _check_lags(lags, [len(track) for track in raw], rates, names)
+    return _observed(raw, rig, t, given, rates, names)
 
 
 def _observed(
@@ -163,28 +165,31 @@ def _observed(
     rig: Rig,
     t: Floats,
     lags: Floats | None,
-    rates: Floats | None,
+    rates: Floats,
     names: Sequence[str],
     doubts: Sequence[str] = (),
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
-    learned_lags = learn_lags(raw, rig, rates, start=lags)
-    used_lags = learned_lags if lags is None else _given(lags, learned_lags)
-    tracks = align(raw, used_lags.frames, rates)
+    best = learn_lags(raw, rig, rates, start=lags)
+    if lags is not None:
+        _refuse_wrong(lags, best)
+    tracks = align(raw, best.frames if lags is None else lags, rates)
     learned = learn_cameras(tracks, rig)
-    shared = systematic_errors(raw, rig, learned, used_lags), trailing_errors(tracks, learned)
+    missed = disagreement(tracks, learned)
+    used = best if lags is None else Lags(lags, rates, 0 * lags, max(missed))
+    shared = systematic_errors(raw, rig, learned, used), trailing_errors(tracks, learned)
     return Observation(
         tracks=tracks,
         rig=learned,
-        lags=used_lags,
+        lags=used,
         t=t,
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
-            *_rig_warnings(tracks, learned, rig, names, learned_lags),
+            *_rig_warnings(missed, tracks, rig, names, best),
             *learned.warnings,
             *doubts,
-            *used_lags.warnings,
+            *used.warnings,
         ),
     )
 
@@ -197,12 +202,27 @@ def _check_clock(t: ArrayLike, frames: int, each: str) -> Floats:
     return times
 
 
-def _check_lags(lags: Sequence[float] | None, cameras: int) -> Floats | None:
-    """By how much each video starts later than the first, if that is given."""
+def _check_lags(
+    lags: Sequence[float] | None, frames: list[int], rates: Floats, names: Sequence[str]
+) -> Floats | None:
+    """By how much each video starts later than the first, if that is given.
+
+    Each must share half of the shorter one's time with the first.
+    """
     if lags is None:
         return None
-    given = check_vector("lags", lags, cameras)
-    return given - given[0]
+    given = check_vector("lags", lags, len(frames))
+    given -= given[0]
+    ends = np.array(frames) / rates
+    common = np.minimum(given + ends, frames[0]) - np.maximum(given, 0)
+    few = common < np.minimum(ends, frames[0]) / 2
+    if few.any():
+        i = int(few.argmax())
+        raise ValueError(
+            "lags: every video must have half of the shorter of the two in common with the first "
+            f"({frames[0]} frames), got {given[i]:g} for {names[i]} ({frames[i]} frames)"
+        )
+    return given
 
 
 def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
@@ -232,30 +252,21 @@ def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
     return shots
 
 
-def _clock(shots: Sequence[VideoInfo], t: ArrayLike | None) -> tuple[Floats, Floats | None]:
+def _clock(shots: Sequence[VideoInfo], t: ArrayLike | None) -> tuple[Floats, Floats]:
     """Time of each frame of the first video, and frames of each video in one frame of the first."""
-    if t is not None:
-        return _check_clock(t, shots[0].frames, "frame of the first video"), None
     fps = np.array([shot.fps for shot in shots])
-    if not (np.isfinite(fps) & (fps > 0)).all():
+    told = np.isfinite(fps) & (fps > 0)
+    if t is not None:
+        if told.any() and np.ptp(fps[told]) > _SAME_RATE * fps[told].min():
+            raise ValueError(
+                "t: may be given, as --fps may, only for videos of one frame rate, got files that "
+                f"state {', '.join(f'{rate:g}' for rate in fps)}: leave it out, so that the rate "
+                "of each file counts, or convert the videos"
+            )
+        return _check_clock(t, shots[0].frames, "frame of the first video"), np.ones(len(fps))
+    if not told.all():
         raise ValueError(f"t: must be given if a file states no frame rate, got {fps.tolist()}")
     return np.arange(shots[0].frames) / fps[0], fps / fps[0]
-
-
-def _check_overlap(
-    lags: Floats, rates: Floats | None, shots: Sequence[VideoInfo], paths: Sequence[Path]
-) -> None:
-    """That every video shares, at its given lag, half of the shorter one's time with the first."""
-    rates = np.ones(len(lags)) if rates is None else rates
-    for path, shot, lag, rate in zip(paths, shots, lags, rates, strict=True):
-        end = shot.frames / rate
-        common = min(lag + end, shots[0].frames) - max(lag, 0)
-        if common < min(end, shots[0].frames) / 2:
-            raise ValueError(
-                "lags: every video must have half of the shorter of the two in common with the "
-                f"first ({shots[0].frames} frames), got {lag:g} for {path.name} ({shot.frames} "
-                "frames)"
-            )
 
 
 def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
@@ -275,22 +286,23 @@ def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     return found
 
 
-def _given(lags: Floats, learned: Lags) -> Lags:
-    """The lags that are given, unless others are clearly those of the tracks."""
+def _refuse_wrong(lags: Floats, learned: Lags) -> None:
+    """Refuse given lags if others are clearly those of the tracks."""
     apart = np.abs(learned.frames - lags) > _WRONG_LAG + 5 * learned.errors
     if learned.agree and apart.any():
         raise ValueError(
             f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
             f"({list_lags(learned.frames)}) do: leave them out, or check them"
         )
-    return replace(learned, frames=lags, errors=0 * lags, warnings=())
 
 
 def _rig_warnings(
-    tracks: Sequence[Floats], learned: Rig, given: Rig, names: Sequence[str], lags: Lags
+    missed: Sequence[float], tracks: Sequence[Floats], given: Rig, names: Sequence[str], lags: Lags
 ) -> list[str]:
-    """Do the cameras agree on the target to within what tracking can be blamed for?"""
-    missed = disagreement(tracks, learned)
+    """Do the cameras agree on the target to within what tracking can be blamed for?
+
+    `missed` is their disagreement, `given` the rig before it was learned, `lags` are the best.
+    """
     if max(missed) <= DISAGREEMENT:
         return []
     sizes = ", ".join(f"{size:.1f}" for size in missed)

@@ -21,7 +21,7 @@ PACKAGE = Path(__file__).parent
 # Whose pins in requirements.txt are part of every stamp: results depend on them.
 LIBRARIES = (
     "numpy", "scipy", "scikit-learn", "torch", "pysindy", "opencv-python-headless", "av", "pandas",
-    "matplotlib",
+    "matplotlib", "seaborn",
 )  # fmt: skip
 
 BY_DEFINITION = tuple(

@@ -3,8 +3,10 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
+import warnings
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -197,6 +199,16 @@ def test_a_notebook_still_shows_its_figures_after_a_report():
     command = [sys.executable, "-c", IN_A_NOTEBOOK]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert "interactive: True" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["a" * 200, r"\$a$", "$x^$", "line\nbreak", "{{ x }}"])
+def test_a_strange_name_does_not_spoil_the_report(case, tmp_path, name):
+    found, paths = case
+    copies = [shutil.copy(path, tmp_path / f"{name}{i}.mov") for i, path in enumerate(paths)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        page = write_report(found, copies, tmp_path / "report")
+    assert f"<td>{name}1.mov</td>" in page.read_text("utf-8")
 
 
 def test_one_video_per_camera(case, tmp_path):

@@ -299,12 +299,12 @@ def test_dead_kernel_is_a_failure(tiny):
         execute(path, {"profile": "quick"})
 
 
-def test_a_process_that_dies_takes_no_other_notebook_along(tiny, capsys):
-    tiny.write("01_bad", "import os, signal\nos.kill(os.getppid(), signal.SIGKILL)")
+def test_a_kernel_that_dies_takes_no_other_notebook_along(tiny, capsys):
+    tiny.write("01_bad", "import os, signal\nos.kill(os.getpid(), signal.SIGKILL)")
     tiny.write("02_good", PLOT, SAVE)
     report = runner.run(root=tiny.root)
     bad, good = report.outcomes
-    assert bad.error == "01_bad: the process that ran it died (exit code -9)"
+    assert bad.error == "01_bad: Kernel died"
     assert good.error is None
     assert bad.error in capsys.readouterr().out
     assert report.problems == ()
@@ -359,7 +359,8 @@ def test_a_notebook_executed_by_others_leaves_the_committed_figures(good):
     assert after["build/out.ipynb"].count(b"build/interactive/figures;") == 1
 
 
-def test_kernel_that_dies_at_start_is_a_failure(tiny, tmp_path):
+def test_kernel_that_dies_at_start_is_a_failure(tiny, tmp_path, monkeypatch):
+    monkeypatch.setenv("JUPYTER_PATH", str(tmp_path / "jupyter"))
     kernel = tmp_path / "jupyter" / "kernels" / "python3" / "kernel.json"
     kernel.parent.mkdir(parents=True)
     path = tiny.write("01_first", "x = 1")
@@ -367,9 +368,7 @@ def test_kernel_that_dies_at_start_is_a_failure(tiny, tmp_path):
         kernel.write_text(json.dumps({"argv": [command, "-c", "exit(1)"], "display_name": "x"}))
         message = "01_first: could not be executed: .* If kernel python3 did not"
         with pytest.raises(NotebookError, match=message):
-            execute(
-                path, {"profile": "quick"}, environment={"JUPYTER_PATH": str(tmp_path / "jupyter")}
-            )
+            execute(path, {"profile": "quick"})
 
 
 def test_kernel_that_is_slow_to_return_is_not_interrupted(tiny, capfd):

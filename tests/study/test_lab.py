@@ -66,13 +66,14 @@ def test_perspective_cameras_are_exact_where_orthographic_ones_are_not(x):
     assert rms(reconstruct(tracks, learn_cameras(tracks, rig.uncalibrated())) - x) < 1e-6
 
 
-def test_learn_from_ball_finds_its_centre(x):
+def test_observe_ball_finds_its_centre(x):
     rig = lab.cameras()
     centroids = [camera.ball_image(x, lab.RADIUS)[0] for camera in rig.cameras]
     plain = reconstruct(centroids, learn_cameras(centroids, rig.uncalibrated())) - x
-    learned, found = lab.learn_from_ball(centroids, rig.uncalibrated())
-    assert rms(found - x) < 1e-4 * rms(plain)
-    assert np.abs(calibration_errors(learned, rig)).max() < 1e-8
+    seen = lab.observe_ball(centroids, rig.uncalibrated())
+    assert rms(seen.x - x) < 1e-4 * rms(plain)
+    assert np.abs(calibration_errors(seen.rig, rig)).max() < 1e-8
+    assert seen.warnings == ()
 
 
 @pytest.mark.slow

@@ -342,19 +342,15 @@ def as_table(record: dict) -> Table:
 def _with_steady_seconds(record: dict, rows: list[dict]) -> list[dict]:
     """Round the wall times; take the recorded ones where the same code wrote the same rows."""
     before = read_json(figures_folder() / f"{record['id']}.json")
-    if before.get("stamp") != record["stamp"] or record["stamp"] is None:
-        before = {}
+    is_same_code = record["stamp"] is not None and record["stamp"] == before.get("stamp")
+    earlier = before.get("rows", []) if is_same_code else []
     for row in rows:
         if isinstance(row.get(SECONDS), int | float):
             row[SECONDS] = float(f"{row[SECONDS]:.2g}")
-    for row, old in zip(rows, before.get("rows", []), strict=False):
-        if SECONDS in row and _without_seconds(row) == _without_seconds(old):
+    for row, old in zip(rows, earlier, strict=False):
+        if SECONDS in row and row | {SECONDS: None} == old | {SECONDS: None}:
             row[SECONDS] = old[SECONDS]
     return rows
-
-
-def _without_seconds(row: dict) -> dict:
-    return {column: value for column, value in row.items() if column != SECONDS}
 
 
 def _shown(value: object) -> str:

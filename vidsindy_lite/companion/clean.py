@@ -50,17 +50,10 @@ def clean(
 
 
 def _tidy_outputs(outputs: list[NotebookNode]) -> list[NotebookNode]:
-    """Outputs without stderr, with neighbouring pieces of stdout joined."""
-    tidy: list[NotebookNode] = []
-    for output in copy.deepcopy(outputs):
-        is_stream = output.output_type == "stream"
-        if is_stream and output.name == "stderr":
-            continue
-        if is_stream and tidy and tidy[-1].output_type == "stream":
-            tidy[-1].text += output.text
-        else:
-            if "image/png" in output.get("data", {}):
-                small = with_palette(base64.b64decode(output.data["image/png"]))
-                output.data["image/png"] = base64.b64encode(small).decode() + "\n"
-            tidy.append(output)
+    """Outputs without stderr, with small pictures."""
+    tidy = [copy.deepcopy(output) for output in outputs if output.get("name") != "stderr"]
+    for output in tidy:
+        if "image/png" in output.get("data", {}):
+            small = with_palette(base64.b64decode(output.data["image/png"]))
+            output.data["image/png"] = base64.b64encode(small).decode() + "\n"
     return tidy

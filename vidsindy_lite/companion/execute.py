@@ -1,8 +1,8 @@
 """Execute one notebook through papermill, and see to it that a failure is one."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from queue import Empty
 from typing import Any
@@ -90,11 +90,10 @@ def execute(
     path = Path(path)
     check_parameters(path, parameters)
     try:
-        with _kernel_environment(environment or {}):
-            executed = papermill.execute_notebook(
-                jupytext.read(path), None, dict(parameters),
-                cwd=path.parent, timeout=timeout, **SETTINGS,
-            )  # fmt: skip
+        executed = papermill.execute_notebook(
+            jupytext.read(path), None, dict(parameters),
+            folder=path.parent, environment=environment or {}, timeout=timeout, **SETTINGS,
+        )  # fmt: skip
     except PapermillExecutionError as error:
         traceback = strip_color("\n".join(error.traceback)) or f"{error.ename}: {error.evalue}"
         raise _cell_error(path, error.exec_count, error.source, traceback) from None
@@ -137,7 +136,10 @@ class _Client(PapermillNotebookClient):
 
 
 class _Engine(Engine):
-    """Makes papermill use that client."""
+    """Makes papermill use that client, and give folder and environment to the kernel alone.
+
+    So notebooks can run at once: papermill itself would change this process's.
+    """
 
     @classmethod
     def execute_managed_notebook(
@@ -145,29 +147,25 @@ class _Engine(Engine):
     ) -> None:
         """Execute the cells with papermill's options that are the client's, too."""
         chosen = {name: options[name] for name in ("timeout", "startup_timeout", "config")}
-        _Client(nb_man, kernel_name=kernel_name, **chosen).execute()
+        client = _Client(nb_man, kernel_name=kernel_name, coalesce_streams=True, **chosen)
+        client.execute(cwd=options["folder"], env=_kernel_environment(options["environment"]))
 
 
 papermill_engines.register(ENGINE, _Engine)
 
 
-@contextmanager
-def _kernel_environment(environment: Mapping[str, str]) -> Iterator[None]:
+def _kernel_environment(environment: Mapping[str, str]) -> dict[str, str]:
     """What the kernel inherits: this very package, an order of sets, one thread per process."""
-    before = dict(os.environ)
-    os.environ.update(
-        environment,
-        PYTHONPATH=os.pathsep.join(filter(None, [str(PACKAGE.parent), before.get("PYTHONPATH")])),
-        PYTHONHASHSEED="0",  # the order of a set is then the same in every run
-        PYDEVD_DISABLE_FILE_VALIDATION="1",  # the kernel's debugger warns without it
-    )
-    # Sums then do not depend on the number of cores, and joblib's workers do not fight over them.
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    try:
-        yield
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
+    paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH")]
+    return {
+        # Sums do not depend on the number of cores, and joblib's workers do not fight over them.
+        "OMP_NUM_THREADS": "1",
+        **os.environ,
+        **environment,
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "PYTHONHASHSEED": "0",  # the order of a set is then the same in every run
+        "PYDEVD_DISABLE_FILE_VALIDATION": "1",  # the kernel's debugger warns without it
+    }
 
 
 def _cell_error(path: Path, count: int | None, source: str, what: str) -> NotebookError:

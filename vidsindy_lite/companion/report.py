@@ -24,11 +24,12 @@ from ..cameras import DISAGREEMENT, residuals
 from ..checks import check_path
 from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
-from ..study.plots import plot_path, plot_residuals, plot_rig, plot_views
+from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..vision import read_frame, video_info
 from .pages import page
 from .records import as_json
 
+LONGEST_NAME = 30  # characters above a picture
 PAGE, DATA, RIG = FILES = ("report.html", "result.json", "rig.toml")
 
 
@@ -200,9 +201,14 @@ def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int
     """The frames of all videos at one instant of the first."""
     places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
     images = [read_frame(path, frame) for path, frame in places]
-    # A dollar sign would begin a formula.
-    titles = [f"{path.name}, frame {frame}".replace("$", r"\$") for path, frame in places]
-    return plot_views(images, titles, found.tracks, instant)
+    titles = [f"{_short(path.name)}, frame {frame}" for path, frame in places]
+    return plot_frames(images, titles, found.tracks, instant)
+
+
+def _short(name: str) -> str:
+    """A file's name as it fits above its picture, where a dollar sign would begin a formula."""
+    fitting = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
+    return fitting.replace("$", r"\$")
 
 
 def _encoded(figure: Figure) -> str:

@@ -10,18 +10,14 @@ its outputs are in place byte for byte (see `ledger`).
 """
 
 import os
-import signal
 import sys
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from pathlib import Path
-from types import FrameType
 
 import jupytext
 import nbformat
@@ -168,14 +164,13 @@ def run(
     stamps: dict[str, str | None] = dict.fromkeys(path.stem for path in find_notebooks(root))
     registry.prune(figures, stamps)  # what a notebook left that has gone
     outcomes = {}
-    with _ended_by_sigterm():
-        for task, outcome in _outcomes(chosen, profile, output, force, dask):
-            outcomes[task.path] = outcome
-            if outcome.error is None:
-                stamps[task.path.stem] = task.stamp
-                registry.prune(figures, stamps)  # what an earlier version of it left
-                registry.record_run_time(figures, task.path.stem, task.stamp, outcome.seconds)
-                enter(output, task.path, task.stamp, outcome.seconds)
+    for task, outcome in _outcomes(chosen, profile, output, force, dask):
+        outcomes[task.path] = outcome
+        if outcome.error is None:
+            stamps[task.path.stem] = task.stamp
+            registry.prune(figures, stamps)  # what an earlier version of it left
+            registry.record_run_time(figures, task.path.stem, task.stamp, outcome.seconds)
+            enter(output, task.path, task.stamp, outcome.seconds)
     problems = _written_pages(figures, stamps, root)
     done = tuple(outcomes[path] for path in chosen)
     return Report(done, tuple(problems), _systems_table(figures, done), _largest_process())
@@ -196,7 +191,7 @@ def notebook_stamp(path: str | os.PathLike, profile: str) -> str:
 
 @dataclass(frozen=True)
 class _Task:
-    """One notebook to execute, and all that a process of its own has to know of it."""
+    """One notebook to execute, and how."""
 
     path: Path
     label: str
@@ -259,52 +254,37 @@ def _outcomes(
 
 
 def _executed(tasks: Sequence[_Task]) -> Iterator[tuple[_Task, Outcome]]:
-    """The notebooks as they end, begun in this order.
-
-    Each runs in a process of its own: the folder and the environment that papermill and its kernel
-    start from are those of a process, and one that dies takes no other along.
-    """
-    context, waiting = get_context("spawn"), deque(tasks)
-    running: dict[Connection, tuple[_Task, BaseProcess, float]] = {}
+    """The notebooks as they end, begun in this order; each has a kernel, a process of its own."""
+    waiting, running = deque(tasks), dict[Future[Outcome], _Task]()
+    others = psutil.Process().children(recursive=True)
     # The bar stands still while a notebook runs, but for the clock and what is running.
-    with tqdm(total=len(tasks), desc="notebooks", leave=False, disable=None) as bar:
+    with (
+        ThreadPoolExecutor(AT_ONCE) as pool,
+        tqdm(total=len(tasks), desc="notebooks", leave=False, disable=None) as bar,
+    ):
         try:
             while waiting or running:
                 while waiting and len(running) < AT_ONCE:
                     task = waiting.popleft()
                     _say(task.label)
-                    receiver, sender = context.Pipe(duplex=False)
-                    process = context.Process(target=_work, args=(task, sender))
-                    process.start()
-                    sender.close()  # here: so the end of the process is the end of the pipe
-                    running[receiver] = task, process, time.perf_counter()
-                bar.set_postfix_str(", ".join(task.path.stem for task, *_ in running.values()))
-                ended = wait(list(running), timeout=1)
-                for receiver in [each for each in running if each in ended]:
-                    outcome = _received(receiver, *running[receiver])
-                    task = running.pop(receiver)[0]
+                    running[pool.submit(_outcome, task)] = task
+                bar.set_postfix_str(", ".join(task.path.stem for task in running.values()))
+                for future in wait(running, timeout=1, return_when=FIRST_COMPLETED).done:
+                    task, outcome = running.pop(future), future.result()
                     failed = f"FAILED\n\n{outcome.error}\n" if outcome.error else ""
                     _say(f"{task.label}: {failed or f'{outcome.seconds:.1f} s'}")
                     bar.update()
                     yield task, outcome
         finally:
-            for _, left, _ in running.values():
-                _end(left)
+            while wait(running, timeout=0.1).not_done:  # left early: the kernels end now
+                for process in psutil.Process().children(recursive=True):
+                    with suppress(psutil.NoSuchProcess):
+                        if process not in others:
+                            process.kill()
 
 
-def _received(receiver: Connection, task: _Task, process: BaseProcess, started: float) -> Outcome:
-    """What a process reports, or that it died before it could."""
-    with suppress(EOFError):
-        outcome = receiver.recv()
-        process.join()
-        return outcome
-    process.join()
-    message = f"{task.path.stem}: the process that ran it died (exit code {process.exitcode})"
-    return Outcome(task.path.stem, time.perf_counter() - started, message)
-
-
-def _work(task: _Task, sender: Connection) -> None:
-    """Execute a notebook, write its executed half, and report how it ended."""
+def _outcome(task: _Task) -> Outcome:
+    """Execute a notebook, write its executed half, and tell how it ended."""
     error, started = None, time.perf_counter()
     try:
         executed = execute(task.path, {"profile": task.profile}, environment=task.environment)
@@ -314,38 +294,7 @@ def _work(task: _Task, sender: Connection) -> None:
         error = str(failure)
     except Exception as failure:  # such as a full disk: the other notebooks go on
         error = f"{task.path.stem}: {type(failure).__name__}: {failure}"
-    sender.send(Outcome(task.path.stem, time.perf_counter() - started, error))
-
-
-def _end(process: BaseProcess) -> None:
-    """End a process and all that it has started: its kernel, and the kernel's own processes."""
-    try:
-        parent = psutil.Process(process.pid)
-        family = [parent, *parent.children(recursive=True)]
-    except psutil.NoSuchProcess:
-        return
-    for each in family:
-        with suppress(psutil.NoSuchProcess):
-            each.kill()
-    process.join()
-
-
-@contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """SIGTERM ends a run as Ctrl-C does, instead of leaving kernels behind."""
-
-    def leave(number: int, frame: FrameType | None) -> None:
-        sys.exit(128 + number)
-
-    try:
-        before = signal.signal(signal.SIGTERM, leave)
-    except ValueError:  # not the main thread: whose signals are others' business
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    return Outcome(task.path.stem, time.perf_counter() - started, error)
 
 
 def _say(line: str) -> None:

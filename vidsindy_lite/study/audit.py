@@ -6,8 +6,6 @@ law that is right in stretched, shifted coordinates or by a wrong clock differs 
 its own way (`seen_in`, `fit_coordinates`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

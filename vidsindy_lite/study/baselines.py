@@ -14,8 +14,6 @@ the best of several that were scored on the seven systems, which favours the bas
 Missing rows never reach pysindy: the record is cut at gaps into segments, which share one law.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

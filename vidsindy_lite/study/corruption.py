@@ -4,8 +4,6 @@ The paper names levels and rates but not what they are relative to; this is the 
 all notebooks. Every function returns a copy.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Floats
@@ -36,8 +34,7 @@ def add_noise(x: Floats, level: float, rng: np.random.Generator) -> Floats:
     ValueError
         If ``x`` is not two-dimensional or ``level`` is negative or not finite.
     """
-    x = _states(x)
-    check_instance("rng", rng, np.random.Generator)
+    x = _check(x, rng)
     if check_number("level", level) < 0:
         raise ValueError(f"level: must not be negative, got {level}")
     return x + level * np.nanstd(x, axis=0) * rng.standard_normal(x.shape)
@@ -86,8 +83,7 @@ def drop_fibers(x: Floats, rate: float, rng: np.random.Generator, gaps: int = 5)
 
 
 def _drop(x: Floats, rate: float, count: int, rng: np.random.Generator) -> Floats:
-    x = _states(x).copy()
-    check_instance("rng", rng, np.random.Generator)
+    x = _check(x, rng).copy()
     total = round(rate * len(x))
     if total == 0:
         return x
@@ -113,7 +109,8 @@ def _rate(rate: float) -> float:
     return rate
 
 
-def _states(x: Floats) -> Floats:
+def _check(x: Floats, rng: np.random.Generator) -> Floats:
+    check_instance("rng", rng, np.random.Generator)
     x = check_array("x", x)
     if x.ndim != 2 or not len(x):
         raise ValueError(f"x: must have shape (n, d) with n of at least 1, got {x.shape}")

@@ -6,8 +6,6 @@ then recovered from the video files as a user's would be, with only the first ca
     films = sweep(run_film, [FilmTask("Lorenz", trial) for trial in range(5)])
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from functools import lru_cache
@@ -181,7 +179,7 @@ def run_film(task: FilmTask) -> FilmResult:
         task=task,
         truth=shot.truth,
         pixel_error=pixel_error,
-        path_error=trajectory_error(seen.x, shot.x).rmse,
+        path_error=trajectory_error(seen.x, shot.x),
         seconds=seconds,
     )
 

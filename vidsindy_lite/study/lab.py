@@ -10,8 +10,6 @@ All lengths are in millimetres.
 Paper: Appendix "Lab Experiment on Trajectory Extraction".
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,11 +21,11 @@ from ..cameras import (
     PerspectiveCamera,
     Rig,
     calibration_errors,
-    learn_cameras,
-    reconstruct,
     rotation_to_z,
 )
+from ..observation import Observation, observe_tracks
 from ..vision import Scene, render_video, track
+from .films import TOGETHER
 from .published import LAB
 
 MARKED = np.array(LAB.truth)  # where the paper compares
@@ -233,13 +231,11 @@ def film_ball(rig: Rig, x: Floats, folder: str | Path, seed: int = 0) -> list[Fl
     return tracks
 
 
-def learn_from_ball(
-    tracks: Sequence[Floats], rig: Rig, radius: float = RADIUS, rounds: int = 3
-) -> tuple[Rig, Floats]:
+def observe_ball(tracks: Sequence[Floats], rig: Rig) -> Observation:
     """Learn the cameras from centroids of a ball's images, which are not images of its centre.
 
-    How far the two differ follows from the ball's radius and place (`ball_image`). So: learn and
-    reconstruct, correct the tracks, and again; each round leaves about a thousandth of the error.
+    How far the two differ follows from the ball's radius and place (`ball_image`). So: observe,
+    correct the tracks, and again; each round leaves about a thousandth of the error.
 
     Parameters
     ----------
@@ -247,25 +243,21 @@ def learn_from_ball(
         Centroids of the ball's images.
     rig : Rig
         Of perspective cameras, at least one calibrated.
-    radius : float
-    rounds : int
 
     Returns
     -------
-    rig : Rig
-        All calibrated.
-    x : ndarray, shape (n, 3)
-        Centre of the ball.
+    Observation
+        Of the centre of the ball, as `observe_tracks` makes it from the corrected tracks.
     """
-    corrected = tracks
-    for _ in range(rounds):
-        learned = learn_cameras(corrected, rig)
-        x = reconstruct(corrected, learned)
+    t = np.arange(len(tracks[0])) / FPS
+    seen = observe_tracks(tracks, rig, t, lags=TOGETHER)
+    for _ in range(2):
         corrected = [
-            pixels - camera.ball_image(x, radius)[0] + camera.project(x)
-            for pixels, camera in zip(tracks, _perspective(learned), strict=True)
+            pixels - camera.ball_image(seen.x, RADIUS)[0] + camera.project(seen.x)
+            for pixels, camera in zip(tracks, _perspective(seen.rig), strict=True)
         ]
-    return learned, x
+        seen = observe_tracks(corrected, rig, t, lags=TOGETHER)
+    return seen
 
 
 def _perspective(rig: Rig) -> list[PerspectiveCamera]:

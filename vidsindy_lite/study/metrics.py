@@ -1,7 +1,5 @@
 """How good a discovered law is: the paper's scores, and the ones it promises without a formula."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,24 +168,7 @@ def coefficients_in(system: PolynomialSystem, library: Ints) -> Floats:
     return np.array([rows.get(tuple(powers), np.zeros(system.d)) for powers in library])
 
 
-@dataclass(frozen=True, eq=False)
-class TrajectoryError:
-    """How far a measured trajectory is from the true one.
-
-    Parameters
-    ----------
-    rmse : ndarray, shape (d,)
-        Root mean square error of each axis, in scene units.
-    relative : ndarray, shape (d,)
-        The same over the standard deviation of the true trajectory along the axis; NaN along an
-        axis that does not move.
-    """
-
-    rmse: Floats
-    relative: Floats
-
-
-def trajectory_error(x: Floats, truth: Floats) -> TrajectoryError:
+def trajectory_error(x: Floats, truth: Floats) -> Floats:
     """Root mean square error of a reconstructed trajectory, axis by axis.
 
     It separates the error of tracking and cameras from that of the regression.
@@ -198,6 +179,11 @@ def trajectory_error(x: Floats, truth: Floats) -> TrajectoryError:
         Reconstructed states; rows with a NaN are ignored.
     truth : array_like, shape (n, d)
         True states at the same times.
+
+    Returns
+    -------
+    ndarray, shape (d,)
+        In the units of the states.
 
     Raises
     ------
@@ -212,6 +198,4 @@ def trajectory_error(x: Floats, truth: Floats) -> TrajectoryError:
     seen = ~np.isnan(x).any(axis=1)
     if not seen.any():
         raise ValueError(f"x: must hold at least one row without NaN, got {len(x)} missing rows")
-    rmse = np.sqrt(((x - truth)[seen] ** 2).mean(axis=0))
-    spread = truth.std(axis=0)
-    return TrajectoryError(rmse, rmse / np.where(spread > 0, spread, np.nan))
+    return np.asarray(np.sqrt(((x - truth)[seen] ** 2).mean(axis=0)))

@@ -21,8 +21,6 @@ PyTorch works in double precision: a cubic library is nearly collinear, and on a
 precision saves no more than a third of the time.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ Scores are looked up as ``SCORES[table, method, system]``, those of the ablation
 method goes by its printed name, "Ours"; its ground truths by "Ground truth".
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

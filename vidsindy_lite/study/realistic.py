@@ -10,8 +10,6 @@ target vanishes.
 Paper: section "Simulating Realistic Scenarios", Fig. 4.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

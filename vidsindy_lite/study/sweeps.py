@@ -19,8 +19,6 @@ calls; it does not make two processes share a task, nor take a result that a clu
 the stamp, the lock and the storing added, it would save no more than the pickling.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import pickle

@@ -1,13 +1,11 @@
 """The seven chaotic systems of the paper's Table S1, as data, and the frame they are seen in."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints  # noqa: F401 (Ints: in the signature that is inherited)
 from ..checks import check_integer, check_positive, check_vector
 from ..dynamics import PolynomialSystem
 
@@ -45,7 +43,7 @@ class Benchmark(PolynomialSystem):
         check_vector("x0", self.x0, self.d)
         check_positive("period", self.period)
 
-    def shift(self, offset: Sequence[float] | Floats) -> Benchmark:
+    def shift(self, offset: Sequence[float] | Floats) -> "Benchmark":
         """The same experiment seen from a shifted origin; see `PolynomialSystem.shift`."""
         law = super().shift(offset)
         x0 = tuple(float(v) for v in np.add(self.x0, offset))

@@ -45,7 +45,7 @@ def _row(result: TrialResult) -> dict[str, object]:
         "wrong_terms": result.wrong_terms,
         "verdict": result.verdict,
     }
-    left_out = ("score", "sigma", "coefficient_errors")
+    left_out = ("score", "coefficient_errors")
     return {name: fields[name] for name in fields if name not in left_out} | properties
 
 
@@ -66,12 +66,11 @@ def by_condition(trials: DataFrame) -> DataFrame:
 
     clean = trials[trials.condition == "clean"]
     parts = [
-        pandas.concat([clean.assign(condition=name), trials[trials.condition == name]])
+        pandas.concat([clean.assign(condition=name), noisy]).sort_values("level", kind="stable")
         for name in CORRUPTIONS
-        if (trials.condition == name).any()
+        if len(noisy := trials[trials.condition == name])
     ]
-    ordered = (part.sort_values("level", kind="stable") for part in parts)
-    return pandas.concat(ordered, ignore_index=True) if parts else trials[:0]
+    return pandas.concat(parts, ignore_index=True) if parts else trials[:0]
 
 
 def summary(trials: DataFrame, by: str | list[str]) -> DataFrame:

@@ -9,8 +9,6 @@ The number of a trial seeds all that is random in it: scenes, noise, gaps, and t
 numbers; ours runs with its default seed. `tables` turns results into rows.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -116,13 +114,8 @@ class TrialResult:
         As found, in the reference frame.
     score : Score
         Of the law.
-    sigma : ndarray, shape (3,)
-        Standard deviation of the added noise, in scene units; 0 without noise.
     seconds : float
         From path to law.
-    native_exact : bool or None
-        Whether the law has exactly the true terms in its native frame; None for the methods that
-        do not look for that frame.
     status : str or None
         ``"ok"`` or ``"suspect"``; None for the methods that do not say.
     warnings : tuple of str
@@ -136,9 +129,7 @@ class TrialResult:
     trial: Trial
     law: PolynomialSystem
     score: Score
-    sigma: Floats
     seconds: float
-    native_exact: bool | None = None
     status: str | None = None
     warnings: tuple[str, ...] = ()
     promised_l2: float | None = None
@@ -173,14 +164,12 @@ def run_trial(trial: Trial) -> TrialResult:
     found = find_law(trial.method, filmed.t, x, systematic, trial.trial)
     seconds = time.perf_counter() - began
     law = found if isinstance(found, PolynomialSystem) else found.system
-    sigma = trial.level * np.nanstd(path, axis=0) if trial.condition == "noise" else np.zeros(3)
-    result = TrialResult(trial, law, score(law, filmed.truth), sigma, seconds)
+    result = TrialResult(trial, law, score(law, filmed.truth), seconds)
     if isinstance(found, PolynomialSystem):
         return result
     promised = np.linalg.norm(found.standard_errors) / np.linalg.norm(filmed.truth.coefficients)
     return replace(
         result,
-        native_exact=score(found.native, SYSTEMS[trial.system]).exact,
         status=found.status,
         warnings=found.warnings,
         promised_l2=float(promised),

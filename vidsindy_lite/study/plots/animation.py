@@ -1,7 +1,5 @@
 """The animation of the tour: videos, tracks, path in space, law, in one moving picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import matplotlib.pyplot as plt

@@ -1,39 +1,10 @@
 """Figures on the paper's own numbers."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
-
-from ...arrays import Floats
-from .common import draw_against_first
-
-
-def plot_paths(
-    paths: Mapping[str, Floats], names: Sequence[str], columns: tuple[int, int] = (0, 1)
-) -> Figure:
-    """Two coordinates of several paths, the first drawn as a broad line.
-
-    Parameters
-    ----------
-    paths : dict of str to ndarray, shape (n, 3)
-        Scene units.
-    names : sequence of str
-        Names of the three coordinates.
-    columns : pair of int
-        Which coordinate goes right and which up.
-    """
-    figure, axes = plt.subplots(figsize=(7, 4.8))
-    right, up = columns
-    curves = {label: path[:, columns] for label, path in paths.items()}
-    draw_against_first(axes, curves, styles=("-", "-", "--", ":"))
-    axes.set(xlabel=f"{names[right]} (scene units)", ylabel=f"{names[up]} (scene units)")
-    axes.set_aspect("equal", adjustable="datalim")
-    figure.legend(loc="outside upper center")
-    return figure
 
 
 def plot_recomputed(differences: Mapping[str, float]) -> Figure:

@@ -1,7 +1,5 @@
 """Figures of view planes, rigs, calibration and reconstruction."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
@@ -11,7 +9,7 @@ from mpl_toolkits.mplot3d import Axes3D
 
 from ...arrays import Floats
 from ...cameras import Camera, Rig
-from .common import SPACE, draw_against_first, finish_space, image_axes
+from .common import SPACE, finish_space, image_axes
 
 
 def plot_view_plane(camera: Camera, x: Floats) -> Figure:
@@ -78,21 +76,6 @@ def plot_independence(d: Floats, turned: Mapping[str, Floats]) -> Figure:
         axes.set(title=title, xlabel="D (scene units)")
     panels[0].set_ylabel("coordinate (scene units)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
-    return figure
-
-
-def plot_in_plane(curves: Mapping[str, Floats]) -> Figure:
-    """Curves in a view plane, several to compare.
-
-    Parameters
-    ----------
-    curves : dict of str to ndarray, shape (n, 2)
-        In-plane coordinates by name, the first drawn as a broad line.
-    """
-    figure, axes = plt.subplots(figsize=(7, 4.8))
-    draw_against_first(axes, curves)
-    axes.set(xlabel="X' (scene units)", ylabel="Y' (scene units)", aspect="equal")
-    figure.legend(loc="outside upper center")
     return figure
 
 
@@ -196,13 +179,13 @@ def plot_reconstruction(t: Floats, truth: Floats, found: Floats, pixel: float) -
         Scene units per pixel.
     """
     figure, (above, below) = plt.subplots(2, 1, figsize=(8, 5.5), sharex=True)
+    above.plot(t, truth, color="0.7", lw=4, label=("truth", "", ""))
     for i, (name, style) in enumerate(zip("xyz", "ov^", strict=True)):
-        above.plot(t, truth[:, i], color="0.7", lw=4)
         above.plot(t, found[:, i], f"C{i}", lw=1, label=name)
         below.plot(t, (found - truth)[:, i] / pixel, f"C{i}{style}", ms=2)
     above.set(ylabel="coordinate (scene units)")
     below.set(ylabel="error (px)", xlabel="time (time units)")
-    figure.legend(loc="outside upper center", ncols=3)
+    figure.legend(loc="outside upper center", ncols=4)
     return figure
 
 

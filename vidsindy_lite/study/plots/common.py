@@ -1,14 +1,8 @@
 """What several modules of figures need: axes in space, axes of an image, curves, line styles."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d import Axes3D
-
-from ...arrays import Floats
 
 STYLES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (7, 2)), (0, (1, 1)))
 SPACE = {"projection": "3d", "proj_type": "ortho"}
@@ -32,12 +26,3 @@ def image_axes(axes: Axes, size: tuple[int, int]) -> None:
     width, height = size
     axes.set(xlim=(-0.5, width - 0.5), xticks=(0, width // 2, width), xlabel="u (px)")
     axes.set(ylim=(height - 0.5, -0.5), yticks=(0, height // 2, height), aspect="equal")
-
-
-def draw_against_first(
-    axes: Axes, curves: Mapping[str, Floats], styles: Sequence[str] = ("-",) * 4
-) -> None:
-    """Curves in a plane, (n, 2) by label, at most four; the first as a broad line below."""
-    for index, (label, curve) in enumerate(curves.items()):
-        style = {"lw": 1.2, "color": f"C{index - 1}"} if index else {"lw": 5, "color": "0.8"}
-        axes.plot(*curve.T, label=label, ls=styles[index], **style)

@@ -1,7 +1,5 @@
 """Figures of the lab experiment. All lengths are in millimetres."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
@@ -40,8 +38,7 @@ def plot_table(
     for i, camera in enumerate(rig.cameras):
         place = np.asarray(camera.position)
         middle = place - camera.normal * np.linalg.norm(place - x.mean((0, 1)))
-        space.plot(*np.transpose([place, middle]), f"C{i + 2}:", lw=1)
-        space.plot(*place, f"C{i + 2}s", ms=8)
+        space.plot(*np.transpose([place, middle]), "s:", color="0.4", ms=8, lw=1, markevery=2)
         space.text(*place + [0, 0, 130], f"$C_{i + 1}$", ha="center")
     space.plot([0, 750, 750, 0, 0], [0, 0, 750, 750, 0], 0, color="0.6", lw=0.8)
     space.set_zlim3d(0, space.get_zlim3d()[1])

@@ -1,8 +1,6 @@
 """Figures of motions over time and in space, and of the laws behind them."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -49,6 +47,27 @@ def plot_divergence(periods: Floats, differences: Mapping[str, Floats]) -> Figur
         axes.semilogy(periods, np.maximum(difference, 1e-14), ls=style, label=name)
     axes.set(xlabel="time (characteristic periods)", ylabel="distance / spread of the motion")
     figure.legend(loc="outside right center")
+    return figure
+
+
+def plot_in_plane(curves: Mapping[str, Floats], names: Sequence[str]) -> Figure:
+    """Curves in a plane, several to compare.
+
+    Parameters
+    ----------
+    curves : dict of str to ndarray, shape (n, 2)
+        By label, scene units; the first is drawn as a broad line.
+    names : sequence of str
+        Names of the two coordinates: to the right and upwards.
+    """
+    tall = np.ptp(np.vstack(list(curves.values())), axis=0) @ (-1, 1) > 0
+    figure, axes = plt.subplots(figsize=(8, 4.2) if tall else (7, 4.8))
+    for index, (label, curve) in enumerate(curves.items()):
+        style = {"lw": 1.2, "color": f"C{index - 1}"} if index else {"lw": 5, "color": "0.8"}
+        axes.plot(*curve.T, label=label, **style)
+    right, up = (f"{name} (scene units)" for name in names)
+    axes.set(xlabel=right, ylabel=up, aspect="equal")
+    figure.legend(loc="outside right center" if tall else "outside upper center")
     return figure
 
 
@@ -109,7 +128,7 @@ def plot_attractors(curves: Mapping[str, tuple[Floats, Floats]], columns: int = 
         finish_space(axes, azimuth=-60, elevation=20, zoom=0.9)
         if columns > 1:  # small panels: cubes with few numbers, and the unit goes to the legend
             axes.set_box_aspect((1, 1, 1), zoom=0.9)
-            axes.locator_params(nbins=4)
+            axes.locator_params(nbins=4, integer=True)
             axes.tick_params(labelsize=8, pad=-2)
             for letter in "xyz":
                 axes.set(**{f"{letter}label": letter})

@@ -64,8 +64,10 @@ def plot_robustness(
             column[0].plot(*known.T, "*k", ms=10, label="paper (Table 2)")
         column[0].set_title(_TITLES[condition])
         column[1].set_xlabel("level (%)" if condition == "noise" else "rate (%)")
+        column[1].set_xticks(100 * np.sort(chosen.level.unique()))
     grid[0, 0].set(yscale="log", ylabel=r"relative $\ell_2$ error (%)")
     grid[1, 0].set(ylabel="wrong terms", ylim=(-0.5, max(3.5, grid[1, 0].get_ylim()[1])))
+    grid[1, 0].locator_params(axis="y", integer=True)
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return figure

@@ -1,7 +1,5 @@
 """Figures of the solver: curve, matrix, selection, origin, error bars."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
@@ -100,6 +98,7 @@ def plot_collocation(
     above.plot(*final, "C0", lw=2, label="curve that obeys the law")
     above.plot(*nodes, "|k", ms=9, label="collocation nodes")
     above.set(ylabel="x (scene units)")
+    above.locator_params(axis="y", integer=True)
     below.plot(*residual, "C0", lw=1.2)
     below.plot(nodes[0], np.zeros_like(nodes[0]), "|k", ms=9)
     below.set(ylabel="residual of the law\n/ speed", xlabel="time (time units)")
@@ -138,8 +137,8 @@ def plot_histories(
     for frame, terms in true_terms.items():
         panels[2].axhline(terms, color="k", lw=0.8, ls=":")
         panels[2].annotate(
-            f"truth, {frame}", (0.01, terms), xycoords=("axes fraction", "data"),
-            xytext=(0, 2), textcoords="offset points", fontsize=9,
+            f"truth, {frame}", (1, terms), xycoords=("axes fraction", "data"), fontsize=9,
+            ha="right", va="center", bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
         )  # fmt: skip
     panels[2].set_yticks(ticks, [str(tick) for tick in ticks])
     panels[2].minorticks_off()
@@ -228,8 +227,9 @@ def plot_origin_map(
         Origin with the smallest count, and the true one.
     """
     figure, axes = plt.subplots(figsize=(6.2, 4.8), layout="compressed")
-    shown = axes.contourf(x_axis, y_axis, count, levels=10)
-    figure.colorbar(shown, ax=axes, label="smoothed number of terms")
+    whole = np.arange(np.floor(count.min()), np.ceil(count.max()) + 1)
+    shown = axes.contourf(x_axis, y_axis, count, levels=whole)
+    figure.colorbar(shown, ax=axes, label="smoothed number of significant terms")
     axes.plot(*data.T, color="white", lw=0.5, label="data")
     axes.plot(*truth, "o", ms=15, mfc="none", mec="C1", mew=2, label="true origin")
     axes.plot(*best, "+", color="C1", ms=12, mew=2, label="fewest terms")

@@ -1,7 +1,5 @@
 """Figures of video frames and of what the tracker made of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,53 +10,16 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ...arrays import Floats, Image
-from .common import STYLES, image_axes
+from .common import STYLES
 
 
 def plot_frames(
     images: Sequence[Image],
     titles: Sequence[str],
-    tracks: Sequence[Floats] | None = None,
+    tracks: Sequence[Floats],
     index: int | Sequence[int] = 0,
-    columns: int = 3,
 ) -> Figure:
-    """Video frames side by side, with the tracks over them and the target magnified.
-
-    Parameters
-    ----------
-    images : sequence of ndarray, shape (height, width, 3), uint8
-        Blue-green-red, as a video reader gives them.
-    titles : sequence of str
-    tracks : sequence of ndarray, shape (n, 2), optional
-        Pixels of the target in all frames of each video.
-    index : int or sequence of int
-        Frame number of the images: where the target is on its track, if it is seen there.
-    columns : int
-    """
-    indices = np.broadcast_to(index, len(images))
-    rows = -(-len(images) // columns)
-    size = (2.7 * columns + 0.6, 3.0 * rows + 0.5)
-    shared = {"sharex": True, "sharey": True, "squeeze": False}
-    figure, grid = plt.subplots(rows, columns, figsize=size, layout="compressed", **shared)
-    for k, (axes, image, title) in enumerate(zip(grid.flat, images, titles, strict=True)):
-        height, width = image.shape[:2]
-        _show(axes, image)
-        axes.set_title(title, fontsize=11)
-        axes.set(xlim=(-0.5, width - 0.5), xticks=(0, 200, 400), xlabel="u (px)")
-        axes.set(ylim=(height - 0.5, -0.5), yticks=(0, 200, 400), ylabel="v (px)")
-        if tracks is not None:
-            halo = withStroke(linewidth=2.4, foreground="white")
-            axes.plot(*tracks[k].T, color="C0", lw=1.0, path_effects=[halo])
-            if np.isfinite(tracks[k][indices[k]]).all():
-                _magnify(axes, image, tracks[k], indices[k])
-        axes.label_outer()
-    return figure
-
-
-def plot_views(
-    images: Sequence[Image], titles: Sequence[str], tracks: Sequence[Floats], index: int
-) -> Figure:
-    """One frame of each video, the whole track over it, and a ring where the target is.
+    """Video frames, three a row, with the tracks over them and the target magnified.
 
     Parameters
     ----------
@@ -67,21 +28,31 @@ def plot_views(
     titles : sequence of str
     tracks : sequence of ndarray, shape (n, 2)
         Pixels of the target in all frames of each video.
-    index : int
-        Where on the tracks the images were taken.
+    index : int or sequence of int
+        Where on the tracks the images were taken: the target is magnified if it is seen there.
     """
     columns = min(len(images), 3)
     rows = -(-len(images) // columns)
-    size = (3.5 * columns, 3.2 * rows)
-    figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False)
-    halo = [withStroke(linewidth=3.5, foreground="white")]
-    for axes, image, title, track in zip(grid.flat, images, titles, tracks, strict=False):
+    size = (2.7 * columns + 0.6, 3.0 * rows + 0.5)
+    alike = len({image.shape for image in images}) == 1
+    shared = {"sharex": alike, "sharey": alike, "squeeze": False}
+    figure, grid = plt.subplots(rows, columns, figsize=size, layout="compressed", **shared)
+    halo = [withStroke(linewidth=2.4, foreground="white")]
+    indices = np.broadcast_to(index, len(images))
+    for axes, image, title, track, k in zip(
+        grid.flat, images, titles, tracks, indices, strict=False
+    ):
+        height, width = image.shape[:2]
         _show(axes, image)
-        axes.plot(*track.T, color="white", lw=0.7)
-        axes.plot(*track[index], "o", ms=22, mfc="none", mec="C0", mew=2, path_effects=halo)
         axes.set_title(title, fontsize=11)
-        image_axes(axes, image.shape[1::-1])
-        axes.set_ylabel("v (px)")
+        axes.set(xlim=(-0.5, width - 0.5), xlabel="u (px)")
+        axes.set(ylim=(height - 0.5, -0.5), ylabel="v (px)")
+        axes.locator_params(nbins=3)
+        axes.plot(*track.T, color="C0", lw=1.0, path_effects=halo)
+        if np.isfinite(track[k]).all():
+            _magnify(axes, image, track, k)
+        if alike:
+            axes.label_outer()
     for axes in grid.flat[len(images) :]:
         axes.remove()
     return figure
@@ -109,10 +80,11 @@ def plot_tracker_steps(
     _show(panels[0], frame, extent=extent)
     _show(panels[1], background, extent=extent)
     distance = np.linalg.norm(frame.astype(float) - background, axis=-1)
-    for axes, values in ((panels[2], distance), (panels[3], coverage)):
+    units = ("grey levels", "share of the pixel")
+    for axes, values, unit in zip(panels[2:], (distance, coverage), units, strict=True):
         shown = axes.imshow(values, extent=extent, cmap="gray", interpolation="nearest", vmin=0)
         axes.grid(False)
-        figure.colorbar(shown, ax=axes, shrink=0.72, pad=0.03)
+        figure.colorbar(shown, ax=axes, shrink=0.72, pad=0.03, label=unit)
     panels[3].plot(*centroid, "+", color="C1", ms=16, mew=2)
     for axes, title in zip(panels, ("frame", "background", "difference", "coverage"), strict=True):
         axes.set_title(title)
@@ -180,8 +152,9 @@ def _show(axes: Axes, image: Image, extent: tuple[float, ...] | None = None) -> 
     axes.spines[:].set_visible(False)
 
 
-def _magnify(axes: Axes, image: Image, track: Floats, index: int, reach: int = 24) -> None:
+def _magnify(axes: Axes, image: Image, track: Floats, index: int) -> None:
     """The surroundings of the target, three times as large, in the corner with the least track."""
+    reach = 3 / 64 * image.shape[1]  # 24 px of 512
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])  # right, bottom
     size = np.array(image.shape[1::-1])
     part = 6 * reach / size

@@ -1,0 +1,39 @@
+"""What tracks tell of a path, with lags that are given."""
+
+import numpy as np
+import pytest
+
+import vidsindy_lite as vl
+from vidsindy_lite import study
+
+
+@pytest.fixture(scope="module")
+def case():
+    """A rig, and what its cameras see of a motion."""
+    _, x = study.SYSTEMS["Lorenz"].trajectory(150)
+    rig = vl.Rig.around(x)
+    return rig, [camera.project(x) for camera in rig.cameras]
+
+
+@pytest.mark.parametrize("lag", [75.5, -76, 1e12, -1e300])
+def test_a_hopeless_lag_is_named(case, lag):
+    rig, tracks = case
+    message = (
+        r"lags: every video must have half of the shorter of the two in common with the first "
+        r"\(150 frames\), got .* for tracks\[2\] \(150 frames\)"
+    )
+    with pytest.raises(ValueError, match=message):
+        vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0, lag))
+
+
+def test_the_residual_is_that_of_the_given_lags(case):
+    rig, tracks = case
+    learned = vl.observe_tracks(tracks, rig, np.arange(150))
+    assert learned.lags.frames.tolist() == [0, 0, 0]
+    assert learned.lags.residual < 1e-6
+    given = vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0.4, 0))
+    assert given.lags.frames.tolist() == [0, 0.4, 0]
+    residuals = [np.hypot(*part.T) for part in vl.residuals(given.tracks, given.rig)]
+    missed = [np.nanquantile(part, 0.9) for part in residuals]
+    assert given.lags.residual == pytest.approx(max(missed))
+    assert given.lags.residual > 0.1
