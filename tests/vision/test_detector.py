@@ -221,6 +221,11 @@ def test_the_loss_of_perfect_predictions_is_least():
         worse = perfect.clone()
         worse[row] += change
         assert training.detection_loss(worse[None], centre, size, torch.ones(1)) > least + 0.01
+    # The same image twice costs as much as once.
+    worse, whole = perfect[None] + 0.3, torch.ones(1)
+    once = training.detection_loss(worse, centre, size, whole)
+    pair = worse.tile(2, 1, 1), centre.tile(2, 1), size.tile(2, 1), whole.tile(2)
+    torch.testing.assert_close(training.detection_loss(*pair), once)
     hidden = training.detection_loss(perfect[None], centre, size, torch.zeros(1))
     assert hidden > least + 0.1
 

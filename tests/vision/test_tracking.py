@@ -434,3 +434,9 @@ def test_a_motion_of_more_than_two_sizes_and_24_pixels_a_frame_is_a_jump(away, b
     motion = [[seen(100.0)] for _ in range(20)]
     motion[10] = [seen(100.0 + away)]
     assert (link(motion)[10] is not None) == belongs
+
+
+@pytest.mark.parametrize(("again", "believed"), [(1, False), (2, True)])
+def test_after_a_long_gap_one_sighting_is_too_few(again, believed):
+    motion = [[seen(100.0)] for _ in range(20)] + [[]] * 40 + [[seen(400.0)]] * again
+    assert (link(motion)[-1] is not None) == believed
