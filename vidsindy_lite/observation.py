@@ -110,8 +110,9 @@ def observe(
     ------
     FileNotFoundError, ValueError
         If a file is missing, cut off or no video, if the numbers of files and cameras disagree, if
-        a target is not found, if the given lags are clearly wrong, or if the cameras cannot be
-        learned (see `learn_cameras`). What can be told before a video is tracked is.
+        ``t`` is given for files that state different frame rates, if a target is not found, if the
+        given lags are clearly wrong, or if the cameras cannot be learned (see `learn_cameras`).
+        What can be told before a video is tracked is.
     """
     check_learnable(rig)
     check_detector(detector)

@@ -136,6 +136,15 @@ def test_plane_through_by_hand():
     assert d == pytest.approx(-2)
 
 
+def test_a_small_triangle_far_away_is_a_plane():
+    normal, d = plane_through((1e6, 0, 0), (1e6, 1e-6, 0), (1e6, 0, 1e-6))
+    np.testing.assert_allclose(normal, [1, 0, 0], atol=1e-15)
+    assert d == pytest.approx(-1e6)
+    for size in (1e-6, 1e6):
+        with pytest.raises(ValueError, match="must not lie on one line"):
+            plane_through((0, 0, 0), (size, size, 0), (3 * size, 3 * size, 1e-13 * size))
+
+
 def test_distance_does_not_depend_on_the_length_of_the_equation():
     x = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
     np.testing.assert_allclose(signed_distance(x, (0, 0, 2), -4), [1, -2])

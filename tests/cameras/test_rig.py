@@ -43,3 +43,47 @@ def test_its_origin_is_in_the_middle_and_z_is_up(tmp_path, model):
 def test_bad_input_is_named(arguments, message):
     with pytest.raises(ValueError, match=message):
         rig_template(*arguments)
+
+
+@pytest.mark.parametrize(("cameras", "apart"), [(2, 120), (3, 120), (5, 72)])
+def test_its_cameras_stand_evenly_around_the_scene(tmp_path, cameras, apart):
+    path = tmp_path / "rig.toml"
+    path.write_text(rig_template(cameras), encoding="utf-8")
+    placed = vl.Rig.load(path).cameras
+    azimuths = np.deg2rad(20 + apart * np.arange(cameras))
+    circle = np.cos(np.deg2rad(20)) * np.column_stack((np.cos(azimuths), np.sin(azimuths)))
+    expected = np.column_stack((circle, np.full(cameras, np.sin(np.deg2rad(20)))))
+    np.testing.assert_allclose([c.normal for c in placed], expected, atol=2e-3)
+    np.testing.assert_allclose([c.position for c in placed], 3 * expected, atol=2e-3)
+
+
+def test_most_cameras_of_a_template():
+    assert rig_template(100).count("\n[[camera]]\n") == 100
+    with pytest.raises(ValueError, match="cameras: must be at most 100, got 101"):
+        rig_template(101)
+
+
+def test_cameras_around_stand_off_the_scene_by_its_diagonal():
+    x = np.array([[1, 2, 3], [4, 6, 3], [2, 3, 15]])  # a box of 3 x 4 x 12
+    for camera in vl.Rig.around(x).cameras:
+        apart = camera.position - [2.5, 4, 9]
+        np.testing.assert_allclose(apart, 13 * camera.normal, rtol=1e-12)
+
+
+@pytest.mark.parametrize("far", [1.0, 1e6])
+def test_pinholes_at_one_place_are_no_rig_however_far_from_the_origin(far):
+    def rig(apart):
+        places = [(far, 0, 0), (far, apart * far, 0)]
+        return vl.Rig(vl.PerspectiveCamera(position=p, normal=(1, 0, 0)) for p in places)
+
+    assert len(rig(1e-8).cameras) == 2
+    with pytest.raises(ValueError, match="must have at least two independent positions"):
+        rig(1e-10)
+
+
+def test_one_camera_of_each_model_is_a_rig():
+    pinhole = vl.PerspectiveCamera(position=(0, 0, 1), normal=(0, 0, 1))
+    flat = vl.OrthographicCamera(normal=(0, 0, 1))
+    assert len(vl.Rig([pinhole, flat]).cameras) == 2
+    assert len(vl.Rig([pinhole, flat, flat]).cameras) == 3
+    assert len(vl.Rig([pinhole, pinhole, flat]).cameras) == 3

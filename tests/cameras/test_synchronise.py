@@ -20,6 +20,7 @@ from vidsindy_lite.cameras import (
 )
 from vidsindy_lite.cameras import synchronise as synchrony
 from vidsindy_lite.cameras.calibrate import cameras_of_views
+from vidsindy_lite.cameras.unknowns import Unknowns
 
 NOISE = 0.05  # pixels
 
@@ -67,6 +68,25 @@ def test_far_lags_and_fast_rates_are_no_trouble(first, second, slow, fast):
     assert (ours == 1).all()
     if second - first > 9:
         assert np.isnan(theirs).all()
+
+
+def test_only_ratios_of_rates_count(motion):
+    tracks = filmed(motion, (40, 40, 40), (0, 0, 0))
+    ours, theirs = (align(tracks, (0, 1, 2), rates) for rates in ((2, 2.4, 1), (1, 1.2, 0.5)))
+    for one, other in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+
+
+@pytest.mark.parametrize("seen", [1, 2, 3, 4])
+def test_few_frames_are_joined_by_a_curve_of_low_degree(seen):
+    track = np.full((9, 2), np.nan)
+    instants = np.arange(2, 2 + seen)
+    track[instants] = np.column_stack((instants ** (seen - 1), np.ones(seen)))
+    _, found = align([track, track], (0, 0.5))
+    between = instants[1:] - 0.5
+    shown = np.flatnonzero(np.isfinite(found).all(axis=1))
+    assert shown.tolist() == instants[1:].tolist()
+    np.testing.assert_allclose(found[shown, 0], between ** (seen - 1), rtol=1e-12)
 
 
 @given(st.floats(-5, 5), st.floats(0.4, 2.5))
@@ -133,12 +153,58 @@ def test_different_frame_rates(motion):
     assert found.frame_at(1, 100) == round((100 - 10.3) * 1.2)
 
 
+def test_different_frame_rates_of_known_cameras(motion):
+    lags, rates = (0, 10.3, -20), (1, 1.2, 0.5)
+    tracks = filmed(motion, (200, 220, 110), lags, rates)
+    found = learn_lags(tracks, motion[1], rates)
+    np.testing.assert_allclose(found.frames, lags, atol=0.02)
+
+
+def test_errors_are_those_of_least_squares(motion):
+    """Noise over the slope of the residuals in each lag, both as `residuals` shows them."""
+    tracks = filmed(motion, (150,) * 3, (0, 0, 0))
+    found = learn_lags(tracks, motion[1])
+    assert found.frames.tolist() == [0, 0, 0]
+    assert not np.signbit(found.frames).any()
+
+    def missed(second, third):
+        aligned = align(tracks, (0, second, third))
+        return np.hstack(vl.residuals(aligned, motion[1]))[2:-2].ravel()
+
+    slope = [(missed(*h) - missed(*-h)) / 0.1 for h in 0.05 * np.eye(2)]
+    covariance = np.linalg.inv(np.inner(slope, slope)) * np.mean(missed(0, 0) ** 2)
+    np.testing.assert_allclose(found.errors[1:] ** 2, np.diag(covariance), rtol=0.05)
+
+
+def test_a_start_that_is_some_frames_off_is_mended(motion):
+    """Further than a frame the slope does not hold: there it takes several steps."""
+    path, rig = motion
+
+    def slow(frame):
+        return path(frame / 20)
+
+    tracks = filmed((slow, rig), (250,) * 3, (0, 3, 0), noise=0.001)
+    found = learn_lags(tracks, rig)
+    np.testing.assert_allclose(found.frames, (0, 3, 0), atol=0.01)
+    assert found.warnings == ()
+
+
 def test_calibrated_rig_and_outliers(motion):
     tracks = filmed(motion, (250, 250, 250), (0, 7, -4))
     for i, track in enumerate(tracks):
         track[20 + i :: 50] += 60  # jumps of the tracker, in up to six frames of a hundred
     found = learn_lags(tracks, motion[1])
     np.testing.assert_allclose(found.frames, (0, 7, -4), atol=0.02)
+    assert found.errors.max() < 0.01
+
+
+def test_lags_count_from_the_first_video_whichever_camera_is_known(motion):
+    tracks = filmed(motion, (150, 150, 150), (0, 7, 12), noise=0.0)
+    found = synchrony._whole_lags(
+        synchrony._Videos.of(tracks, Unknowns.of(motion[1].uncalibrated(2)), np.ones(3))
+    )
+    assert [0, 7, 12] in [lags.tolist() for lags in found]
+    assert all(lags[0] == 0 for lags in found)
 
 
 @pytest.mark.slow
@@ -202,7 +268,10 @@ def test_a_target_that_hardly_moves_tells_no_lag():
         return rig.cameras[0].scale * np.outer(k, [0.01, 0.02, 0.01])
 
     found = learn_lags(filmed((slow, rig), (150,) * 3, (0, 0, 0), noise=0.4), rig)
-    assert any("the target moves too little or too slowly" in warning for warning in found.warnings)
+    assert [w.split(" cannot")[0] for w in found.warnings] == [
+        "the lag of video 2", "the lag of video 3",
+    ]  # fmt: skip
+    assert all("the target moves too little or too slowly" in w for w in found.warnings)
 
 
 def test_a_wrong_rig_is_not_explained_by_lags(motion):
@@ -241,6 +310,79 @@ def test_a_slope_that_is_noise_tells_nothing(motion, monkeypatch):
         errors[share] = learn_lags(tracks, motion[1]).errors
     assert (errors[1][1:] > 0).all()
     np.testing.assert_allclose(errors[0.25], 2 * errors[1], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("residuals", "told"),
+    [
+        ((0.2, 0.39, 0.41), "(0, 9, 0) or (0, 8, 0) frames fit about"),  # up to twice the best
+        ((0.01, 0.06, 0.049), "(0, 9, 0) or (0, 7, 0) frames fit about"),  # tracks are no better
+        ((0.2, 0.41, 0.5), None),
+    ],
+)
+def test_lags_fit_equally_well_up_to_a_ratio(motion, monkeypatch, residuals, told):
+    every = dict(zip((9.0, 8.0, 7.0), residuals, strict=True))
+
+    def refined(videos, lags):
+        return vl.Lags(lags, np.ones(3), np.zeros(3), every[lags[1]])
+
+    monkeypatch.setattr(synchrony, "_whole_lags", lambda _: [np.array([0, k, 0]) for k in every])
+    monkeypatch.setattr(synchrony, "_refined", refined)
+    found = learn_lags(filmed(motion, (60,) * 3, (0, 9, 0)), motion[1])
+    assert len(found.warnings) == (told is not None)
+    assert told is None or told in found.warnings[0]
+    smallest = {0.39: 8, 0.06: 7, 0.41: 9}[residuals[1]]
+    assert found.frames.tolist() == [0, smallest, 0]
+
+
+class Shown:
+    """Residuals of two numbers in each of 50 frames, of a given size at each pair of lags."""
+
+    def __init__(self, **sizes):
+        self.sizes = sizes
+
+    def residuals(self, lags):
+        names = {(0, 0, 0): "here", (0, 1, 0): "b1", (0, -1, 0): "a1", (0, 0, 1): "b2"}
+        return np.full((50, 2), self.sizes.get(names.get(tuple(lags), "a2"), np.nan))
+
+
+def test_what_a_slope_tells_is_what_the_residuals_rise_by():
+    # By hand: (100 * 2^2 + 100 * 3^2) / 2 - 100 * 1^2 - 2 * .5 sqrt(200) of 1000 or 2000.
+    used = np.ones((50, 2), bool)
+    videos = Shown(here=1.0, b1=2.0, a1=3.0, b2=3.0, a2=2.0)
+    told = synchrony._told(videos, np.zeros(3), used, 0.5, np.array([1000.0, 2000.0]))
+    rise = 200 + 450 - 100 - np.sqrt(200)
+    np.testing.assert_allclose(told, [rise / 1000, rise / 2000], rtol=1e-12)
+    told = synchrony._told(videos, np.zeros(3), used, 0.5, np.array([100.0, 100.0]))
+    assert told.tolist() == [1, 1]
+    videos = Shown(here=1.0, b1=1.0, a1=1.0, b2=3.0)  # nothing fits two frames beside
+    told = synchrony._told(videos, np.zeros(3), used, 0.5, np.array([10.0, 10.0]))
+    assert told.tolist() == [0, 1]
+
+
+def test_two_views_are_compared_only_where_they_have_enough_in_common(motion):
+    """More equations than twice the unknowns, also without the tenth that is missed the most."""
+    tracks, (first, second, _) = filmed(motion, (8, 8, 8), (0, 0, 0)), motion[1].cameras
+    lines = synchrony.epipolar_lines(first, tracks[0], second)
+    unknown = replace(second, scale=None, angle=None)
+    for other, placed, least in (
+        (second, True, 1), (second, False, 4), (unknown, True, 6), (unknown, False, 8),
+    ):  # fmt: skip
+        for frames, enough in ((least - 1, False), (least, True)):
+            theirs = np.where(np.arange(8)[:, None] < frames, tracks[1], np.nan)
+            missed = synchrony._pair_missed(other, placed, lines, theirs)
+            assert np.isfinite(missed) == enough
+            assert not enough or missed < 5 * NOISE * first.scale
+
+
+@pytest.mark.parametrize("lag", [-50, 50])
+def test_videos_may_have_half_of_the_shorter_one_in_common(motion, lag):
+    tracks = filmed(motion, (100, 100, 100), (0, lag, 0), noise=0.0)
+    videos = synchrony._Videos.of(tracks, Unknowns.of(motion[1]), np.ones(3))
+    assert synchrony._pair_lags(videos, 0, 1)[0] == lag
+    tracks = filmed(motion, (100, 100, 100), (0, 1.1 * lag, 0), noise=0.0)
+    videos = synchrony._Videos.of(tracks, Unknowns.of(motion[1]), np.ones(3))
+    assert np.abs(synchrony._pair_lags(videos, 0, 1)).max() <= 50
 
 
 @pytest.mark.slow

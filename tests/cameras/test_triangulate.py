@@ -1,5 +1,7 @@
 """Lines of sight against OpenCV, scipy and points found by hand."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -151,6 +153,26 @@ def test_epipolar_equations_leave_out_what_is_not_seen():
     assert np.isnan(epipolar_lines(known, seen, twin)[1]).all()
 
 
+def test_the_unit_of_length_does_not_move_an_epipolar_line():
+    _, (known, other, _), (seen, _, _) = scene(*KINDS[1])
+    lines = epipolar_lines(known, seen, other)
+    for unit in (1e-5, 1e5):
+        tiny = [replace(c, position=unit * c.position) for c in (known, other)]
+        for ours, theirs in zip(epipolar_lines(tiny[0], seen, tiny[1]), lines, strict=True):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("apart", "told"), [(1.3e-6, False), (2e-6, True)])
+def test_cameras_that_hardly_stand_apart_cannot_disagree(apart, told):
+    # The line of sight, at 45 degrees, comes closest to the origin .71 deep and .71 aside. What the
+    # cameras are apart shows as .71 of that, and counts from 1e-6 (.71 + .71 * .71) on.
+    half = np.sqrt(0.5)
+    place = {"normal": (0, 0, 1), "scale": 1.0, "angle": 0.0, "image_size": (1, 1)}
+    known = PerspectiveCamera(position=(-half, 0, half), **place)
+    other = PerspectiveCamera(position=(-half, apart, half), **place)
+    assert np.isfinite(epipolar_lines(known, np.array([[1.0, 0.0]]), other)[1]).all() == told
+
+
 def test_small_systems_as_numpy():
     rng = np.random.default_rng(0)
     left, right = rng.normal(size=(5, 6, 3)), rng.normal(size=(5, 6))
@@ -159,6 +181,8 @@ def test_small_systems_as_numpy():
     for k in (0, 1, 3, 4):
         np.testing.assert_allclose(found[k], np.linalg.lstsq(left[k], right[k])[0], rtol=1e-10)
     assert found[2].tolist() == [0, 0, 0]
+    for unit in (1e-9, 1e9):
+        np.testing.assert_allclose(unit * module._least_squares(unit * left, right), found)
 
 
 def test_a_search_that_leads_uphill_takes_half_the_step_and_one_that_never_ends_says_so():

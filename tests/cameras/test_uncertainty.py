@@ -296,3 +296,30 @@ def test_a_lag_moves_the_path_as_far_as_it_may_be_wrong():
     # The residuals see part of the motion of one camera, so the error is above noise / speed.
     least = NOISE / np.sqrt(np.sum(pixels**2))
     assert least < abs(size) < 5 * least
+
+
+def test_gross_outliers_do_not_move_the_errors_of_cameras():
+    rng = np.random.default_rng(8)
+    x = trajectory(rng, 150)
+    truth = vl.Rig.around(x)
+    rig = truth.uncalibrated()
+    tracks = [c.project(x) + NOISE * rng.normal(size=(150, 2)) for c in truth.cameras]
+    learned = vl.learn_cameras(tracks, rig)
+    still = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
+
+    def sizes():
+        modes = systematic_errors(tracks, rig, learned, still).reshape(4, -1)
+        return np.linalg.svd(modes, compute_uv=False)
+
+    clean = sizes()
+    tracks[0][70] += 40
+    tracks[2][20] -= 40
+    np.testing.assert_allclose(sizes(), clean, rtol=0.1)
+
+
+def test_lags_that_are_exact_or_unknown_move_nothing():
+    x = trajectory(np.random.default_rng(9), 60)
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) for camera in rig.cameras]
+    lags = Lags(np.zeros(3), np.ones(3), np.array([0, 0, np.inf]), 0.0)
+    assert systematic_errors(tracks, rig, rig, lags).shape == (0, 60, 3)

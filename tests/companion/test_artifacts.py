@@ -117,7 +117,7 @@ def test_a_small_thing_keeps_its_colour_in_an_animation(folder):
 
 def test_table_round_trip(folder):
     saved = save_table("table_1", ROWS, caption="Two systems.")
-    assert load_table("table_1") == saved
+    assert load_table("table_1", folder) == saved
     assert saved.rows[0] == {**ROWS[0], "l2": 0.00123457, "seconds": 2.3}
     assert saved.rows[1]["l2"] is None
     assert (folder / "table_1.csv").read_text() == (
@@ -135,7 +135,7 @@ def test_table_shows_itself(folder):
 def test_load_table_lists_those_there_are(folder):
     save_table("table_1", ROWS, caption="Two systems.")
     with pytest.raises(FileNotFoundError, match=r"table_id: .*table_1.* got 'table_2'"):
-        load_table("table_2")
+        load_table("table_2", folder)
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,7 @@ def test_a_headline_says_what_its_table_holds(tmp_path, name, rows, headline):
     (tmp_path / "notebooks").mkdir()
     (tmp_path / "notebooks" / "00_one.py").write_text("# # One\n")
     record = {"id": name, "kind": "table", "caption": "A table.", "notebook": "00_one"}
+    record |= {"stamp": None, "files": []}
     (figures / f"{name}.json").write_text(json.dumps({**record, "rows": rows}))
     assert f"| One | {headline} |" in PARTS["notebooks"](tmp_path)
 

@@ -1,5 +1,7 @@
 """The parts of the background model by themselves, on arrays whose answer is known."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -13,12 +15,14 @@ from vidsindy_lite.vision.background import (
     _median,
     _reduce,
     _shape,
+    sample_frames,
     track_blobs,
     view_distances,
     whole_views,
 )
 from vidsindy_lite.vision.rendering import render
 from vidsindy_lite.vision.scenes import Scene
+from vidsindy_lite.vision.video import write_video
 
 SIZE = (128, 96)
 
@@ -147,3 +151,180 @@ def test_shapes_are_told_by_complex_moments():
     cube = c11**1.5 / np.sqrt(area)
     expected = [np.log(c11 / area**2), abs(c20) / c11, abs(c21) / cube, abs(c30) / cube]
     np.testing.assert_allclose(_shape(alpha, u, v), expected, rtol=1e-12)
+
+
+# ---------------------------------------------------------- squares on a plain ground: all is known
+
+
+GROUND, TARGET = (90, 100, 110), (20, 40, 220)
+
+
+def squares(*boxes, colour=TARGET):
+    """A frame with squares (left, top, side), on whole pixels."""
+    frame = np.full((SIZE[1], SIZE[0], 3), GROUND, np.uint8)
+    for left, top, side in boxes:
+        frame[max(top, 0):top + side, max(left, 0):left + side] = colour
+    return frame
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """A model that has seen a square of 16 pixels in 20 places."""
+    return BackgroundModel(np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)]))
+
+
+def test_what_is_learned_of_a_square(plain):
+    np.testing.assert_array_equal(plain.background, squares())
+    assert plain.area == 16**2
+    np.testing.assert_array_equal(plain.contrast[0, 0], np.subtract(TARGET, GROUND))
+    assert plain.noise == plain.camera_motion == plain.background_motion == 0
+
+
+def test_search_finds_the_middle_of_a_square_and_looks_a_little_beyond_it(plain):
+    centre, half = plain.search(squares((40, 24, 16)))
+    np.testing.assert_array_equal(centre, [47.5, 31.5])
+    assert half == 4 * (4 / 2 + 1) + 4  # half its width, a coarse pixel, the ring on both sides
+    centre, half = plain.search(squares((80, 60, 8)))
+    np.testing.assert_array_equal(centre, [83.5, 63.5])
+    assert half == 4 * (2 / 2 + 1) + 4
+    assert plain.search(squares()) is None
+
+
+def test_search_prefers_what_has_the_colour_of_the_target(plain):
+    frame = squares((20, 12, 28), colour=(160, 160, 0))  # larger, of the opposite colour
+    frame[60:76, 80:96] = TARGET
+    np.testing.assert_array_equal(plain.search(frame)[0], [87.5, 67.5])
+    faint = np.rint(0.9 * np.array(GROUND) + 0.1 * np.array(TARGET))
+    frame[12:40, 20:48] = faint  # a little of its colour on a larger area
+    np.testing.assert_array_equal(plain.search(frame)[0], [87.5, 67.5])
+
+
+@pytest.mark.parametrize(
+    ("left", "top"), [(40, 24), (33, 51), (1, 30), (30, 1), (111, 30), (30, 79)]
+)
+def test_a_square_is_measured_exactly(plain, left, top):
+    blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
+    np.testing.assert_allclose(blob.centroid, [left + 7.5, top + 7.5], atol=1e-3)
+    assert blob.area == pytest.approx(16**2, rel=1e-3)
+    assert blob.inside
+
+
+def test_a_pixel_half_covered_counts_half(plain):
+    frame = squares((40, 24, 16))
+    frame[24:40, 55] = np.add(TARGET, GROUND) / 2
+    blob = plain.measure(frame, np.array([47.5, 31.5]), 14)
+    assert blob.area == pytest.approx(15.5 * 16, rel=1e-3)
+    # In one row: 15 whole pixels around 47, half a one at 55.
+    np.testing.assert_allclose(blob.centroid, [(15 * 47 + 0.5 * 55) / 15.5, 31.5], atol=1e-2)
+
+
+@pytest.mark.parametrize(("left", "top"), [(0, 30), (30, 0), (112, 30), (30, 80), (-4, 30)])
+def test_a_square_at_the_border_of_the_image_may_go_on_beyond_it(plain, left, top):
+    blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
+    assert not blob.inside
+
+
+def test_a_window_holds_all_pixels_near_a_place_and_at_least_one(plain):
+    low, high, window = plain._window(np.array([50.0, 40.0]), 10.0)
+    assert (low.tolist(), high.tolist()) == ([40, 30], [61, 51])
+    assert window == np.s_[30:51, 40:61]
+    low, high, _ = plain._window(np.array([3.5, 94.2]), 5.0)
+    assert (low.tolist(), high.tolist()) == ([0, 89], [10, 96])
+    for place, corner in (((-30.0, -30.0), [0, 0]), ((500.0, 500.0), [127, 95])):
+        low, high, _ = plain._window(np.array(place), 5.0)
+        assert (low.tolist(), (high - low).tolist()) == (corner, [1, 1])
+
+
+@pytest.mark.parametrize("off", [(9, 0), (-9, 0), (0, 9), (0, -9)])
+def test_a_square_across_the_border_of_the_window_is_not_measured(plain, off):
+    frame = squares((40, 40, 16))
+    assert plain.measure(frame, np.array([47.5, 47.5]) + off, 17) is not None
+    assert plain.measure(frame, np.array([47.5, 47.5]) + off, 14) is None
+
+
+@pytest.mark.parametrize(("side", "is_target"), [(6, False), (8, True), (32, True), (40, False)])
+def test_what_has_five_times_the_area_of_the_target_or_a_fifth_is_none(plain, side, is_target):
+    found = plain.measure(squares((30, 30, side)), np.full(2, 30 + (side - 1) / 2), 30)
+    assert (found is not None) == is_target
+
+
+def test_a_target_beside_ground_of_its_own_colour_has_no_shape():
+    frames = np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)])
+    frames[:, :, 56:60] = np.add(TARGET, 3)  # a stripe, on which the target cannot be told
+    model = BackgroundModel(frames)
+    frame = squares((40, 40, 16))
+    frame[:, 56:60] = np.add(TARGET, 3)
+    assert model.measure(frame, np.array([47.5, 47.5]), 14).shape is None
+    frame = squares((20, 40, 16))
+    frame[:, 56:60] = np.add(TARGET, 3)
+    assert model.measure(frame, np.array([27.5, 47.5]), 14).shape is not None
+
+
+@pytest.mark.parametrize(("left", "top"), [(40, 24), (37, 51), (0, 0), (112, 80)])
+def test_a_square_that_stays_in_most_samples_is_no_background(left, top):
+    stays = [squares((left, top, 16))] * 13
+    leaves = [squares((76 + i, 4 + i, 16)) for i in range(0, 16, 2)]
+    model = BackgroundModel(np.array(stays + leaves))
+    np.testing.assert_array_equal(model.background, squares())
+    assert model.area == 16**2
+
+
+def test_what_moves_away_for_a_few_samples_is_background():
+    lamp = squares((40, 24, 16), colour=(250, 250, 250))
+    dark = squares((4, 60, 16))  # the target, and the lamp is off
+    model = BackgroundModel(np.array([lamp] * 20 + [dark]))
+    np.testing.assert_array_equal(model.background, lamp)
+
+
+@pytest.mark.parametrize(("distance", "counts"), [(1, 1), (2, 1), (3, 0)])
+def test_faint_coverage_counts_up_to_two_pixels_beyond_the_outline(plain, distance, counts):
+    faint = np.rint(np.array(GROUND) + 0.06 * np.subtract(TARGET, GROUND))
+    for beside in (np.s_[24:40, 55 + distance], np.s_[39 + distance, 40:56]):
+        frame = squares((40, 24, 16))
+        frame[beside] = faint
+        blob = plain.measure(frame, np.array([47.5, 31.5]), 14)
+        assert blob.area == pytest.approx(16**2 + counts * 16 * 0.06, abs=0.3)
+
+
+def test_samples_are_spread_from_the_first_frame_to_the_last(tmp_path):
+    for n in (50, 21, 3):
+        frames = [np.full((64, 64, 3), 4 * i, np.uint8) for i in range(n)]
+        samples = sample_frames(write_video(tmp_path / "clip.mov", frames))
+        numbers = samples[:, 0, 0, 0] // 4
+        np.testing.assert_array_equal(numbers, np.unique(np.linspace(0, n - 1, 21).round()))
+
+
+# ---------------------------------------------------------------------------------------- following
+
+
+class Seen:
+    """A model of a target in even motion, which notes where it is looked for."""
+
+    area = np.pi * 5**2
+    motion = np.array([[10.0 + 3 * i, 20.0 - 2 * i] for i in range(20)])
+
+    def __init__(self, hidden):
+        self.hidden, self.near, self.anywhere = hidden, {}, []
+
+    def search(self, number):
+        self.anywhere.append(number)
+        return self.motion[number], None
+
+    def measure(self, number, centre, half):
+        if half is not None:
+            self.near[number] = (centre, half)
+        whole = blob(inside=number % 2 == 0)  # a view across the border counts, too
+        return None if number in self.hidden else replace(whole, centroid=self.motion[number])
+
+
+def test_a_target_is_looked_for_where_its_motion_leads():
+    model = Seen(hidden=(4, 5, 9, 10, 11, 12))
+    found = list(track_blobs(model, range(20)))
+    assert [i for i, one in enumerate(found) if one is None] == [4, 5, 9, 10, 11, 12]
+    # Anywhere: at first, where it is not at its place, and at once after three such frames.
+    assert model.anywhere == [0, 4, 5, 9, 10, 11, 12, 13]
+    assert sorted(set(range(20)) - set(model.near)) == [0, 12, 13]
+    for number, (centre, half) in model.near.items():
+        still = number == 1  # one frame shows no motion
+        np.testing.assert_allclose(centre, model.motion[0 if still else number])
+        assert half == pytest.approx(2 * 5 + 8 + (0 if still else 0.5 * 3))

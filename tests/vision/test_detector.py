@@ -221,6 +221,11 @@ def test_the_loss_of_perfect_predictions_is_least():
         worse = perfect.clone()
         worse[row] += change
         assert training.detection_loss(worse[None], centre, size, torch.ones(1)) > least + 0.01
+    # The same image twice costs as much as once.
+    worse, whole = perfect[None] + 0.3, torch.ones(1)
+    once = training.detection_loss(worse, centre, size, whole)
+    pair = worse.tile(2, 1, 1), centre.tile(2, 1), size.tile(2, 1), whole.tile(2)
+    torch.testing.assert_close(training.detection_loss(*pair), once)
     hidden = training.detection_loss(perfect[None], centre, size, torch.zeros(1))
     assert hidden > least + 0.1
 
@@ -264,3 +269,66 @@ def test_labels_of_a_batch_say_how_much_of_the_target_is_seen(monkeypatch):
     np.testing.assert_allclose(presence, wanted, atol=1e-6)
     np.testing.assert_allclose(centres, [[30, 40]] * 5)
     np.testing.assert_allclose(sizes, [[20, 10]] * 5)
+
+
+class Given:
+    """A source of these random numbers, in this order."""
+
+    def __init__(self, *numbers):
+        self.numbers = list(numbers)
+
+    def uniform(self, *ranges):
+        return self.numbers.pop(0)
+
+    integers = random = uniform
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_tiles_are_rectangles_of_one_brightness(turned):
+    table = np.arange(training.SIDE**2, dtype=float).reshape(training.SIDE, training.SIDE)
+    light = training._tiles(Given(np.pi / 2 if turned else 0.0, 12.0, 20.0, table))
+    assert light.shape == (training.SIDE, training.SIDE, 3)
+    assert np.ptp(light, axis=2).max() == 0
+    plane = light[..., 0] if turned else light[..., 0].T
+    for axis, pitch in ((0, 12), (1, 20)):
+        steps = np.flatnonzero(np.diff(plane, axis=axis).any(axis=1 - axis)) + 1
+        np.testing.assert_array_equal(steps, np.arange(pitch, training.SIDE, pitch))
+
+
+def test_a_piece_of_a_background_keeps_its_place_and_mixes_its_colours():
+    v, u = np.mgrid[:512, :512]
+    pool = np.stack([np.dstack([u // 4, v // 4, 0 * u + 60])]).astype(np.uint8)
+    # As large as the frame, from (100, 200); each colour by itself, 0.8 times as bright.
+    place, alone = np.array([100, 200]), np.zeros((3, 3))
+    piece = training._background(Given(np.log(1.0), place, 0, alone, 0.8), pool)
+    expected = 0.8 * pool[0, 200:200 + training.SIDE, 100:100 + training.SIDE]
+    np.testing.assert_allclose(piece, expected, atol=0.51)
+    # Twice as large, so that it shrinks; red takes half of blue, and the sum of shares stays one.
+    mix = np.array([[0, 0, 0], [0, 0, 0], [0.25, 0, 0]])
+    piece = training._background(Given(np.log(2.0), place, 0, mix, 1.0), pool)
+    large = pool[0, 200:200 + 2 * training.SIDE, 100:100 + 2 * training.SIDE].astype(float)
+    small = large.reshape(training.SIDE, 2, training.SIDE, 2, 3).mean(axis=(1, 3))
+    small[..., 2] = (0.25 * small[..., 0] + small[..., 2]) / 1.25
+    np.testing.assert_allclose(piece, small, atol=1.01)
+
+
+def test_posts_and_hedges_lie_in_the_frame():
+    assert training._rectangle(Given(np.array([10, 50]), 0.4, 86, 46)) == (86, 46, 10, 50)
+    assert training._rectangle(Given(np.array([10, 50]), 0.6, 46, 86)) == (46, 86, 50, 10)
+    rng = np.random.default_rng(0)
+    boxes = np.array([training._rectangle(rng) for _ in range(500)])
+    assert (boxes[:, :2].min(axis=0) == 0).all()
+    assert ((boxes[:, :2] + boxes[:, 2:]).max(axis=0) == training.SIDE).all()
+
+
+def test_white_balance_of_a_camera():
+    frame = np.full((8, 8, 3), (50, 100, 200), np.uint8)
+    same = 0.9  # no exchange, no grey, no blur, no codec
+    seen = training._seen_by_a_camera(frame, Given(same, same, 1.1, np.ones(3), -5.0, same, same))
+    np.testing.assert_array_equal(seen, np.full((8, 8, 3), (50, 105, 215), np.uint8))
+    grey = training._seen_by_a_camera(frame, Given(same, 0.05, 1.0, np.ones(3), 0.0, same, same))
+    assert (grey == cv2.cvtColor(frame[:1, :1], cv2.COLOR_BGR2GRAY)[0, 0]).all()
+    # Of a frame of one colour, neither blur nor a lossy codec leaves much to be seen.
+    for rest in ([0.1, 1.0, same], [same, 0.1, 90]):
+        seen = training._seen_by_a_camera(frame, Given(same, same, 1.0, np.ones(3), 0.0, *rest))
+        np.testing.assert_allclose(seen.astype(float), frame, atol=2)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from vidsindy_lite.vision.rendering import (
     _NORMAL,
+    _poses,
     draw_frames,
     render,
     render_labelled,
@@ -92,6 +93,16 @@ def test_size_variation_keeps_the_centroid():
     assert np.abs([c - track[0] for c, _ in looks]).max() < 0.02
     areas = np.array([a for _, a in looks])
     assert areas.max() / areas.min() > 3
+
+
+def test_poses_turn_tumble_and_grow_as_the_scene_says():
+    angle, scale = _poses(Scene(turns=-3), 101, np.random.default_rng(0))
+    np.testing.assert_allclose(np.diff(angle), -3 * 2 * np.pi / 100)
+    np.testing.assert_array_equal(scale, 1)
+    angle, _ = _poses(Scene(tumbling=0.5), 100_000, np.random.default_rng(0))
+    assert 25 * np.std(np.diff(angle)) == pytest.approx(0.5, rel=0.03)
+    _, scale = _poses(Scene(size_variation=0.2), 1000, np.random.default_rng(0))
+    np.testing.assert_allclose([scale.min(), scale.max()], [0.8, 1.2], atol=1e-3)
 
 
 def test_shapes_map_the_outline_and_keep_the_centroid():

@@ -429,3 +429,16 @@ def test_a_single_sighting_in_a_long_gap_is_not_believed():
     motion += [[seen(200 + 5.0 * i)] for i in range(20)]
     motion[35] = [seen(300)]
     assert link(motion)[35] is None
+
+
+@pytest.mark.parametrize(("away", "belongs"), [(60.0, True), (68.0, False)])
+def test_a_motion_of_more_than_two_sizes_and_24_pixels_a_frame_is_a_jump(away, belongs):
+    motion = [[seen(100.0)] for _ in range(20)]
+    motion[10] = [seen(100.0 + away)]
+    assert (link(motion)[10] is not None) == belongs
+
+
+@pytest.mark.parametrize(("again", "believed"), [(1, False), (2, True)])
+def test_after_a_long_gap_one_sighting_is_too_few(again, believed):
+    motion = [[seen(100.0)] for _ in range(20)] + [[]] * 40 + [[seen(400.0)]] * again
+    assert (link(motion)[-1] is not None) == believed

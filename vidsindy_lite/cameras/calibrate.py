@@ -85,7 +85,8 @@ def learn_normal(tracks: Sequence[Floats], rig: Rig, index: int) -> Rig:
     """Learn the cameras with the normal of one of them unknown as well.
 
     For a rig that does not agree with its tracks: if the normal of this camera alone was measured
-    badly, the residuals of the new rig are no larger than the errors of the tracks.
+    badly, the residuals of the new rig are no larger than the errors of the tracks. Outliers are
+    left out as by `learn_cameras`.
 
     Parameters
     ----------
@@ -232,8 +233,7 @@ def _spread(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:
         found, failed = {}, []
         for i in waiting:
             try:
-                alone = replace(unknowns, uncalibrated=np.array([i]))
-                found[i] = solve(*_from_known(views, cameras, i), alone)[0][0]
+                found[i] = _from_known(views, replace(unknowns, cameras=cameras), i)
             except ValueError as error:
                 failed.append(error)
         if not found:
@@ -247,13 +247,13 @@ def _spread(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:
     return cameras
 
 
-def _from_known(views: Views, cameras: Sequence[Camera], index: int) -> tuple[Floats, Floats]:
-    """Linear equations for one unknown camera from all known ones."""
-    camera, track = cameras[index], views.tracks[index]
+def _from_known(views: Views, unknowns: Unknowns, index: int) -> complex:
+    """s exp(i theta) of one unknown camera from all known ones."""
+    camera, track = unknowns.cameras[index], views.tracks[index]
     equations = [
         epipolar_design(epipolar_lines(known, other, camera), camera, track)
-        for known, other in zip(cameras, views.tracks, strict=True)
+        for known, other in zip(unknowns.cameras, views.tracks, strict=True)
         if known.is_calibrated
     ]
     design, target = map(np.concatenate, zip(*equations, strict=True))
-    return design, target
+    return solve(design, target, replace(unknowns, uncalibrated=np.array([index])))[0][0]

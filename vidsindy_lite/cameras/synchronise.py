@@ -222,7 +222,7 @@ class _Videos:
     rates: Floats
     unknowns: Unknowns
     speed: float  # pixels in a frame
-    tried: dict[tuple[float, ...], Floats | None] = field(default_factory=dict)
+    tried: dict[tuple[float, ...], Floats] = field(default_factory=dict)
 
     @classmethod
     def of(cls, tracks: Sequence[Floats], unknowns: Unknowns, rates: Floats) -> _Videos:
@@ -238,8 +238,8 @@ class _Videos:
         """Durations on the clock."""
         return self.frames / self.rates
 
-    def residuals(self, lags: Floats) -> Floats | None:
-        """Reprojection residuals of the cameras that fit best, (n_0, 2 m); None if none do."""
+    def residuals(self, lags: Floats) -> Floats:
+        """Reprojection residuals of the cameras that fit best, (n_0, 2 m); NaN if none do."""
         key = tuple(lags.tolist())
         if key not in self.tried:
             tracks = _aligned(self.curves, lags, self.rates, int(self.frames[0]))
@@ -249,20 +249,20 @@ class _Videos:
     def disagreement(self, lags: Floats) -> float:
         """The worst camera's, pixels; infinite where no cameras fit."""
         missed = self.residuals(lags)
-        if missed is None:
+        if np.isnan(missed).all():
             return np.inf
         return max(_trimmed(part) for part in np.split(missed, len(self.curves), axis=1))
 
 
-def _best_residuals(tracks: Sequence[Floats], unknowns: Unknowns) -> Floats | None:
-    """Residuals of the cameras that fit aligned tracks best; None if none do."""
-    if not all(np.isfinite(track).any() for track in tracks):
-        return None
-    views = Views.of(tracks)
-    try:
-        return np.hstack(residuals_of_views(views, cameras_of_views(views, unknowns).cameras))
-    except ValueError:  # these lags leave too little in common, or nothing that agrees
-        return None
+def _best_residuals(tracks: Sequence[Floats], unknowns: Unknowns) -> Floats:
+    """Residuals of the cameras that fit aligned tracks best, (n, 2 m); NaN if none do."""
+    if all(np.isfinite(track).any() for track in tracks):
+        views = Views.of(tracks)
+        try:
+            return np.hstack(residuals_of_views(views, cameras_of_views(views, unknowns).cameras))
+        except ValueError:  # these lags leave too little in common, or nothing that agrees
+            pass
+    return np.full_like(np.hstack(tracks), np.nan)
 
 
 def _trimmed(residual: Floats) -> float:
@@ -276,12 +276,11 @@ def _refined(videos: _Videos, whole: Floats) -> Lags:
     lags = whole.copy()
     shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
     for _ in range(_STEPS):
-        parts = [videos.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)]
-        if any(part is None for part in parts):
-            return _untold(videos, lags)
-        tried = np.array(parts)
+        tried = np.array([videos.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)])
         here, ahead, behind = tried[0], *np.split(tried[1:], 2)
         used = np.isfinite(tried).all(axis=0)
+        if not used.any():
+            return _untold(videos, lags)
         limit = max(OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
         used &= np.abs(np.where(used, here, 0)) <= limit
         slope = (ahead - behind)[:, used].T / (2 * PROBE)
@@ -319,17 +318,13 @@ def _told(videos: _Videos, lags: Floats, used: Bools, noise: float, slopes: Floa
     """
     shares = []
     for one, slope in zip(np.eye(len(lags))[1:], slopes, strict=True):
-        parts = [videos.residuals(lags + shift) for shift in (0 * one, one, -one)]
-        if any(part is None for part in parts):  # a frame beside, nothing fits at all
-            shares.append(1.0)
-            continue
-        tried = np.array(parts)
+        tried = np.array([videos.residuals(lags + shift) for shift in (0 * one, one, -one)])
         both = used & np.isfinite(tried).all(axis=0)
         here, ahead, behind = (np.sum(part[both] ** 2) for part in tried)
         chance = 2 * noise * np.sqrt(2 * both.sum())  # two standard deviations of such a sum
         rise = ((ahead + behind) / 2 - here - chance) / slope
-        shares.append(float(np.clip(rise, 0, 1)))
-    return np.array(shares)
+        shares.append(rise if both.any() else 1.0)  # a frame beside, nothing fits at all
+    return np.clip(shares, 0, 1)
 
 
 def _whole_lags(videos: _Videos) -> list[Floats]:
@@ -359,11 +354,12 @@ def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
     lags = np.arange(np.ceil(margin - videos.ends[other]), videos.ends[known] - margin + 1)
     frames = np.arange(0, videos.frames[known], max(1, int(shortest // _INSTANTS)))
     first, second = videos.unknowns.cameras[known], videos.unknowns.cameras[other]
-    placed = [c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second)]
-    lines = epipolar_lines(placed[0], videos.curves[known](frames), placed[1])
+    placed = first.is_placed and second.is_placed
+    near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
+    lines = epipolar_lines(near, videos.curves[known](frames), far)
     instants, rate = frames / videos.rates[known], videos.rates[other]
-    at = videos.curves[other]
-    missed = np.array([_pair_missed(first, second, lines, at((instants - k) * rate)) for k in lags])
+    theirs = [videos.curves[other]((instants - k) * rate) for k in lags]
+    missed = np.array([_pair_missed(second, placed, lines, pixels) for pixels in theirs])
     padded = np.concatenate(([np.inf], missed, [np.inf]))
     dips = (missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed)
     ranked = sorted(np.flatnonzero(dips), key=lambda k: missed[k])
@@ -371,18 +367,18 @@ def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
 
 
 def _pair_missed(
-    known: Camera, other: Camera, lines: tuple[Floats, Floats], theirs: Floats
+    other: Camera, placed: bool, lines: tuple[Floats, Floats], theirs: Floats
 ) -> float:
-    """How badly two views agree at best, in pixels of the first; one instant in ten is left out.
+    """By how much its pixels miss the epipolar lines of a known camera at best, scene units rms.
 
-    `lines` are the epipolar lines of the first view's pixels, `theirs` the pixels of the second.
+    `placed` says whether both positions are known. One instant in ten is left out.
     """
     design, target = epipolar_design(lines, other, theirs)
     if other.is_calibrated:
         scale, angle = other.calibration
         turned = scale * np.array([np.cos(angle), np.sin(angle)])
         design, target = design[:, :0], target - design @ turned
-    if not (known.is_placed and other.is_placed):  # the offset adds the same to all equations
+    if not placed:  # the offset adds the same to all equations
         design = np.column_stack((design, np.ones(len(design))))
     fits = np.ones(len(target), bool)
     for _ in range(2):
@@ -391,7 +387,7 @@ def _pair_missed(
         solution = np.linalg.lstsq(design[fits], target[fits])[0]
         missed = np.abs(design @ solution - target)
         fits = missed <= np.quantile(missed, _TRIMMED)
-    return float(np.sqrt(np.mean(missed[fits] ** 2))) / known.calibration[0]
+    return float(np.sqrt(np.mean(missed[fits] ** 2)))
 
 
 def _aligned(

@@ -170,13 +170,11 @@ def points_of_views(views: Views, cameras: Sequence[Camera]) -> Floats:
         group = [cameras[i] for i in indices]
         if not independent(group):
             continue
-        scales = [camera.calibration[0] for camera in group]
-        rows = np.vstack([c.rows / scale for c, scale in zip(group, scales, strict=True)])
-        seen = [
-            (scale * camera.turned(views.tracks[i][frames]) + camera.offset) / scale
-            for i, camera, scale in zip(indices, group, scales, strict=True)
-        ]
-        x[frames] = np.hstack(seen) @ np.linalg.pinv(rows).T
+        scales = np.repeat([camera.calibration[0] for camera in group], 2)
+        rows = np.vstack([camera.rows for camera in group]) / scales[:, None]
+        turned = np.hstack([cameras[i].turned(views.tracks[i][frames]) for i in indices])
+        offsets = np.hstack([camera.offset for camera in group])
+        x[frames] = (scales * turned + offsets) / scales @ np.linalg.pinv(rows).T
     return x
 
 

@@ -41,6 +41,7 @@ from .records import RUN_TIMES, as_json, json_bytes, read_json, read_records
 INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
 LARGEST_SVG = 120_000  # bytes
+PICTURE = 83  # milliseconds that one of an animation stays
 SECONDS = "seconds"  # the column of a table that holds wall times
 
 
@@ -216,7 +217,6 @@ def save_animation(
     *,
     caption: str,
     numbers: Mapping[str, object],
-    rate: float = 12,
 ) -> None:
     """Write pictures as an animated GIF, which every code host plays, and register it.
 
@@ -225,11 +225,9 @@ def save_animation(
     animation_id : str
         As of `save_figure`.
     pictures : sequence of ndarray of uint8, shape (height, width, 3)
-        One palette of 256 colours serves all of them.
+        One palette of 256 colours serves all of them. The last one stays for three seconds.
     caption, numbers
         As of `save_figure`.
-    rate : float
-        Pictures per second. The last one stays for three seconds.
 
     Raises
     ------
@@ -245,7 +243,7 @@ def save_animation(
     strip = strip.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1)
     tops = range(0, strip.height, height)
     first, *rest = (strip.crop((0, top, width, top + height)) for top in tops)
-    durations = [round(1000 / rate)] * len(rest) + [3000]
+    durations = [PICTURE] * len(rest) + [3000]
     file = io.BytesIO()
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
     _write(record, {f"{animation_id}.gif": file.getvalue()})
@@ -284,15 +282,14 @@ def save_table(table_id: str, rows: Iterable[Mapping[str, object]], *, caption: 
     return table
 
 
-def load_table(table_id: str, folder: str | os.PathLike | None = None) -> Table:
-    """Read a registered table back, its values as they were written.
+def load_table(table_id: str, folder: Path) -> Table:
+    """Read a table of a folder back, its values as they were written.
 
     Raises
     ------
     FileNotFoundError
         If the folder holds no table of that id; the message lists those it holds.
     """
-    folder = figures_folder() if folder is None else Path(folder)
     record = read_json(folder / f"{table_id}.json")
     if record.get("kind") != "table":
         tables = [r["id"] for r in read_records(folder).values() if r["kind"] == "table"]

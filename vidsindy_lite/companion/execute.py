@@ -20,15 +20,8 @@ from traitlets.config import Config
 from ..stamp import PACKAGE
 
 CELL_TIMEOUT = 3600  # seconds; papermill's own default is to wait for ever
+STARTUP_TIMEOUT = 120  # seconds, of a kernel
 ENGINE = "vidsindy_lite"  # under which papermill knows ours
-SETTINGS: dict[str, Any] = {
-    "engine_name": ENGINE,
-    "kernel_name": "python3",
-    "startup_timeout": 120,
-    "progress_bar": False,
-    # The kernel warns on stderr that anyone on the machine could listen in otherwise.
-    "config": Config(KernelManager={"transport_encryption": "auto"}),
-}
 
 
 class NotebookError(RuntimeError):
@@ -92,7 +85,8 @@ def execute(
     try:
         executed = papermill.execute_notebook(
             jupytext.read(path), None, dict(parameters),
-            folder=path.parent, environment=environment or {}, timeout=timeout, **SETTINGS,
+            engine_name=ENGINE, kernel_name="python3", progress_bar=False,
+            folder=path.parent, environment=environment or {}, timeout=timeout,
         )  # fmt: skip
     except PapermillExecutionError as error:
         traceback = strip_color("\n".join(error.traceback)) or f"{error.ename}: {error.evalue}"
@@ -145,9 +139,16 @@ class _Engine(Engine):
     def execute_managed_notebook(
         cls, nb_man: NotebookExecutionManager, kernel_name: str, **options: Any
     ) -> None:
-        """Execute the cells with papermill's options that are the client's, too."""
-        chosen = {name: options[name] for name in ("timeout", "startup_timeout", "config")}
-        client = _Client(nb_man, kernel_name=kernel_name, coalesce_streams=True, **chosen)
+        """Execute the cells."""
+        client = _Client(
+            nb_man,
+            kernel_name=kernel_name,
+            timeout=options["timeout"],
+            startup_timeout=STARTUP_TIMEOUT,
+            coalesce_streams=True,
+            # The kernel warns on stderr that anyone on the machine could listen in otherwise.
+            config=Config(KernelManager={"transport_encryption": "auto"}),
+        )
         client.execute(cwd=options["folder"], env=_kernel_environment(options["environment"]))
 
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from ..stamp import write_file
 from ..study import LEAST
-from .artifacts import Table, load_table
+from .artifacts import Table, as_table, load_table
+from .records import read_records
 from .registry import load_run_times
 
 PART = re.compile(r"(?<=^<!-- )(?!end )(\w+) -->\n.*?(?=<!-- end -->$)", re.DOTALL | re.MULTILINE)
@@ -206,9 +207,5 @@ HEADLINES: dict[str, Callable[[Table], str]] = {
 
 def _headlines(figures: Path) -> dict[str, str]:
     """By notebook; a notebook without one of these tables has none."""
-    found = {}
-    for table_id, headline in HEADLINES.items():
-        if (figures / f"{table_id}.json").exists():
-            table = load_table(table_id, figures)
-            found[table.notebook] = headline(table)
-    return found
+    tables = [as_table(r) for r in read_records(figures).values() if r["id"] in HEADLINES]
+    return {table.notebook: HEADLINES[table.table_id](table) for table in tables}

@@ -50,8 +50,7 @@ Window = tuple[slice, slice]
 
 def sample_frames(path: str | os.PathLike) -> NDArray[np.uint8]:
     """About `_SAMPLES` frames spread evenly over the clip, (m, height, width, 3)."""
-    last = max(video_info(path).frames - 1, 0)
-    spread = np.linspace(0, last, _SAMPLES).round().astype(int)
+    spread = np.linspace(0, video_info(path).frames - 1, _SAMPLES).round().astype(int)
     return np.stack(list(pick_frames(path, np.unique(spread).tolist())))
 
 

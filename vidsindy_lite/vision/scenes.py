@@ -40,7 +40,7 @@ class Scene:
     turns : float
         Steady self-rotation, turns over the whole clip.
     tumbling : float
-        Random self-rotation: standard deviation in radians of the turn over 25 frames.
+        Random self-rotation: standard deviation of its speed, radians per 25 frames.
     size_variation : float
         Relative amplitude, in [0, 0.5], of a slow change of the diameter over the clip (as of a
         target that comes nearer and recedes).
