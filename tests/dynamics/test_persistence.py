@@ -1,0 +1,117 @@
+"""Which law persists: errors that are smooth, terms that are small, plateaus that compete."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from vidsindy_lite.dynamics import persistence, solver
+from vidsindy_lite.dynamics.persistence import LARGEST, Plateau
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, score
+
+DUFFING = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5}}, degree=3)
+
+
+@pytest.fixture(scope="module")
+def swing():
+    t = np.linspace(0, 30, 600)
+    return t, DUFFING.simulate(t, (1.5, 0))
+
+
+def bent(x, share):
+    """Every coordinate is off by a smooth function of the next."""
+    place = (x - x.mean(axis=0)) / np.ptp(x, axis=0)
+    return x + share * np.ptp(x, axis=0) * np.sin(4 * np.roll(place, 1, axis=1))
+
+
+def drifting(t, x, share):
+    """A slow wander, less than one period over all the record."""
+    wander = np.stack([np.sin(2 * np.pi * (0.7 * t / t[-1] + phase)) for phase in (0.1, 0.6)], 1)
+    return x + share * x.std(axis=0) * wander
+
+
+def test_a_plateau_is_measured_in_decades():
+    assert Plateau(0, 0.01, 1.0, np.ones(3, dtype=bool)).decades == pytest.approx(2)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.2])
+def test_a_path_leads_from_the_errors_left_to_no_law_without_a_break(swing, noise):
+    t, x = swing
+    found = discover(t, add_noise(x, noise, np.random.default_rng(0)))
+    for j, path in enumerate(found.path):
+        assert path[-1].high == pytest.approx(LARGEST)
+        assert path[0].low == pytest.approx(max(noise, 1e-5), rel=0.3)
+        assert all(p.equation == j and p.low < p.high for p in path)
+        for lower, higher in zip(path, path[1:], strict=False):
+            assert lower.high == pytest.approx(higher.low)
+            assert (lower.terms != higher.terms).any()
+
+
+def test_the_law_of_exact_data_is_the_same_over_four_decades(swing):
+    found = discover(*swing)
+    for j, path in enumerate(found.path):
+        widest = max(path, key=lambda plateau: plateau.decades)
+        assert widest.decades > 3.5
+        assert (widest.terms == found.native.support[:, j]).all()
+    assert found.status == "ok"
+
+
+@pytest.mark.parametrize("share", [0.0001, 0.001])
+def test_a_bent_space_does_not_become_terms(swing, share):
+    t, x = swing
+    found = discover(t, bent(x, share))
+    assert score(found, DUFFING).exact
+
+
+def test_a_drift_does_not_become_terms(swing):
+    t, x = swing
+    assert score(discover(t, drifting(t, x, 0.002)), DUFFING).exact
+
+
+def test_a_coarse_integration_does_not_become_terms():
+    truth = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET)
+    t, exact = truth.trajectory(600)
+    path = solve_ivp(lambda _, x: truth(x), (0, t[-1]), exact[0], t_eval=t, rtol=1e-4)
+    assert score(discover(t, path.y.T), truth).exact
+
+
+def test_without_tolerated_errors_smooth_ones_do_become_terms(swing, monkeypatch):
+    """The gate of the tests above: they fail where the path is not followed."""
+    t, x = swing
+    monkeypatch.setattr(solver, "TOLERATED", 0.0)
+    monkeypatch.setattr(persistence, "SMOOTH", 0.0)
+    assert not score(discover(t, bent(x, 0.001)), DUFFING).exact
+
+
+def test_a_small_term_is_found_where_the_errors_allow_it():
+    law = PolynomialSystem.from_terms(
+        {"x": {"y": 1}, "y": {"x": -1, "y": -0.05, "x^3": -0.02}}, degree=3
+    )
+    t = np.linspace(0, 40, 800)
+    x = law.simulate(t, (1.5, 0))
+    assert score(discover(t, x), law).exact
+    assert score(discover(t, add_noise(x, 0.005, np.random.default_rng(0))), law).exact
+
+
+def test_a_law_that_hangs_on_the_tolerated_error_is_told(swing):
+    t, x = swing
+    tiny = PolynomialSystem.from_terms(
+        {"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5, "y": -0.0001}}, degree=3
+    )
+    found = discover(t, tiny.simulate(t, (1.5, 0)))
+    assert found.status == "suspect"
+    (warning,) = found.warnings
+    assert warning.startswith("dy/dt is settled by how large an error is tolerated")
+    assert "and without y from 0.01 to" in warning
+
+
+def test_errors_that_last_widen_the_error_bars(swing):
+    t, x = swing
+    rng = np.random.default_rng(3)
+    white = 0.02 * x.std(axis=0) * rng.standard_normal(x.shape)
+    smooth = np.apply_along_axis(np.convolve, 0, white, np.ones(9) / 3, "same")
+    one, nine = discover(t, x + white), discover(t, x + smooth)
+    assert score(nine, DUFFING).exact
+    live = one.system.support
+    assert (nine.standard_errors[live] > 2 * one.standard_errors[live]).all()
