@@ -312,6 +312,29 @@ def test_a_slope_that_is_noise_tells_nothing(motion, monkeypatch):
     np.testing.assert_allclose(errors[0.25], 2 * errors[1], rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("residuals", "told"),
+    [
+        ((0.2, 0.39, 0.41), "(0, 9, 0) or (0, 8, 0) frames fit about"),  # up to twice the best
+        ((0.01, 0.06, 0.049), "(0, 9, 0) or (0, 7, 0) frames fit about"),  # tracks are no better
+        ((0.2, 0.41, 0.5), None),
+    ],
+)
+def test_lags_fit_equally_well_up_to_a_ratio(motion, monkeypatch, residuals, told):
+    every = dict(zip((9.0, 8.0, 7.0), residuals, strict=True))
+
+    def refined(videos, lags):
+        return vl.Lags(lags, np.ones(3), np.zeros(3), every[lags[1]])
+
+    monkeypatch.setattr(synchrony, "_whole_lags", lambda _: [np.array([0, k, 0]) for k in every])
+    monkeypatch.setattr(synchrony, "_refined", refined)
+    found = learn_lags(filmed(motion, (60,) * 3, (0, 9, 0)), motion[1])
+    assert len(found.warnings) == (told is not None)
+    assert told is None or told in found.warnings[0]
+    smallest = {0.39: 8, 0.06: 7, 0.41: 9}[residuals[1]]
+    assert found.frames.tolist() == [0, smallest, 0]
+
+
 class Shown:
     """Residuals of two numbers in each of 50 frames, of a given size at each pair of lags."""
 

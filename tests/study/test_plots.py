@@ -2,6 +2,7 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas
 import pytest
 from mpl_toolkits.mplot3d import proj3d
 
@@ -54,3 +55,33 @@ def test_what_is_missing_is_shaded_over_time(plot, word):
             ends = shade.get_paths()[0].vertices[:, 0]
             assert t[9] < ends.min() <= t[10]
             assert t[14] <= ends.max() < t[15]
+
+
+def test_every_line_of_a_reconstruction_is_named():
+    t, x = np.arange(5.0), np.zeros((5, 3))
+    legend = plots.plot_reconstruction(t, x, x, 1.0).legends[0]
+    assert [text.get_text() for text in legend.texts] == ["truth", "x", "y", "z"]
+
+
+def test_frames_of_different_sizes_keep_their_own_axes():
+    images = [np.zeros((60, 80, 3), np.uint8), np.zeros((120, 200, 3), np.uint8)]
+    tracks = [np.array([[40.0, 30.0], [np.nan, np.nan]]), np.array([[10.0, 20.0], [30.0, 20.0]])]
+    figure = plots.plot_frames(images, ["a", "b"], tracks, 1)
+    assert [axes.get_xlim()[1] for axes in figure.axes[:2]] == [79.5, 199.5]
+    # The target is magnified where it was seen.
+    assert [len(axes.child_axes) for axes in figure.axes[:2]] == [0, 1]
+
+
+def test_wrong_terms_are_counted_in_whole_numbers_at_the_levels_tried():
+    columns = {"condition": "noise", "method": "ours", "level": [0, 0.15, 0.3], "l2": 0.01}
+    figure = plots.plot_robustness(pandas.DataFrame(columns | {"wrong_terms": [0, 6, 12]}))
+    _, below = figure.axes
+    assert all(tick == round(tick) for tick in below.get_yticks())
+    np.testing.assert_allclose(below.get_xticks(), [0, 15, 30])
+
+
+def test_the_map_of_origins_counts_in_whole_terms():
+    axis = np.linspace(-1, 1, 9)
+    count = 6.6 + np.add.outer(axis**2, axis**2) * 3
+    figure = plots.plot_origin_map(axis, axis, count, np.zeros((2, 2)), (0, 0), (0, 0))
+    np.testing.assert_array_equal(figure.axes[1].get_yticks() % 1, 0)

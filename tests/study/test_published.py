@@ -71,4 +71,4 @@ def test_laws_have_the_printed_number_of_terms(name):
 
 def test_misprints_point_at_laws():
     for misprint in MISPRINTS:
-        assert misprint.equation in LAWS[misprint.method, misprint.system].names
+        assert misprint["equation"] in LAWS[misprint["method"], misprint["system"]].names

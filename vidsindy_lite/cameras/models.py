@@ -365,8 +365,6 @@ def independent(cameras: Sequence[Camera]) -> bool:
     """
     normals = np.array([c.normal for c in cameras if isinstance(c, OrthographicCamera)])
     pinholes = np.array([c.position for c in cameras if isinstance(c, PerspectiveCamera)])
-    if len(normals) < 2 and len(pinholes) < 2:
-        return len(normals) == len(pinholes) == 1
     apart = len(pinholes) > 1 and np.ptp(pinholes, axis=0).max() > 1e-9 * np.abs(pinholes).max()
     turned = len(normals) > 1 and np.linalg.svd(normals, compute_uv=False)[1] > PARALLEL
     return bool(apart or turned or (len(normals) and len(pinholes)))

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..arrays import Floats
-from ..checks import check_integer
+from ..checks import check_integer, check_positive, check_vector
 from ..dynamics import PolynomialSystem
 from .metrics import coefficients_in
 from .published import PublishedScore
@@ -134,11 +134,10 @@ def seen_in(
     clock : float
         Positive.
     """
-    scale = np.asarray(scale, dtype=float)
-    if scale.shape != (law.d,) or not (np.isfinite(scale) & (scale > 0)).all():
+    check_positive("clock", clock)
+    scale = check_vector("scale", scale, law.d)
+    if not (scale > 0).all():
         raise ValueError(f"scale: must be {law.d} positive numbers, got {scale}")
-    if not (np.isfinite(clock) and clock > 0):
-        raise ValueError(f"clock: must be a positive number, got {clock!r}")
     stretched = clock * law.coefficients * scale / np.prod(scale**law.exponents, axis=1)[:, None]
     # A Benchmark has an initial condition and a period, which the stretch does not carry along.
     return PolynomialSystem(law.names, law.exponents, stretched).shift(offset)
@@ -195,23 +194,19 @@ def fit_coordinates(
     library = np.unique(np.concatenate([printed.exponents, truth.exponents]), axis=0)
     target, true = coefficients_in(printed, library), coefficients_in(truth, library)
 
-    def law(parameters: Floats) -> PolynomialSystem:
-        scale, clock = np.exp(parameters[:d]), np.exp(parameters[2 * d :].sum())
-        return seen_in(native, scale, parameters[d : 2 * d], clock)
+    def coordinates(parameters: Floats) -> tuple[Floats, Floats, float]:
+        scale, shift, clock = np.split(parameters, [d, 2 * d])
+        return np.exp(scale), shift, float(np.exp(clock.sum()))
 
     def misfit(parameters: Floats) -> Floats:
-        return ((coefficients_in(law(parameters), library) - target) / norm).ravel()
+        law = seen_in(native, *coordinates(parameters))
+        return ((coefficients_in(law, library) - target) / norm).ravel()
 
     both = (true != 0) & (target / np.where(true, true, 1) > 0)
     clock = [np.log(np.median(target[both] / true[both]))] if free_clock else []
     fit = least_squares(misfit, [*np.zeros(d), *offset, *clock], xtol=1e-14, ftol=1e-14)
-    return Coordinates(
-        scale=np.exp(fit.x[:d]),
-        offset=fit.x[d : 2 * d],
-        clock=float(np.exp(fit.x[2 * d :].sum())),
-        law=law(fit.x),
-        misfit=float(np.linalg.norm(fit.fun)),
-    )
+    found = coordinates(fit.x)
+    return Coordinates(*found, seen_in(native, *found), float(np.linalg.norm(fit.fun)))
 
 
 def coefficients_of(law: PolynomialSystem, support: PolynomialSystem) -> dict[str, float]:

@@ -1,6 +1,6 @@
 """How good a discovered law is: the paper's scores, and the ones it promises without a formula."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -97,10 +97,7 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
     guess, true = coefficients_in(law, library), coefficients_in(truth, library)
     hits = int(((guess != 0) & (true != 0)).sum())
     claimed, actual = int(np.count_nonzero(guess)), int(np.count_nonzero(true))
-    here = coefficients_in(law, truth.exponents)
-    errors = np.full(truth.coefficients.shape, np.nan)
-    support = truth.support
-    errors[support] = np.abs(here[support] / truth.coefficients[support] - 1)
+    wanted = np.where(truth.support, truth.coefficients, np.nan)
     return Score(
         terms_found=hits == actual,
         false_positives=claimed - hits,
@@ -108,7 +105,7 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
         l2=float(np.linalg.norm(guess - true) / np.linalg.norm(true)),
         precision=hits / claimed if claimed else 0.0,
         recall=hits / actual,
-        coefficient_errors=errors,
+        coefficient_errors=np.abs(coefficients_in(law, truth.exponents) / wanted - 1),
     )
 
 
@@ -141,11 +138,8 @@ def pulls(found: Discovery, truth: PolynomialSystem) -> Floats:
         ``(found - true) / standard error``. If the standard errors are right, and the law is, its
         mean square is 1; the coefficients of one law are correlated.
     """
-    laws = (
-        PolynomialSystem(truth.names, found.system.exponents, table)
-        for table in (found.standard_errors, found.coefficients)
-    )
-    errors, values = (coefficients_in(law, truth.exponents) for law in laws)
+    uncertain = replace(found.system, coefficients=found.standard_errors)
+    errors, values = (coefficients_in(law, truth.exponents) for law in (uncertain, found.system))
     seen = truth.support & (errors > 0)
     return (values - truth.coefficients)[seen] / errors[seen]
 

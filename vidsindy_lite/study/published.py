@@ -81,26 +81,6 @@ class PublishedPosition:
         return float(np.linalg.norm(np.subtract(self.found, self.truth)))
 
 
-@dataclass(frozen=True)
-class Misprint:
-    """A print that cannot stand as it is, and how it was read into `LAWS`.
-
-    Parameters
-    ----------
-    method, system : str
-        Key of `LAWS`.
-    equation : str
-        Name of the variable on the left.
-    printed, read_as : str
-    """
-
-    method: str
-    system: str
-    equation: str
-    printed: str
-    read_as: str
-
-
 def _law(equations: Mapping[str, Mapping[str, float | str]]) -> PolynomialSystem:
     """A law as it is printed; text is a fraction: "8/3"."""
     return PolynomialSystem.from_terms({name: _numbers(row) for name, row in equations.items()})
@@ -154,5 +134,6 @@ LAWS: dict[tuple[str, str], PolynomialSystem] = {
 }
 """Table S2 by (method, system), in the paper's reference frame."""
 
-MISPRINTS = tuple(Misprint(**entry) for entry in _PRINTED["misprints"])
-"""Prints of Table S2 that are no polynomial as they stand."""
+MISPRINTS: tuple[dict[str, str], ...] = tuple(_PRINTED["misprints"])
+"""Prints of Table S2 that cannot stand as they are, and how they were read into `LAWS`: method,
+system, equation (the name of the variable on the left), printed, read_as."""

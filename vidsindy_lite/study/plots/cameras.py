@@ -9,7 +9,7 @@ from mpl_toolkits.mplot3d import Axes3D
 
 from ...arrays import Floats
 from ...cameras import Camera, Rig
-from .common import SPACE, finish_space, image_axes
+from .common import SPACE, finish_space
 
 
 def plot_view_plane(camera: Camera, x: Floats) -> Figure:
@@ -110,9 +110,11 @@ def plot_tracks(tracks: Sequence[Floats], rig: Rig) -> Figure:
     """
     figure, panels = plt.subplots(1, len(tracks), figsize=(3.2 * len(tracks), 3.6))
     for i, (axes, track, camera) in enumerate(zip(panels, tracks, rig.cameras, strict=True)):
+        width, height = camera.image_size
         axes.plot(*track.T, color=f"C{i}", lw=0.8)
-        axes.set_title(f"camera {i + 1}")
-        image_axes(axes, camera.image_size)
+        axes.set(title=f"camera {i + 1}", xlabel="u (px)", aspect="equal")
+        axes.set(xlim=(-0.5, width - 0.5), xticks=(0, width // 2, width))
+        axes.set(ylim=(height - 0.5, -0.5), yticks=(0, height // 2, height))
         axes.spines[["top", "right"]].set_visible(True)
     panels[0].set_ylabel("v (px)")
     return figure

@@ -1,7 +1,6 @@
-"""What several modules of figures need: axes in space, axes of an image, curves, line styles."""
+"""What several modules of figures need: axes in space, line styles."""
 
 import numpy as np
-from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d import Axes3D
 
 STYLES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (7, 2)), (0, (1, 1)))
@@ -19,10 +18,3 @@ def finish_space(
         axes.set(**{f"{name}label": f"{name} ({unit})"})
         getattr(axes, f"{name}axis").labelpad = 7
     axes.view_init(elev=elevation, azim=azimuth)
-
-
-def image_axes(axes: Axes, size: tuple[int, int]) -> None:
-    """The limits of an image of a width and a height, with three ticks on each side."""
-    width, height = size
-    axes.set(xlim=(-0.5, width - 0.5), xticks=(0, width // 2, width), xlabel="u (px)")
-    axes.set(ylim=(height - 0.5, -0.5), yticks=(0, height // 2, height), aspect="equal")

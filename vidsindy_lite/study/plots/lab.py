@@ -44,8 +44,6 @@ def plot_table(
     space.set_zlim3d(0, space.get_zlim3d()[1])
     finish_space(space, azimuth=-65, elevation=25, zoom=1.12, unit="mm")
     space.locator_params(nbins=3)
-    for axis in (space.xaxis, space.yaxis, space.zaxis):
-        axis.labelpad = 8
     for k, path in enumerate(x):
         above.plot(*path[:, :2].T, color="0.75", lw=5, label="truth" if k == 0 else None)
     for i, (name, paths) in enumerate(found.items()):

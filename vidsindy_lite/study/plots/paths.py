@@ -108,16 +108,15 @@ def plot_path(t: Floats, x: Floats, curve: Floats) -> Figure:
     return _over_time_and_in_space(t, curves, "not seen", "units of the equations")
 
 
-def plot_attractors(curves: Mapping[str, tuple[Floats, Floats]], columns: int = 4) -> Figure:
+def plot_attractors(curves: Mapping[str, tuple[Floats, Floats]]) -> Figure:
     """True motions and those of the discovered laws, one panel a system (Fig. 2).
 
     Parameters
     ----------
     curves : dict of str to pair of ndarray, shape (n, 3)
         True and simulated states by system, scene units.
-    columns : int
     """
-    columns = min(columns, len(curves))
+    columns = min(len(curves), 4)
     rows = -(-len(curves) // columns)
     size = (3.1 * columns, 3.3 * rows + 0.5) if columns > 1 else (6.5, 5)
     figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False, subplot_kw=SPACE)

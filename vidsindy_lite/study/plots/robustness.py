@@ -117,8 +117,9 @@ def plot_methods(trials: DataFrame) -> Figure:
         One trial of each system, method and source (see `tabulate`); one panel a source.
     """
     sources, methods, systems = (trials[name].unique() for name in ("source", "method", "system"))
-    figure, panels = plt.subplots(1, len(sources), figsize=(10.5, 4.4), sharey=True)
-    for axes, source in zip(np.atleast_1d(panels), sources, strict=True):
+    shape = {"figsize": (10.5, 4.4), "sharey": True, "squeeze": False}
+    figure, (panels,) = plt.subplots(1, len(sources), **shape)
+    for axes, source in zip(panels, sources, strict=True):
         for k, method in enumerate(methods):
             chosen = trials[(trials.source == source) & (trials.method == method)]
             place = np.arange(len(chosen)) + 0.13 * (k - (len(methods) - 1) / 2)
@@ -130,10 +131,9 @@ def plot_methods(trials: DataFrame) -> Figure:
         axes.set(title=source, yscale="log")
         axes.set_xticks(range(len(systems)), systems, rotation=35, ha="right")
         axes.grid(axis="x", visible=False)
-    first = np.atleast_1d(panels)[0]
-    first.plot([], [], "o", ms=8, color="0.4", mfc="white", mew=1.5, label="open: wrong terms")
-    first.set_ylabel(r"relative $\ell_2$ error (%)")
-    handles, labels = first.get_legend_handles_labels()
+    panels[0].plot([], [], "o", ms=8, color="0.4", mfc="white", mew=1.5, label="open: wrong terms")
+    panels[0].set_ylabel(r"relative $\ell_2$ error (%)")
+    handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return figure
 

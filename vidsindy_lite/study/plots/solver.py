@@ -12,6 +12,8 @@ from ...arrays import Bools, Floats
 
 Pair = tuple[Floats, Floats]
 
+_WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 2}  # behind words that lie on lines
+
 
 # ------------------------------------------------------------------------- the curve and its matrix
 
@@ -138,11 +140,11 @@ def plot_histories(
         panels[2].axhline(terms, color="k", lw=0.8, ls=":")
         panels[2].annotate(
             f"truth, {frame}", (1, terms), xycoords=("axes fraction", "data"), fontsize=9,
-            ha="right", va="center", bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
+            ha="right", va="center", bbox=_WHITE,
         )  # fmt: skip
     panels[2].set_yticks(ticks, [str(tick) for tick in ticks])
     panels[2].minorticks_off()
-    panels[2].set_xlabel("wall time (s)")
+    panels[2].set(xlabel="wall time (s)", ylim=(0.7 * min(ticks), None))
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
@@ -173,10 +175,7 @@ def plot_ranks(panels: Mapping[str, tuple[Floats, float | None]], true: Bools) -
         if threshold is not None:
             axes.axhline(threshold, color="k", ls="--", lw=1, label="penalty of a linear term")
         axes.set(yscale="log", xlabel="rank", title=name, xlim=(0, len(values) + 1))
-    handles: dict[str, object] = {}
-    for axes in grid:
-        handles |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=3)
+    figure.legend(*scored[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 
@@ -194,11 +193,8 @@ def plot_windows(thresholds: Floats, exact: Mapping[str, Bools]) -> Figure:
         axes.axhline(-row, color="0.85", lw=1)
         axes.plot(thresholds, np.where(good, -row, np.nan), "s-C0", ms=5)
         if not good.any():
-            middle = np.sqrt(thresholds[0] * thresholds[-1])
-            axes.text(
-                middle, -row, "no threshold", color="C1", ha="center", va="center",
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 2},
-            )  # fmt: skip
+            at = {"xy": (0.5, -row), "xycoords": ("axes fraction", "data")}
+            axes.annotate("no threshold", **at, ha="center", va="center", color="C1", bbox=_WHITE)
     axes.set_yticks(-np.arange(len(exact)), exact)
     axes.set(xscale="log", xlim=(thresholds[0], thresholds[-1]), ylim=(-len(exact) + 0.4, 0.6))
     axes.set_xlabel("threshold (units of the coefficients)")
@@ -236,9 +232,8 @@ def plot_origin_map(
     axes.set(xlim=(x_axis[0], x_axis[-1]), ylim=(y_axis[0], y_axis[-1]), aspect="equal")
     axes.set(xlabel="x of the origin (scene units)", ylabel="y of the origin (scene units)")
     axes.grid(False)
-    legend = axes.legend(loc="lower right", frameon=True, facecolor="0.25", edgecolor="none")
-    for text in legend.get_texts():
-        text.set_color("white")
+    dark = {"frameon": True, "facecolor": "0.25", "edgecolor": "none", "labelcolor": "white"}
+    axes.legend(loc="lower right", **dark)
     return figure
 
 
@@ -261,15 +256,12 @@ def plot_errors_and_bound(labels: Sequence[str], deviations: Floats, errors: Flo
     axes.axhspan(-2, 2, color="0.9", label="truth ± 2 Cramér-Rao bounds")
     axes.axhline(0, color="k", lw=0.8)
     spread = np.linspace(-0.36, 0.36, len(deviations) + 2)[1:-1]
-    for k in range(len(labels)):
-        near = np.abs(deviations[:, k]) <= 1.96 * errors[:, k]
-        for inside, style in ((near, "oC0"), (~near, "sC1")):
-            axes.errorbar(
-                k + spread[inside], deviations[inside, k], 1.96 * errors[inside, k],
-                fmt=style, ms=3.5, lw=0.9, capsize=0,
-            )  # fmt: skip
-    axes.errorbar([], [], [], fmt="oC0", ms=3.5, label="95 % interval holds the truth")
-    axes.errorbar([], [], [], fmt="sC1", ms=3.5, label="does not")
+    place = spread[:, None] + np.arange(len(labels))
+    near = np.abs(deviations) <= 1.96 * errors
+    styles = {"95 % interval holds the truth": (near, "oC0"), "does not": (~near, "sC1")}
+    for label, (inside, style) in styles.items():
+        bars = place[inside], deviations[inside], 1.96 * errors[inside]
+        axes.errorbar(*bars, fmt=style, ms=3.5, lw=0.9, capsize=0, label=label)
     axes.set_xticks(range(len(labels)), labels, rotation=25, ha="right")
     axes.set_ylabel("(estimate - truth) / bound")
     axes.grid(axis="x", visible=False)
