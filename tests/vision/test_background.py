@@ -96,6 +96,8 @@ def test_distances_of_views_from_the_commonest_one():
     assert distance[22] == pytest.approx(np.log(2) * np.sqrt(800) / 0.6)
     assert np.isinf(distance[23:]).all()
     assert np.isinf(view_distances([None, None])).all()
+    many = view_distances([*[blob()] * 250, blob((0, 0.3, 0, 0))])
+    np.testing.assert_allclose(many, [*[0] * 250, 10])
 
 
 def test_views_beside_a_distant_one_must_be_twice_as_close():

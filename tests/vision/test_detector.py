@@ -78,6 +78,7 @@ def test_an_untrained_network_is_sure_of_nothing():
         predictions = Network().eval()(torch.rand(2, 3, 64, 96))
     assert predictions.shape == (2, 5, 16 * 24)
     assert predictions[:, 4].sigmoid().max() < 0.1
+    assert Network().what[-1].bias.sigmoid().item() == pytest.approx(0.01)
 
 
 def test_fused_normalisation_changes_no_value():
@@ -123,6 +124,7 @@ def test_sizes_that_are_no_multiple_of_anything(learned):
     frame = next(render([[140.3, 70.6]], scene, 0))
     (found,) = detections(learned.predict(frame))
     np.testing.assert_allclose(found.centre, [140.3, 70.6], atol=1.5)
+    np.testing.assert_allclose(found.size, 20, rtol=0.35)
 
 
 @pytest.mark.parametrize("seed", range(4))
