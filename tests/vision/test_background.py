@@ -165,7 +165,7 @@ def squares(*boxes, colour=TARGET):
     """A frame with squares (left, top, side), on whole pixels."""
     frame = np.full((SIZE[1], SIZE[0], 3), GROUND, np.uint8)
     for left, top, side in boxes:
-        frame[max(top, 0):top + side, max(left, 0):left + side] = colour
+        frame[max(top, 0) : top + side, max(left, 0) : left + side] = colour
     return frame
 
 

@@ -303,12 +303,12 @@ def test_a_piece_of_a_background_keeps_its_place_and_mixes_its_colours():
     # As large as the frame, from (100, 200); each colour by itself, 0.8 times as bright.
     place, alone = np.array([100, 200]), np.zeros((3, 3))
     piece = training._background(Given(np.log(1.0), place, 0, alone, 0.8), pool)
-    expected = 0.8 * pool[0, 200:200 + training.SIDE, 100:100 + training.SIDE]
+    expected = 0.8 * pool[0, 200 : 200 + training.SIDE, 100 : 100 + training.SIDE]
     np.testing.assert_allclose(piece, expected, atol=0.51)
     # Twice as large, so that it shrinks; red takes half of blue, and the sum of shares stays one.
     mix = np.array([[0, 0, 0], [0, 0, 0], [0.25, 0, 0]])
     piece = training._background(Given(np.log(2.0), place, 0, mix, 1.0), pool)
-    large = pool[0, 200:200 + 2 * training.SIDE, 100:100 + 2 * training.SIDE].astype(float)
+    large = pool[0, 200 : 200 + 2 * training.SIDE, 100 : 100 + 2 * training.SIDE].astype(float)
     small = large.reshape(training.SIDE, 2, training.SIDE, 2, 3).mean(axis=(1, 3))
     small[..., 2] = (0.25 * small[..., 0] + small[..., 2]) / 1.25
     np.testing.assert_allclose(piece, small, atol=1.01)

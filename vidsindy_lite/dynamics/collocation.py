@@ -25,6 +25,9 @@ from .splines import WIDTH, Grid, Segment, normal_band, rows_from
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
+NEARLY = 1e-2
+"""Fall of the objective promised by the next step, below which a fit that ran out of steps has
+converged all the same: a tenth of a standard error, squared."""
 STRONGEST_DAMPING = 1e2
 """Relative Levenberg-Marquardt damping at which a fit that still finds no lower point stops."""
 
@@ -364,7 +367,7 @@ class Collocation:
             After so many steps it ends anyway.
         """
         columns = np.flatnonzero(state.free())
-        value = self.objective(state)
+        value, promise = self.objective(state), np.inf
         damping = 0.0
         for _ in range(max_steps):
             try:
@@ -389,7 +392,8 @@ class Collocation:
                 continue
             state, value = trial, trial_value
             damping = damping / 10 if damping > 1e-8 else 0.0
-        return Fit(state, self, Status.MAX_STEPS)
+        near = damping == 0.0 and promise < NEARLY
+        return Fit(state, self, Status.CONVERGED if near else Status.MAX_STEPS)
 
 
 def _without_systematic(gram: Floats, solved: Floats, size: int) -> tuple[Floats, Floats]:
