@@ -7,7 +7,7 @@ import pytest
 
 from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
-from vidsindy_lite.dynamics.persistence import follow
+from vidsindy_lite.dynamics.persistence import Plateau, follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.dynamics.splines import DEGREE, Segment
@@ -140,3 +140,15 @@ def test_a_fit_that_did_not_converge_is_named_with_advice(duffing, status, words
     (warning,) = diagnose(problem, replace(fit, status=status), path, law, margins)
     assert warning.startswith(f"the last fit did not converge ({status.value})")
     assert words in warning
+
+
+def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
+    problem, fit, path, law, margins = fitted(duffing)
+    rows = range(len(law.terms))
+    other = np.isin(rows, [law.terms.index("x"), law.terms.index("x^2")])
+    (own,) = path.of(fit.state.active)[1:]
+    rival = Plateau(1, own.low / 2, own.high, other)
+    plateaus = (path.plateaus[0], (rival, own))
+    (warning,) = diagnose(problem, fit, replace(path, plateaus=plateaus), law, margins)
+    assert "dy/dt is settled by how large an error is tolerated" in warning
+    assert "with x^2, without x^3" in warning

@@ -128,7 +128,7 @@ def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
         yield (
             f"the curve misses the data of {variable_names(problem.d)[j]} by {ratio[j]:.1f} times "
             "the noise estimated beforehand: the law may lie outside the library (raise the "
-            "degree), or the motion may not be autonomous"
+            "degree), the motion may not be autonomous, or errors last for several samples"
         )
 
 
@@ -147,7 +147,7 @@ def _unmet(fit: Fit) -> Iterator[str]:
 
 
 def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
-    yield from _contested(problem.law(fit.state), path)
+    yield from _contested(problem.law(fit.state).terms, fit.state, path)
     if max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest:
         return  # weaker errors than those tolerated say nothing about the law
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
@@ -158,20 +158,21 @@ def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
     yield from _near_tie(problem, fit.state, model)
 
 
-def _contested(law: PolynomialSystem, path: Path) -> Iterator[str]:
-    """Is the plateau of an equation's law hardly wider than that of another?"""
-    for widest, *others in path.ranked():
-        if others and others[0].decades > RIVAL * widest.decades:
+def _contested(terms: Sequence[str], state: State, path: Path) -> Iterator[str]:
+    """Is there another plateau nearly as wide as that of an equation's law?"""
+    names = variable_names(len(state.moving))
+    for own, ranked in zip(path.of(state.active), path.ranked(), strict=True):
+        others = [plateau for plateau in ranked if (plateau.terms != own.terms).any()]
+        if others and others[0].decades > RIVAL * own.decades:
             rival = others[0]
-            changed = np.flatnonzero(rival.terms != widest.terms)
+            changed = np.flatnonzero(rival.terms != own.terms).tolist()
             change = ", ".join(
-                f"{'with' if rival.terms[k] else 'without'} {law.terms[k]}"
-                for k in changed.tolist()
+                f"{'with' if rival.terms[k] else 'without'} {terms[k]}" for k in changed
             )
             yield (
-                f"d{law.names[widest.equation]}/dt is settled by how large an error is tolerated: "
-                f"it stays the same from {widest.low:.1g} to {widest.high:.1g} of the spread of "
-                f"the data, and {change} from {rival.low:.1g} to {rival.high:.1g}; use cleaner "
+                f"d{names[own.equation]}/dt is settled by how large an error is tolerated: "
+                f"it stays the same from {own.low:.1g} to {own.high:.1g} of the spread of the "
+                f"data, and {change} from {rival.low:.1g} to {rival.high:.1g}; use cleaner "
                 "samples or a longer trajectory"
             )
 

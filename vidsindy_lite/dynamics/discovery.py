@@ -12,6 +12,7 @@ from ..arrays import Floats, Ints
 from ..checks import check_array
 from .collocation import Fit
 from .diagnostics import diagnose
+from .errors import residual_noise
 from .library import shift_generators, shift_matrix, variable_names
 from .persistence import Path, Plateau
 from .polynomials import PolynomialSystem
@@ -94,7 +95,7 @@ class Discovery:
     offset_errors : ndarray, shape (d,)
         Standard errors of the offset; zero along an axis that was not moved.
     noise : ndarray, shape (d,)
-        Estimated standard deviation of the measurement noise, in units of the data.
+        Estimated standard deviation of the errors of single samples, in units of the data.
     warnings : tuple of str
         Why the law should not be trusted, with advice; empty if nothing was found.
     path : tuple of tuple of Plateau
@@ -216,7 +217,7 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
         covariance=moved_covariance,
         native_covariance=covariance[: l * d, : l * d],
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
-        noise=collocation.data_weights**-0.5 * units.scale,
+        noise=residual_noise(fit) * units.scale,
         warnings=diagnose(problem, fit, path, law, margins),
         path=path.plateaus,
         history=tuple(history.steps),
