@@ -23,7 +23,7 @@ from .cameras import (
     residuals,
     rig_template,
 )
-from .dynamics import Discovery, PolynomialSystem, discover
+from .dynamics import Discovery, PolynomialSystem, SplineSINDy, discover
 from .observation import Observation, observe, observe_tracks
 from .pipeline import VideoDiscovery, discover_from_videos
 from .vision import (
@@ -63,4 +63,5 @@ __all__ = [
     "discover",
     "Discovery",
     "PolynomialSystem",
+    "SplineSINDy",
 ]

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import check_grad
 
 from vidsindy_lite.dynamics.library import closure_mask, monomial_exponents
-from vidsindy_lite.dynamics.origin import ShiftedLaw, sparse_origins
+from vidsindy_lite.dynamics.origin import ShiftedLaw, _starts, sparse_origins
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.study import SYSTEMS
 
@@ -113,3 +113,14 @@ def test_origins_are_distinct_within_the_box_and_best_first():
         assert (origin >= low).all()
         assert (origin <= high).all()
         assert all(np.abs(origin - other).max() > 0.02 for other in origins[:i])
+
+
+def test_some_first_origins_make_as_many_coefficients_vanish_as_there_are_axes():
+    offset = np.array([1.3, -0.7, 0.4])
+    law = SYSTEMS["Lorenz"].shift(offset)
+    active = closure_mask(law.exponents, law.support)
+    box = (np.full(3, -2.0), np.full(3, 2.0))
+    starts = _starts(algebra(law, 1e-3), active, np.zeros(3), box, np.random.default_rng(0))
+    # On xz and xy hang both constants and the terms in y and z: three of them fix the origin.
+    assert min(np.abs(start - offset).max() for start in starts) < 1e-6
+    assert len(starts) > 100

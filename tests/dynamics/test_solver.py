@@ -129,6 +129,16 @@ def test_gaps_are_bridged():
     assert len(found.curves) == 1
 
 
+@pytest.mark.parametrize(("kick", "bridges"), [(0.0, True), (0.03, False)])
+def test_a_gap_in_which_the_target_was_kicked_stays_open(kick, bridges):
+    # The kick is small: of a chi-square of thousands it costs some hundreds.
+    t = np.delete(np.linspace(0, 30, 600), slice(290, 330))
+    phase = t + kick * (t > 15)
+    x = np.stack([np.sin(phase), np.cos(phase)], axis=1)
+    found = discover(t, add_noise(x, 0.02, np.random.default_rng(0)), degree=1)
+    assert len(found.curves) == (1 if bridges else 2)
+
+
 @pytest.mark.slow
 def test_missing_single_rows_are_no_gaps():
     truth, t, x = measured("WangSun", 0.02)

@@ -5,6 +5,7 @@ solver: `discover`; its stages use collocation on splines, selection of terms, o
 that last, and persistence: which law stays the same while more error is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings
 law: polynomials, on a library of monomials; integrate solves it
+sindy: the same for code that is written for pysindy
 beside the way: cramer_rao, the least errors that any estimate could have
 """
 
@@ -18,6 +19,7 @@ from .persistence import Plateau
 from .polynomials import PolynomialSystem
 from .problem import Units, term_penalties
 from .selection import closest_rival, subset_search
+from .sindy import SplineSINDy
 from .smoothing import smooth
 from .solver import discover
 from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis

@@ -1,0 +1,86 @@
+"""`SplineSINDy` does what a user of pysindy expects of a model."""
+
+import re
+
+import numpy as np
+import pytest
+
+import vidsindy_lite as vl
+from vidsindy_lite.study import add_noise
+
+LAW = vl.PolynomialSystem.from_terms(
+    {"x0": {"x0": -0.1, "x1": 2}, "x1": {"x0": -2, "x1": -0.1}}, degree=2
+)
+TIMES = np.linspace(0, 15, 400)
+
+
+@pytest.fixture(scope="module")
+def path():
+    return LAW.simulate(TIMES, (2, 0))
+
+
+@pytest.fixture(scope="module")
+def model(path):
+    return vl.SplineSINDy(degree=2).fit(path, t=TIMES)
+
+
+def test_coefficients_features_and_equations_are_those_of_pysindy(model, path, capsys):
+    pysindy = pytest.importorskip("pysindy")
+    other = pysindy.SINDy(optimizer=pysindy.STLSQ(threshold=0.05)).fit(path, t=TIMES)
+    assert model.get_feature_names() == other.get_feature_names()
+    assert model.coefficients().shape == other.coefficients().shape
+    np.testing.assert_allclose(model.coefficients(), other.coefficients(), atol=2e-3)
+    np.testing.assert_allclose(model.predict(path), other.predict(path), atol=5e-3)
+    assert model.score(path, t=TIMES) == pytest.approx(other.score(path, t=TIMES), abs=1e-3)
+    np.testing.assert_allclose(
+        model.simulate(path[0], TIMES), other.simulate(path[0], TIMES), atol=0.05
+    )
+    model.print()
+    ours = capsys.readouterr().out
+    other.print()
+    assert _form(ours) == _form(capsys.readouterr().out)
+
+
+def _form(text):
+    """Printed equations, whatever the numbers are."""
+    return re.sub(r"\d+\.\d+", "#", text).split()
+
+
+def test_the_law_is_that_of_discover(model, path):
+    found = vl.discover(TIMES, path, degree=2)
+    np.testing.assert_array_equal(model.coefficients(), found.coefficients.T)
+    assert model.discovery.status == found.status == "ok"
+
+
+def test_a_time_step_serves_for_even_times(model, path):
+    step = TIMES[1] - TIMES[0]
+    again = vl.SplineSINDy(degree=2).fit(path, t=step)
+    np.testing.assert_allclose(again.coefficients(), model.coefficients(), rtol=1e-6)
+
+
+@pytest.mark.parametrize("times", [TIMES, [TIMES, TIMES], TIMES[1] - TIMES[0]])
+def test_several_trajectories_share_a_law(path, times):
+    rng = np.random.default_rng(0)
+    other = LAW.simulate(TIMES, (-1, 1))
+    runs = [add_noise(run, 0.02, rng) for run in (path, other)]
+    model = vl.SplineSINDy(degree=2, feature_names=("a", "b")).fit(runs, t=times)
+    np.testing.assert_array_equal(model.coefficients() != 0, LAW.coefficients.T != 0)
+    assert model.get_feature_names()[:5] == ["1", "a", "b", "a^2", "a b"]
+    assert model.score(runs, t=times) > 0.9
+
+
+def test_rows_of_nan_are_missing(path):
+    x = path.copy()
+    x[::7] = np.nan
+    model = vl.SplineSINDy(degree=2).fit(x, t=TIMES)
+    np.testing.assert_allclose(model.coefficients(), LAW.coefficients.T, atol=1e-4)
+    assert model.score(x, t=TIMES) > 0.999
+
+
+def test_bad_input_is_named(path):
+    with pytest.raises(ValueError, match=r"feature_names: must name 2 variables, got \('a',\)"):
+        vl.SplineSINDy(feature_names=["a"]).fit(path, t=TIMES)
+    with pytest.raises(ValueError, match="t: must be a positive time step"):
+        vl.SplineSINDy().fit(path, t=0.0)
+    with pytest.raises(ValueError, match="t: must hold times for 2 trajectories, got 1"):
+        vl.SplineSINDy().fit([path, path], t=[TIMES])
