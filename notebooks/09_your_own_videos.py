@@ -210,9 +210,9 @@ save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rat
 
 # %% [markdown]
 # The coefficients are still good to a thousandth, as the solver allows for trails
-# (`cameras.trailing_errors`). The terms need not be: the errors of the tracks last for several frames, so
-# that they look like terms that were left out, and the verdict may be "suspect". Film at a high bit rate
-# if you can.
+# (`cameras.trailing_errors`). The errors of the tracks last for several frames, and what lasts looks like
+# terms that were left out: the solver counts that in, but a small false term or the verdict "suspect" remain
+# possible. Film at a high bit rate if you can.
 
 # %% [markdown]
 # ### The path

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.discovery import _pruned
+from vidsindy_lite.dynamics.discovery import Discovery, _pruned
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import Units
@@ -83,3 +83,61 @@ def test_text_holds_the_warnings():
     x = np.stack([np.sin(t), np.cos(t)], axis=1)
     short = discover(t, add_noise(x, 0.05, np.random.default_rng(0)))
     assert "warning: the trajectory covers only" in str(short)
+
+
+# ----------------------------------------------------------------------- to use a law, and keep it
+
+
+@pytest.fixture(scope="module")
+def spring():
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1, "y": -0.1}}, degree=2)
+    t = np.linspace(0, 12, 200)
+    return law, t, discover(t, law.simulate(t, (1, 0)) + (2, 0), degree=2)
+
+
+def test_a_law_predicts_slopes_and_paths(spring):
+    law, t, found = spring
+    x = np.array([[2.5, 0.5], [1.0, -1.0]])
+    np.testing.assert_allclose(found.predict(x), law(x - (2, 0)), atol=1e-5)
+    np.testing.assert_allclose(found.predict(x[0]), found.predict(x)[0], rtol=1e-12)
+    ahead = found.simulate((2.5, 0.5), t)
+    np.testing.assert_allclose(ahead.x, law.simulate(t, (0.5, 0.5)) + (2, 0), atol=1e-5)
+    assert ahead.status == "ok"
+    np.testing.assert_array_equal(ahead.t, t)
+
+
+def test_a_path_that_diverges_is_told():
+    law = PolynomialSystem.from_terms({"x": {"x^2": 1}})
+    t = np.linspace(0, 0.9, 100)
+    found = discover(t, law.simulate(t, [1.0]), degree=2)  # 1 / (1 - t)
+    ahead = found.simulate([1.0], np.linspace(0, 2, 21))
+    assert ahead.status in {"diverges after t = 0.9", "diverges after t = 1"}
+    assert np.isfinite(ahead.x[:10]).all()
+    assert np.isnan(ahead.x[11:]).all()
+
+
+def test_a_discovery_is_saved_and_loaded_digit_for_digit(spring, tmp_path):
+    _, t, found = spring
+    found.save(tmp_path / "law.json")
+    again = Discovery.load(tmp_path / "law.json")
+    assert str(again) == str(found)
+    assert again.equations("native") == found.equations("native")
+    np.testing.assert_array_equal(again.curve(t), found.curve(t))
+    np.testing.assert_array_equal(again.native_covariance, found.native_covariance)
+    assert again.status == found.status
+    assert [step.stage for step in again.history] == [step.stage for step in found.history]
+    for mine, other in zip(found.path, again.path, strict=True):
+        assert [p.low for p in mine] == [p.low for p in other]
+        assert all((p.terms == q.terms).all() for p, q in zip(mine, other, strict=True))
+    again.save(tmp_path / "copy.json")
+    assert (tmp_path / "copy.json").read_bytes() == (tmp_path / "law.json").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"format": "another", "discovery": {}}', "not JSON"]
+)
+def test_a_file_that_holds_no_discovery_is_refused(tmp_path, text):
+    file = tmp_path / "law.json"
+    file.write_text(text)
+    with pytest.raises(ValueError, match="path: must be a file that `save` has written"):
+        Discovery.load(file)

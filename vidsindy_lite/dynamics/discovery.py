@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import dataclass, field
 
@@ -74,6 +75,24 @@ class History:
                 offset=problem.units.point(state.offset),
             )
         )
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What a law foretells.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+    x : ndarray, shape (n, d)
+        NaN from where the path has left all bounds.
+    status : str
+        ``"ok"``, or where the path diverges.
+    """
+
+    t: Floats
+    x: Floats
+    status: str
 
 
 @dataclass(frozen=True)
@@ -175,6 +194,45 @@ class Discovery:
             inside = (t >= low - slack) & (t <= high + slack)
             values[inside] = spline(np.clip(t[inside], low, high))
         return values
+
+    def predict(self, x: Floats) -> Floats:
+        """Time derivative at states, shape (n, d) or (d,), in units of the data."""
+        return self.system(x)
+
+    def simulate(self, x0: Floats, t: Floats) -> Simulation:
+        """Follow the law from the state ``x0`` at ``t[0]``.
+
+        Parameters
+        ----------
+        x0 : array_like, shape (d,)
+            Where to start.
+        t : array_like, shape (n,)
+            Increasing times.
+        """
+        x = self.system.simulate(t, x0)
+        lost = np.isnan(x).any(axis=1)
+        t = np.asarray(t, dtype=float)
+        status = f"diverges after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
+        return Simulation(t, x, status)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write everything to a text file (JSON), with all digits; `load` reads it."""
+        from .storage import write  # which needs this class
+
+        write(self, path)
+
+    @staticmethod
+    def load(path: str | os.PathLike) -> Discovery:
+        """Read a discovery that `save` has written.
+
+        Raises
+        ------
+        ValueError
+            If the file holds none.
+        """
+        from .storage import read  # which needs this class
+
+        return read(path)
 
     def __str__(self) -> str:
         return "\n".join([self.equations(), *(f"warning: {text}" for text in self.warnings)])

@@ -1,0 +1,71 @@
+"""A discovery as a text file: JSON in which every number keeps all its digits."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from ..checks import check_path
+from .discovery import Discovery, Step
+from .persistence import Plateau
+from .polynomials import PolynomialSystem
+
+FORMAT = "vidsindy_lite discovery, version 1"
+TYPES: dict[str, Any] = {
+    kind.__name__: kind for kind in (Discovery, PolynomialSystem, Plateau, Step)
+}
+
+
+def write(found: Discovery, path: str | os.PathLike) -> None:
+    """Write a discovery to a file."""
+    text = json.dumps({"format": FORMAT, "discovery": _encoded(found)}, indent=1)
+    check_path("path", path).write_text(text + "\n", encoding="utf-8")
+
+
+def read(path: str | os.PathLike) -> Discovery:
+    """Read a discovery from a file that `write` has made.
+
+    Raises
+    ------
+    ValueError
+        If the file holds none.
+    """
+    file = check_path("path", path)
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        found = _decoded(content["discovery"]) if content["format"] == FORMAT else None
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"path: must be a file that `save` has written, got {file}") from error
+    if not isinstance(found, Discovery):
+        raise ValueError(f"path: must be a file that `save` has written, got {file}")
+    return found
+
+
+def _encoded(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return {"type": "array", "dtype": value.dtype.kind, "values": value.tolist()}
+    if isinstance(value, BSpline):
+        return {"type": "spline", "t": _encoded(value.t), "c": _encoded(value.c), "k": value.k}
+    if is_dataclass(value):
+        parts = {field.name: _encoded(getattr(value, field.name)) for field in fields(value)}
+        return {"type": type(value).__name__, **parts}
+    if isinstance(value, tuple | list):
+        return [_encoded(item) for item in value]
+    return value
+
+
+def _decoded(value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(_decoded(item) for item in value)
+    if not isinstance(value, dict):
+        return value
+    kind = value["type"]
+    if kind == "array":
+        return np.array(value["values"], dtype={"f": float, "i": int, "b": bool}[value["dtype"]])
+    parts = {name: _decoded(part) for name, part in value.items() if name != "type"}
+    return BSpline(parts["t"], parts["c"], parts["k"]) if kind == "spline" else TYPES[kind](**parts)
