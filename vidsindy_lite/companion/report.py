@@ -24,7 +24,7 @@ from ..cameras import DISAGREEMENT, residuals
 from ..checks import check_path
 from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
-from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
+from ..study.plots import plot_frames, plot_path, plot_plateaus, plot_residuals, plot_rig
 from ..vision import read_frame, video_info
 from .pages import page
 from .records import as_json
@@ -195,6 +195,8 @@ def _figures(found: VideoDiscovery, paths: Sequence[str | Path]) -> Iterator[tup
             yield "rig", _encoded(plot_rig(found.rig, found.x))
         missed = residuals(found.tracks, found.rig)
         yield "residuals", _encoded(plot_residuals(found.t, missed, DISAGREEMENT))
+        law = found.discovery
+        yield "plateaus", _encoded(plot_plateaus(law.path, law.system.names))
 
 
 def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:

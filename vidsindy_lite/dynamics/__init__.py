@@ -3,8 +3,8 @@
 trajectories -> problem (smoothing: noise, gaps, units) -> solver -> discovery (diagnostics)
 solver: `discover`; its stages use collocation on splines, selection of terms, origin, gaps, errors
 that last, and persistence: which law stays the same while more error is tolerated
-discovery: the result, with error bars from the last fit; diagnostics: all its warnings; storage: the
-result as a file
+discovery: the result, with error bars from the last fit; diagnostics: all its warnings
+storage: the result as a file
 law: polynomials, on a library of monomials; integrate solves it
 sindy: the same for code that is written for pysindy
 beside the way: cramer_rao, the least errors that any estimate could have
