@@ -550,7 +550,7 @@ for s in np.geomspace(0.001, 1, 13):
 # %%
 persistent = discover(t, bent)
 assert score(persistent, truth).exact
-fig = plots.plot_plateaus(persistent.path, persistent.system.names)
+fig = plots.plot_plateaus(persistent)
 caption = "Terms of each equation over the tolerated error: space is bent by 0.3 %, without noise."
 numbers = [[(p.low, p.high, int(p.terms.sum())) for p in path] for path in persistent.path]
 save_figure("solver_path", fig, caption=caption, numbers=dict(zip("xyz", numbers, strict=True)))

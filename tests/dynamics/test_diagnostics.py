@@ -9,7 +9,7 @@ from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
 from vidsindy_lite.dynamics.persistence import Plateau, follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.problem import pose
+from vidsindy_lite.dynamics.problem import Units, pose
 from vidsindy_lite.dynamics.splines import DEGREE, Segment
 from vidsindy_lite.dynamics.trajectories import check_trajectories
 from vidsindy_lite.study import SYSTEMS, corruption
@@ -33,6 +33,7 @@ def fitted(duffing, dropped=None):
     problem = replace(
         pose([(t, x)], [np.empty((*x.shape, 0))], degree=3, rng=np.random.default_rng(0)),
         trajectories=[(t, x)],
+        units=Units(np.zeros(2), np.ones(2), 1.0),
         noise=np.full(2, NOISE),
     )
     segment = Segment.even(t, x, 1 / 8, 0)
@@ -74,8 +75,16 @@ def test_a_narrow_decision_in_the_frame_of_the_data_is_told(duffing):
 def test_a_coordinate_that_lost_its_law_is_told(duffing):
     problem, fit, path, _, _ = fitted(duffing)
     law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
-    (warning,) = diagnose(problem, fit, path, law, np.full(law.coefficients.size, 100.0))
-    assert "no term was found for dy/dt" in warning
+    told = diagnose(problem, fit, path, law, np.full(law.coefficients.size, 100.0))
+    assert any("no term was found for dy/dt" in warning for warning in told)
+
+
+def test_a_law_in_the_data_that_is_not_the_native_one_is_told(duffing):
+    problem, fit, path, law, margins = fitted(duffing)
+    assert diagnose(problem, fit, path, law, margins) == ()
+    other = replace(law, coefficients=law.coefficients * [1.0, 1.5])
+    (warning,) = diagnose(problem, fit, path, other, margins)
+    assert "the law in the frame of the data is not that in its own frame" in warning
 
 
 @pytest.mark.parametrize("size", [1e3, -1e6])

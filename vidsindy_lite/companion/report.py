@@ -195,8 +195,7 @@ def _figures(found: VideoDiscovery, paths: Sequence[str | Path]) -> Iterator[tup
             yield "rig", _encoded(plot_rig(found.rig, found.x))
         missed = residuals(found.tracks, found.rig)
         yield "residuals", _encoded(plot_residuals(found.t, missed, DISAGREEMENT))
-        law = found.discovery
-        yield "plateaus", _encoded(plot_plateaus(law.path, law.system.names))
+        yield "plateaus", _encoded(plot_plateaus(found.discovery))
 
 
 def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:

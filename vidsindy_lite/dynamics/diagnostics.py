@@ -42,6 +42,9 @@ RIVAL = 0.5
 """Width of another plateau, over that of the law's own, from which on the law is contested."""
 UNMET = 1e-2
 """Root mean square residual of the law along the curve, relative to the speed."""
+APART = 0.2
+"""Root mean square distance of the law's two frames along the curve, relative to the speed: more
+than terms that cannot be told from zero make."""
 ADVICE = {
     Status.MAX_STEPS: "its coefficients may be off by more than their errors; use cleaner samples, "
     "or a lower degree",
@@ -75,6 +78,7 @@ def diagnose(
         *_misfit(problem, fit),
         *_unfinished(fit),
         *_unmet(fit),
+        *_another_in_the_data(problem, fit, law),
         *_selection(problem, fit, path),
         *_sampling(problem.trajectories),
         *_standstill(law),
@@ -143,6 +147,18 @@ def _unmet(fit: Fit) -> Iterator[str]:
         yield (
             f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit "
             "did not converge; use more or cleaner samples, or another degree"
+        )
+
+
+def _another_in_the_data(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
+    units, (x, _) = problem.units, fit.collocation.node_states(fit.state.control_points)
+    native = problem.law(fit.state)(x - fit.state.offset)
+    slopes = law(units.point(x)) * units.time / units.scale
+    apart = float(np.sqrt(((slopes - native) ** 2).mean()))
+    if not apart < APART:
+        yield (
+            f"the law in the frame of the data is not that in its own frame (apart by {apart:.2g} "
+            "of the speed): terms that belong together were told apart; use the native law"
         )
 
 

@@ -118,8 +118,9 @@ class Discovery:
     warnings : tuple of str
         Why the law should not be trusted, with advice; empty if nothing was found.
     path : tuple of tuple of Plateau
-        Of each equation, its laws in the native frame over the tolerated error, from the errors
-        that the law leaves up to the spread of the data; the widest is the law.
+        Of each equation, its laws in the native frame over the tolerated error, from the least
+        errors that a law leaves up to the spread of the data. The law is the widest of those that
+        begin below what has to be tolerated.
     history : tuple of Step
         How the fit went.
     curves : tuple of scipy.interpolate.BSpline
@@ -260,11 +261,11 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
-    # What the frame of the data needs is decided at the error at which the terms were chosen.
-    tolerated = max(plateau.low for plateau in path.of(state.active)) / path.own
-    moved, moved_covariance, margins = _pruned(
-        moved, moved_covariance, problem.penalties * max(tolerated, 1.0) ** 2
-    )
+    # What the frame of the data needs is decided at the errors at which the terms were chosen.
+    tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
+    prices = (problem.penalties * tolerated[:, None] ** 2).ravel()
+    moved, moved_covariance, margins = _pruned(moved, moved_covariance, prices)
+    margins /= np.repeat(tolerated**2, l)
     if not state.moving.any():
         margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
     law = PolynomialSystem(names, exponents, moved)
@@ -325,7 +326,6 @@ def _pruned(
     flat = coefficients.T.ravel().copy()
     covariance = covariance.copy()
     original = np.diag(covariance).copy()
-    penalty = np.tile(penalties, shape[0])
     margins = np.full(len(flat), np.inf)
     while True:
         variance = np.diag(covariance)
@@ -337,13 +337,13 @@ def _pruned(
         if len(gone):
             flat[gone] = 0.0
             continue
-        weakness = score / penalty[live]
+        weakness = score / penalties[live]
         if not len(live) or weakness.min() >= 1:
-            margins[live] = score - penalty[live]
+            margins[live] = score - penalties[live]
             break
         weakest = weakness.argmin()
         k = live[weakest]
-        margins[k] = penalty[k] - score[weakest]
+        margins[k] = penalties[k] - score[weakest]
         gain = covariance[:, k] / covariance[k, k]
         flat -= gain * flat[k]
         covariance -= np.outer(gain, covariance[k])

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats
-from .collocation import CLEANEST, Fit, Linearisation, State
+from .collocation import Fit, Linearisation, State
 from .errors import effective_noise, residual_noise
 from .problem import Problem
 from .selection import minimiser, subset_search
@@ -28,13 +28,17 @@ those that make the motion."""
 SMOOTH = 0.1
 """Where errors are smooth, a plateau may begin here: terms below are as likely made by the errors.
 Independent errors average out, and whatever they do not explain is a term."""
+NOISELESS = 1e-4
+"""Errors as small as this are taken for smooth: no measurement is so good, a simulation may be."""
+LASTING = 2.0
+"""Errors are smooth if a signal is left so many times as uncertain as by independent ones."""
 LARGEST = 1.0
 """Largest error on a path: that of no law at all."""
 STEP = 0.1
 """Decades between two laws of a path."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plateau:
     """A range of tolerated errors over which the law of one equation has the same terms.
 
@@ -98,13 +102,9 @@ class Path:
         ]
 
     def of(self, active: Bools) -> list[Plateau]:
-        """The plateau of each equation of a law, the lowest if the path does not hold it."""
+        """The lowest plateau with the terms of each equation of a law, or the lowest of all."""
         return [
-            max(
-                (p for p in path if (p.terms == terms).all()),
-                key=lambda plateau: plateau.decades,
-                default=path[0],
-            )
+            next((p for p in path if (p.terms == terms).all()), path[0])
             for path, terms in zip(self.plateaus, active.T, strict=True)
         ]
 
@@ -116,7 +116,7 @@ class Path:
         return self.model.along(self.fit.state, solution - present, 1.0).of_terms(active)
 
 
-def follow(problem: Problem, fit: Fit, level: float = 0.0) -> Path:
+def follow(problem: Problem, fit: Fit) -> Path:
     """The path of laws around a fit at a physics weight at which the law holds exactly.
 
     Parameters
@@ -125,8 +125,6 @@ def follow(problem: Problem, fit: Fit, level: float = 0.0) -> Path:
         Its prices.
     fit : Fit
         Around which.
-    level : float
-        Errors that have to be tolerated, if they are larger than those that the fit leaves.
     """
     size = problem.exponents.size
     columns = np.concatenate([np.arange(size), size + np.flatnonzero(fit.state.moving)])
@@ -150,8 +148,8 @@ def follow(problem: Problem, fit: Fit, level: float = 0.0) -> Path:
                 low_here = low
             paths[j].append(Plateau(j, low_here, high, terms))
     single, lasting = residual_noise(fit), effective_noise(fit)
-    smooth = bool((lasting > single).any() or (single <= CLEANEST).all())
-    level = max(level, lowest, typical(lasting), SMOOTH if smooth else 0.0)
+    smooth = bool((lasting > LASTING * single).any() or (single <= NOISELESS).all())
+    level = max(lowest, typical(lasting), SMOOTH if smooth else 0.0)
     return Path(fit, model, level, tuple(map(tuple, paths)))
 
 

@@ -396,29 +396,21 @@ def at_own_noise(fit: Fit) -> Fit:
 def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
     """The law with the widest plateau in each equation, and the path on which it lies.
 
-    Where the path could hold a wider plateau still below the errors that a law leaves, the richer
-    law there is fitted, and the path followed from that.
+    The richer laws below the errors that a law leaves are fitted first, and the path followed from
+    the last of them: a missing term leaves smooth errors, too, and only its own law tells.
     """
     deepest, path = fit, follow(problem, fit)
     for _ in range(LONGEST_DESCENT):
-        trial = _refitted(problem, path, _deeper(problem, path), history)
+        lowest = [plateaus[0] for plateaus in path.plateaus]
+        trial = _refitted(problem, path, lowest, history)
         if trial is None:
             break
-        deepest, path = trial, follow(problem, trial, path.level)
+        deepest, path = trial, follow(problem, trial)
     best = [widest for widest, *_ in path.ranked()]
     for known in (fit, deepest):
         if not _changed(known, best):
             return known, path
     return _refitted(problem, path, best, history) or fit, path
-
-
-def _deeper(problem: Problem, path: Path) -> list[Plateau]:
-    """The widest plateaus, or the lowest where a wider one may be out of sight."""
-    unseen = np.log10(path.lowest / typical(problem.noise))
-    return [
-        lowest if lowest.decades + unseen > widest.decades else widest
-        for (widest, *_), (lowest, *_) in zip(path.ranked(), path.plateaus, strict=True)
-    ]
 
 
 def _refitted(

@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from ...arrays import Bools, Floats
-from ...dynamics import Plateau
+from ...dynamics import Discovery
 
 Pair = tuple[Floats, Floats]
 
@@ -242,31 +242,29 @@ def plot_origin_map(
 # ------------------------------------------------------------------------------------ path of laws
 
 
-def plot_plateaus(path: Sequence[Sequence[Plateau]], names: Sequence[str]) -> Figure:
+def plot_plateaus(found: Discovery) -> Figure:
     """Number of terms of each equation over the error that is tolerated.
 
     Parameters
     ----------
-    path : sequence of sequence of Plateau
-        Of each equation; see `Discovery.path`. The widest plateau is drawn broad.
-    names : sequence of str
-        Of the variables.
+    found : Discovery
+        Its path; the plateaus of the law itself are drawn broad.
     """
+    path, names = found.path, found.system.names
     figure, panels = plt.subplots(
         1, len(path), figsize=(2.9 * len(path), 2.8), sharex=True, sharey=True, squeeze=False
     )
-    for axes, plateaus, name in zip(panels[0], path, names, strict=True):
+    for j, (axes, plateaus) in enumerate(zip(panels[0], path, strict=True)):
         edges = [plateaus[0].low, *(plateau.high for plateau in plateaus)]
         counts = [int(plateau.terms.sum()) for plateau in plateaus]
         axes.stairs(counts, edges, color="0.4", baseline=None, label="all laws")
-        widest = max(plateaus, key=lambda plateau: plateau.decades)
-        axes.hlines(
-            widest.terms.sum(), widest.low, widest.high, color="C1", lw=5, label="widest plateau"
-        )
-        axes.set(xscale="log", xlabel="tolerated error / spread", title=f"d{name}/dt")
+        for own in (p for p in plateaus if (p.terms == found.native.support[:, j]).all()):
+            axes.hlines(own.terms.sum(), own.low, own.high, color="C1", lw=5, label="the law")
+        axes.set(xscale="log", xlabel="tolerated error / spread", title=f"d{names[j]}/dt")
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     panels[0, 0].set(ylabel="terms", ylim=(0, None))
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles[:2], labels[:2], loc="outside upper center", ncols=2)
     return figure
 
 
