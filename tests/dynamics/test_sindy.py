@@ -63,7 +63,7 @@ def test_several_trajectories_share_a_law(path, times):
     rng = np.random.default_rng(0)
     other = LAW.simulate(TIMES, (-1, 1))
     runs = [add_noise(run, 0.02, rng) for run in (path, other)]
-    model = vl.SplineSINDy(degree=2, feature_names=("a", "b")).fit(runs, t=times)
+    model = vl.SplineSINDy(degree=2).fit(runs, t=times, feature_names=("a", "b"))
     np.testing.assert_array_equal(model.coefficients() != 0, LAW.coefficients.T != 0)
     assert model.get_feature_names()[:5] == ["1", "a", "b", "a^2", "a b"]
     assert model.score(runs, t=times) > 0.9
@@ -79,8 +79,41 @@ def test_rows_of_nan_are_missing(path):
 
 def test_bad_input_is_named(path):
     with pytest.raises(ValueError, match=r"feature_names: must name 2 variables, got \('a',\)"):
-        vl.SplineSINDy(feature_names=["a"]).fit(path, t=TIMES)
+        vl.SplineSINDy().fit(path, t=TIMES, feature_names=np.array(["a"]).tolist())
+    with pytest.raises(ValueError, match=r"feature_names: must name 2 variables, got \(\)"):
+        vl.SplineSINDy().fit(path, t=TIMES, feature_names=[])
+    with pytest.raises(ValueError, match="degree: must be an integer"):
+        vl.SplineSINDy(degree="a")
+    with pytest.raises(ValueError, match=r"model: must be fitted first: call fit\(x, t\)"):
+        vl.SplineSINDy().predict(path)
+    with pytest.raises(ValueError, match="x: must have shape"):
+        vl.SplineSINDy().fit([], t=1.0)
     with pytest.raises(ValueError, match="t: must be a positive time step"):
         vl.SplineSINDy().fit(path, t=0.0)
     with pytest.raises(ValueError, match="t: must hold times for 2 trajectories, got 1"):
         vl.SplineSINDy().fit([path, path], t=[TIMES])
+    with pytest.raises(ValueError, match="x: must hold at least 4 samples, got 2"):
+        vl.SplineSINDy(degree=1).fit(path, t=TIMES).score(path[:2], t=TIMES[:2])
+
+
+def test_trajectories_of_other_lengths_share_a_law(path):
+    model = vl.SplineSINDy(degree=1).fit([path, path[:200]], t=(TIMES, TIMES[:200]))
+    np.testing.assert_allclose(model.coefficients()[:, 1:], LAW.coefficients[1:3].T, atol=1e-5)
+    first, second = model.predict([path, path[:200]])
+    np.testing.assert_array_equal(first[:200], second)
+    assert model.score([path, path[:200]], t=[TIMES, TIMES[:200]]) > 0.999
+
+
+def test_what_does_not_move_has_no_score(model, path):
+    assert np.isnan(model.score(np.stack([path[:, 0], np.ones(len(path))], axis=1), t=TIMES))
+
+
+def test_small_numbers_and_warnings_are_printed(capsys):
+    law = vl.PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1, "y": -1e-4}})
+    t = np.linspace(0, 30, 600)
+    model = vl.SplineSINDy(degree=2).fit(law.simulate(t, (1, 0)), t=np.array(t[1]))
+    model.print(lhs=["a", "b"])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == ["a = 1.000 x1", "b = -1.000 x0 + -0.0001 x1"]
+    assert lines[2].startswith("warning: dy/dt is settled by")
+    assert repr(model) == "SplineSINDy(degree=2, seed=0)"

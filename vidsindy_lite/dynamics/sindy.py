@@ -8,11 +8,12 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats
-from ..checks import check_array, check_number
+from ..checks import check_array, check_integer, check_number
 from .discovery import Discovery
 from .polynomials import PolynomialSystem
 from .smoothing import smooth
 from .solver import discover
+from .splines import WIDTH
 from .trajectories import check_trajectory
 
 
@@ -26,8 +27,6 @@ class SplineSINDy:
     ----------
     degree : int
         Highest degree of the candidate terms.
-    feature_names : sequence of str, optional
-        Of the state variables; x0, x1, ... by default.
     seed : int
         See `discover`.
 
@@ -37,13 +36,19 @@ class SplineSINDy:
         After `fit`: the law with error bars, status and warnings.
     """
 
-    def __init__(
-        self, degree: int = 3, feature_names: Sequence[str] | None = None, seed: int = 0
-    ) -> None:
-        self.degree, self.feature_names, self.seed = degree, feature_names, seed
+    def __init__(self, degree: int = 3, seed: int = 0) -> None:
+        self.degree = check_integer("degree", degree, 1)
+        self.seed = check_integer("seed", seed)
+        self._law: PolynomialSystem | None = None
+
+    def __repr__(self) -> str:
+        return f"SplineSINDy(degree={self.degree}, seed={self.seed})"
 
     def fit(
-        self, x: Floats | Sequence[Floats], t: float | Floats | Sequence[Floats] = 1.0
+        self,
+        x: Floats | Sequence[Floats],
+        t: float | Floats | Sequence[Floats] = 1.0,
+        feature_names: Sequence[str] | None = None,
     ) -> SplineSINDy:
         """Discover the law of one trajectory or of several.
 
@@ -53,6 +58,8 @@ class SplineSINDy:
             States.
         t : float, array_like, shape (n,), or list of such
             Time step, or times.
+        feature_names : sequence of str, optional
+            Of the state variables; x0, x1, ... by default.
 
         Raises
         ------
@@ -60,39 +67,54 @@ class SplineSINDy:
             As `discover`, or if there are not as many names as variables.
         """
         runs = _runs(x, t)
-        found = discover(runs, degree=self.degree, seed=self.seed)
-        d = found.system.d
-        names = tuple(self.feature_names or (f"x{i}" for i in range(d)))
+        d = runs[0][1].shape[-1]
+        names = tuple(f"x{i}" for i in range(d)) if feature_names is None else tuple(feature_names)
         if len(names) != d:
             raise ValueError(f"feature_names: must name {d} variables, got {names}")
+        found = discover(runs, degree=self.degree, seed=self.seed)
         self._law = PolynomialSystem(names, found.system.exponents, found.coefficients)
         self.discovery: Discovery = found
         return self
 
     @property
     def law(self) -> PolynomialSystem:
-        """The law in the model's own names; an AttributeError before `fit`."""
+        """The law in the model's own names."""
+        if self._law is None:
+            raise ValueError("model: must be fitted first: call fit(x, t)")
         return self._law
 
-    def predict(self, x: Floats) -> Floats:
-        """Time derivative at states, shape (n, d)."""
+    def predict(self, x: Floats | Sequence[Floats]) -> Floats | list[Floats]:
+        """Time derivative at states, shape (n, d), or a list of such."""
+        if _are_several(x):
+            return [self.law(check_array("x", run)) for run in x]
         return self.law(check_array("x", x))
 
     def simulate(self, x0: Floats, t: Floats) -> Floats:
         """The path from ``x0``, shape (n, d); NaN after a blow-up."""
         return self.law.simulate(t, x0)
 
-    def score(self, x: Floats | Sequence[Floats], t: float | Floats | Sequence[Floats]) -> float:
-        """Coefficient of determination of the slopes of smoothed data, mean over the variables."""
-        slopes, predicted = [], []
+    def score(
+        self, x: Floats | Sequence[Floats], t: float | Floats | Sequence[Floats] = 1.0
+    ) -> float:
+        """Coefficient of determination of the slopes of smoothed data, mean over the variables.
+
+        NaN if a variable stands still.
+        """
+        measured, slopes, predicted = [], [], []
         for times, states in _runs(x, t):
-            seen = check_trajectory(times, states)
-            (spline,) = smooth([seen], np.random.default_rng(self.seed)).splines
-            slopes.append(spline.derivative()(seen[0]))
-            predicted.append(self.predict(spline(seen[0])))
+            seen, values = check_trajectory(times, states)
+            if len(seen) < WIDTH:
+                raise ValueError(f"x: must hold at least {WIDTH} samples, got {len(seen)}")
+            (spline,) = smooth([(seen, values)], np.random.default_rng(self.seed)).splines
+            measured.append(values)
+            slopes.append(spline.derivative()(seen))
+            predicted.append(self.law(spline(seen)))
         truth, guess = np.concatenate(slopes), np.concatenate(predicted)
-        left = ((truth - guess) ** 2).sum(axis=0)
-        return float((1 - left / ((truth - truth.mean(axis=0)) ** 2).sum(axis=0)).mean())
+        left, total = (
+            ((truth - middle) ** 2).sum(axis=0) for middle in (guess, truth.mean(axis=0))
+        )
+        moves = np.ptp(np.concatenate(measured), axis=0) > 0
+        return float((1 - left / np.where(moves, total, np.nan)).mean())
 
     def coefficients(self) -> Floats:
         """One row an equation, one column a feature, shape (d, l)."""
@@ -111,11 +133,11 @@ class SplineSINDy:
         ]
 
     def equations(self, precision: int = 3) -> list[str]:
-        """The right-hand sides as text."""
+        """The right-hand sides as text, with so many decimals, or digits where these were zeros."""
         features = self.get_feature_names()
         return [
             " + ".join(
-                f"{value:.{precision}f} {feature}"
+                f"{_number(value, precision)} {feature}"
                 for value, feature in zip(row, features, strict=True)
                 if value
             )
@@ -123,25 +145,42 @@ class SplineSINDy:
             for row in self.coefficients()
         ]
 
-    def print(self, precision: int = 3) -> None:
-        """Print the equations."""
-        for name, right in zip(self.law.names, self.equations(precision), strict=True):
-            print(f"({name})' = {right}")
+    def print(self, lhs: Sequence[str] | None = None, precision: int = 3) -> None:
+        """Print the equations, and warnings if any."""
+        left = [f"({name})'" for name in self.law.names] if lhs is None else lhs
+        for name, right in zip(left, self.equations(precision), strict=True):
+            print(f"{name} = {right}")
+        for warning in self.discovery.warnings:
+            print(f"warning: {warning}")
+
+
+def _number(value: float, precision: int) -> str:
+    text = f"{value:.{precision}f}"
+    return text if float(text) else f"{value:.{precision}g}"
+
+
+def _are_several(x: Floats | Sequence[Floats]) -> bool:
+    """Whether states are those of several trajectories."""
+    return isinstance(x, list | tuple) and all(np.ndim(run) == 2 for run in x)
 
 
 def _runs(
     x: Floats | Sequence[Floats], t: float | Floats | Sequence[Floats]
 ) -> list[tuple[Floats, Floats]]:
     """Times and states of each trajectory."""
-    several = isinstance(x, list | tuple) and np.ndim(x[0]) == 2
+    several = _are_several(x)
     states = [check_array("x", run) for run in (x if several else [x])]
-    if np.ndim(t) == 0:
-        step = check_number("t", cast(float, t))
+    if not states or any(run.ndim != 2 for run in states):
+        raise ValueError("x: must have shape (n, d), or be a list of such, at least one")
+    if several and isinstance(t, list | tuple) and all(np.ndim(times) == 1 for times in t):
+        times = list(t)
+    elif np.ndim(t) == 0:
+        step = check_number("t", np.asarray(t).item())
         if not step > 0:
             raise ValueError(f"t: must be a positive time step or increasing times, got {step:g}")
-        return [(np.arange(len(run), dtype=float) * step, run) for run in states]
-    given = cast(Sequence[Floats], t)
-    times = list(given) if several and np.ndim(given[0]) == 1 else [np.asarray(t)] * len(states)
+        times = [np.arange(len(run), dtype=float) * step for run in states]
+    else:
+        times = [cast(Floats, t)] * len(states)
     if len(times) != len(states):
         raise ValueError(f"t: must hold times for {len(states)} trajectories, got {len(times)}")
     return list(zip(times, states, strict=True))
