@@ -204,13 +204,9 @@ everything = np.arange(exponents.size)
 
 def step_row(n):
     times, states = truth.trajectory(n)
-    whole = dynamics.Collocation.of(
-        [dynamics.Segment(times, states, times)], exponents, np.ones(3), np.ones(3)
-    )
+    whole = dynamics.Collocation.of([dynamics.Segment(times, states, times)], exponents, np.ones(3), np.ones(3))
     P = dynamics.smooth([(times, states)], rng).splines[0].c
-    start = dynamics.State(
-        P, np.zeros(exponents.shape), np.ones(exponents.shape, bool), offset, ~all_axes
-    )
+    start = dynamics.State(P, np.zeros(exponents.shape), np.ones(exponents.shape, bool), offset, ~all_axes)
     seconds = min(timed(lambda: whole.linearise(start, everything), number=1, repeat=3))
     return {"samples": n, "in the band": 12 * P.size, "if dense": P.size**2, "seconds": seconds}
 
@@ -283,18 +279,13 @@ some = slice(0, 400 if full else 300)
 def compare(noise):
     data = t[some], add_noise(clean[some], noise, np.random.default_rng(seed))
     results = []
-    for name, optimise, options in (
-        ("paper's", paper_ado.discover_paper, steps),
-        ("ours", discover, {}),
-    ):
+    for name, optimise, options in (("paper's", paper_ado.discover_paper, steps), ("ours", discover, {})):
         began = perf_counter()
         results.append((name, optimise(*data, **options), perf_counter() - began))
     return results
 
 
-paper_ado.discover_paper(
-    t[:99], x[:99], pretraining=1, epochs=1
-)  # so that PyTorch's start is not timed
+paper_ado.discover_paper(t[:99], x[:99], pretraining=1, epochs=1)  # so that PyTorch's start is not timed
 runs = {noise: compare(noise) for noise in ((0.02, level) if full else (level,))}
 
 
@@ -367,17 +358,10 @@ assert ours.history[-1].terms == native.support.sum()
 
 # %%
 def start(t, x):
-    spline, origin = (
-        dynamics.smooth([(t, x)], np.random.default_rng(seed)).splines[0],
-        x.mean(axis=0),
-    )
-    problem = dynamics.Collocation.of(
-        [dynamics.Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3)
-    )
+    spline, origin = dynamics.smooth([(t, x)], np.random.default_rng(seed)).splines[0], x.mean(axis=0)
+    problem = dynamics.Collocation.of([dynamics.Segment(t, x, t)], exponents, (level * x.std(axis=0)) ** -2, np.ones(3))
     curve, slope = problem.node_states(spline.c)
-    coefficients, squares, *_ = np.linalg.lstsq(
-        dynamics.monomials(curve - origin, exponents), slope
-    )
+    coefficients, squares, *_ = np.linalg.lstsq(dynamics.monomials(curve - origin, exponents), slope)
     terms = np.ones(exponents.shape, dtype=bool)
     state = dynamics.State(spline.c, coefficients, terms, origin, moving=~all_axes)
     return state, problem, squares / len(curve)

@@ -126,9 +126,7 @@ assert lost == 0
 titles = [f"camera {i}" for i in (1, 2, 3)]
 first = [track[:frames] for track in tracks]
 fig = plots.plot_frames(images, titles, first, marked)
-caption = (
-    "The three views when the ball is at the marked point, and its tracks along the first path."
-)
+caption = "The three views when the ball is at the marked point, and its tracks along the first path."
 numbers = {f"camera {i}": track for i, track in enumerate(tracks, start=1)}
 save_figure("lab_frames", fig, caption=caption, numbers=numbers)
 
@@ -151,11 +149,7 @@ error = by_flat - x
 rows = [
     {"": "truth", **dict(zip("xyz", lab.MARKED, strict=True)), "error (mm)": 0.0},
     {"": "paper", **dict(zip("xyz", lab.IDENTIFIED, strict=True)), "error (mm)": published},
-    {
-        "": "here",
-        **dict(zip("xyz", by_flat[marked], strict=True)),
-        "error (mm)": length(error)[marked],
-    },
+    {"": "here", **dict(zip("xyz", by_flat[marked], strict=True)), "error (mm)": length(error)[marked]},
 ]
 assert 3 < length(error)[marked] < 20
 save_table("lab_marked_point", rows, caption="The marked point (mm), by orthographic cameras.")
@@ -198,9 +192,7 @@ for factor in (1, 2, 4, 8, 16):
     found = learn_cameras(pixels, lab.orthographic(far).uncalibrated())
     measured_rms.append(rms(reconstruct(pixels, found) - x))
     predicted_rms.append(rms(lab.orthographic_error(far, found, x)))
-    ratio.append(
-        np.mean([np.ptp(x @ c.normal) / length(c.position - lab.MIDDLE) for c in far.cameras])
-    )
+    ratio.append(np.mean([np.ptp(x @ c.normal) / length(c.position - lab.MIDDLE) for c in far.cameras]))
 assert np.isclose(measured_rms[0], rms(error), rtol=0.05)  # from pixels as from videos
 
 # %%
@@ -315,9 +307,7 @@ tracking = [
     length(track - camera.ball_image(x, lab.RADIUS)[0])
     for camera, track in zip(truth.cameras, tracks, strict=True)
 ]
-print(
-    f"centroid beside centre: up to {np.max(shifts):.3f} px; tracker: up to {np.max(tracking):.3f} px"
-)
+print(f"centroid beside centre: up to {np.max(shifts):.3f} px; tracker: up to {np.max(tracking):.3f} px")
 assert np.max(tracking) < 0.005
 assert 5 * np.max(tracking) < np.max(shifts) < 0.1
 
@@ -340,9 +330,7 @@ results = {
 # %%
 rows = []
 for name, (rig, path) in results.items():
-    scale, angle = np.abs(
-        cameras.calibration_errors(rig, lab.orthographic(truth) if rig is flat else truth)
-    ).max(0)
+    scale, angle = np.abs(cameras.calibration_errors(rig, lab.orthographic(truth) if rig is flat else truth)).max(0)
     row = {"cameras": name, "rms (mm)": rms(path - x), "largest (mm)": length(path - x).max()}
     row |= {"marked point (mm)": length(path - x)[marked]}
     rows.append(row | {"error of scale (%)": 100 * scale, "error of angle (mrad)": 1000 * angle})

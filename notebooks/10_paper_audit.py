@@ -198,13 +198,9 @@ assert abs(of_d["proof"][0]) < 1e-12 < 0.1 < abs(of_d["proof"][1])
 assert np.linalg.det(proof) < 0.99
 
 # %%
-note(
-    "Sec. 3.1, App. A",
-    "v1 = R v0: R takes e_z to the normal",
-    "x_rp = R x_p needs the inverse",
-    f"residual of {missed:.0f} px, path off by {off:.0f} scene units (spread {x.std():.0f})",
-    "no, if data and reconstruction share it; yes for real cameras",
-)
+note("Sec. 3.1, App. A", "v1 = R v0: R takes e_z to the normal", "x_rp = R x_p needs the inverse",
+     f"residual of {missed:.0f} px, path off by {off:.0f} scene units (spread {x.std():.0f})",
+     "no, if data and reconstruction share it; yes for real cameras")
 note("Eq. (S4)", "row 2, column 3 is +u_x sin", "-u_x sin, as in Eq. (S2)",
      f"det {np.linalg.det(proof):.3f}; y_rp changes by {-of_d['proof'][1]:.2f} D",
      "no: misprint, the expansion that follows is of x_rp")  # fmt: skip
@@ -237,13 +233,8 @@ assert not np.allclose(np.abs(signed[:, [1, 2]]), np.abs(offsets), atol=1)
 moved = np.abs(np.abs(offsets) - offsets).max()
 print("offsets", offsets.round(1).tolist())
 assert (offsets < 0).any()
-note(
-    "Sec. 3.1",
-    "axis u = v0 x v1 / |v0 x v1|",
-    "0/0 for a camera along z",
-    str(axis[0]),
-    "only for such cameras; any horizontal axis will do",
-)
+note("Sec. 3.1", "axis u = v0 x v1 / |v0 x v1|", "0/0 for a camera along z", str(axis[0]),
+     "only for such cameras; any horizontal axis will do")
 note("App. C", "offset: distances to X'OZ' and X'OY'", "signed distances to Y'OZ' and X'OZ'",
      f"an image moves by up to {moved:.0f} scene units without signs",
      "for whoever implements the text; X'OY' is a slip for Y'OZ'")  # fmt: skip
@@ -271,20 +262,11 @@ assert worst < 1e-9
 print("closed form: scales and angles are exact to 1e-9")
 
 # %%
-note(
-    "Eq. (5), (6)",
-    "inverse of stacked R^-",
-    "least squares: no inverse exists",
-    f"shapes {np.vstack([second, third]).shape} and {stack.shape}",
-    "no: surely what was computed",
-)
-note(
-    "Eq. (4)",
-    "a loss to be optimised over s, theta",
-    "linear in (s cos, s sin): closed form",
-    "exact to 1e-9 in one solve",
-    "saves iterations and the first guess",
-)
+note("Eq. (5), (6)", "inverse of stacked R^-", "least squares: no inverse exists",
+     f"shapes {np.vstack([second, third]).shape} and {stack.shape}",
+     "no: surely what was computed")
+note("Eq. (4)", "a loss to be optimised over s, theta", "linear in (s cos, s sin): closed form",
+     "exact to 1e-9 in one solve", "saves iterations and the first guess")
 note("Eq. (4)", "the loss for learning cameras 2 and 3", "drops the condition between 2 and 3",
      f"uses {np.linalg.matrix_rank(eq_4)} of {conditions} conditions a frame",
      "a little: more scatter with noisy pixels")  # fmt: skip
@@ -329,20 +311,11 @@ assert shifts[1.0] > 0.1 > shifts[0.1] > 0.01
 end = (knots[:-1] <= times[-1]) & (times[-1] < knots[1:])
 assert not end.any()
 
-note(
-    "Eq. (7)-(10)",
-    "phi is evaluated at x(t; P, Delta)",
-    "then Delta is not determined",
-    "losses unchanged by (P + c, Delta - c)",
-    "yes, as printed; not with phi at x - Delta",
-)
-note(
-    "Eq. (10)",
-    "x is replaced by x - Delta",
-    "one shift too many, unless phi is at x - Delta",
-    f"Lorenz: l2 {shifts[1.0]:.2f} for a shift by (1, 1, 0)",
-    "the same slip",
-)
+note("Eq. (7)-(10)", "phi is evaluated at x(t; P, Delta)", "then Delta is not determined",
+     "losses unchanged by (P + c, Delta - c)",
+     "yes, as printed; not with phi at x - Delta")
+note("Eq. (10)", "x is replaced by x - Delta", "one shift too many, unless phi is at x - Delta",
+     f"Lorenz: l2 {shifts[1.0]:.2f} for a shift by (1, 1, 0)", "the same slip")
 note("Eq. (3)", "spans u_i <= u < u_(i+1)", "no basis function at the last knot",
      f"{int(end.sum())} spans hold it", "no: every library closes the last span")  # fmt: skip
 
@@ -415,22 +388,13 @@ assert differences["NoseHoover, PySINDy"] < 1.5  # 824.44 beside 824.47
 # differed. No spread is given; for clean videos the second is well possible.
 
 # %%
-note(
-    "Table S2",
-    "WangSun, PySINDy: +82.27y",
-    "82.27z",
-    f"l2 {as_printed:.2f} as printed, "
-    f"{as_z['l2 recomputed (e-2)']:.2f} as z; Table 1: {as_z['l2 printed (e-2)']:.2f}",
-    "no: misprint, the score is that of 82.27z",
-)
-note(
-    "Table 1",
-    "l2 of SprottF (own method), Tsucs2 (PySINDy)",
-    "not those of Table S2's laws",
-    f"{sprott['l2 recomputed (e-2)']:.2f} for {sprott['l2 printed (e-2)']:.2f}, "
-    f"{tsucs['l2 recomputed (e-2)']:.2f} for {tsucs['l2 printed (e-2)']:.2f}",
-    "hardly",
-)
+note("Table S2", "WangSun, PySINDy: +82.27y", "82.27z",
+     f"l2 {as_printed:.2f} as printed, "
+     f"{as_z['l2 recomputed (e-2)']:.2f} as z; Table 1: {as_z['l2 printed (e-2)']:.2f}",
+     "no: misprint, the score is that of 82.27z")
+note("Table 1", "l2 of SprottF (own method), Tsucs2 (PySINDy)", "not those of Table S2's laws",
+     f"{sprott['l2 recomputed (e-2)']:.2f} for {sprott['l2 printed (e-2)']:.2f}, "
+     f"{tsucs['l2 recomputed (e-2)']:.2f} for {tsucs['l2 printed (e-2)']:.2f}", "hardly")
 note("Sec. 4.1", "results are averaged over five trials",
      "most errors are, to the last digit, those of one printed law",
      f"{agree} of {len(rows)} rows", "no spread is known")  # fmt: skip
@@ -506,27 +470,14 @@ for name, terms in false.items():
     assert all(term.endswith(": 1") for term in terms)
 
 # %%
-note(
-    "Tables 1, 2, S3",
-    "False positives, P and R",
-    "three columns that exclude one another",
-    f"{len(rows)} rows, {never} not even as averages of five",
-    "for the baselines; one row of its own method: noise 20 %, off by a false positive",
-)
-note(
-    "Table S3",
-    "SprottF, WeakSINDy",
-    "P, R and l2 are NoseHoover's",
-    "R = 7/9 of ten terms",
-    "this row is lost",
-)
-note(
-    "Table 1",
-    "WangSun, own method: one false positive",
-    "Table S2 shows none",
-    f"{own['WangSun'].false_positives} false, l2 {100 * own['WangSun'].l2:.2f} as in Table 1",
-    "in the authors' favour",
-)
+note("Tables 1, 2, S3", "False positives, P and R", "three columns that exclude one another",
+     f"{len(rows)} rows, {never} not even as averages of five",
+     "for the baselines; one row of its own method: noise 20 %, off by a false positive")
+note("Table S3", "SprottF, WeakSINDy", "P, R and l2 are NoseHoover's", "R = 7/9 of ten terms",
+     "this row is lost")
+note("Table 1", "WangSun, own method: one false positive", "Table S2 shows none",
+     f"{own['WangSun'].false_positives} false, l2 {100 * own['WangSun'].l2:.2f} as in Table 1",
+     "in the authors' favour")
 note("Sec. 4.3", "false positives are all small constants", "constants indeed",
      ", ".join(f"{name} {value:g}" for name, terms in false.items() for value in terms.values()),
      "they are what a misplaced origin leaves (see below)")  # fmt: skip
@@ -552,9 +503,7 @@ for name, law in (("NoseHoover", LAWS["PySINDy", "NoseHoover"]), ("WangSun", men
 
 # %%
 fig = plots.plot_ratios(ratios)
-caption = (
-    "PySINDy's coefficients over the true ones (no symbol: not found): printed with a wrong clock."
-)
+caption = "PySINDy's coefficients over the true ones (no symbol: not found): printed with a wrong clock."
 save_figure("audit_factor_ten", fig, caption=caption, numbers=ratios)
 
 # %% [markdown]
@@ -720,14 +669,10 @@ truth, implied = paths.values()
 away = rms(implied - truth) / rms(truth - truth.mean(axis=0))
 print(f"distance of the two, over the spread: {away:.2f}")
 assert away > 0.3
-note(
-    "Table 1, S2",
-    "NoseHoover, own method: 6.22",
-    "the true law, in coordinates of its own",
-    f"stretch of y {fit.scale[1]:.3f}, of z {fit.scale[2]:.3f}, y from {fit.offset[1]:.2f}; "
-    f"l2 left: {100 * fit.misfit:.3f}",
-    "in the authors' favour: cameras, not regression",
-)
+note("Table 1, S2", "NoseHoover, own method: 6.22", "the true law, in coordinates of its own",
+     f"stretch of y {fit.scale[1]:.3f}, of z {fit.scale[2]:.3f}, y from {fit.offset[1]:.2f}; "
+     f"l2 left: {100 * fit.misfit:.3f}",
+     "in the authors' favour: cameras, not regression")
 note("Fig. 2", "discovered and true paths nearly coincide", "not for NoseHoover's printed law",
      f"{away:.0%} of the spread apart",
      "unless the reconstructed path is shown as true")  # fmt: skip
@@ -772,27 +717,12 @@ assert alone.l2 < 0.002
 
 # %%
 low, high = (f(part["constants"] for part in shares.values()) for f in (min, max))
-note(
-    "Sec. 4.1",
-    "l2 of all coefficients",
-    "nearly all its norm is in the constants of the shift",
-    f"{low:.0%} to {high:.0%} of the squared norm",
-    "yes: compare coefficients one by one",
-)
-note(
-    "Table 1, S2",
-    "Tsucs2, own method: 5.39",
-    "hides a coefficient that is off by a third",
-    f"0.63 for 1, {alone.max_coefficient_error:.0%}; alone l2 = {100 * alone.l2:.2f}",
-    "as above",
-)
-note(
-    "Sec. 4.1",
-    "a non-dimensional measure is introduced",
-    "it is not defined",
-    "",
-    "not reproducible",
-)
+note("Sec. 4.1", "l2 of all coefficients", "nearly all its norm is in the constants of the shift",
+     f"{low:.0%} to {high:.0%} of the squared norm", "yes: compare coefficients one by one")
+note("Table 1, S2", "Tsucs2, own method: 5.39", "hides a coefficient that is off by a third",
+     f"0.63 for 1, {alone.max_coefficient_error:.0%}; alone l2 = {100 * alone.l2:.2f}", "as above")
+note("Sec. 4.1", "a non-dimensional measure is introduced", "it is not defined", "",
+     "not reproducible")
 note("Sec. 4.1, Fig. 3", "up to 20 % noise nearly exact", "noise level: of what, is not said", "",
      "ours is stated in the README")  # fmt: skip
 
@@ -810,13 +740,8 @@ assert len(SYSTEMS_S1) != DATASETS_CLAIMED
 assert 8.865 < LAB.error < 8.875
 assert share > 0.8
 
-note(
-    "Sec. 4",
-    f"{DATASETS_CLAIMED} datasets",
-    "as many as the footnote lists",
-    str(len(SYSTEMS_S1)),
-    "no",
-)
+note("Sec. 4", f"{DATASETS_CLAIMED} datasets", "as many as the footnote lists",
+     str(len(SYSTEMS_S1)), "no")
 note("Lab experiment", "closely aligning with the ground truth", "the distance, which is not given",
      f"{LAB.error:.2f} mm, {LAB.error / LAB.truth[2]:.2f} of the ball's radius",
      "a matter of words; one position of one path")  # fmt: skip
