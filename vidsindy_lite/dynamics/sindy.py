@@ -171,7 +171,8 @@ def _runs(
     several = _are_several(x)
     states = [check_array("x", run) for run in (x if several else [x])]
     if not states or any(run.ndim != 2 for run in states):
-        raise ValueError("x: must have shape (n, d), or be a list of such, at least one")
+        shapes = [run.shape for run in states]
+        raise ValueError(f"x: must have shape (n, d), or be a list of such, got shapes {shapes}")
     if several and isinstance(t, list | tuple) and all(np.ndim(times) == 1 for times in t):
         times = list(t)
     elif np.ndim(t) == 0:
