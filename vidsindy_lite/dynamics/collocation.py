@@ -267,9 +267,7 @@ class Collocation:
         """
         physics, unknowns = self._derivatives(state, columns)
         data_residual, sizes = self.data_residual(state.control_points)
-        band = self._data_band + normal_band(physics)
-        band[0] += damping * band[0] + 1e-12 * band[0].max()
-        factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+        factor = self._factor(physics, damping)
 
         right = physics.T @ unknowns
         right[:, 0] += (self.grid.samples.T @ (data_residual * self.data_weights)).ravel()
@@ -292,6 +290,17 @@ class Collocation:
             curve_step=-solved[:, :, 0],
             curve_response=-solved[:, :, 1:],
         )
+
+    def _factor(self, physics: sparse.csr_array, damping: float = 0.0) -> Floats:
+        """Cholesky factor of the normal matrix of the control points, in lower banded storage."""
+        band = self._data_band + normal_band(physics)
+        band[0] += damping * band[0] + 1e-12 * band[0].max()
+        return cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+
+    def factor(self, state: State) -> tuple[Floats, sparse.csr_array]:
+        """That factor at a state, and the Jacobian of the weighted physics residual, (k d, r d)."""
+        physics, _ = self._derivatives(state, np.array([], dtype=int))
+        return self._factor(physics), physics
 
     def _derivatives(self, state: State, columns: Ints) -> tuple[sparse.csr_array, Floats]:
         """The weighted physics residual around a state.

@@ -87,6 +87,9 @@ class Problem:
         Price of a term; see `term_penalties`.
     slack : ndarray, shape (d,)
         Misfit of a plain regression on the smoothed curves: the scale of physics weights.
+    process_noise : ndarray, shape (d,)
+        What random kicks leave of each equation, root mean square over a sample; zero for a law
+        that holds exactly.
     """
 
     measured: list[Trajectory]
@@ -99,6 +102,7 @@ class Problem:
     exponents: Ints
     penalties: Floats
     slack: Floats
+    process_noise: Floats
 
     @property
     def d(self) -> int:
@@ -136,8 +140,9 @@ class Problem:
         return self.systematic[segment.trajectory][np.searchsorted(t, segment.t)]
 
     def weighted(self, collocation: Collocation, weight: float) -> Collocation:
-        """The same with another physics weight, relative to the slack."""
-        return collocation.weighted(collocation.data_weights, weight / self.slack**2)
+        """The same with another physics weight, relative to the slack, as far as kicks allow."""
+        physics = 1.0 / np.maximum(self.slack**2 / weight, self.process_noise**2)
+        return collocation.weighted(collocation.data_weights, physics)
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
@@ -190,6 +195,7 @@ def pose(
         exponents=exponents,
         penalties=term_penalties(exponents),
         slack=np.ones(x.shape[1]),
+        process_noise=np.zeros(x.shape[1]),
     )
     return replace(problem, slack=_slack(problem))
 
