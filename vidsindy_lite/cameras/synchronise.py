@@ -365,5 +365,3 @@ def _pair_missed(
         missed = np.abs(design @ solution - target)
         fits = missed <= np.quantile(missed, _TRIMMED)
     return float(np.sqrt(np.mean(missed[fits] ** 2)))
-
-
