@@ -29,8 +29,8 @@ from scipy.interpolate import make_interp_spline
 from ..arrays import Bools, Floats
 from ..checks import check_positive, check_tracks, check_vector
 from .calibrate import cameras_of_views, check_learnable
+from .camera import Camera
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
-from .models import Camera
 from .rig import Rig
 from .triangulate import (
     Views,
