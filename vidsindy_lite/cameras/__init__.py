@@ -1,7 +1,9 @@
 """Pixels and space: cameras, and what several of them that watch one target say of it.
 
     geometry      rotations and planes
+    camera        what all cameras have in common: place, image, errors of what was measured
     models        the two models of camera: orthographic and perspective
+    lens          what a lens does to the image: distortion
     rig           the cameras that watch one scene, and their file
     unknowns      what is unknown of a rig: as one vector, and linear equations for it
  1. synchronise   tracks -> when each camera started (`Lags`)
@@ -19,7 +21,8 @@ from .alignment import align
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
-from .models import Camera, OrthographicCamera, PerspectiveCamera
+from .camera import Camera
+from .models import OrthographicCamera, PerspectiveCamera
 from .rig import Rig, rig_template
 from .synchronise import DISAGREEMENT, Lags, disagreement, learn_lags, list_lags
 from .triangulate import reconstruct, residuals

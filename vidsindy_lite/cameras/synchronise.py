@@ -27,8 +27,8 @@ from numpy.typing import ArrayLike
 from ..arrays import Bools, Floats
 from .alignment import Curve, aligned, check_clocks, check_lags, check_rates, curve
 from .calibrate import cameras_of_views, check_learnable
+from .camera import Camera
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
-from .models import Camera
 from .rig import Rig
 from .triangulate import (
     Views,
