@@ -355,7 +355,7 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
         bridged = problem.weighted(bridged, weight)
         trial = bridged.solve(trial, tolerance=1.0, max_steps=10).state
     # A bridge takes away the freedom of one initial condition: so much may the fit lose.
-    freedom = problem.d * len(group) + bridged.grid.x.size - fit.collocation.grid.x.size
+    freedom = problem.d * len(group) + (bridged.counts - fit.collocation.counts).sum()
     loss = bridged.objective(trial) - fit.collocation.objective(fit.state)
     if loss < freedom + 4 * np.sqrt(2 * freedom):
         return replace(fit, state=trial, collocation=bridged)
