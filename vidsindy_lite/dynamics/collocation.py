@@ -326,6 +326,24 @@ class Collocation:
         physics, _ = self._derivatives(state, np.array([], dtype=int))
         return self._factor(physics), physics
 
+    def data_pull(self, errors: Floats) -> Floats:
+        """Right-hand sides of the control points, (r d, m), for errors in noise units, (n, d, m)."""
+        weighted = np.sqrt(self._sample_weights)[:, :, None] * errors
+        pull = self.grid.samples.T @ weighted.reshape(len(self.grid.x), -1)
+        return pull.reshape(self.grid.r * self.d, -1)
+
+    def data_freedom(self, probes: Floats, solved: Floats) -> Floats:
+        """How many measurements of each coordinate the curve uses up, (d,): Hutchinson's trace.
+
+        From random vectors of +-1, (r d, m), and what the normal matrix makes of them.
+        """
+        shape = (len(self.grid.x), self.d, -1)
+        seen, answer = (
+            (self.grid.samples @ v.reshape(self.grid.r, -1)).reshape(shape)
+            for v in (probes, solved)
+        )
+        return ((seen * answer).mean(axis=2) * self._sample_weights).sum(axis=0)
+
     def _derivatives(self, state: State, columns: Ints) -> tuple[sparse.csr_array, Floats]:
         """The weighted physics residual around a state.
 

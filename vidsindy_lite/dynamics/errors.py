@@ -87,7 +87,9 @@ def prediction_gain(fit: Fit) -> Floats:
     """
     residual, _ = fit.collocation.data_residual(fit.state.control_points)
     n = len(residual)
-    covariances = np.stack([(residual[k:] * residual[: n - k]).sum(axis=0) for k in range(ORDER + 1)])
+    covariances = np.stack(
+        [(residual[k:] * residual[: n - k]).sum(axis=0) for k in range(ORDER + 1)]
+    )
     return np.array([_levinson(covariance, n) for covariance in covariances.T])
 
 

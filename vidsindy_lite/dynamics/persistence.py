@@ -73,6 +73,8 @@ class Path:
         Around which the laws are found.
     model : Linearisation
         Its quadratic model in all terms.
+    own : float
+        The errors that the fit was weighted with; those of the law, where kicks are larger.
     level : float
         Errors that have to be tolerated: a plateau that begins above them is no law of these data.
     plateaus : tuple of tuple of Plateau
@@ -81,13 +83,9 @@ class Path:
 
     fit: Fit
     model: Linearisation
+    own: float
     level: float
     plateaus: tuple[tuple[Plateau, ...], ...]
-
-    @property
-    def own(self) -> float:
-        """The errors that the fit was weighted with."""
-        return typical(self.fit.collocation.data_weights**-0.5)
 
     @property
     def lowest(self) -> float:
@@ -131,8 +129,10 @@ def follow(problem: Problem, fit: Fit) -> Path:
     model = fit.collocation.linearise(fit.state, columns)
     prices = np.append(np.tile(problem.penalties, problem.d), np.full(len(columns) - size, -np.inf))
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
-    own = typical(fit.collocation.data_weights**-0.5)
-    lowest = min(typical(residual_noise(fit)), LARGEST / 10**STEP)
+    own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))
+    single = np.full(problem.d, own) if problem.kicked else residual_noise(fit)
+    lasting = single if problem.kicked else effective_noise(fit)
+    lowest = min(typical(single), LARGEST / 10**STEP)
     count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
     levels = np.geomspace(lowest, LARGEST, count + 1)
     paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
@@ -147,10 +147,9 @@ def follow(problem: Problem, fit: Fit) -> Path:
             else:
                 low_here = low
             paths[j].append(Plateau(j, low_here, high, terms))
-    single, lasting = residual_noise(fit), effective_noise(fit)
     smooth = bool((lasting > LASTING * single).any() or (single <= NOISELESS).all())
     level = max(lowest, typical(lasting), SMOOTH if smooth else 0.0)
-    return Path(fit, model, level, tuple(map(tuple, paths)))
+    return Path(fit, model, own, level, tuple(map(tuple, paths)))
 
 
 def typical(noise: Floats) -> float:

@@ -14,7 +14,8 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
-from .collocation import CLEANEST, Collocation, State
+from .collocation import CLEANEST, Collocation, Fit, State
+from .errors import effective_noise
 from .library import monomial_exponents, monomials, variable_names
 from .polynomials import PolynomialSystem
 from .smoothing import smooth
@@ -150,6 +151,18 @@ class Problem:
         """The same with another physics weight, relative to the slack, as far as kicks allow."""
         physics = 1.0 / np.maximum(self.slack**2 / weight, self.process_noise**2)
         return collocation.weighted(collocation.data_weights, physics)
+
+    @property
+    def kicked(self) -> bool:
+        """Whether the law holds but for random kicks."""
+        return bool(self.process_noise.any())
+
+    def errors(self, fit: Fit) -> Floats:
+        """How large the errors of the data are by a fit, (d,), were they independent.
+
+        A curve that may leave its law follows the errors, too: then they are as estimated.
+        """
+        return self.noise if self.kicked else effective_noise(fit)
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""

@@ -1,14 +1,16 @@
 """Process noise: random kicks of the motion, told from errors of the measurement by evidence.
 
-A law that leaves more than the noise of the data can be exact and badly measured (errors that
-last), or well measured and not exact (kicks at every instant). Both are Gaussian models of the
-same data, so their marginal likelihoods can be compared (MacKay 1992; weak-constraint 4D-Var):
-``evidence`` is minus twice its logarithm, with the curve integrated out.
+A law that leaves more than the noise of the data may be exact and measured with errors that last,
+or measured well and not exact: kicked at every instant. Both are Gaussian models of the same data,
+so their marginal likelihoods can be compared (MacKay 1992); in the language of data assimilation,
+a strong against a weak constraint. And kicks have a spectrum of their own: what lasts, such as a
+bent space or a law outside the library, is none.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_solve_banded
@@ -22,9 +24,16 @@ from .splines import Segment
 PROBES = 8
 """Random vectors of a trace (Hutchinson): they leave an error of a hundredth at 1,500 samples."""
 MOST_UPDATES, SETTLED = 20, 0.1
-"""Updates of the two variances, and the change (of the logarithm) at which they end."""
+"""Updates of the variances, and the change of a logarithm at which they end."""
 HARDEST = 1e8
 """Physics weight, relative to the misfit of a plain regression, that leaves no room for kicks."""
+OCTAVE = 8
+"""Frequencies of the lowest band of a spectrum; each next one has twice as many."""
+UNLIKE, BLUR = 4.0, 0.15
+"""Distance between two spectra in standard errors from which on they differ, and the error of a
+band's logarithm that splines make by themselves."""
+LEAST = 1e-300
+"""Keeps a quotient finite where nothing is left."""
 
 
 def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
@@ -42,19 +51,12 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     segments = [
         Segment.even(s.t, s.x, problem.spacing, s.trajectory) for s in fit.collocation.segments
     ]
-    grid = problem.collocation(segments, residual_noise(fit))
-    control = fit_curves(grid, fit.collocation.grid.splines(fit.state.control_points))
-    exact = problem.weighted(grid, HARDEST).solve(replace(fit.state, control_points=control))
-    noise = residual_noise(exact)
-    exact = exact.collocation.weighted(noise**-2, exact.collocation.physics_weights).solve(
-        exact.state
-    )
-    residual, _ = exact.collocation.data_residual(exact.state.control_points)
-    lasting = evidence(exact) + prediction_gain(exact).sum()
+    exact = _measured_badly(problem, fit, segments)
     every = replace(exact.state, active=np.ones_like(fit.state.active))
     kicked = _balanced(problem.weighted(problem.collocation(segments), 1.0), every, rng)
-    newcomers = int((~fit.state.active).sum())  # each gains 1 by chance
-    if not evidence(kicked) < lasting - 2 * newcomers:
+    newcomers = int((~fit.state.active).sum())  # each of them gains 1 by chance
+    measured = evidence(exact) + prediction_gain(exact).sum()
+    if not evidence(kicked) + 2 * newcomers < measured or unlike_kicks(kicked, rng) > UNLIKE:
         return problem
     weights = kicked.collocation
     return replace(
@@ -66,42 +68,75 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
 
 def evidence(fit: Fit) -> float:
     """Minus twice the log marginal likelihood of a fit; comparable on the same knots."""
-    collocation = fit.collocation
+    collocation, grid = fit.collocation, fit.collocation.grid
     factor, _ = collocation.factor(fit.state)
-    grid = collocation.grid
-    weights = len(grid.x) * np.log(collocation.data_weights).sum()
+    weights = collocation.counts @ np.log(collocation.data_weights)
     weights += np.log(np.outer(grid.node_weights, collocation.physics_weights)).sum()
     return float(collocation.objective(fit.state) - weights + 2 * np.log(factor[0]).sum())
+
+
+def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
+    """The exact law on other knots, at the errors that it leaves."""
+    grid = problem.collocation(segments, residual_noise(fit))
+    curves = fit.collocation.grid.splines(fit.state.control_points)
+    state = replace(fit.state, control_points=fit_curves(grid, curves))
+    exact = problem.weighted(grid, HARDEST).solve(state)
+    own = exact.collocation.weighted(residual_noise(exact) ** -2, exact.collocation.physics_weights)
+    return own.solve(exact.state)
 
 
 def _balanced(collocation: Collocation, state: State, rng: np.random.Generator) -> Fit:
     """The fit at the variances of noise and kicks that make the data most likely.
 
-    Each variance is the mean square of its residual, over the share of its equations that is not
-    used up by the curve (MacKay's update).
+    Each is the sum of the squares of its residuals, over how many of these the curve has not used
+    up (MacKay's update).
     """
     grid, d = collocation.grid, collocation.d
     probes = rng.choice([-1.0, 1.0], (grid.r * d, PROBES))
-    limit = HARDEST * collocation.physics_weights
+    hardest = HARDEST * collocation.physics_weights
     for _ in range(MOST_UPDATES):
         fit = collocation.solve(state, tolerance=1.0, max_steps=10)
         state, collocation = fit.state, fit.collocation
         factor, physics = collocation.factor(state)
         solved = cho_solve_banded((factor, True), probes)
-        follows = (physics @ probes) * (physics @ solved)
-        law = follows.mean(axis=1).reshape(-1, d).sum(axis=0)
-        probe, answer = ((grid.samples @ v.reshape(grid.r, -1)) for v in (probes, solved))
-        data = (probe * answer).reshape(len(grid.x), d, PROBES).mean(axis=2).sum(axis=0)
-        data *= collocation.data_weights
+        in_law = ((physics @ probes) * (physics @ solved)).mean(axis=1).reshape(-1, d).sum(axis=0)
+        in_data = collocation.data_freedom(probes, solved)
         residual, _ = collocation.data_residual(state.control_points)
-        missed = grid.node_weights @ collocation.physics_residual(state) ** 2
-        nodes = len(grid.node_weights)
-        left = np.maximum(len(grid.x) - data, 1.0) / np.maximum((residual**2).sum(axis=0), 1e-300)
-        kicks = np.maximum(nodes - law, 1.0) / np.maximum(missed, 1e-300)
-        left, kicks = np.minimum(left, CLEANEST**-2), np.minimum(kicks, limit)
-        change = np.log(np.concatenate([left, kicks]))
-        change -= np.log(np.concatenate([collocation.data_weights, collocation.physics_weights]))
-        collocation = collocation.weighted(left, kicks)
+        missed = (collocation.precision * residual**2).sum(axis=0)
+        kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
+        data = np.maximum(collocation.counts - in_data, 1.0) / np.maximum(missed, LEAST)
+        law = np.maximum(len(grid.node_weights) - in_law, 1.0) / np.maximum(kicked, LEAST)
+        data, law = np.minimum(data, CLEANEST**-2), np.minimum(law, hardest)
+        change = np.log([data / collocation.data_weights, law / collocation.physics_weights])
+        collocation = collocation.weighted(data, law)
         if (np.abs(change) < SETTLED).all():
             break
     return collocation.solve(state, tolerance=1.0)
+
+
+def unlike_kicks(fit: Fit, rng: np.random.Generator) -> float:
+    """How far what the law misses is from what independent kicks and errors would leave.
+
+    Both are simulated and smoothed as the data were; their spectra are compared by octaves: the
+    largest distance between the logarithms of a band, in standard errors.
+    """
+    collocation, grid, d = fit.collocation, fit.collocation.grid, fit.collocation.d
+    factor, physics = collocation.factor(fit.state)
+    kicks = rng.standard_normal((physics.shape[0], PROBES))
+    errors = rng.standard_normal((len(grid.x), d, PROBES))
+    pull = collocation.data_pull(errors) - physics.T @ kicks
+    simulated = kicks + physics @ cho_solve_banded((factor, True), pull)
+    root = np.sqrt(grid.node_weights[:, None] * collocation.physics_weights)
+    found = _bands((root * collocation.physics_residual(fit.state))[:, :, None])
+    expected = _bands(simulated.reshape(-1, d, PROBES))
+    count = OCTAVE * 2.0 ** np.maximum(np.arange(len(found)) - 1, 0)
+    distance = np.abs(np.log(np.maximum(found, LEAST) / np.maximum(expected, LEAST)))
+    return float((distance / np.sqrt(1 / count + BLUR**2)[:, None]).max())
+
+
+def _bands(signal: Floats) -> Floats:
+    """Mean power of signals of shape (k, d, m) in octaves of frequency, (bands, d)."""
+    power = (np.abs(np.fft.rfft(signal, axis=0)[1:]) ** 2).mean(axis=2) / len(signal)
+    octaves = int(np.log2(max(len(power) / OCTAVE, 1.0)))
+    edges = [0, *(OCTAVE * 2 ** np.arange(octaves + 1)).tolist()]
+    return np.stack([power[low:high].mean(axis=0) for low, high in pairwise(edges)])

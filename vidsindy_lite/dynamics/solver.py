@@ -22,9 +22,9 @@ from ..arrays import Floats
 from ..checks import check_integer
 from .collocation import Fit
 from .discovery import Discovery, History, conclude
-from .errors import effective_noise
 from .persistence import Path, Plateau, follow, typical
 from .problem import Problem, fit_curves, pose
+from .process_noise import with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, search
 from .selection import inverse
 from .trajectories import check_systematic, check_trajectories
@@ -94,9 +94,12 @@ def discover(
     history = History()
     problem = pose(trajectories, shared, degree, probes)
     with tqdm(total=3, disable=not progress, desc="discover", leave=False) as bar:
-        fit = search(problem, degree, starts, history)
+        fit = polish(problem, search(problem, degree, starts, history), history)
         bar.update()
-        fit = polish(problem, fit, history)
+        if (problem.errors(fit) > CONSISTENT * problem.noise).any():
+            problem = with_process_noise(problem, fit, probes)
+        if problem.kicked:
+            fit = polish(problem, search(problem, degree, starts, history), history)
         bar.update()
         fit, path = settle(problem, fit, history)
         bar.update()
@@ -110,7 +113,7 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     for _ in range(MOST_HALVINGS):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
-        finer = problem.collocation(segments, effective_noise(fit))
+        finer = problem.collocation(segments, problem.errors(fit))
         splines = fit.collocation.grid.splines(fit.state.control_points)
         state = replace(fit.state, control_points=fit_curves(finer, splines))
         fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
@@ -124,10 +127,10 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     return fit
 
 
-def at_own_noise(fit: Fit) -> Fit:
+def at_own_noise(problem: Problem, fit: Fit) -> Fit:
     """The same fit, weighted with the errors that it leaves."""
     collocation = fit.collocation
-    weighted = collocation.weighted(effective_noise(fit) ** -2, collocation.physics_weights)
+    weighted = collocation.weighted(problem.errors(fit) ** -2, collocation.physics_weights)
     return weighted.solve(fit.state, EXACT)
 
 
@@ -165,10 +168,10 @@ def _refitted(
     for weight in SEARCH_WEIGHTS:
         collocation = problem.weighted(collocation, weight)
         state = collocation.solve(state, tolerance=1.0, max_steps=10).state
-    fit = at_own_noise(collocation.solve(state, EXACT))
+    fit = at_own_noise(problem, collocation.solve(state, EXACT))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     largest = max(plateau.low for plateau in changed)
-    return fit if typical(effective_noise(fit)) <= CONSISTENT * largest else None
+    return fit if typical(problem.errors(fit)) <= CONSISTENT * largest else None
 
 
 def _changed(fit: Fit, goal: Sequence[Plateau]) -> list[Plateau]:
