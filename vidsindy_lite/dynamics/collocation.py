@@ -216,7 +216,7 @@ class Collocation:
         return np.count_nonzero(self.precision, axis=0)
 
     @cached_property
-    def _sample_weights(self) -> Floats:
+    def sample_weights(self) -> Floats:
         """1 / variance of every measurement, shape (n, d)."""
         return self.precision * self.data_weights
 
@@ -224,14 +224,14 @@ class Collocation:
     def _data_band(self) -> Floats:
         """Normal matrix of the data loss in the control points, in lower banded storage."""
         band = np.zeros((WIDTH * self.d, self.grid.r * self.d))
-        for j, weights in enumerate(self._sample_weights.T):
+        for j, weights in enumerate(self.sample_weights.T):
             band[:: self.d, j :: self.d] = normal_band(self.grid.samples, weights)
         return band
 
     @cached_property
     def _shared(self) -> tuple[Floats, Floats]:
         """Weighted systematic errors, and the normal matrix of their sizes."""
-        weighted = self._sample_weights[:, :, None] * self.systematic
+        weighted = self.sample_weights[:, :, None] * self.systematic
         information = np.einsum("nik,nil->kl", weighted, self.systematic)
         information += np.eye(self.systematic.shape[-1])
         return weighted, information
@@ -258,7 +258,7 @@ class Collocation:
     def data_loss(self, control_points: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
         residual, sizes = self.data_residual(control_points)
-        return float((residual**2 * self._sample_weights).sum() + sizes @ sizes)
+        return float((residual**2 * self.sample_weights).sum() + sizes @ sizes)
 
     def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
@@ -294,7 +294,7 @@ class Collocation:
         factor = self._factor(physics, damping)
 
         right = physics.T @ unknowns
-        right[:, 0] += (self.grid.samples.T @ (data_residual * self._sample_weights)).ravel()
+        right[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
         pull = self.grid.samples.T @ self._shared[0].reshape(len(self.grid.x), -1)
         right[:, 1 + len(columns) :] = pull.reshape(len(right), -1)
         solved = cho_solve_banded((factor, True), right, check_finite=False)
@@ -303,7 +303,7 @@ class Collocation:
         gram = self._gram(unknowns - physics @ solved, solved, data_residual, sizes)
         solved = solved.reshape(-1, self.d, solved.shape[1])
         gram, solved = _without_systematic(gram, solved, 1 + len(columns))
-        objective = (data_residual**2 * self._sample_weights).sum()
+        objective = (data_residual**2 * self.sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
         return Linearisation(
@@ -325,24 +325,6 @@ class Collocation:
         """That factor at a state, and the Jacobian of the weighted physics residual, (k d, r d)."""
         physics, _ = self._derivatives(state, np.array([], dtype=int))
         return self._factor(physics), physics
-
-    def data_pull(self, errors: Floats) -> Floats:
-        """Right-hand sides of the control points, (r d, m), for errors in noise units, (n, d, m)."""
-        weighted = np.sqrt(self._sample_weights)[:, :, None] * errors
-        pull = self.grid.samples.T @ weighted.reshape(len(self.grid.x), -1)
-        return pull.reshape(self.grid.r * self.d, -1)
-
-    def data_freedom(self, probes: Floats, solved: Floats) -> Floats:
-        """How many measurements of each coordinate the curve uses up, (d,): Hutchinson's trace.
-
-        From random vectors of +-1, (r d, m), and what the normal matrix makes of them.
-        """
-        shape = (len(self.grid.x), self.d, -1)
-        seen, answer = (
-            (self.grid.samples @ v.reshape(self.grid.r, -1)).reshape(shape)
-            for v in (probes, solved)
-        )
-        return ((seen * answer).mean(axis=2) * self._sample_weights).sum(axis=0)
 
     def _derivatives(self, state: State, columns: Ints) -> tuple[sparse.csr_array, Floats]:
         """The weighted physics residual around a state.
@@ -392,7 +374,7 @@ class Collocation:
         follow = -curve.reshape(-1, self.d, left.shape[1])
         follow[:, :, 0] += data_residual
         follow[:, :, shared] += self.systematic
-        follow *= np.sqrt(self._sample_weights)[:, :, None]
+        follow *= np.sqrt(self.sample_weights)[:, :, None]
         follow = follow.reshape(-1, left.shape[1])
         gram += follow.T @ follow
         gram[shared, shared] += np.eye(len(sizes))

@@ -100,7 +100,7 @@ def _balanced(collocation: Collocation, state: State, rng: np.random.Generator) 
         factor, physics = collocation.factor(state)
         solved = cho_solve_banded((factor, True), probes)
         in_law = ((physics @ probes) * (physics @ solved)).mean(axis=1).reshape(-1, d).sum(axis=0)
-        in_data = collocation.data_freedom(probes, solved)
+        in_data = _measurements_used(collocation, probes, solved)
         residual, _ = collocation.data_residual(state.control_points)
         missed = (collocation.precision * residual**2).sum(axis=0)
         kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
@@ -114,6 +114,19 @@ def _balanced(collocation: Collocation, state: State, rng: np.random.Generator) 
     return collocation.solve(state, tolerance=1.0)
 
 
+def _measurements_used(collocation: Collocation, probes: Floats, solved: Floats) -> Floats:
+    """How many measurements of each coordinate the curve uses up, (d,): Hutchinson's trace.
+
+    From random vectors of +-1, (r d, m), and what the inverse of the normal matrix makes of them.
+    """
+    grid = collocation.grid
+    shape = (len(grid.x), collocation.d, -1)
+    before, after = (
+        (grid.samples @ v.reshape(grid.r, -1)).reshape(shape) for v in (probes, solved)
+    )
+    return ((before * after).mean(axis=2) * collocation.sample_weights).sum(axis=0)
+
+
 def unlike_kicks(fit: Fit, rng: np.random.Generator) -> float:
     """How far what the law misses is from what independent kicks and errors would leave.
 
@@ -124,7 +137,9 @@ def unlike_kicks(fit: Fit, rng: np.random.Generator) -> float:
     factor, physics = collocation.factor(fit.state)
     kicks = rng.standard_normal((physics.shape[0], PROBES))
     errors = rng.standard_normal((len(grid.x), d, PROBES))
-    pull = collocation.data_pull(errors) - physics.T @ kicks
+    weighted = np.sqrt(collocation.sample_weights)[:, :, None] * errors
+    pull = (grid.samples.T @ weighted.reshape(len(grid.x), -1)).reshape(grid.r * d, PROBES)
+    pull -= physics.T @ kicks
     simulated = kicks + physics @ cho_solve_banded((factor, True), pull)
     root = np.sqrt(grid.node_weights[:, None] * collocation.physics_weights)
     found = _bands((root * collocation.physics_residual(fit.state))[:, :, None])
