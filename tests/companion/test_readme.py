@@ -90,7 +90,8 @@ def test_a_headline_says_what_its_table_holds(tmp_path, name, rows, headline):
     record = {"id": name, "kind": "table", "caption": "A table.", "notebook": "00_one"}
     record |= {"stamp": None, "files": []}
     (figures / f"{name}.json").write_text(json.dumps({**record, "rows": rows}))
-    assert f"| One | {headline} |" in PARTS["notebooks"](tmp_path)
+    text = fill("<!-- notebooks -->\n<!-- end -->", tmp_path)
+    assert f"| One | {headline} |" in text
 
 
 def test_another_result_is_seen(tmp_path):
