@@ -1,5 +1,7 @@
 """Pixels and space: cameras, and what several of them that watch one target say of it.
 
+::
+
     geometry      rotations and planes
     models        the two models of camera: orthographic and perspective
     rig           the cameras that watch one scene, and their file

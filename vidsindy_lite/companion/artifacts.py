@@ -1,6 +1,6 @@
 """What the notebooks produce: figures, tables, and the registry that keeps the folder honest.
 
-A notebook hands each result over under an id, the paper's number where there is one:
+A notebook hands each result over under an id, the paper's number where there is one::
 
     save_figure("fig_3", fig, caption="...", numbers={"noise": levels, "l2": errors})
     save_table("table_1", rows, caption="...")          # rows: a list of dicts
@@ -75,7 +75,7 @@ def versions() -> str:
 class Table:
     """A registered table, shown by a notebook as HTML and by a terminal as text.
 
-    Attributes
+    Parameters
     ----------
     table_id : str
     caption : str

@@ -1,4 +1,4 @@
-"""Pages from the templates that lie beside this module, each named like what fills it in."""
+"""Pages and parts of pages, from the templates that lie beside this module."""
 
 from pathlib import Path
 

@@ -76,7 +76,9 @@ def _titles(root: Path) -> dict[str, str]:
 def _headlines(figures: Path) -> dict[str, str]:
     """By notebook; a notebook without one of these tables has none."""
     tables = [record for record in read_records(figures).values() if record["id"] in HEADLINES]
-    return {t["notebook"]: HEADLINES[t["id"]](pd.DataFrame(t["rows"], dtype=object)) for t in tables}
+    return {
+        t["notebook"]: HEADLINES[t["id"]](pd.DataFrame(t["rows"], dtype=object)) for t in tables
+    }
 
 
 def _below(value: float) -> str:

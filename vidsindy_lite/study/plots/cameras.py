@@ -42,7 +42,7 @@ def plot_view_plane(camera: Camera, x: Floats) -> Figure:
 
 
 def plot_rotation_accuracy(tilt: Floats, errors: Mapping[str, Floats]) -> Figure:
-    """Error |R n - e_z| of several ways to compute R, for normals near the z axis.
+    """Error ``|R n - e_z|`` of several ways to compute R, for normals near the z axis.
 
     Parameters
     ----------
