@@ -144,5 +144,5 @@ def test_a_file_that_holds_no_discovery_is_refused(tmp_path, text):
 
 
 def test_a_missing_file_is_told_with_the_argument(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"path: must be a file .*, got no file .*law\.json"):
+    with pytest.raises(FileNotFoundError, match=r"path: must be .*, got no file .*law\.json"):
         Discovery.load(tmp_path / "law.json")
