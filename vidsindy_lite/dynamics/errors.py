@@ -94,6 +94,8 @@ def prediction_gain(fit: Fit) -> Floats:
 
 
 def _levinson(covariance: Floats, n: int) -> float:
+    if not covariance[0] > 0:
+        return 0.0  # of what was never observed
     best, variance, weights = 0.0, covariance[0], np.zeros(0)
     for order in range(1, min(ORDER, n // 10) + 1):
         reflection = (covariance[order] - weights @ covariance[order - 1 : 0 : -1]) / variance

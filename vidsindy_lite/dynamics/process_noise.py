@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import cho_solve_banded
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from .collocation import CLEANEST, Collocation, Fit, State
 from .errors import prediction_gain, residual_noise
 from .problem import Problem, fit_curves
@@ -52,17 +52,42 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
         Segment.even(s.t, s.x, problem.spacing, s.trajectory) for s in fit.collocation.segments
     ]
     exact = _measured_badly(problem, fit, segments)
-    every = replace(exact.state, active=np.ones_like(fit.state.active))
-    kicked = _balanced(problem.weighted(problem.collocation(segments), 1.0), every, rng)
-    newcomers = int((~fit.state.active).sum())  # each of them gains 1 by chance
+    every = replace(exact.state, active=problem.form.candidates)
+    free = _free(problem)
+    start = problem.weighted(problem.collocation(segments), 1.0)
+    kicked = _balanced(_hard_where_known(start, free), every, free, rng)
+    newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
     measured = evidence(exact) + prediction_gain(exact).sum()
-    if not evidence(kicked) + 2 * newcomers < measured or unlike_kicks(kicked, rng) > UNLIKE:
+    if not evidence(kicked) + 2 * newcomers < measured or unlike_kicks(kicked, free, rng) > UNLIKE:
         return problem
-    weights = kicked.collocation
+    return _with_variances(problem, kicked.collocation)
+
+
+def rebalanced(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
+    """The problem with the kicks and the noise that a law leaves, rather than all terms together."""
+    return _with_variances(
+        problem, _balanced(fit.collocation, fit.state, _free(problem), rng).collocation
+    )
+
+
+def _with_variances(problem: Problem, weights: Collocation) -> Problem:
     return replace(
         problem,
         noise=np.maximum(weights.data_weights**-0.5, CLEANEST),
-        process_noise=weights.physics_weights**-0.5,
+        process_noise=np.where(_free(problem), weights.physics_weights**-0.5, 0.0),
+    )
+
+
+def _free(problem: Problem) -> Bools:
+    """Which equations may be kicked: those that are not known, (d,)."""
+    return np.asarray(problem.form.candidates.any(axis=0), dtype=bool)
+
+
+def _hard_where_known(collocation: Collocation, free: Bools) -> Collocation:
+    """What is known of a law (the slope of a position is the velocity) holds exactly."""
+    hard = HARDEST * collocation.physics_weights
+    return collocation.weighted(
+        collocation.data_weights, np.where(free, collocation.physics_weights, hard)
     )
 
 
@@ -85,15 +110,16 @@ def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
     return own.solve(exact.state)
 
 
-def _balanced(collocation: Collocation, state: State, rng: np.random.Generator) -> Fit:
+def _balanced(collocation: Collocation, state: State, free: Bools, rng: np.random.Generator) -> Fit:
     """The fit at the variances of noise and kicks that make the data most likely.
 
-    Each is the sum of the squares of its residuals, over how many of these the curve has not used
-    up (MacKay's update).
+    Each is the sum of the squares of its residuals, over how many of these the curve and the terms
+    have not used up (MacKay's update).
     """
     grid, d = collocation.grid, collocation.d
     probes = rng.choice([-1.0, 1.0], (grid.r * d, PROBES))
     hardest = HARDEST * collocation.physics_weights
+    unfitted = len(grid.node_weights) - state.active.sum(axis=0)
     for _ in range(MOST_UPDATES):
         fit = collocation.solve(state, tolerance=1.0, max_steps=10)
         state, collocation = fit.state, fit.collocation
@@ -105,7 +131,9 @@ def _balanced(collocation: Collocation, state: State, rng: np.random.Generator) 
         missed = (collocation.precision * residual**2).sum(axis=0)
         kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
         data = np.maximum(collocation.counts - in_data, 1.0) / np.maximum(missed, LEAST)
-        law = np.maximum(len(grid.node_weights) - in_law, 1.0) / np.maximum(kicked, LEAST)
+        law = np.maximum(unfitted - in_law, 1.0) / np.maximum(kicked, LEAST)
+        data = np.where(collocation.counts > 0, data, collocation.data_weights)
+        law = np.where(free, law, collocation.physics_weights)
         data, law = np.minimum(data, CLEANEST**-2), np.minimum(law, hardest)
         change = np.log([data / collocation.data_weights, law / collocation.physics_weights])
         collocation = collocation.weighted(data, law)
@@ -127,11 +155,12 @@ def _measurements_used(collocation: Collocation, probes: Floats, solved: Floats)
     return ((before * after).mean(axis=2) * collocation.sample_weights).sum(axis=0)
 
 
-def unlike_kicks(fit: Fit, rng: np.random.Generator) -> float:
+def unlike_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
     """How far what the law misses is from what independent kicks and errors would leave.
 
     Both are simulated and smoothed as the data were; their spectra are compared by octaves: the
-    largest distance between the logarithms of a band, in standard errors.
+    largest distance between the logarithms of a band, in standard errors, over the equations that
+    are ``free`` to be kicked.
     """
     collocation, grid, d = fit.collocation, fit.collocation.grid, fit.collocation.d
     factor, physics = collocation.factor(fit.state)
@@ -146,7 +175,7 @@ def unlike_kicks(fit: Fit, rng: np.random.Generator) -> float:
     expected = _bands(simulated.reshape(-1, d, PROBES))
     count = OCTAVE * 2.0 ** np.maximum(np.arange(len(found)) - 1, 0)
     distance = np.abs(np.log(np.maximum(found, LEAST) / np.maximum(expected, LEAST)))
-    return float((distance / np.sqrt(1 / count + BLUR**2)[:, None]).max())
+    return float((distance / np.sqrt(1 / count + BLUR**2)[:, None])[:, free].max())
 
 
 def _bands(signal: Floats) -> Floats:
