@@ -6,7 +6,8 @@
     lens          what a lens does to the image: distortion
     rig           the cameras that watch one scene, and their file
     unknowns      what is unknown of a rig: as one vector, and linear equations for it
- 1. synchronise   tracks -> when each camera started (`Lags`); tracks at the same instants
+ 1. synchronise   tracks -> when each camera started (`Lags`)
+    alignment     tracks at the same instants, whatever the lags, rates and clocks of the videos
  2. calibrate     tracks -> the same `Rig`, with nothing unknown
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
@@ -16,12 +17,13 @@
 The other rooms import from here alone.
 """
 
+from .alignment import align
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .camera import Camera
 from .models import OrthographicCamera, PerspectiveCamera
 from .rig import Rig, rig_template
-from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
+from .synchronise import DISAGREEMENT, Lags, disagreement, learn_lags, list_lags
 from .triangulate import reconstruct, residuals
 from .uncertainty import systematic_errors, trailing_errors
