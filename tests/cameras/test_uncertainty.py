@@ -244,7 +244,7 @@ def test_covariance_of_independent_residuals_is_that_of_least_squares():
     rng = np.random.default_rng(3)
     slope = rng.normal(size=(4000, 3, 2))
     missed = 0.2 * rng.normal(size=(4000, 3))
-    factor = uncertainty._sandwich(missed, slope)
+    factor = uncertainty._sandwich(missed, slope, np.zeros(2), 0.2)
     flat = slope.reshape(-1, 2)
     expected = 0.2**2 * np.linalg.inv(flat.T @ flat)
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))

@@ -16,7 +16,7 @@ Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,7 +57,8 @@ class Adjustment:
     path_slopes : ndarray, shape (n, 3, p)
         Of the points.
     settled : bool
-        Whether the search came to its end.
+        Whether the search came to its end, after so many ...
+    steps : int
     """
 
     cameras: tuple[Camera, ...]
@@ -69,6 +70,7 @@ class Adjustment:
     slopes: Floats
     path_slopes: Floats
     settled: bool
+    steps: int
 
     @property
     def prior(self) -> Floats:
@@ -91,18 +93,25 @@ def adjust(views: Views, start: Sequence[Camera], errors: Floats) -> Adjustment:
     change = np.zeros((errors > 0).sum())
     state = problem.at(change, problem.begin)
     noise = _noise(state.misses)
-    for _ in range(_STEPS):
+    settled, steps = False, 0
+    while not settled and steps < _STEPS:
         weights = _weights(state.misses, noise)
         moved, step = _downhill(problem, state, weights, noise)
-        if moved is None:  # rounding is all that is left, or nothing that is downhill
-            break
-        state, before = moved, noise
-        noise = _noise(state.misses)
-        if step <= max(_SETTLED, _ENOUGH * noise) and abs(noise - before) <= 1e-3 * before:
-            break
-    else:
-        return problem.result(state, noise, settled=False)
-    return problem.result(state, noise, settled=True)
+        if moved is None:  # rounding is all that is left
+            settled = True
+        else:
+            state, before = moved, noise
+            noise = _noise(state.misses)
+            settled = step <= max(_SETTLED, _ENOUGH * noise) and noise >= before * (1 - 1e-3)
+        steps += 1
+    return problem.result(state, noise, settled, steps)
+
+
+def linearised(views: Views, cameras: Sequence[Camera], errors: Floats) -> Adjustment:
+    """What is known near cameras that were adjusted before."""
+    problem = _Problem.of(views, cameras, errors)
+    state = problem.at(np.zeros((errors > 0).sum()), problem.begin)
+    return problem.result(state, _noise(state.misses), settled=True, steps=0)
 
 
 @dataclass(frozen=True)
@@ -183,7 +192,7 @@ class _Problem:
         seen = np.isfinite(state.misses)[..., None]
         return np.where(seen, in_change, 0.0), np.where(seen, in_points, 0.0)
 
-    def result(self, state: _State, noise: float, settled: bool) -> Adjustment:
+    def result(self, state: _State, noise: float, settled: bool, steps: int) -> Adjustment:
         """All of it, in all frames."""
         in_change, in_points = self.slopes(state)
         q, r = np.linalg.qr(in_points)
@@ -195,14 +204,23 @@ class _Problem:
         slopes[self.found], path[self.found] = in_change - q @ along, -np.linalg.solve(r, along)
         change = self.full(state.change)
         return Adjustment(
-            state.cameras, self.errors, change, misses, weights, noise, slopes, path, settled
+            self._read(state, change), self.errors, change, misses, weights, noise, slopes, path,
+            settled, steps,
+        )  # fmt: skip
+
+    def _read(self, state: _State, change: Floats) -> tuple[Camera, ...]:
+        """The cameras of a state, with the readout of each in place."""
+        late = change[:, PARTS["readout"]][:, 0]
+        return tuple(
+            replace(c, readout=float(np.clip(c.readout + add, -1, 1))) if add else c
+            for c, add in zip(state.cameras, late, strict=True)
         )
 
 
 def _downhill(
     problem: _Problem, state: _State, weights: Floats, noise: float
 ) -> tuple[_State | None, float]:
-    """The state after a step that lessens the errors, and by how many pixels it moved the images."""
+    """The state after a step that lessens the errors, and how far it moved images, pixels."""
     in_change, in_points = problem.slopes(state)
     q, r = np.linalg.qr(in_points)
     missed = np.nan_to_num(state.misses)[..., None]
@@ -219,7 +237,8 @@ def _downhill(
     size[size == 0] = 1.0
     factor, triangle = np.linalg.qr(rows / size)
     aim = factor.T @ target
-    here = _cost(state, weights, noise, prior)
+    seen = np.isfinite(state.misses)
+    here = _cost(state, seen, weights, noise, prior)
     for damping in _DAMPING:
         damped = np.vstack((triangle, np.sqrt(damping) * np.eye(len(size))))
         full = np.append(aim, np.zeros(len(size)))
@@ -227,13 +246,15 @@ def _downhill(
         points = state.points + own - np.linalg.solve(r, along @ step[:, None])[..., 0]
         moved = problem.at(state.change + step, points)
         shift = float(np.sqrt(np.mean((slopes @ step) ** 2))) if slopes.size else 0.0
-        if _cost(moved, weights, noise, prior) <= here * (1 + 1e-12) + 1e-18:
+        if _cost(moved, seen, weights, noise, prior) <= here * (1 + 1e-12) + 1e-18:
             return moved, max(shift, float(np.abs(q.swapaxes(1, 2) @ missed).max(initial=0)))
     return None, 0.0
 
 
-def _cost(state: _State, weights: Floats, noise: float, prior: Floats) -> float:
+def _cost(state: _State, seen: Bools, weights: Floats, noise: float, prior: Floats) -> float:
     """What is to be smallest; infinite if a point that was seen would not be."""
+    if not np.isfinite(state.misses[seen]).all():
+        return np.inf
     squares = np.nansum(state.misses**2, axis=1)
     sigma = max(noise, _PRIOR_NOISE)
     return float(np.sum(weights * squares) / sigma**2 + np.sum((prior * state.change) ** 2))
@@ -253,6 +274,6 @@ def _noise(misses: Floats) -> float:
 def _weights(misses: Floats, noise: float) -> Floats:
     """Of each frame: one, unless it is missed by far."""
     worst = np.nanmax(np.abs(misses), axis=1, initial=0.0)
-    return np.minimum(1.0, (_OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2)
+    return np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2
 
 

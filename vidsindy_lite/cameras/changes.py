@@ -8,6 +8,7 @@ principal point (pixels), k1, k2, p1, p2, and the readout of the shutter (frames
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -59,10 +60,10 @@ def units(width: float, image: float) -> Floats:
 def changed(camera: Camera, change: Floats) -> Camera:
     """A calibrated camera after a change. Its readout is that of the tracks, and not applied."""
     part = {name: change[place] for name, place in PARTS.items()}
-    values: dict[str, object] = {}
+    values: dict[str, Any] = {}
     if part["normal"].any():
         values["normal"] = camera.normal + part["normal"] @ camera.rows
-    if part["position"].any():
+    if part["position"].any() and camera.position is not None:
         axes = np.vstack((camera.rows, camera.normal))
         values["position"] = camera.position + part["position"] @ axes
     if part["principal point"].any():
