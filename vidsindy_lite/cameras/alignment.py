@@ -73,7 +73,7 @@ def aligned(
 
 
 def curve(track: Floats, clock: Floats) -> Curve:
-    """A track as a function of the frame number, whole or not: a cubic spline through its frames.
+    """A track as a function of the frame number, whole or not: a spline through its frames.
 
     Its values are NaN outside, and unless the target is seen in the frames before and after, and
     these are close to each other.
@@ -82,7 +82,9 @@ def curve(track: Floats, clock: Floats) -> Curve:
     seen = np.flatnonzero(shown)
     if not seen.size:
         return lambda frames: np.full((len(frames), 2), np.nan)
-    spline = make_interp_spline(clock[seen], track[seen], k=min(3, len(seen) - 1))
+    # Where a frame was dropped, a cubic is off by some ten times as much as between two frames.
+    degree = 3 if (clock == np.arange(len(clock))).all() else 5
+    spline = make_interp_spline(clock[seen], track[seen], k=min(degree, len(seen) - 1))
 
     def at(frames: Floats) -> Floats:
         within = np.clip(frames, clock[0], clock[-1])

@@ -91,7 +91,7 @@ class Lags:
     errors: Floats
     residual: float
     warnings: tuple[str, ...] = ()
-    clocks: tuple[Floats, ...] = ()
+    clocks: tuple[Floats, ...] = field(default=(), repr=False)
 
     @property
     def agree(self) -> bool:
