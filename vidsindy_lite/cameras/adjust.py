@@ -275,5 +275,3 @@ def _weights(misses: Floats, noise: float) -> Floats:
     """Of each frame: one, unless it is missed by far."""
     worst = np.nanmax(np.abs(misses), axis=1, initial=0.0)
     return np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2
-
-

@@ -45,8 +45,15 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     bias that pixel noise causes in a scale. With a perspective camera in the rig, the closed form
     goes from the known cameras to the others, and the refinement is the same.
 
-    Frames in which orthographic views contradict each other by more than eight robust standard
-    deviations are left out, so that a few outliers of the tracker do not bend the cameras.
+    What was measured with an error (`normal_error` and so on, see `Camera`) may change, too, by as
+    much as that: the refinement is a bundle adjustment of cameras and path with the measurements as
+    priors, in which half a degree of a normal is found to a hundredth. What neither tracks nor
+    measurements tell, such as a turn of the whole rig, stays uncertain; `observe` counts that among
+    the systematic errors of the path. Without errors, what is given stays as it is.
+
+    Frames that are missed by far pull with less weight the further they are off, and those in which
+    orthographic views of an exact rig contradict each other by more than eight robust standard
+    deviations are left out: a few outliers of the tracker do not bend the cameras.
 
     Two cameras are enough, but raise no alarm at a normal that is turned about the cross product of
     both: the path is then wrong without a residual. Three do.
@@ -56,7 +63,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     tracks : sequence of array_like, shape (n, 2)
         One track per camera of the rig, frame by frame the same instants; NaN = not seen.
     rig : Rig
-        At least one calibrated camera. What is given stays as it is. If a position is missing, two
+        At least one calibrated camera. If a position is missing, two
         others must be given, with independent normals, and all cameras be orthographic: in depth
         from a single camera nothing would fix the origin.
 

@@ -41,6 +41,7 @@ from .triangulate import (
     views_of,
 )
 
+_SMALLEST = 1e-4  # of the largest mode
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 
 
@@ -60,7 +61,9 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     -------
     ndarray, shape (k, n, 3)
         Scene units; what k independent causes, each off by one standard error, add to the path.
-        Zero where nothing can be reconstructed.
+        Zero where nothing can be reconstructed. If something of the rig was measured with an error,
+        without what moves or stretches the whole path: no law's terms depend on the origin and the
+        unit of length, which are as uncertain as the measurements leave them.
     """
     errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = np.flatnonzero((lags.errors > 0) & np.isfinite(lags.errors))
@@ -76,7 +79,8 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
         seen, cameras = views(shift), learned.cameras
         return np.hstack((*residuals_of_views(seen, cameras), points_of_views(seen, cameras)))
 
-    near = linearised(views(0 * lags.frames), learned.cameras, errors)
+    still = views(0 * lags.frames)
+    near = linearised(still, learned.cameras, errors)
     shifts = PROBE * np.eye(len(lags.frames))[moving]
     late = [(both(shift) - both(-shift)) / (2 * PROBE) for shift in shifts]
     slopes = np.concatenate((near.slopes, near.path_slopes), axis=1)
@@ -89,7 +93,23 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     factor = _sandwich(
         np.where(used, missed, 0), np.where(used[..., None], slope, 0), prior, near.noise
     )
-    return np.einsum("ik,nji->knj", factor, np.nan_to_num(slopes[:, -3:]))
+    modes = np.einsum("ik,nji->knj", factor, np.nan_to_num(slopes[:, -3:]))
+    return _of_shape(modes, points_of_views(still, learned.cameras)) if prior.any() else modes
+
+
+def _of_shape(modes: Floats, x: Floats) -> Floats:
+    """Modes, (k, n, 3), without moves and stretches of the whole path x, (n, 3), largest first.
+
+    What is smaller than `_SMALLEST` of the largest is left out.
+    """
+    seen = np.isfinite(x).all(axis=1)
+    centred = np.where(seen[:, None], x - x[seen].mean(axis=0), 0.0)
+    moves = [seen[:, None] * axis for axis in np.eye(3)]
+    frame, _ = np.linalg.qr(np.reshape([*moves, centred], (4, -1)).T)
+    flat = modes.reshape(len(modes), -1)
+    _, sizes, ways = np.linalg.svd(flat - flat @ frame @ frame.T, full_matrices=False)
+    kept = sizes > _SMALLEST * sizes[:1]
+    return (sizes[kept, None] * ways[kept]).reshape(-1, *x.shape)
 
 
 def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
