@@ -102,7 +102,7 @@ def _of_shape(modes: Floats, x: Floats) -> Floats:
 
     What is smaller than `_SMALLEST` of the largest is left out.
     """
-    seen = np.isfinite(x).all(axis=1)
+    seen = np.asarray(np.isfinite(x).all(axis=1))
     centred = np.where(seen[:, None], x - x[seen].mean(axis=0), 0.0)
     moves = [seen[:, None] * axis for axis in np.eye(3)]
     frame, _ = np.linalg.qr(np.reshape([*moves, centred], (4, -1)).T)
