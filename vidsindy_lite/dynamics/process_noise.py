@@ -64,10 +64,9 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
 
 
 def rebalanced(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
-    """The problem with the kicks and the noise that a law leaves, rather than all terms together."""
-    return _with_variances(
-        problem, _balanced(fit.collocation, fit.state, _free(problem), rng).collocation
-    )
+    """The problem with the kicks and the noise that a law leaves; all terms together leave less."""
+    balanced = _balanced(fit.collocation, fit.state, _free(problem), rng)
+    return _with_variances(problem, balanced.collocation)
 
 
 def _with_variances(problem: Problem, weights: Collocation) -> Problem:
