@@ -110,7 +110,7 @@ class Path:
 
     def restricted(self, active: Bools) -> State:
         """The state that the quadratic model promises for other terms, (l, d)."""
-        support = np.append(active.T.ravel(), self.fit.state.moving[self.fit.state.moving])
+        support = np.append(active.T.ravel(), self.fit.state.moving)[self.model.columns]
         present = self.fit.state.flat()[self.model.columns]
         solution = minimiser(self.model.information, self.model.gradient, present, support)
         return self.model.along(self.fit.state, solution - present, 1.0).of_terms(active)
@@ -126,10 +126,9 @@ def follow(problem: Problem, fit: Fit) -> Path:
     fit : Fit
         Around which.
     """
-    size = problem.exponents.size
-    columns = np.concatenate([np.arange(size), size + np.flatnonzero(fit.state.moving)])
+    columns, terms_end = problem.columns(fit.state), len(problem.form.searched)
     model = fit.collocation.linearise(fit.state, columns)
-    prices = np.append(np.tile(problem.penalties, problem.d), np.full(len(columns) - size, -np.inf))
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
     own = typical(fit.collocation.data_weights**-0.5)
     lowest = min(typical(residual_noise(fit)), LARGEST / 10**STEP)
@@ -141,7 +140,9 @@ def follow(problem: Problem, fit: Fit) -> Path:
         support, _, _ = subset_search(
             share * model.information, share * model.gradient, present, prices, support
         )
-        for j, terms in enumerate(support[:size].reshape(problem.d, -1)):
+        active = np.zeros(problem.exponents.T.shape, dtype=bool)
+        active.flat[problem.form.searched] = support[:terms_end]
+        for j, terms in enumerate(active):
             if paths[j] and (paths[j][-1].terms == terms).all():
                 low_here = paths[j].pop().low
             else:
