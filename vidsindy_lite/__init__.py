@@ -36,6 +36,8 @@ from .vision import (
     write_video,
 )
 
+__version__ = "0.2.0"
+
 __all__ = [
     "discover_from_videos",
     "discover_from_tracks",

@@ -11,6 +11,7 @@ from .arrays import Floats
 
 _JUMP = 8.0  # medians of a track's steps; more is a jump, ...
 _JUMPY = 0.02  # ... and a track with more of them than this, ...
+_STILL = 2.0  # pixels; ... or one that stays within that, ...
 _SPARSE = 0.5  # ... or of a target that is seen in fewer frames than that, may be of something else
 
 
@@ -54,8 +55,12 @@ def _likely_causes(step: str, tracks: Sequence[Floats], names: Sequence[str]) ->
 
 
 def _is_strange(track: Floats) -> bool:
-    """Whether a track jumps, or is mostly missing."""
-    steps = np.hypot(*np.diff(track, axis=0).T)
-    steps = steps[np.isfinite(steps)]
-    jumps = np.mean(steps > _JUMP * max(np.median(steps), 1.0)) if len(steps) else 1.0
-    return bool(jumps > _JUMPY or np.isfinite(track).all(axis=1).mean() < _SPARSE)
+    """Whether a track jumps, trembles, stands still, or is mostly missing."""
+    seen = np.isfinite(track).all(axis=1)
+    steps, turns = (np.hypot(*np.diff(track, n, axis=0).T) for n in (1, 2))
+    steps, turns = steps[np.isfinite(steps)], turns[np.isfinite(turns)]
+    if not len(turns) or seen.mean() < _SPARSE:
+        return True
+    jumps = np.mean(steps > _JUMP * max(np.median(steps), 1.0)) > _JUMPY
+    still = np.ptp(track[seen], axis=0).max() < _STILL
+    return bool(jumps or still or np.median(turns) > np.median(steps))

@@ -86,7 +86,7 @@ def read_tracks(path: str | os.PathLike) -> list[TrackFile]:
     header, rows = _split(path, _cells(path))
     names = [name.strip().lower() for name in header[-1]] if header else []
     values = _numbers(path, rows, len(names) or max(map(len, rows)))
-    columns = {name: values[:, i] for i, name in reversed(list(enumerate(names))) if name}
+    columns = {name: values[:, names.index(name)] for name in names if name}
     if any(_DLTDV.fullmatch(name) for name in columns):
         return _of_dltdv(path, columns)
     if header and header[0][0].strip().lower() == "scorer":
