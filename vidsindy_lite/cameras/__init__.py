@@ -1,5 +1,7 @@
 """Pixels and space: cameras, and what several of them that watch one target say of it.
 
+::
+
     geometry      rotations and planes
     camera        what all cameras have in common: place, image, errors of what was measured
     models        the two models of camera: orthographic and perspective

@@ -14,7 +14,7 @@ beside the way: cramer_rao, the least errors that any estimate could have
 
 from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao
-from .discovery import Discovery, Simulation
+from .discovery import Discovery
 from .integrate import runge_kutta_4
 from .library import monomial_exponents, monomial_gradients, monomials, variable_names
 from .origin import ShiftedLaw

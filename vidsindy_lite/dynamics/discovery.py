@@ -228,6 +228,8 @@ class Discovery:
 
         Raises
         ------
+        FileNotFoundError
+            If there is no such file.
         ValueError
             If the file holds none.
         """

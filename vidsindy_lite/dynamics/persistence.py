@@ -73,6 +73,8 @@ class Path:
         Around which the laws are found.
     model : Linearisation
         Its quadratic model in all terms.
+    own : float
+        The errors that the fit was weighted with.
     level : float
         Errors that have to be tolerated: a plateau that begins above them is no law of these data.
     plateaus : tuple of tuple of Plateau
@@ -81,13 +83,9 @@ class Path:
 
     fit: Fit
     model: Linearisation
+    own: float
     level: float
     plateaus: tuple[tuple[Plateau, ...], ...]
-
-    @property
-    def own(self) -> float:
-        """The errors that the fit was weighted with."""
-        return typical(self.fit.collocation.data_weights**-0.5)
 
     @property
     def lowest(self) -> float:
@@ -151,7 +149,7 @@ def follow(problem: Problem, fit: Fit) -> Path:
     single, lasting = residual_noise(fit), effective_noise(fit)
     smooth = bool((lasting > LASTING * single).any() or (single <= NOISELESS).all())
     level = max(lowest, typical(lasting), SMOOTH if smooth else 0.0)
-    return Path(fit, model, level, tuple(map(tuple, paths)))
+    return Path(fit, model, own, level, tuple(map(tuple, paths)))
 
 
 def typical(noise: Floats) -> float:
