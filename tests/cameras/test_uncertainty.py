@@ -250,7 +250,8 @@ def test_covariance_of_independent_residuals_is_that_of_least_squares():
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     assert np.abs(factor @ factor.T - expected).max() < 0.15 * size.max()
     # Every residual three times in a row: three times the variance for as many numbers.
-    tripled = uncertainty._sandwich(np.repeat(missed, 3, 0), np.repeat(slope, 3, 0), np.zeros(2), 0.2)
+    thrice = np.repeat(missed, 3, 0), np.repeat(slope, 3, 0)
+    tripled = uncertainty._sandwich(*thrice, np.zeros(2), 0.2)
     grown = np.trace(tripled @ tripled.T) / np.trace(factor @ factor.T)
     assert 0.6 < grown < 1.1  # and a third if they were taken as independent
 
