@@ -23,6 +23,7 @@ from ..checks import check_integer
 from .collocation import Fit
 from .discovery import Discovery, History, conclude
 from .persistence import Path, Plateau, follow, typical
+from .precision import with_precision
 from .problem import Problem, fit_curves, pose
 from .process_noise import rebalanced, with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, search
@@ -37,6 +38,8 @@ RICHEST = 2.0
 """Most terms of a law that refines another, over the terms of that."""
 MOST_HALVINGS = 4
 """Most halvings of the knot spans."""
+MOST_WEIGHINGS = 2
+"""Most laws of which the precision of the measurements is learned."""
 LONGEST_DESCENT = 3
 """Most laws at smaller errors."""
 
@@ -102,6 +105,12 @@ def discover(
     with tqdm(total=3, disable=not progress, desc="discover", leave=False) as bar:
         fit = polish(problem, search(problem, degree, starts, history), history)
         bar.update()
+        for _ in range(MOST_WEIGHINGS):
+            weighed = with_precision(problem, fit)
+            if weighed is problem:
+                break
+            problem = weighed
+            fit = polish(problem, search(problem, degree, starts, history), history)
         if (problem.errors(fit) > CONSISTENT * problem.noise).any():
             problem = with_process_noise(problem, fit, probes)
         if problem.kicked:
