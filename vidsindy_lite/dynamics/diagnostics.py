@@ -180,6 +180,8 @@ def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]
     names, terms = law.names, law.terms
     for own, ranked in zip(path.of(state.active), path.ranked(), strict=True):
         others = [plateau for plateau in ranked if (plateau.terms != own.terms).any()]
+        same = [plateau for plateau in ranked if (plateau.terms == own.terms).all()]
+        own = same[0] if same else own
         if others and others[0].decades > RIVAL * own.decades:
             rival = others[0]
             changed = np.flatnonzero(rival.terms != own.terms).tolist()

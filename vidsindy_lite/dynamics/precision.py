@@ -89,8 +89,15 @@ def _factors(residual: Floats, causes: list[Floats]) -> Floats:
     if not cost < plain - LIKELY or gross.mean() > MOST_GROSS:
         return even
     if inflation([np.where(gross, 0.0, residual / np.sqrt(variance))[:, None]])[0] > LASTING:
-        return even  # what lasts is no noise
-    return np.where(gross, 0.0, np.minimum(np.median(variance) / variance, LARGEST_RATIO))
+        variance = even  # what lasts is no noise, but a single sample may still be wrong
+    precision = np.minimum(np.median(variance) / variance, LARGEST_RATIO)
+    return np.where(gross & _alone(residual), 0.0, precision)
+
+
+def _alone(residual: Floats) -> Bools:
+    """Which residuals are more than twice those around them, (n,)."""
+    around = np.stack([np.roll(residual, k) for k in (-2, -1, 1, 2)])
+    return np.abs(residual) > 2 * np.abs(np.median(around, axis=0))
 
 
 def _variance(residual: Floats, causes: Floats) -> tuple[float, Floats, Bools]:
