@@ -77,6 +77,7 @@ def _discover(options: argparse.Namespace) -> int:
     check_folder_is_free(options.out)
     rig, t = Rig.load(options.rig), None
     told = {"rig file": options.rig, "degree": options.degree, "seed": options.seed}
+    told |= {"order": options.order}
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"detector": options.detector}
     if options.fps is not None:
@@ -89,6 +90,7 @@ def _discover(options: argparse.Namespace) -> int:
         lags=options.lag,
         detector=options.detector,
         degree=options.degree,
+        order="auto" if options.order == "auto" else int(options.order),
         seed=options.seed,
         progress=True,
     )
@@ -257,6 +259,11 @@ COMMANDS = {
             "files say, which makes it a second of video)", type=float
         ),
         "--degree": _count(3, "highest degree of the polynomials (default: 3)"),
+        "--order": _choice(
+            "1", ("1", "2", "auto"),
+            "1 for x' = f(x) (default), 2 for laws of motion, x'' = f(x, x'), auto for the one to "
+            "be trusted"
+        ),
         "--detector": _text(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "
             "ONNX file (default: auto)", default="auto"

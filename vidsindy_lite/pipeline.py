@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .cameras import Rig
 from .checks import check_integer
-from .dynamics import Discovery, discover
+from .dynamics import Discovery, check_order, discover
 from .observation import Observation, observe
 
 
@@ -26,8 +26,9 @@ class VideoDiscovery(Observation):
     discovery: Discovery
 
     def __str__(self) -> str:
+        note = [f"note: {self.discovery.note}"] if self.discovery.note else []
         warnings = (f"warning: {text}" for text in self.warnings)
-        return "\n".join([self.discovery.equations(), *warnings])
+        return "\n".join([self.discovery.equations(), *note, *warnings])
 
 
 def discover_from_videos(
@@ -38,6 +39,7 @@ def discover_from_videos(
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
     degree: int = 3,
+    order: int | str = 1,
     seed: int = 0,
     progress: bool = False,
 ) -> VideoDiscovery:
@@ -49,7 +51,7 @@ def discover_from_videos(
     ----------
     paths, rig, t, lags, detector, progress
         See `observe`. The unit of time is that of the equations.
-    degree, seed : int
+    degree, order, seed
         See `discover`.
 
     Returns
@@ -62,10 +64,12 @@ def discover_from_videos(
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
     check_integer("degree", degree, 1)
+    check_order(order)
     check_integer("seed", seed)
     seen = observe(paths, rig, t, lags=lags, detector=detector, progress=progress)
     found = discover(
-        seen.t, seen.x, degree=degree, seed=seed, progress=progress, systematic=seen.systematic
-    )
+        seen.t, seen.x, degree=degree, order=order, seed=seed, progress=progress,
+        systematic=seen.systematic,
+    )  # fmt: skip
     parts = vars(seen) | {"warnings": (*seen.warnings, *found.warnings)}
     return VideoDiscovery(**parts, discovery=found)
