@@ -15,10 +15,11 @@ The other rooms import from here alone.
 """
 
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
+from .clocks import Lags, align, list_lags
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .models import Camera, OrthographicCamera, PerspectiveCamera
 from .rig import Rig, rig_template
-from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
+from .synchronise import DISAGREEMENT, disagreement, learn_lags
 from .triangulate import reconstruct, residuals
 from .uncertainty import systematic_errors, trailing_errors

@@ -24,10 +24,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
+from .clocks import Lags, align
+from .joint import OUTLIER
 from .rig import Rig
-from .synchronise import OUTLIER, PROBE, Lags, align
 from .triangulate import Views, check_calibrated, check_views, points_of_views, residuals_of_views
 from .unknowns import Unknowns
+
+PROBE = 0.05
+"""Frames; slopes in a lag are taken over twice that."""
 
 _PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1

@@ -1,0 +1,168 @@
+"""The clocks of videos: lags, rates, and tracks at the same instants.
+
+The frames of the first video are the clock. Camera i starts `lag` of them later and takes `rate`
+frames during each, so that the instant k of the clock is its frame (k - lag) * rate. Between two
+frames a track is interpolated, so lags need not be whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline, make_interp_spline
+
+from ..arrays import Bools, Floats
+from ..checks import check_positive, check_tracks, check_vector
+
+_FARTHEST = 1e9  # frames by which a video may start later; and ...
+_FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
+
+
+@dataclass(frozen=True)
+class Lags:
+    """Lags of the videos.
+
+    Parameters
+    ----------
+    frames : ndarray, shape (m,)
+        By how many frames of the first video each one starts later than the first.
+    rates : ndarray, shape (m,)
+        Frames of each video in one frame of the first: as given, or as learned where a clock runs
+        fast or slow.
+    errors : ndarray, shape (m,)
+        Standard errors of the lags; infinite if the tracks do not tell them, zero if they were
+        given. Lags that whole numbers fit as well are whole.
+    residual : float
+        Residual of the worst camera that one frame in ten exceeds, pixels, with the cameras that
+        fit these lags best; see `learn_lags`.
+    warnings : tuple of str
+        Why the lags should not be trusted, with advice.
+    """
+
+    frames: Floats
+    rates: Floats
+    errors: Floats
+    residual: float
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def agree(self) -> bool:
+        """Whether the lags are known: the views agree at these and not at others."""
+        return bool(np.isfinite(self.errors).all())
+
+    def frame_at(self, i: int, instant: int) -> int:
+        """Which frame of video i is closest to one of the first."""
+        return int(np.rint((instant - self.frames[i]) * self.rates[i]))
+
+
+def align(
+    tracks: Sequence[Floats], lags: ArrayLike, rates: ArrayLike | None = None
+) -> tuple[Floats, ...]:
+    """Tracks of all videos at the instants of the first video's frames.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n_i, 2)
+        One per video, frame by frame; NaN = not seen.
+    lags : array_like, shape (m,)
+        By how many frames of the first video each one starts later; only differences count.
+    rates : array_like, shape (m,), optional
+        Frames of each video in one frame of the first; by default one.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n_0, 2)
+        NaN where a video has not begun, has ended, or does not show the target in the frames before
+        and after. At whole frames these are the tracks themselves.
+
+    Raises
+    ------
+    ValueError
+        If a track has a wrong shape or an infinite value, or there is not one finite lag, or
+        positive rate, per track, or one of them is absurdly large or small.
+    """
+    tracks = check_tracks(tracks)
+    shifts = check_lags("lags", lags, len(tracks))
+    speeds = check_rates(rates, len(tracks))
+    clock = np.arange(len(tracks[0]))
+    return tuple(
+        Curve(track).at((clock - lag) * rate)
+        for track, lag, rate in zip(tracks, shifts, speeds, strict=True)
+    )
+
+
+def list_lags(lags: Sequence[float] | Floats) -> str:
+    """Lags as text, to a hundredth of a frame, e.g. ``0, 7, -12.5``."""
+    return ", ".join(f"{round(lag, 2) + 0.0:g}" for lag in lags)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A track as a function of the frame number, whole or not: a cubic spline through its frames.
+
+    Parameters
+    ----------
+    track : ndarray, shape (n, 2)
+        NaN where the target is not seen.
+    """
+
+    track: Floats
+
+    @cached_property
+    def shown(self) -> Bools:
+        """Frames that show the target."""
+        return np.asarray(np.isfinite(self.track).all(axis=1))
+
+    @cached_property
+    def _spline(self) -> BSpline | None:
+        seen = np.flatnonzero(self.shown)
+        if not seen.size:
+            return None
+        return make_interp_spline(seen, self.track[seen], k=min(3, len(seen) - 1))
+
+    def at(self, frames: Floats) -> Floats:
+        """Pixels, (..., 2); NaN outside, and unless the frames before and after are seen."""
+        if self._spline is None:
+            return np.full((*np.shape(frames), 2), np.nan)
+        within = np.clip(frames, 0, len(self.track) - 1)
+        low, high = np.floor(within).astype(int), np.ceil(within).astype(int)
+        values = np.where((low == high)[..., None], self.track[low], self._spline(within))
+        values[~((frames == within) & self.shown[low] & self.shown[high])] = np.nan
+        return values
+
+    def slope(self, frames: Floats) -> Floats:
+        """Pixels a frame, (n, 2), from the frame before to the frame after; finite everywhere.
+
+        Over whole frames, the noise of such a difference does not depend on that of the value
+        between them: both ends share as much with it.
+        """
+        if self._spline is None:
+            return np.zeros((*np.shape(frames), 2))
+        seen = np.flatnonzero(self.shown)
+        ends = [np.clip(frames + step, seen[0], seen[-1]) for step in (1, -1)]
+        width = np.maximum(ends[0] - ends[1], 1)[..., None]
+        return (self._spline(ends[0]) - self._spline(ends[1])) / width
+
+
+def check_lags(name: str, lags: ArrayLike, count: int) -> Floats:
+    """One lag per video, counted from the first one's."""
+    checked = check_vector(name, lags, count)
+    far = np.abs(checked).max()
+    if far > _FARTHEST:
+        raise ValueError(f"{name}: must be at most {_FARTHEST:g} frames, got {far:g}")
+    return checked - checked[0]
+
+
+def check_rates(given: ArrayLike | None, count: int) -> Floats:
+    """One rate per video, in units of the first one's."""
+    rates = np.ones(count) if given is None else check_vector("rates", given, count)
+    for rate in rates:
+        if not 1 / _FASTEST <= check_positive("rates", rate) <= _FASTEST:
+            raise ValueError(
+                f"rates: must be between {1 / _FASTEST:g} and {_FASTEST:g}, got {rate:g}"
+            )
+    return rates / rates[0]
