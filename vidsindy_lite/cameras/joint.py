@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Bools, Floats
-from .clocks import Curve
-from .models import Camera
+from .alignment import Curve
+from .camera import Camera
 from .triangulate import Views, points_of_views
 
 WAYS = 6

@@ -29,11 +29,11 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from ..checks import check_tracks
+from .alignment import Curve, Lags, check_clocks, check_lags, check_rates, list_lags
 from .calibrate import check_learnable, first_cameras
-from .clocks import Curve, Lags, check_lags, check_rates, list_lags
+from .camera import Camera
 from .joint import WAYS, Fit, Scene, fit
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
-from .models import Camera
 from .rig import Rig
 from .triangulate import Views, check_seen, epipolar_lines, epipolar_rows, residuals
 from .uncertainty import long_run_covariance
@@ -87,6 +87,7 @@ def learn_lags(
     rig: Rig,
     rates: ArrayLike | None = None,
     start: ArrayLike | None = None,
+    clocks: Sequence[ArrayLike] | None = None,
     *,
     progress: bool = False,
 ) -> Lags:
@@ -106,6 +107,8 @@ def learn_lags(
         learned where the videos are long enough to tell them.
     start : array_like, shape (m,), optional
         Lags that are tried first, by default zero; of several that fit equally well, these win.
+    clocks : sequence of array_like, shape (n_i,), optional
+        See `align`.
     progress : bool
         Show a progress bar if it takes longer than two seconds.
 
@@ -117,15 +120,16 @@ def learn_lags(
     Raises
     ------
     ValueError
-        If the rig has no calibrated camera, there is not one track, rate and lag per camera, a
-        track has a wrong shape, or a track never shows the target.
+        If the rig has no calibrated camera, there is not one track, rate, lag and clock per
+        camera, a track has a wrong shape, or a track never shows the target.
     """
     unknowns, tracks = check_learnable(rig), check_seen(tracks, rig)
     first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
     given = check_rates(rates, len(tracks))
     with tqdm(desc="synchronise", unit="fit", delay=2, disable=not progress) as bar:
-        videos = _Videos(tuple(map(Curve, tracks)), unknowns, given, bar)
-        return _learned(videos, first)
+        curves = tuple(map(Curve, tracks, check_clocks(clocks, tracks)))
+        found = _learned(_Videos(curves, unknowns, given, bar), first)
+    return found if clocks is None else replace(found, clocks=tuple(c.clock for c in curves))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +142,9 @@ class _Videos:
     bar: tqdm
 
     @property
-    def frames(self) -> Floats:
-        """Of each video."""
-        return np.array([float(len(curve.track)) for curve in self.curves])
-
-    @property
     def ends(self) -> Floats:
-        """Durations on the clock."""
-        return self.frames / self.rates
+        """Durations on the first one's clock."""
+        return np.array([curve.clock[-1] + 1 for curve in self.curves]) / self.rates
 
     def scene(self, lags: Floats, step: int = 1, loose: bool = False) -> Scene | None:
         """Every so many instants, with the cameras that the closed form finds at these lags.
@@ -153,7 +152,7 @@ class _Videos:
         None if it finds none.
         """
         count, unknowns = len(self.curves), self.unknowns
-        instants = np.arange(0, self.frames[0], step)
+        instants = self.curves[0].clock[::step]
         at = [c.at((instants - k) * r) for c, k, r in zip(self.curves, lags, self.rates, strict=True)]
         if not all(np.isfinite(track).any() for track in at):
             return None
@@ -260,7 +259,7 @@ def _climbed(
 
     The best are tried in all combinations with the others' until none is better.
     """
-    count, step = len(promising), max(1, int(videos.frames[0] // _INSTANTS))
+    count, step = len(promising), max(1, len(videos.curves[0].clock) // _INSTANTS)
     tried: dict[tuple[float, ...], _Fitted | None] = {}
 
     def fits(lags: Floats) -> float:
@@ -306,7 +305,8 @@ def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
     shortest = min(videos.ends[known], videos.ends[other])
     margin = _OVERLAP * shortest
     lags = np.arange(np.ceil(margin - videos.ends[other]), videos.ends[known] - margin + 1)
-    frames = np.arange(0, videos.frames[known], max(1, int(shortest // _INSTANTS)))
+    frames = videos.curves[known].clock
+    frames = frames[:: max(1, len(frames) // _INSTANTS)]
     first, second = videos.unknowns.cameras[known], videos.unknowns.cameras[other]
     placed = first.is_placed and second.is_placed
     near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))

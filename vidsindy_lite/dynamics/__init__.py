@@ -1,8 +1,9 @@
 """A trajectory goes in, its law comes out.
 
 trajectories -> problem (smoothing: noise, gaps, units) -> solver -> discovery (diagnostics)
-solver: `discover`; its stages use collocation on splines, selection of terms, origin, gaps, errors
-that last, and persistence: which law stays the same while more error is tolerated
+solver: `discover`; its stages (search, then polish and settle) use collocation on splines,
+selection of terms, origin, gaps, errors that last, and persistence: which law stays the same while
+more error is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings
 storage: the result as a file
 law: polynomials, on a library of monomials; integrate solves it

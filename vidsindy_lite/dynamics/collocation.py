@@ -155,6 +155,8 @@ class Collocation:
         The library.
     data_weights : ndarray, shape (d,)
         1 / variance of the measurement noise.
+    precision : ndarray, shape (n, d)
+        Weight of each measurement relative to these: 1 for most, 0 for what was not observed.
     physics_weights : ndarray, shape (d,)
         Weight of the mean-square residual of each equation per sample.
     systematic : ndarray, shape (n, d, k)
@@ -165,6 +167,7 @@ class Collocation:
     grid: Grid
     exponents: Ints
     data_weights: Floats
+    precision: Floats
     physics_weights: Floats
     systematic: Floats
 
@@ -176,12 +179,18 @@ class Collocation:
         data_weights: Floats,
         physics_weights: Floats,
         systematic: Floats | None = None,
+        precision: Floats | None = None,
     ) -> Collocation:
-        """The problem of these segments, by default without systematic errors."""
+        """The problem of these segments, by default without systematic errors.
+
+        NaN in the data are not observed; all else has a precision of 1 by default.
+        """
         grid = Grid.of(segments)
         shared = np.empty((*grid.x.shape, 0)) if systematic is None else systematic
         data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
-        return cls(grid, exponents, data, physics, shared)
+        relative = np.ones(grid.x.shape) if precision is None else precision
+        seen = np.where(np.isnan(grid.x), 0.0, relative)
+        return cls(grid, exponents, data, seen, physics, shared)
 
     def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
         """The same with other weights."""
@@ -201,17 +210,28 @@ class Collocation:
     def _generators(self) -> Floats:
         return shift_generators(self.exponents)
 
+    @property
+    def counts(self) -> Ints:
+        """How often each coordinate was observed, shape (d,)."""
+        return np.count_nonzero(self.precision, axis=0)
+
+    @cached_property
+    def _sample_weights(self) -> Floats:
+        """1 / variance of every measurement, shape (n, d)."""
+        return self.precision * self.data_weights
+
     @cached_property
     def _data_band(self) -> Floats:
         """Normal matrix of the data loss in the control points, in lower banded storage."""
         band = np.zeros((WIDTH * self.d, self.grid.r * self.d))
-        band[:: self.d] = np.kron(self.grid.sample_band, self.data_weights)
+        for j, weights in enumerate(self._sample_weights.T):
+            band[:: self.d, j :: self.d] = normal_band(self.grid.samples, weights)
         return band
 
     @cached_property
     def _shared(self) -> tuple[Floats, Floats]:
         """Weighted systematic errors, and the normal matrix of their sizes."""
-        weighted = self.data_weights[:, None] * self.systematic
+        weighted = self._sample_weights[:, :, None] * self.systematic
         information = np.einsum("nik,nil->kl", weighted, self.systematic)
         information += np.eye(self.systematic.shape[-1])
         return weighted, information
@@ -225,16 +245,20 @@ class Collocation:
         return self.grid.nodes @ control_points, self.grid.slopes @ control_points
 
     def data_residual(self, control_points: Floats) -> tuple[Floats, Floats]:
-        """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,)."""
-        residual = self.curve(control_points) - self.grid.x
+        """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,).
+
+        What was not observed has residual 0.
+        """
+        seen = self.precision > 0
+        residual = np.where(seen, self.curve(control_points) - self.grid.x, 0.0)
         weighted, information = self._shared
         sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
-        return residual + self.systematic @ sizes, sizes
+        return residual + seen * (self.systematic @ sizes), sizes
 
     def data_loss(self, control_points: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
         residual, sizes = self.data_residual(control_points)
-        return float((residual**2).sum(axis=0) @ self.data_weights + sizes @ sizes)
+        return float((residual**2 * self._sample_weights).sum() + sizes @ sizes)
 
     def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
@@ -272,7 +296,7 @@ class Collocation:
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
 
         right = physics.T @ unknowns
-        right[:, 0] += (self.grid.samples.T @ (data_residual * self.data_weights)).ravel()
+        right[:, 0] += (self.grid.samples.T @ (data_residual * self._sample_weights)).ravel()
         pull = self.grid.samples.T @ self._shared[0].reshape(len(self.grid.x), -1)
         right[:, 1 + len(columns) :] = pull.reshape(len(right), -1)
         solved = cho_solve_banded((factor, True), right, check_finite=False)
@@ -281,7 +305,7 @@ class Collocation:
         gram = self._gram(unknowns - physics @ solved, solved, data_residual, sizes)
         solved = solved.reshape(-1, self.d, solved.shape[1])
         gram, solved = _without_systematic(gram, solved, 1 + len(columns))
-        objective = (data_residual**2).sum(axis=0) @ self.data_weights
+        objective = (data_residual**2 * self._sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
         return Linearisation(
@@ -341,7 +365,7 @@ class Collocation:
         follow = -curve.reshape(-1, self.d, left.shape[1])
         follow[:, :, 0] += data_residual
         follow[:, :, shared] += self.systematic
-        follow *= np.sqrt(self.data_weights)[:, None]
+        follow *= np.sqrt(self._sample_weights)[:, :, None]
         follow = follow.reshape(-1, left.shape[1])
         gram += follow.T @ follow
         gram[shared, shared] += np.eye(len(sizes))

@@ -69,7 +69,7 @@ class History:
                 stage=stage,
                 seconds=time.perf_counter() - self.began,
                 physics_weight=weight,
-                data_loss=data / collocation.grid.x.size,
+                data_loss=data / collocation.counts.sum(),
                 physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
                 terms=int(state.active.sum()),
                 offset=problem.units.point(state.offset),

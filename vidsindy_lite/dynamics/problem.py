@@ -74,6 +74,9 @@ class Problem:
         The same in standard units.
     systematic : list of ndarray, shape (n, d, k)
         Errors that all samples share, for each trajectory.
+    precision : list of ndarray, shape (n, d)
+        Weight of each measurement relative to ``noise ** -2``, for each trajectory; 0 where it was
+        not observed.
     stretches : list of (int, Trajectory)
         The data between gaps, each with the number of its trajectory.
     curves : list of BSpline
@@ -92,6 +95,7 @@ class Problem:
     measured: list[Trajectory]
     trajectories: list[Trajectory]
     systematic: list[Floats]
+    precision: list[Floats]
     stretches: list[tuple[int, Trajectory]]
     curves: list[BSpline]
     units: Units
@@ -126,14 +130,17 @@ class Problem:
 
     def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
         """Data and physics loss on segments; by default for the noise of the smoothing."""
-        shared = np.concatenate([self._shared(segment) for segment in segments])
+        shared, precision = (
+            np.concatenate([self._at(segment, values) for segment in segments])
+            for values in (self.systematic, self.precision)
+        )
         weights = (self.noise if noise is None else noise) ** -2
-        return Collocation.of(segments, self.exponents, weights, np.ones(self.d), shared)
+        return Collocation.of(segments, self.exponents, weights, np.ones(self.d), shared, precision)
 
-    def _shared(self, segment: Segment) -> Floats:
-        """Systematic errors at the samples of a segment, shape (n, d, k)."""
+    def _at(self, segment: Segment, values: Sequence[Floats]) -> Floats:
+        """What is given for all samples of each trajectory, at those of a segment."""
         t, _ = self.trajectories[segment.trajectory]
-        return self.systematic[segment.trajectory][np.searchsorted(t, segment.t)]
+        return values[segment.trajectory][np.searchsorted(t, segment.t)]
 
     def weighted(self, collocation: Collocation, weight: float) -> Collocation:
         """The same with another physics weight, relative to the slack."""
@@ -183,6 +190,7 @@ def pose(
         measured=measured,
         trajectories=[(t * speed, values) for t, values in trajectories],
         systematic=[modes / scale[:, None] for modes in systematic],
+        precision=[np.ones(values.shape) for _, values in measured],
         stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
         curves=curves,
         units=Units(centre, scale, step / speed),

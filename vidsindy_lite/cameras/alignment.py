@@ -1,8 +1,9 @@
-"""The clocks of videos: lags, rates, and tracks at the same instants.
+"""Lags and clocks of videos, and their tracks at the same instants: the frames of the first video.
 
-The frames of the first video are the clock. Camera i starts `lag` of them later and takes `rate`
-frames during each, so that the instant k of the clock is its frame (k - lag) * rate. Between two
-frames a track is interpolated, so lags need not be whole.
+Camera i starts `lag` frames of the first video later and takes `rate` frames during each, so that
+the instant k is its frame (k - lag) * rate. Between two frames a track is interpolated, so lags
+need not be whole. Frames that were dropped, or taken at uneven times, keep the numbers that an even
+camera would have given them: that is the video's `clock`, 0, 1, 2, ... for an even one.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from ..checks import check_positive, check_tracks, check_vector
 
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
-
+_WIDEST = 2.5  # frames between two that a track is interpolated from: one of them may be dropped
 
 @dataclass(frozen=True)
 class Lags:
@@ -41,6 +42,8 @@ class Lags:
         fit these lags best; see `learn_lags`.
     warnings : tuple of str
         Why the lags should not be trusted, with advice.
+    clocks : tuple of ndarray, shape (n_i,)
+        When each frame was taken, see `align`; empty if all videos are even.
     """
 
     frames: Floats
@@ -48,6 +51,7 @@ class Lags:
     errors: Floats
     residual: float
     warnings: tuple[str, ...] = ()
+    clocks: tuple[Floats, ...] = ()
 
     @property
     def agree(self) -> bool:
@@ -56,11 +60,17 @@ class Lags:
 
     def frame_at(self, i: int, instant: int) -> int:
         """Which frame of video i is closest to one of the first."""
-        return int(np.rint((instant - self.frames[i]) * self.rates[i]))
+        if not self.clocks:
+            return int(np.rint((instant - self.frames[i]) * self.rates[i]))
+        sought = (self.clocks[0][instant] - self.frames[i]) * self.rates[i]
+        return int(np.abs(self.clocks[i] - sought).argmin())
 
 
 def align(
-    tracks: Sequence[Floats], lags: ArrayLike, rates: ArrayLike | None = None
+    tracks: Sequence[Floats],
+    lags: ArrayLike,
+    rates: ArrayLike | None = None,
+    clocks: Sequence[ArrayLike] | None = None,
 ) -> tuple[Floats, ...]:
     """Tracks of all videos at the instants of the first video's frames.
 
@@ -72,26 +82,31 @@ def align(
         By how many frames of the first video each one starts later; only differences count.
     rates : array_like, shape (m,), optional
         Frames of each video in one frame of the first; by default one.
+    clocks : sequence of array_like, shape (n_i,), optional
+        When each frame was taken, in frames of its video at an even rate: by default 0, 1, 2, ...;
+        0, 1, 3, 4, ... if one was dropped.
 
     Returns
     -------
     tuple of ndarray, shape (n_0, 2)
         NaN where a video has not begun, has ended, or does not show the target in the frames before
-        and after. At whole frames these are the tracks themselves.
+        and after, or these are more than one dropped frame apart. At whole frames these are the
+        tracks themselves.
 
     Raises
     ------
     ValueError
-        If a track has a wrong shape or an infinite value, or there is not one finite lag, or
-        positive rate, per track, or one of them is absurdly large or small.
+        If a track has a wrong shape or an infinite value, or there is not one finite lag, positive
+        rate, or increasing clock, per track, or a lag or rate is absurdly large or small.
     """
     tracks = check_tracks(tracks)
     shifts = check_lags("lags", lags, len(tracks))
     speeds = check_rates(rates, len(tracks))
-    clock = np.arange(len(tracks[0]))
+    ticks = check_clocks(clocks, tracks)
+    curves = map(Curve, tracks, ticks)
     return tuple(
-        Curve(track).at((clock - lag) * rate)
-        for track, lag, rate in zip(tracks, shifts, speeds, strict=True)
+        curve.at((ticks[0] - lag) * rate)
+        for curve, lag, rate in zip(curves, shifts, speeds, strict=True)
     )
 
 
@@ -108,9 +123,12 @@ class Curve:
     ----------
     track : ndarray, shape (n, 2)
         NaN where the target is not seen.
+    clock : ndarray, shape (n,)
+        Numbers of its frames.
     """
 
     track: Floats
+    clock: Floats
 
     @cached_property
     def shown(self) -> Bools:
@@ -119,19 +137,27 @@ class Curve:
 
     @cached_property
     def _spline(self) -> BSpline | None:
-        seen = np.flatnonzero(self.shown)
-        if not seen.size:
+        count = int(self.shown.sum())
+        if not count:
             return None
-        return make_interp_spline(seen, self.track[seen], k=min(3, len(seen) - 1))
+        return make_interp_spline(
+            self.clock[self.shown], self.track[self.shown], k=min(3, count - 1)
+        )
 
     def at(self, frames: Floats) -> Floats:
-        """Pixels, (..., 2); NaN outside, and unless the frames before and after are seen."""
+        """Pixels, (..., 2).
+
+        NaN outside, and unless the target is seen in the frames before and after, and these are
+        close to each other.
+        """
         if self._spline is None:
             return np.full((*np.shape(frames), 2), np.nan)
-        within = np.clip(frames, 0, len(self.track) - 1)
-        low, high = np.floor(within).astype(int), np.ceil(within).astype(int)
+        within = np.clip(frames, self.clock[0], self.clock[-1])
+        low = np.searchsorted(self.clock, within, "right") - 1
+        high = np.searchsorted(self.clock, within, "left")
         values = np.where((low == high)[..., None], self.track[low], self._spline(within))
-        values[~((frames == within) & self.shown[low] & self.shown[high])] = np.nan
+        near = self.clock[high] - self.clock[low] <= _WIDEST
+        values[~((frames == within) & self.shown[low] & self.shown[high] & near)] = np.nan
         return values
 
     def slope(self, frames: Floats) -> Floats:
@@ -142,10 +168,10 @@ class Curve:
         """
         if self._spline is None:
             return np.zeros((*np.shape(frames), 2))
-        seen = np.flatnonzero(self.shown)
-        ends = [np.clip(frames + step, seen[0], seen[-1]) for step in (1, -1)]
-        width = np.maximum(ends[0] - ends[1], 1)[..., None]
-        return (self._spline(ends[0]) - self._spline(ends[1])) / width
+        seen = self.clock[self.shown]
+        back, on = (np.clip(frames + step, seen[0], seen[-1]) for step in (-1, 1))
+        width = np.maximum(on - back, 1)[..., None]
+        return (self._spline(on) - self._spline(back)) / width
 
 
 def check_lags(name: str, lags: ArrayLike, count: int) -> Floats:
@@ -166,3 +192,18 @@ def check_rates(given: ArrayLike | None, count: int) -> Floats:
                 f"rates: must be between {1 / _FASTEST:g} and {_FASTEST:g}, got {rate:g}"
             )
     return rates / rates[0]
+
+
+def check_clocks(given: Sequence[ArrayLike] | None, tracks: Sequence[Floats]) -> tuple[Floats, ...]:
+    """When each frame of each track was taken, the first one at zero."""
+    if given is None:
+        return tuple(np.arange(len(track), dtype=float) for track in tracks)
+    if len(given) != len(tracks):
+        raise ValueError(f"clocks: must be one per track, got {len(given)} for {len(tracks)}")
+    clocks = []
+    for i, (clock, track) in enumerate(zip(given, tracks, strict=True)):
+        checked = check_vector(f"clocks[{i}]", clock, len(track))
+        if (np.diff(checked) <= 0).any():
+            raise ValueError(f"clocks[{i}]: must increase, got {checked!r:.60}")
+        clocks.append(checked - checked[0])
+    return tuple(clocks)
