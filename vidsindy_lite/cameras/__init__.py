@@ -8,6 +8,7 @@
     unknowns      what is unknown of a rig: as one vector, and linear equations for it
  1. synchronise   tracks -> when each camera started (`Lags`)
     alignment     tracks at the same instants, whatever the lags, rates and clocks of the videos
+    pairs         lags that are promising, from two views at a time
     joint         cameras, lags and points together, from tracks and a start
  2. calibrate     tracks -> the same `Rig`, with nothing unknown
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them

@@ -23,6 +23,7 @@ _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _WIDEST = 2.5  # frames between two that a track is interpolated from: one of them may be dropped
 
+
 @dataclass(frozen=True)
 class Lags:
     """Lags of the videos.

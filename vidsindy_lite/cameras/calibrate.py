@@ -212,18 +212,6 @@ def cameras_of_views(views: Views, unknowns: Unknowns) -> Rig:
     return replace(learned, warnings=learned.warnings + doubts)
 
 
-def first_cameras(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:
-    """The closed form of what is unknown: the start of a search for the smallest residuals."""
-    if not unknowns.any:
-        return unknowns.cameras
-    if not all_orthographic(unknowns.cameras):
-        return _spread(views, unknowns)
-    equations, _ = agreement(views, unknowns)
-    return unknowns.filled(
-        unknowns.vector(*solve(equations.design, equations.target, unknowns))
-    )
-
-
 def _closest(views: Views, candidate: Callable[[Floats], tuple[Camera, ...]], start: Floats) -> Rig:
     """The cameras `candidate(parameters)` of the smallest reprojection error in pixels."""
 

@@ -13,7 +13,7 @@ standard deviation that a measured value may be off by.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,15 +68,16 @@ class Scene:
         """What camera i shows at the instants: pixels."""
         return self.curves[i].at(self.frames(here, i))
 
-    def camera(self, here: Estimate, i: int) -> Camera:
-        """Camera i as it is estimated."""
-        return _moved(self.cameras[i], here.change[i], self.width)
+    def images(self, here: Estimate) -> Floats:
+        """Pixels at which the points should be seen, (n, m, 2)."""
+        pairs = zip(self.cameras, here.change, strict=True)
+        cameras = (_moved(camera, change, self.width) for camera, change in pairs)
+        return np.stack([camera.image(here.points) for camera in cameras], axis=1)
 
     def missed(self, here: Estimate) -> Floats:
         """Residuals, (n, m, 2) in pixels; NaN where nothing is seen, or no point is known."""
-        views = range(len(self.cameras))
-        both = [self.shown(here, i) - self.camera(here, i).image(here.points) for i in views]
-        missed = np.stack(both, axis=1)
+        shown = [self.shown(here, i) for i in range(len(self.cameras))]
+        missed = np.stack(shown, axis=1) - self.images(here)
         missed[np.isfinite(missed).all(axis=-1).sum(axis=1) < 2] = np.nan  # one view has no say
         return missed
 
@@ -125,17 +126,24 @@ def fit(scene: Scene, start: Estimate) -> Fit | None:
 
     None if the views have too little in common.
     """
-    soft = _search(scene, start, _soft_weights)
-    return None if soft is None else _search(scene, soft.estimate, _hard_weights)
+    soft = roughly_fit(scene, start, _ROUNDS)
+    return None if soft is None else _search(scene, soft.estimate, _hard_weights, _ROUNDS)
 
 
-def _search(scene: Scene, here: Estimate, weigh: Callable[[Floats], Floats]) -> Fit | None:
+def roughly_fit(scene: Scene, start: Estimate, rounds: int) -> Fit | None:
+    """The same in robust weights and after a few steps, to tell good starts from bad ones."""
+    return _search(scene, start, _soft_weights, rounds)
+
+
+def _search(
+    scene: Scene, here: Estimate, weigh: Callable[[Floats], Floats], rounds: int
+) -> Fit | None:
     """Gauss-Newton with weights, (n,), that depend on the sizes of the residuals."""
     steps = _Steps(scene)
-    for _ in range(_ROUNDS):
-        look = steps.look(here)
-        if look is None:
-            return None
+    look = steps.look(here)
+    if look is None:
+        return None
+    for _ in range(rounds):
         weights = weigh(look.sizes)
         step = steps.solve(look, here, weights)
         moved = np.abs(step[steps.cameras : steps.lags]).max(initial=0)
@@ -144,13 +152,17 @@ def _search(scene: Scene, here: Estimate, weigh: Callable[[Floats], Floats]) -> 
         if moved < _SETTLED and np.sqrt(np.mean(change**2)) < small:
             break
         there = steps.taken(look, here, weights, step)
-        if there is None:
+        seen_there = None if there is None else steps.look(there)
+        if there is None or seen_there is None:
             break
-        here = there
+        here, look = there, seen_there
     seen = np.isfinite(scene.missed(here))
     missed = np.full(seen.shape, np.nan)
     missed[look.rows] = look.missed.reshape(-1, *seen.shape[1:])
-    slopes, freedom = np.zeros((*seen.shape[:1], look.slopes.shape[1], len(step))), np.zeros(seen.shape[:2])
+    slopes, freedom = (
+        np.zeros((*seen.shape[:1], look.slopes.shape[1], len(step))),
+        np.zeros(seen.shape[:2]),
+    )
     slopes[look.rows], freedom[look.rows] = look.slopes, look.freedom
     used = np.zeros(len(seen), bool)
     used[look.rows] = weights > 0
@@ -184,19 +196,22 @@ class _Steps:
         self.lags = self.cameras + len(scene.cameras) - 1
         self.span = max(float(np.ptp(scene.instants)), 1.0)  # drifts count over the whole time
         spreads = scene.spreads[scene.spreads > 0]
-        self.prior = np.concatenate((1 / spreads**2, np.zeros(self.lags - self.cameras + len(self.drifting))))
+        self.prior = np.concatenate(
+            (1 / spreads**2, np.zeros(self.lags - self.cameras + len(self.drifting)))
+        )
 
     def look(self, here: Estimate) -> _Look | None:
         """At all pixels."""
         scene, missed = self.scene, self.scene.missed(here)
-        rows = np.isfinite(missed).any(axis=(1, 2))
+        rows = np.asarray(np.isfinite(missed).any(axis=(1, 2)))
         if rows.sum() * 3 <= self.lags + len(self.drifting):
             return None
         seen = np.isfinite(missed[rows]).all(axis=-1)
         raw = np.where(seen[..., None], missed[rows], 0).reshape(len(seen), -1)
         mask = np.repeat(seen, 2, axis=1)[..., None]
-        across = np.where(mask, self._points(here, rows), 0)
-        others = np.where(mask, self._others(here, rows), 0)
+        images = scene.images(here)
+        across = np.where(mask, self._points(here, rows, images), 0)
+        others = np.where(mask, self._others(here, rows, images), 0)
         q, r = np.linalg.qr(across)
         pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
         r[~(pivots.min(axis=1) > 1e-9 * pivots.max(axis=1))] = np.inf  # such points stay
@@ -210,7 +225,9 @@ class _Steps:
     def solve(self, look: _Look, here: Estimate, weights: Floats) -> Floats:
         """The step of all parameters."""
         used = weights > 0
-        noise = np.sum(weights[used, None] * look.missed[used] ** 2) / max(look.freedom[used].sum(), 1)
+        noise = np.sum(weights[used, None] * look.missed[used] ** 2) / max(
+            look.freedom[used].sum(), 1
+        )
         noise = max(noise, _ROUNDING**2)
         slopes = look.slopes[used]
         information = np.einsum("n,nik,nil->kl", weights[used], slopes, slopes) / noise
@@ -225,7 +242,7 @@ class _Steps:
         return step / max(longest / _LONGEST, 1)
 
     def taken(self, look: _Look, here: Estimate, weights: Floats, step: Floats) -> Estimate | None:
-        """The estimate after the step, or a part of it that does not lead uphill; None if none does."""
+        """The estimate after the step, or after a part of it that does not lead uphill, if any."""
         raw, others = look.raw
         before = np.sum(weights[:, None] * look.missed**2)
         for part in 0.5 ** np.arange(8):
@@ -247,31 +264,28 @@ class _Steps:
         drifts[self.drifting] += step[self.lags :] / self.span
         return replace(here, change=change, lags=lags, drifts=drifts)
 
-    def _points(self, here: Estimate, rows: Bools) -> Floats:
+    def _points(self, here: Estimate, rows: Bools, images: Floats) -> Floats:
         """Slopes of the residuals in the points, (n, 2 m, 3)."""
-        scene, x = self.scene, here.points[rows]
-        probe = _PROBE * max(float(np.ptp(x, axis=0).max()), 1e-9)
-        slopes = [
-            [(camera.image(x - e) - camera.image(x + e)) / (2 * probe) for e in probe * np.eye(3)]
-            for camera in (scene.camera(here, i) for i in range(len(scene.cameras)))
-        ]
-        return np.moveaxis(np.array(slopes), (0, 2), (1, 0)).swapaxes(2, 3).reshape(len(x), -1, 3)
+        x = here.points
+        probe = _PROBE * max(float(np.nanmax(np.ptp(x[rows], axis=0))), 1e-9)
+        there = [self.scene.images(replace(here, points=x + e)) for e in probe * np.eye(3)]
+        slopes = [(images - image)[rows] / probe for image in there]
+        return np.stack(slopes, axis=-1).reshape(-1, 2 * images.shape[1], 3)
 
-    def _others(self, here: Estimate, rows: Bools) -> Floats:
+    def _others(self, here: Estimate, rows: Bools, images: Floats) -> Floats:
         """Slopes of the residuals in all parameters, (n, 2 m, p)."""
         scene, x = self.scene, here.points[rows]
         slopes = np.zeros((len(x), len(scene.cameras), 2, len(self.prior)))
         for column, (i, way) in enumerate(self.moving):
-            probe = _PROBE * np.eye(WAYS)[way]
-            back, on = (_moved(scene.cameras[i], here.change[i] + s * probe, scene.width) for s in (-1, 1))
-            slopes[:, i, :, column] = (back.image(x) - on.image(x)) / (2 * _PROBE)
-        for i in range(1, len(scene.cameras)):
-            frames = scene.frames(here, i)[rows]
-            moving = scene.curves[i].slope(frames)
-            slopes[:, i, :, self.cameras + i - 1] = -scene.rates[i] * (1 + here.drifts[i]) * moving
-            for column in np.flatnonzero(self.drifting == i) + self.lags:
-                late = (scene.instants[rows] - here.lags[i]) * scene.rates[i] / self.span
-                slopes[:, i, :, column] = late[:, None] * moving
+            change = here.change[i] + _PROBE * np.eye(WAYS)[way]
+            there = _moved(scene.cameras[i], change, scene.width).image(x)
+            slopes[:, i, :, column] = (images[rows, i] - there) / _PROBE
+        for k in range(1, len(scene.cameras)):
+            moving = scene.curves[k].slope(scene.frames(here, k)[rows])
+            slopes[:, k, :, self.cameras + k - 1] = -scene.rates[k] * (1 + here.drifts[k]) * moving
+            for column in np.flatnonzero(self.drifting == k) + self.lags:
+                late = (scene.instants[rows] - here.lags[k]) * scene.rates[k] / self.span
+                slopes[:, k, :, column] = late[:, None] * moving
         return slopes.reshape(len(x), -1, len(self.prior))
 
 
@@ -299,13 +313,3 @@ def _hard_weights(sizes: Floats) -> Floats:
     far = sizes > max(OUTLIER * float(np.median(sizes)), _ROUNDING)
     near = np.convolve(far, np.ones(2 * _BESIDE + 1), mode="same")[: len(far)] if far.any() else far
     return np.where(near > 0, 0.0, 1.0)
-
-
-def spreads_of(cameras: Sequence[Camera], unplaced: Sequence[int], uncalibrated: Sequence[int]) -> Floats:
-    """Those of a rig of which all that is given is exact, (m, 6)."""
-    spreads = np.zeros((len(cameras), WAYS))
-    for i in uncalibrated:
-        spreads[i, 2:4] = np.inf
-    for i in unplaced:
-        spreads[i, 4:] = np.inf
-    return spreads

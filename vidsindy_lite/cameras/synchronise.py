@@ -27,15 +27,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
-from ..arrays import Bools, Floats
-from ..checks import check_tracks
+from ..arrays import Floats
 from .alignment import Curve, Lags, check_clocks, check_lags, check_rates, list_lags
-from .calibrate import check_learnable, first_cameras
-from .camera import Camera
-from .joint import WAYS, Fit, Scene, fit
+from .calibrate import check_learnable
+from .joint import WAYS, Fit, Scene, fit, roughly_fit
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
+from .pairs import promising_lags, rough_cameras
 from .rig import Rig
-from .triangulate import Views, check_seen, epipolar_lines, epipolar_rows, residuals
+from .triangulate import Views, check_seen, residuals
 from .uncertainty import long_run_covariance
 from .unknowns import Unknowns
 
@@ -49,11 +48,10 @@ ALIKE = 2.0
 FINE = 0.05
 """... and residual in pixels below which all do: real tracks are no better than that."""
 
-_OVERLAP = 0.5  # share of the shorter of two videos that both must show
-_INSTANTS = 300  # at which views are compared in the first two steps
-_BLOCK = 200_000  # pairs of a lag and an instant at a time
-_PROMISING = 4  # lags of each camera, with and without a shift, that pass the first step
+_INSTANTS = 300  # at which all cameras are compared in the second step
+_ROUNDS = 8  # of the second step
 _TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
+_BETTER_PART = 0.7  # of all frames, in which no view is an outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
 _SHOWN = 3  # of the lags that fit equally well
 _SETTLED = 1e-2  # frames, of the last step in a lag
@@ -142,9 +140,9 @@ class _Videos:
     bar: tqdm
 
     @property
-    def ends(self) -> Floats:
-        """Durations on the first one's clock."""
-        return np.array([curve.clock[-1] + 1 for curve in self.curves]) / self.rates
+    def step(self) -> int:
+        """Frames from one to the next of those in which all cameras are compared."""
+        return max(1, len(self.curves[0].clock) // _INSTANTS)
 
     def scene(self, lags: Floats, step: int = 1, loose: bool = False) -> Scene | None:
         """Every so many instants, with the cameras that the closed form finds at these lags.
@@ -153,12 +151,13 @@ class _Videos:
         """
         count, unknowns = len(self.curves), self.unknowns
         instants = self.curves[0].clock[::step]
-        at = [c.at((instants - k) * r) for c, k, r in zip(self.curves, lags, self.rates, strict=True)]
+        at = [
+            c.at((instants - k) * r) for c, k, r in zip(self.curves, lags, self.rates, strict=True)
+        ]
         if not all(np.isfinite(track).any() for track in at):
             return None
-        try:
-            cameras = first_cameras(Views.of(at), unknowns)
-        except ValueError:  # these lags leave too little in common, or nothing that agrees
+        cameras = rough_cameras(Views.of(at), unknowns)
+        if cameras is None:
             return None
         spreads = np.zeros((count, WAYS))
         spreads[:, :4] = _LOOSE * loose
@@ -171,8 +170,11 @@ class _Videos:
         """The best lags near given ones; None if nothing fits."""
         self.bar.update()
         scene = self.scene(lags, step, loose)
-        found = None if scene is None else fit(scene, scene.start(lags))
-        return None if scene is None or found is None else _Fitted(scene, found)
+        if scene is None:
+            return None
+        start = scene.start(lags)
+        found = fit(scene, start) if step == 1 else roughly_fit(scene, start, _ROUNDS)
+        return None if found is None else _Fitted(scene, found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +195,11 @@ class _Fitted:
         return max(_trimmed(part) for part in np.moveaxis(self.fit.missed, 1, 0))
 
     @property
+    def score(self) -> float:
+        """The same, if errors are normal but for some outliers: from the better part of them."""
+        return max(_trimmed(part, _BETTER_PART) for part in np.moveaxis(self.fit.missed, 1, 0))
+
+    @property
     def persists(self) -> bool:
         """Whether residuals are like those of the next frame, as tracking errors are not."""
         missed = self.fit.missed[self.fit.used].reshape(self.fit.used.sum(), -1)
@@ -205,10 +212,16 @@ class _Fitted:
         return bool(np.abs(self.lags - lags).max() < _APART)
 
 
-def _trimmed(residual: Floats) -> float:
-    """Length of the residuals, (n, 2), that one frame in ten exceeds."""
+def _trimmed(residual: Floats, share: float = _TRIMMED) -> float:
+    """Length of the residuals, (n, 2), that one frame in ten exceeds.
+
+    From another share of them if they are normal: their lengths are then Rayleigh's.
+    """
     seen = residual[np.isfinite(residual).all(axis=1)]
-    return float(np.quantile(np.hypot(*seen.T), _TRIMMED)) if len(seen) else 0.0
+    if not len(seen):
+        return 0.0
+    ratio = np.sqrt(np.log(1 - _TRIMMED) / np.log(1 - share))
+    return float(ratio * np.quantile(np.hypot(*seen.T), share))
 
 
 # ------------------------------------------------------------------------------------- the search
@@ -217,19 +230,26 @@ def _trimmed(residual: Floats) -> float:
 def _learned(videos: _Videos, first: Floats) -> Lags:
     """`learn_lags` of what was checked."""
     begun = videos.fitted(first)
-    if begun is not None and begun.residual <= DISAGREEMENT and not begun.persists:
+    if (
+        begun is not None
+        and begun.near(first)
+        and begun.score <= DISAGREEMENT
+        and not begun.persists
+    ):
         return _told(videos, _drifted(begun), first)
     loose, sampled = _searched(videos, first)
     if not sampled:
         return _untold(videos, first, no_lags(list_lags(first), np.inf))
-    close = [s for s in sampled if s.residual <= max(2 * ALIKE * sampled[0].residual, FINE)]
-    every = [videos.fitted(s.lags, loose=loose) for s in close[: 2 * _SHOWN]]
-    found = sorted(_different([f for f in every if f]), key=lambda f: f.residual)
+    close = [s for s in sampled if s.score <= max(2 * ALIKE * sampled[0].score, FINE)]
+    small = sorted(close, key=lambda s: np.abs(s.lags).sum())
+    chosen = _different(close[:_SHOWN] + small[:_SHOWN])
+    every = [videos.fitted(s.lags, loose=loose) for s in chosen]
+    found = sorted(_different([f for f in every if f]), key=lambda f: f.score)
     if not found:
         return _untold(videos, first, no_lags(list_lags(first), np.inf))
-    alike = [f for f in found if f.residual <= max(ALIKE * found[0].residual, FINE)]
-    if len(alike) > 1 and found[0].residual > DISAGREEMENT:
-        return _untold(videos, first, no_lags(list_lags(first), alike[0].residual))
+    alike = [f for f in found if f.score <= max(ALIKE * found[0].score, FINE)]
+    if len(alike) > 1 and found[0].score > DISAGREEMENT:
+        return _untold(videos, first, no_lags(list_lags(first), alike[0].score))
     best = min(alike, key=lambda f: (not f.near(first), np.abs(f.lags).sum()))
     told = _told(videos, _drifted(best), first)
     if len(alike) > 1 and not best.near(first):
@@ -241,13 +261,17 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
 
 def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[_Fitted]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
-    promising = _promising(videos)
+    promising = promising_lags(videos.curves, videos.rates, videos.unknowns)
     exact = _climbed(videos, promising, first, False)
-    if not exact or exact[0].residual <= FINE:
+    if not exact or exact[0].score <= FINE:
         return False, exact
+    if exact[0].score <= DISAGREEMENT:
+        other = videos.fitted(exact[0].lags, videos.step, True)
+        if other is None or other.score * _BETTER >= exact[0].score:
+            return False, exact
     # Where the rig is wrong, its best lags may be wrong as well: so all are tried again.
     loose = _climbed(videos, promising, first, True)
-    if loose and loose[0].residual * _BETTER < exact[0].residual:
+    if loose and loose[0].score * _BETTER < exact[0].score:
         return True, loose
     return False, exact
 
@@ -259,15 +283,15 @@ def _climbed(
 
     The best are tried in all combinations with the others' until none is better.
     """
-    count, step = len(promising), max(1, len(videos.curves[0].clock) // _INSTANTS)
+    count = len(promising)
     tried: dict[tuple[float, ...], _Fitted | None] = {}
 
     def fits(lags: Floats) -> float:
         key = tuple((lags - lags[0]).tolist())
         if key not in tried:
-            tried[key] = videos.fitted(np.array(key), step, loose)
+            tried[key] = videos.fitted(np.array(key), videos.step, loose)
         found = tried[key]
-        return np.inf if found is None else found.residual
+        return np.inf if found is None else found.score
 
     best = np.array([lags[0] for lags in promising])
     fits(first)
@@ -278,7 +302,7 @@ def _climbed(
         if winner == 0:
             break
         best = every[winner]
-    found = sorted((f for f in tried.values() if f is not None), key=lambda f: f.residual)
+    found = sorted((f for f in tried.values() if f is not None), key=lambda f: f.score)
     return _different(found)
 
 
@@ -289,75 +313,6 @@ def _different(found: list[_Fitted]) -> list[_Fitted]:
         if not any(one.near(other.lags) for other in kept):
             kept.append(one)
     return kept
-
-
-def _promising(videos: _Videos) -> list[list[float]]:
-    """Some whole lags of each camera behind a calibrated one."""
-    cameras = videos.unknowns.cameras
-    known = next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
-    return [
-        [0.0] if i == known else _pair_lags(videos, known, i) for i in range(len(cameras))
-    ]
-
-
-def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
-    """The most promising lags of one camera behind a calibrated one, best first."""
-    shortest = min(videos.ends[known], videos.ends[other])
-    margin = _OVERLAP * shortest
-    lags = np.arange(np.ceil(margin - videos.ends[other]), videos.ends[known] - margin + 1)
-    frames = videos.curves[known].clock
-    frames = frames[:: max(1, len(frames) // _INSTANTS)]
-    first, second = videos.unknowns.cameras[known], videos.unknowns.cameras[other]
-    placed = first.is_placed and second.is_placed
-    near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
-    lines = epipolar_lines(near, videos.curves[known].at(frames), far)
-    instants, rate = frames / videos.rates[known], videos.rates[other]
-    missed = []
-    for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
-        theirs = videos.curves[other].at((instants - block[:, None]) * rate)
-        missed.append([pair_missed(second, placed, lines, theirs, shift) for shift in (False, True)])
-    choices = [_dips(lags, part)[:_PROMISING] for part in np.concatenate(missed, axis=1)]
-    return list(dict.fromkeys(np.concatenate(choices).tolist())) or [0.0]
-
-
-def _dips(lags: Floats, missed: Floats) -> Floats:
-    """The lags of all minima, the lowest first."""
-    padded = np.concatenate(([np.inf], missed, [np.inf]))
-    dips = np.flatnonzero((missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed))
-    return lags[dips[np.argsort(missed[dips])]]
-
-
-def pair_missed(
-    other: Camera, placed: bool, lines: tuple[Floats, Floats], theirs: Floats, shift: bool
-) -> Floats:
-    """By how much its pixels, (k, n, 2), miss the epipolar lines at best, (k,), scene units rms.
-
-    `placed` says whether both positions are known, `shift` whether the image may be shifted. One
-    instant in ten is left out. Infinite where too few are left.
-    """
-    design, target = epipolar_rows(lines, other, theirs)
-    if other.is_calibrated:
-        scale, angle = other.calibration
-        design, target = design[..., :0], target - design @ [scale * np.cos(angle), scale * np.sin(angle)]
-    extra = lines[0] if shift else np.ones((len(lines[0]), 1)) if not placed else lines[0][:, :0]
-    extra = np.broadcast_to(extra, (*target.shape, extra.shape[1]))
-    design = np.concatenate((design, extra), axis=-1)
-    seen = np.isfinite(target) & np.isfinite(design).all(axis=-1)
-    design, target = np.where(seen[..., None], design, 0), np.where(seen, target, 0)
-    size = np.abs(design).max(axis=(0, 1), initial=0, keepdims=True)
-    design = design / np.where(size > 0, size, 1)
-    fits, unknown = seen, design.shape[-1]
-    for _ in range(2):
-        used = np.where(fits[..., None], design, 0)
-        square = used.swapaxes(-1, -2) @ used
-        right = np.einsum("kni,kn->ki", used, np.where(fits, target, 0))
-        solution = np.einsum("kij,kj->ki", np.linalg.pinv(square, rcond=1e-10, hermitian=True), right)
-        missed = np.where(seen, np.abs(np.einsum("kni,ki->kn", design, solution) - target), np.nan)
-        enough = fits.sum(axis=1) > 2 * unknown
-        limit = np.nanquantile(np.where(enough[:, None], missed, 0), _TRIMMED, axis=1)
-        fits = seen & (missed <= limit[:, None])
-    total = np.sum(np.where(fits, missed, 0) ** 2, axis=1)
-    return np.where(enough, np.sqrt(total / np.maximum(fits.sum(axis=1), 1)), np.inf)
 
 
 # --------------------------------------------------------------------- drifts, errors, what is told
