@@ -1,5 +1,7 @@
 """Pixels and space: cameras, and what several of them that watch one target say of it.
 
+::
+
     geometry      rotations and planes
     camera        what all cameras have in common: place, image, errors of what was measured
     models        the two models of camera: orthographic and perspective
@@ -7,6 +9,7 @@
     rig           the cameras that watch one scene, and their file
     unknowns      what is unknown of a rig: as one vector, and linear equations for it
  1. synchronise   tracks -> when each camera started (`Lags`)
+    clocks        when the frames of each video were taken
     alignment     tracks at the same instants, whatever the lags, rates and clocks of the videos
     pairs         lags that are promising, from two views at a time
     joint         cameras, lags and points together, from tracks and a start
@@ -21,6 +24,7 @@ The other rooms import from here alone.
 
 from .alignment import Lags, align, list_lags
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
+from .clocks import Clock
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .camera import Camera

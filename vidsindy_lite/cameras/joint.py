@@ -157,15 +157,11 @@ def _search(
             break
         here, look = there, seen_there
     seen = np.isfinite(scene.missed(here))
-    missed = np.full(seen.shape, np.nan)
+    missed, freedom = np.full(seen.shape, np.nan), np.zeros(seen.shape[:2])
+    slopes, used = np.zeros((len(seen), *look.slopes.shape[1:])), np.zeros(len(seen), bool)
     missed[look.rows] = look.missed.reshape(-1, *seen.shape[1:])
-    slopes, freedom = (
-        np.zeros((*seen.shape[:1], look.slopes.shape[1], len(step))),
-        np.zeros(seen.shape[:2]),
-    )
     slopes[look.rows], freedom[look.rows] = look.slopes, look.freedom
-    used = np.zeros(len(seen), bool)
-    used[look.rows] = weights > 0
+    used[look.rows] = weigh(look.sizes) > 0
     return Fit(here, np.where(seen, missed, np.nan), slopes, used, freedom, float(moved))
 
 
@@ -203,15 +199,15 @@ class _Steps:
     def look(self, here: Estimate) -> _Look | None:
         """At all pixels."""
         scene, missed = self.scene, self.scene.missed(here)
-        rows = np.asarray(np.isfinite(missed).any(axis=(1, 2)))
+        rows: Bools = np.atleast_1d(np.isfinite(missed[..., 0]).any(axis=1))
         if rows.sum() * 3 <= self.lags + len(self.drifting):
             return None
-        seen = np.isfinite(missed[rows]).all(axis=-1)
+        seen: Bools = np.atleast_1d(np.isfinite(missed[rows]).all(axis=-1))
         raw = np.where(seen[..., None], missed[rows], 0).reshape(len(seen), -1)
         mask = np.repeat(seen, 2, axis=1)[..., None]
         images = scene.images(here)
-        across = np.where(mask, self._points(here, rows, images), 0)
-        others = np.where(mask, self._others(here, rows, images), 0)
+        across = np.nan_to_num(np.where(mask, self._points(here, rows, images), 0))
+        others = np.nan_to_num(np.where(mask, self._others(here, rows, images), 0))
         q, r = np.linalg.qr(across)
         pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
         r[~(pivots.min(axis=1) > 1e-9 * pivots.max(axis=1))] = np.inf  # such points stay
@@ -235,7 +231,10 @@ class _Steps:
         information += np.diag(self.prior)
         known = here.change[*self.moving.T] if self.cameras else np.zeros(0)
         gradient += self.prior * np.concatenate((known, np.zeros(len(self.prior) - self.cameras)))
-        size = np.sqrt(np.diag(information)) + 1e-300
+        size = np.sqrt(np.diag(information))
+        if not (np.isfinite(information).all() and np.isfinite(gradient).all()):
+            return np.zeros_like(size)
+        size[size == 0] = 1.0
         scaled = information / np.outer(size, size)
         step = -np.linalg.lstsq(scaled, gradient / size, rcond=1e-12)[0] / size
         longest = np.abs(step[self.cameras : self.lags]).max(initial=0)
@@ -283,9 +282,10 @@ class _Steps:
         for k in range(1, len(scene.cameras)):
             moving = scene.curves[k].slope(scene.frames(here, k)[rows])
             slopes[:, k, :, self.cameras + k - 1] = -scene.rates[k] * (1 + here.drifts[k]) * moving
-            for column in np.flatnonzero(self.drifting == k) + self.lags:
+            if scene.drifting[k]:
+                place = self.lags + int(np.searchsorted(self.drifting, k))
                 late = (scene.instants[rows] - here.lags[k]) * scene.rates[k] / self.span
-                slopes[:, k, :, column] = late[:, None] * moving
+                slopes[:, k, :, place] = late[:, None] * moving
         return slopes.reshape(len(x), -1, len(self.prior))
 
 

@@ -230,26 +230,22 @@ def _trimmed(residual: Floats, share: float = _TRIMMED) -> float:
 def _learned(videos: _Videos, first: Floats) -> Lags:
     """`learn_lags` of what was checked."""
     begun = videos.fitted(first)
-    if (
-        begun is not None
-        and begun.near(first)
-        and begun.score <= DISAGREEMENT
-        and not begun.persists
-    ):
+    fits = begun is not None and begun.score <= DISAGREEMENT and not begun.persists
+    if begun is not None and fits and (begun.near(first) or not _shares(begun).all()):
         return _told(videos, _drifted(begun), first)
     loose, sampled = _searched(videos, first)
     if not sampled:
-        return _untold(videos, first, no_lags(list_lags(first), np.inf))
+        return _untold(videos, first, False)
     close = [s for s in sampled if s.score <= max(2 * ALIKE * sampled[0].score, FINE)]
     small = sorted(close, key=lambda s: np.abs(s.lags).sum())
     chosen = _different(close[:_SHOWN] + small[:_SHOWN])
     every = [videos.fitted(s.lags, loose=loose) for s in chosen]
     found = sorted(_different([f for f in every if f]), key=lambda f: f.score)
     if not found:
-        return _untold(videos, first, no_lags(list_lags(first), np.inf))
+        return _untold(videos, first, False)
     alike = [f for f in found if f.score <= max(ALIKE * found[0].score, FINE)]
     if len(alike) > 1 and found[0].score > DISAGREEMENT:
-        return _untold(videos, first, no_lags(list_lags(first), alike[0].score))
+        return _untold(videos, first, False)
     best = min(alike, key=lambda f: (not f.near(first), np.abs(f.lags).sum()))
     told = _told(videos, _drifted(best), first)
     if len(alike) > 1 and not best.near(first):
@@ -361,7 +357,7 @@ def _told(videos: _Videos, found: _Fitted, first: Floats) -> Lags:
     covariance = _covariance(found.scene, found.fit)[:count, :count]
     share = _shares(found)
     if not share.all():
-        return _untold(videos, first)
+        return _untold(videos, first, found.score <= DISAGREEMENT)
     information = np.linalg.pinv(covariance, hermitian=True) * np.sqrt(np.outer(share, share))
     errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information, hermitian=True)))))
     # Schwarz's criterion: a fraction is one more unknown per video.
@@ -394,13 +390,14 @@ def _shares(found: _Fitted) -> Floats:
     return np.clip((total - chance) / np.maximum(total, 1e-300), 0, 1)
 
 
-def _untold(videos: _Videos, lags: Floats, *warnings: str) -> Lags:
-    """Lags of which the tracks tell nothing; that of the first video is zero in any case."""
+def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
+    """Lags of which the tracks tell nothing, as all agree or none; the first one is the clock."""
     errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-    blurred = [blurred_lag(i + 1, lags[i]) for i in range(1, len(lags))]
-    scene = videos.scene(lags)
-    residual = np.inf
+    residual, scene = np.inf, videos.scene(lags)
     if scene is not None:
         missed = scene.missed(scene.start(lags))
         residual = max(_trimmed(part) for part in np.moveaxis(missed, 1, 0))
-    return Lags(lags, videos.rates, errors, residual, warnings or tuple(blurred))
+    warnings = [blurred_lag(i + 1, lags[i]) for i in range(1, len(lags))]
+    if not agree:
+        warnings = [no_lags(list_lags(lags), residual)]
+    return Lags(lags, videos.rates, errors, residual, tuple(warnings))

@@ -162,6 +162,8 @@ class Collocation:
     systematic : ndarray, shape (n, d, k)
         Errors that all samples share: they are the curve plus noise plus a sum of these, each
         times an unknown number of mean 0 and variance 1.
+    known : ndarray, shape (l, d)
+        Coefficients of the law that are given; those of a `State` come on top.
     """
 
     grid: Grid
@@ -170,6 +172,7 @@ class Collocation:
     precision: Floats
     physics_weights: Floats
     systematic: Floats
+    known: Floats
 
     @classmethod
     def of(
@@ -180,8 +183,9 @@ class Collocation:
         physics_weights: Floats,
         systematic: Floats | None = None,
         precision: Floats | None = None,
+        known: Floats | None = None,
     ) -> Collocation:
-        """The problem of these segments, by default without systematic errors.
+        """The problem of these segments, by default without systematic errors or known terms.
 
         NaN in the data are not observed; all else has a precision of 1 by default.
         """
@@ -190,7 +194,8 @@ class Collocation:
         data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
         relative = np.ones(grid.x.shape) if precision is None else precision
         seen = np.where(np.isnan(grid.x), 0.0, relative)
-        return cls(grid, exponents, data, seen, physics, shared)
+        given = np.zeros(exponents.shape) if known is None else known
+        return cls(grid, exponents, data, seen, physics, shared, given)
 
     def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
         """The same with other weights."""
@@ -263,9 +268,9 @@ class Collocation:
     def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
         x, slope = self.node_states(state.control_points)
-        rows = state.active.any(axis=1)
-        terms = monomials(x - state.offset, self.exponents[rows])
-        return slope - terms @ state.coefficients[rows]
+        law = state.coefficients + self.known
+        rows = law.any(axis=1)
+        return slope - monomials(x - state.offset, self.exponents[rows]) @ law[rows]
 
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
@@ -324,12 +329,13 @@ class Collocation:
         residual itself, its derivatives in the columns, and zeros for the systematic errors.
         """
         d, l = self.d, len(self.exponents)
+        law = state.coefficients + self.known
         x, slope = self.node_states(state.control_points)
         terms = monomials(x - state.offset, self.exponents)
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
-        residual = root * (slope - terms @ state.coefficients)
+        residual = root * (slope - terms @ law)
         # (nodes, equation, coordinate): how the law changes with the state.
-        rates = (terms @ (self._generators @ state.coefficients)).transpose(1, 2, 0)
+        rates = (terms @ (self._generators @ law)).transpose(1, 2, 0)
         jacobian = root[:, :, None] * rates
         # Minus the terms in their own equation, and the rates of the law for the offset.
         offset_columns = columns[columns >= d * l] - d * l

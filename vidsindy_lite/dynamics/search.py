@@ -69,7 +69,7 @@ def candidates(
     for start in sorted({min(2, degree), degree}):
         fit = unpruned(problem, collocation, control, start, history)
         found += _in_sparse_frames(problem, fit, rng, history)
-        if not _leaves_something_over(fit):
+        if not _leaves_something_over(problem, fit):
             break
     return found
 
@@ -83,7 +83,8 @@ def unpruned(
     coefficients = np.zeros(problem.exponents.shape)
     terms = monomials(x, problem.exponents[rows])
     coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=problem.noise.min())[0]
-    active = np.repeat(rows[:, None], d, axis=1)
+    active = rows[:, None] & problem.form.candidates
+    coefficients[~active] = 0.0
     state = State(control, coefficients, active, np.zeros(d), np.zeros(d, dtype=bool))
     for weight in FIRST_WEIGHTS:
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
@@ -92,12 +93,13 @@ def unpruned(
     return fit
 
 
-def _leaves_something_over(fit: Fit) -> bool:
+def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
     """Would the terms of higher degree together explain more of the data than chance does?"""
-    left_out = int((~fit.state.active).sum())
+    searched = problem.form.searched
+    left_out = len(searched) - int(fit.state.active.sum())
     if not left_out:
         return False
-    _, gain = fit.collocation.linearise(fit.state, np.arange(fit.state.active.size)).newton()
+    _, gain = fit.collocation.linearise(fit.state, searched).newton()
     return bool(gain > chi2.isf(NEEDLESS_START, left_out))
 
 
@@ -108,9 +110,12 @@ def _in_sparse_frames(
     weight, stage = FIRST_WEIGHTS[-1], "subset search, centred frame"
     fit = select(problem, fit, weight, stage, history)
     closed, law = _closed(problem, fit, weight)
-    x = fit.collocation.grid.x
+    x, movable = fit.collocation.grid.x, problem.form.movable
+    low, high = (
+        np.where(movable, extreme.reduce(x), problem.home) for extreme in (np.fmin, np.fmax)
+    )
     origins = sparse_origins(
-        law, closed.state.active, problem.home, (x.min(axis=0), x.max(axis=0)),
+        law, closed.state.active, problem.home, (low, high),
         problem.penalties.max(), keep=4, rng=rng,
     )  # fmt: skip
     unique = {
@@ -133,7 +138,7 @@ def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]
     state = State(
         fit.state.control_points,
         shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
-        closure_mask(exponents, fit.state.active),
+        closure_mask(exponents, fit.state.active, problem.form.movable),
         np.zeros(d),
         np.zeros(d, dtype=bool),
     )
@@ -143,7 +148,7 @@ def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]
     state, columns = closed.state, np.flatnonzero(closed.state.free())
     information = np.diag(np.where(state.free()[: exponents.size], 0.0, 1e30))
     information[np.ix_(columns, columns)] = collocation.linearise(state, columns).information
-    return closed, ShiftedLaw(exponents, state.coefficients, information)
+    return closed, ShiftedLaw(exponents, state.coefficients, information, problem.form.movable)
 
 
 def _candidate(
@@ -156,7 +161,7 @@ def _candidate(
         information[np.ix_(columns, columns)],
         np.zeros(len(columns)),
         coefficients.T.ravel()[columns],
-        np.tile(problem.penalties, problem.d)[columns],
+        problem.prices[columns],
         np.ones(len(columns), dtype=bool),
     )
     flat = np.zeros(problem.exponents.size)
@@ -184,11 +189,10 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
 
     best = refit(start.state)
     history.add(stage, problem, best, weight)
-    size = problem.exponents.size
-    prices = np.append(np.tile(problem.penalties, problem.d), np.full(problem.d, -np.inf))
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
     for _ in range(LONGEST_SEARCH):
         state = best.state
-        columns = np.concatenate([np.arange(size), size + np.flatnonzero(state.moving)])
+        columns = problem.columns(state)
         model = weighted.linearise(state, columns)
         support, solution, _ = subset_search(
             model.information, model.gradient, state.flat()[columns], prices[columns],

@@ -48,6 +48,7 @@ def discover(
     seed: int = 0,
     progress: bool = False,
     systematic: Floats | Sequence[Floats] | None = None,
+    order: int = 1,
 ) -> Discovery:
     """Discover the polynomial law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -67,6 +68,9 @@ def discover(
         Errors that all samples share, such as those of a scale: what k independent causes, each
         off by one standard error, add to ``x``; smooth like the path, and below its noise. One
         such array per trajectory if ``t`` is a list.
+    order : {1, 2}
+        1 for ``x' = f(x)``; 2 for ``x'' = f(x, x')``, where ``x`` are positions alone: velocities
+        become states ``vx, ...`` of the law, after the positions.
 
     Returns
     -------
@@ -85,6 +89,8 @@ def discover(
     >>> print(vl.discover(t, x).equations())
     """
     degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
+    if order not in (1, 2):
+        raise ValueError(f"order: must be 1 or 2, got {order!r}")
     trajectories = check_trajectories(t, x)
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
@@ -92,7 +98,7 @@ def discover(
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     history = History()
-    problem = pose(trajectories, shared, degree, probes)
+    problem = pose(trajectories, shared, degree, probes, order)
     with tqdm(total=3, disable=not progress, desc="discover", leave=False) as bar:
         fit = search(problem, degree, starts, history)
         bar.update()
