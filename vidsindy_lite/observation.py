@@ -335,7 +335,7 @@ def _rig_warnings(
             return []
         return [
             "the lags that are given differ from those of the tracks: "
-            f"({list_lags(lags)}) for ({list_lags(best.frames)}) frames: leave them out, or check them"
+            f"({list_lags(lags)}) for ({list_lags(best.frames)}) frames: leave them out, or check"
         ]
     sizes = ", ".join(f"{size:.1f}" for size in missed)
     apart = (
