@@ -129,6 +129,8 @@ class Discovery:
         How the fit went.
     curves : tuple of scipy.interpolate.BSpline
         The fitted curve, one spline per stretch of data, in units of the data.
+    note : str
+        Which order the law has and why, where that was left open.
     """
 
     system: PolynomialSystem
@@ -143,6 +145,7 @@ class Discovery:
     path: tuple[tuple[Plateau, ...], ...]
     history: tuple[Step, ...]
     curves: tuple[BSpline, ...]
+    note: str = ""
 
     @property
     def status(self) -> str:
@@ -248,6 +251,8 @@ class Discovery:
             sizes = zip(self.model_error, self.system.names, strict=True)
             kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
             lines.append(f"kicked at random, by {kicks} over a unit of time")
+        if self.note:
+            lines.append(f"note: {self.note}")
         return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
 
 
