@@ -76,7 +76,7 @@ def _view(
         while now < number:
             now, frame = next(frames, (number, None))
             image = grey if frame is None else _small(frame, size)
-        trail = pixels[list(instants[max(j - _TRAIL, 0) : j + 1])]
+        trail = pixels[instants[max(j - _TRAIL, 0)] : instants[j] + 1]
         yield _drawn(image if number >= 0 else grey, (trail + 0.5) * scale - 0.5, spread * scale)
 
 
