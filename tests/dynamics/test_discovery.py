@@ -170,3 +170,11 @@ def test_turns_are_counted_from_the_first_sample_to_the_last():
     ]
     assert len(told[0]) == 1
     assert told[1] == told[0]
+
+
+def test_a_curve_forgives_the_rounding_of_its_ends_in_proportion_to_its_length(found):
+    low, high = found.curves[0].t[[0, -1]]
+    near, far = (share * (high - low) for share in (1e-10, 1e-6))
+    inside = found.curve(np.array([low - near, high + near]))
+    np.testing.assert_array_equal(inside, found.curve(np.array([low, high])))
+    assert np.isnan(found.curve(np.array([low - far, high + far]))).all()
