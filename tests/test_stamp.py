@@ -199,7 +199,7 @@ DISCOVER = {"00", "04", "05", "06", "07", "09", "sweeps"}
 def test_only_what_depends_on_an_edit_becomes_stale(clone):
     edits = {
         "study/plots/cameras.py": ('"angle between normal and z axis (rad)"', '"tilt"', {"01"}),
-        "companion/site.css": ("body", "html", set()),
+        "companion/contents.md": ("glob", "no", set()),
         "../requirements.txt": ("ruff==", "ruff==9", set()),
         "dynamics/splines.py": ('"""', '"""Prose. ', set()),
     }

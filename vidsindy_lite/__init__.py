@@ -1,5 +1,7 @@
 """Governing equations of a moving target from the videos of several cameras.
 
+::
+
     video files --vision--> pixel tracks --cameras--> path in space --dynamics--> equations
                                                       and its errors
     `------------------ observation ------------------'

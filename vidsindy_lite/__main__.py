@@ -67,13 +67,11 @@ def _discover(options: argparse.Namespace) -> int:
     exit status: 0 if there is no reason to doubt the law, 1 if there is (the report says which),
     2 if there is no report; the error says why.
     """
-    import numpy as np
-
     from .cameras import Rig, list_lags
     from .checks import check_positive
     from .companion.report import PAGE, check_folder_is_free, write_report
     from .pipeline import discover_from_videos
-    from .vision import check_detector, video_info
+    from .vision import check_detector, frame_clock
 
     check_detector(options.detector)
     check_folder_is_free(options.out)
@@ -82,7 +80,7 @@ def _discover(options: argparse.Namespace) -> int:
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"detector": options.detector}
     if options.fps is not None:
-        t = np.arange(video_info(options.videos[0]).frames) / check_positive("fps", options.fps)
+        t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
         told |= {"frames in a unit of time": options.fps}
     found = discover_from_videos(
         options.videos,

@@ -1,5 +1,7 @@
 """From video files to a path in space: track, synchronise, learn the cameras, reconstruct."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,6 +14,7 @@ from tqdm import tqdm
 from .arrays import Floats
 from .cameras import (
     DISAGREEMENT,
+    Clock,
     Lags,
     Rig,
     align,
@@ -25,11 +28,10 @@ from .cameras import (
     systematic_errors,
     trailing_errors,
 )
-from .checks import check_path, check_times, check_tracks, check_vector
-from .vision import Track, VideoInfo, check_detector, track, video_info
+from .checks import check_path, check_tracks, check_vector
+from .vision import Track, VideoInfo, check_detector, frame_clock, track, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
-_SAME_RATE = 0.01  # relative difference of frame rates that are the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,17 +83,19 @@ def observe(
     """Track a target in the videos of several fixed cameras and reconstruct its path.
 
     The frames of the first video are the clock; the others may start earlier or later, differ in
-    length, and in frame rate if their files state it.
+    length, and in frame rate if their files state it. Frames that were dropped, or taken at uneven
+    times, count at the times that the files state.
 
     Parameters
     ----------
     paths : sequence of path
-        One video file per camera of the rig.
+        One video per camera of the rig: a file, a folder of images, or a pattern of their names,
+        see `read_video`.
     rig : Rig
         Positions and normals of all cameras, scale and angle of at least one.
     t : array_like, shape (n,), optional
         Time of each frame of the first video, increasing; all videos then have the same frame rate.
-        By default the frame number over the frame rate, in seconds.
+        By default as the file states, in seconds from its first frame.
     lags : array_like, shape (m,), optional
         By how many frames of the first video each one starts later; only differences count. By
         default they are learned, see `learn_lags`.
@@ -119,29 +123,35 @@ def observe(
     files = _check_paths(paths, rig)
     shots = _check_shots(files, rig)
     names = [path.name for path in files]
-    times, rates = _clock(shots, t)
-    given = _check_lags(lags, [shot.frames for shot in shots], rates, names)
+    clocks = _check_clocks(files, shots)
+    clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
+    given = _check_lags(lags, clock, names)
     videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
     seen = [_track_one(path, shot.frames, detector) for path, shot in videos]
     tracks = [track.pixels for track in seen]
     doubts = [warning for track in seen for warning in track.warnings]
-    return _observed(tracks, rig, times, given, rates, names, doubts)
+    return _observed(tracks, rig, clock, given, names, doubts)
 
 
 def observe_tracks(
-    tracks: Sequence[ArrayLike], rig: Rig, t: ArrayLike, *, lags: Sequence[float] | None = None
+    tracks: Sequence[ArrayLike],
+    rig: Rig,
+    t: ArrayLike | Sequence[ArrayLike],
+    *,
+    lags: Sequence[float] | None = None,
 ) -> Observation:
     """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
 
     Parameters
     ----------
     tracks : sequence of array_like, shape (n_i, 2)
-        Pixels of the target, one track per camera of the rig, each from its own first frame; all
-        cameras have the same frame rate. NaN where it was not seen.
+        Pixels of the target, one track per camera of the rig, each from its own first frame. NaN
+        where it was not seen.
     rig, lags
         See `observe`.
-    t : array_like, shape (n_0,)
-        Time of each frame of the first track, increasing.
+    t : array_like, shape (n_0,), or a sequence of such
+        Time of each frame of the first track, increasing; all cameras then have its frame rate. Or
+        the times of each track by its own clock, if rates differ or frames are missing.
 
     Returns
     -------
@@ -154,69 +164,60 @@ def observe_tracks(
     """
     check_learnable(rig)
     raw = check_tracks(tracks, len(rig.cameras))
-    t = _check_clock(t, len(raw[0]), "row of tracks[0]")
+    clock = Clock.of_tracks(t, raw)
     names = [f"tracks[{i}]" for i in range(len(raw))]
-    rates = np.ones(len(raw))
-    given = _check_lags(lags, [len(track) for track in raw], rates, names)
-    return _observed(raw, rig, t, given, rates, names)
+    given = _check_lags(lags, clock, names)
+    return _observed(raw, rig, clock, given, names)
 
 
 def _observed(
     raw: Sequence[Floats],
     rig: Rig,
-    t: Floats,
+    clock: Clock,
     lags: Floats | None,
-    rates: Floats,
     names: Sequence[str],
     doubts: Sequence[str] = (),
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
-    best = learn_lags(raw, rig, rates, start=lags)
+    best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven)
     if lags is not None:
         _refuse_wrong(lags, best)
-    tracks = align(raw, best.frames if lags is None else lags, rates)
+    used = best.frames if lags is None else lags
+    tracks = align(raw, used, clock.rates, clock.uneven)
     learned = learn_cameras(tracks, rig)
     missed = disagreement(tracks, learned)
-    used = best if lags is None else Lags(lags, rates, 0 * lags, max(missed))
-    shared = systematic_errors(raw, rig, learned, used), trailing_errors(tracks, learned)
+    told = (
+        best if lags is None else Lags(lags, clock.rates, 0 * lags, max(missed), clocks=best.clocks)
+    )
+    shared = systematic_errors(raw, rig, learned, told), trailing_errors(tracks, learned)
     return Observation(
         tracks=tracks,
         rig=learned,
-        lags=used,
-        t=t,
+        lags=told,
+        t=clock.times,
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
             *_rig_warnings(missed, tracks, rig, names, best),
             *learned.warnings,
             *doubts,
-            *used.warnings,
+            *told.warnings,
         ),
     )
 
 
-def _check_clock(t: ArrayLike, frames: int, each: str) -> Floats:
-    """The time of each frame of the first video."""
-    times = check_times(t)
-    if times.shape != (frames,):
-        raise ValueError(f"t: must have shape ({frames},), one per {each}, got {times.shape}")
-    return times
-
-
-def _check_lags(
-    lags: Sequence[float] | None, frames: list[int], rates: Floats, names: Sequence[str]
-) -> Floats | None:
+def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]) -> Floats | None:
     """By how much each video starts later than the first, if that is given.
 
     Each must share half of the shorter one's time with the first.
     """
     if lags is None:
         return None
-    given = check_vector("lags", lags, len(frames))
+    given = check_vector("lags", lags, len(names))
     given -= given[0]
-    ends = np.array(frames) / rates
-    common = np.minimum(given + ends, frames[0]) - np.maximum(given, 0)
-    few = common < np.minimum(ends, frames[0]) / 2
+    frames, ends = [len(one) for one in clock.frames], clock.ends
+    common = np.minimum(given + ends, ends[0]) - np.maximum(given, 0)
+    few = common < np.minimum(ends, ends[0]) / 2
     if few.any():
         i = int(few.argmax())
         raise ValueError(
@@ -253,32 +254,27 @@ def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
     return shots
 
 
-def _clock(shots: Sequence[VideoInfo], t: ArrayLike | None) -> tuple[Floats, Floats]:
-    """Time of each frame of the first video, and frames of each video in one frame of the first."""
-    fps = np.array([shot.fps for shot in shots])
-    told = np.isfinite(fps) & (fps > 0)
-    if t is not None:
-        if told.any() and np.ptp(fps[told]) > _SAME_RATE * fps[told].min():
-            raise ValueError(
-                "t: may be given, as --fps may, only for videos of one frame rate, got files that "
-                f"state {', '.join(f'{rate:g}' for rate in fps)}: leave it out, so that the rate "
-                "of each file counts, or convert the videos"
-            )
-        return _check_clock(t, shots[0].frames, "frame of the first video"), np.ones(len(fps))
-    if not told.all():
-        raise ValueError(f"t: must be given if a file states no frame rate, got {fps.tolist()}")
-    return np.arange(shots[0].frames) / fps[0], fps / fps[0]
+def _check_clocks(files: Sequence[Path], shots: Sequence[VideoInfo]) -> list[Floats]:
+    """When the frames of each file were taken, in frames."""
+    clocks = [frame_clock(path) for path in files]
+    for path, shot, clock in zip(files, shots, clocks, strict=True):
+        if len(clock) != shot.frames:
+            raise ValueError(_cut_off(path, shot.frames, len(clock)))
+    return clocks
+
+
+def _cut_off(path: Path, stated: int, read: int) -> str:
+    return (
+        f"paths: {path.name} must hold the {stated} frames that its header states, got {read} "
+        "that can be read: the file is cut off or damaged, or its header wrong"
+    )
 
 
 def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
     """Track a video that should have so many frames and one moving target."""
     found = track(path, detector)
     if len(found.pixels) != frames:
-        raise ValueError(
-            f"paths: {path.name} must hold the {frames} frames that its header states, got "
-            f"{len(found.pixels)} that can be read: the file is cut off or damaged, or its header "
-            "wrong"
-        )
+        raise ValueError(_cut_off(path, frames, len(found.pixels)))
     if not np.isfinite(found.pixels).any():
         raise ValueError(
             f"paths: {path.name} must show one moving target, got none in any frame: what never "

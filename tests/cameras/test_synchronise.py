@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import (
     DISAGREEMENT,
+    Lags,
     align,
     disagreement,
     learn_lags,
@@ -471,3 +472,77 @@ def test_a_camera_that_never_sees_the_target(motion, blind):
 def test_the_frame_of_an_instant():
     lags = vl.Lags(np.array([0, 10.3, -4]), np.array([1, 1.2, 0.5]), np.zeros(3), 0.0)
     assert [lags.frame_at(i, 100) for i in range(3)] == [100, 108, 52]
+
+
+# ------------------------------------------------------------------------------------ uneven clocks
+
+
+def uneven(rng, frames):
+    """Frame numbers of a phone's camera: they waver, and some frames are dropped."""
+    wavering = np.arange(frames) + 0.2 * rng.uniform(-1, 1, frames)
+    wavering[0] = 0.0
+    return wavering[np.sort(rng.permutation(np.arange(1, frames))[: frames - 1 - frames // 20])]
+
+
+def filmed_at(motion, clocks, lags, rates):
+    path, rig = motion
+    parts = zip(rig.cameras, clocks, lags, rates, strict=True)
+    return [camera.project(path(lag + clock / rate)) for camera, clock, lag, rate in parts]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("rates", [(1, 1, 1), (1, 1.5, 0.8)])
+def test_lags_of_uneven_videos_are_found(motion, seed, rates):
+    rng = np.random.default_rng(seed)
+    clocks = [uneven(rng, int(200 * rate)) for rate in rates]
+    clocks = [clock - clock[0] for clock in clocks]
+    lags = np.array([0, 7.3, -4.6])
+    tracks = filmed_at(motion, clocks, lags, rates)
+    found = learn_lags(tracks, motion[1].uncalibrated(0), rates, clocks=clocks)
+    np.testing.assert_allclose(found.frames, lags, atol=2e-3)
+    assert found.warnings == ()
+    shown = align(tracks, found.frames, rates, clocks)
+    for camera, track in zip(motion[1].cameras, shown, strict=True):
+        true = camera.project(motion[0](clocks[0]))
+        both = np.isfinite(track).all(axis=1)
+        assert both.mean() > 0.9
+        assert np.abs(track - true)[both].max() < 0.05
+    # The same tracks, as if the cameras were even, agree nowhere near as well.
+    assert learn_lags(tracks, motion[1].uncalibrated(0), rates).residual > 3 * found.residual
+
+
+def test_a_long_pause_of_a_camera_is_not_interpolated(motion):
+    clocks = [np.arange(60.0), np.delete(np.arange(60.0), [10, 30, 31]), np.arange(60.0)]
+    tracks = filmed_at(motion, clocks, (0, 0, 0), (1, 1, 1))
+    _, second, _ = align(tracks, (0, 0, 0), clocks=clocks)
+    assert np.flatnonzero(np.isnan(second[:, 0])).tolist() == [30, 31]
+
+
+def test_even_clocks_are_the_default(motion):
+    tracks = filmed(motion, (100, 90, 120), (0, 7, -3), (1, 1.2, 0.9))
+    clocks = [np.arange(len(track)) for track in tracks]
+    for lags in ((0, 7, -3), (0, 7.25, -3.5)):
+        for rates in ((1, 1, 1), (1, 1.2, 0.9)):
+            ours, theirs = (align(tracks, lags, rates, given) for given in (clocks, None))
+            for one, other in zip(ours, theirs, strict=True):
+                np.testing.assert_array_equal(one, other)
+
+
+def test_the_nearest_frame_of_an_uneven_video():
+    clocks = (np.arange(9.0), np.array([0, 1, 4, 5, 6.0]))
+    lags = Lags(np.array([0, 1.2]), np.array([1, 2.0]), np.zeros(2), 0.0, clocks=clocks)
+    assert [lags.frame_at(1, k) for k in range(5)] == [0, 0, 1, 2, 4]
+    assert [lags.frame_at(0, k) for k in (0, 8)] == [0, 8]
+
+
+@pytest.mark.parametrize(
+    ("clocks", "message"),
+    [
+        ([range(3)], "clocks: must be one per track, got 1 for 2"),
+        ([range(3), range(2)], r"clocks\[1\]: must be 3 finite numbers"),
+        ([range(3), [0, 1, 1]], r"clocks\[1\]: must increase, got"),
+    ],
+)
+def test_clocks_that_are_none(clocks, message):
+    with pytest.raises(ValueError, match=message):
+        align([np.ones((3, 2))] * 2, (0, 0), clocks=clocks)

@@ -8,7 +8,6 @@ import pytest
 
 from vidsindy_lite.cameras import Rig
 from vidsindy_lite.companion.readme import HEADLINES, PARTS, fill
-from vidsindy_lite.companion.site import heading_anchor
 from vidsindy_lite.stamp import PACKAGE
 
 ROOT = PACKAGE.parent
@@ -90,7 +89,8 @@ def test_a_headline_says_what_its_table_holds(tmp_path, name, rows, headline):
     record = {"id": name, "kind": "table", "caption": "A table.", "notebook": "00_one"}
     record |= {"stamp": None, "files": []}
     (figures / f"{name}.json").write_text(json.dumps({**record, "rows": rows}))
-    assert f"| One | {headline} |" in PARTS["notebooks"](tmp_path)
+    text = fill("<!-- notebooks -->\n<!-- end -->", tmp_path)
+    assert f"| One | {headline} |" in text
 
 
 def test_another_result_is_seen(tmp_path):
@@ -108,6 +108,15 @@ def test_an_unknown_part_is_named():
 
 
 # -------------------------------------------------------------------------------------------- links
+
+
+def heading_anchor(text):
+    """The anchor of a heading, as code hosts make it: lower case, hyphens, no punctuation."""
+    return re.sub(r"[^\w\- ]", "", re.sub(r"<[^>]*>", "", text)).strip().lower().replace(" ", "-")
+
+
+def test_anchors_are_those_of_a_code_host():
+    assert heading_anchor("Figure_S1: what it <em>shows</em>") == "figure_s1-what-it-shows"
 
 
 def dead_links(page):

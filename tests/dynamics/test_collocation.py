@@ -138,3 +138,40 @@ def test_systematic_errors_are_eliminated_as_by_a_least_squares_fit():
     np.testing.assert_allclose(left, np.linalg.inv(np.linalg.inv(gram)[:3, :3]))
     best = np.linalg.lstsq(rows[:, 3:], rows[:, :3], rcond=None)[0]
     np.testing.assert_allclose(curve, solved[..., :3] - solved[..., 3:] @ best)
+
+
+def test_what_was_not_observed_has_no_weight_whatever_its_value(problem, state):
+    rng = np.random.default_rng(2)
+    precision = rng.uniform(0.5, 2, problem.grid.x.shape)
+    precision[rng.random(precision.shape) < 0.3] = 0
+    hidden = [
+        replace(s, x=np.where(precision[i * 9 : i * 9 + 9] > 0, s.x, np.nan))
+        for i, s in enumerate(problem.segments)
+    ]
+    weights = problem.data_weights, problem.physics_weights
+    columns = np.arange(14)
+    of_nan = Collocation.of(hidden, problem.exponents, *weights, precision=precision)
+    of_zero = replace(problem, precision=precision)
+    assert (of_nan.counts == (precision > 0).sum(axis=0)).all()
+    for one in (of_nan, of_zero):
+        residual, _ = one.data_residual(state.control_points)
+        by_hand = (residual**2 * precision * problem.data_weights).sum()
+        assert one.data_loss(state.control_points) == pytest.approx(by_hand, rel=1e-12)
+    first, second = (one.linearise(state, columns) for one in (of_nan, of_zero))
+    np.testing.assert_allclose(first.information, second.information, rtol=1e-12)
+    np.testing.assert_allclose(first.gradient, second.gradient, rtol=1e-9)
+
+
+def test_a_sample_twice_is_one_of_double_precision(problem, state):
+    doubled = [
+        replace(s, t=np.repeat(s.t, 2), x=np.repeat(s.x, 2, axis=0)) for s in problem.segments
+    ]
+    weights = problem.data_weights, problem.physics_weights
+    twice = Collocation.of(doubled, problem.exponents, *weights)
+    once = replace(problem, precision=2 * problem.precision)
+    # The physics loss is per sample: half the weight for twice the samples.
+    twice = twice.weighted(twice.data_weights, twice.physics_weights / 2)
+    columns = np.arange(14)
+    first, second = (one.linearise(state, columns) for one in (twice, once))
+    np.testing.assert_allclose(first.information, second.information, rtol=1e-9, atol=1e-9)
+    assert twice.objective(state) == pytest.approx(once.objective(state), rel=1e-9)

@@ -141,3 +141,8 @@ def test_a_file_that_holds_no_discovery_is_refused(tmp_path, text):
     file.write_text(text)
     with pytest.raises(ValueError, match="path: must be a file that `save` has written"):
         Discovery.load(file)
+
+
+def test_a_missing_file_is_told_with_the_argument(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"path: must be .*, got no file .*law\.json"):
+        Discovery.load(tmp_path / "law.json")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.dynamics import persistence, solver
+from vidsindy_lite.dynamics import persistence, search
 from vidsindy_lite.dynamics.persistence import LARGEST, Plateau
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover
@@ -79,7 +79,7 @@ def test_a_coarse_integration_does_not_become_terms():
 def test_without_tolerated_errors_smooth_ones_do_become_terms(swing, monkeypatch):
     """The gate of the tests above: they fail where the path is not followed."""
     t, x = swing
-    monkeypatch.setattr(solver, "TOLERATED", 0.0)
+    monkeypatch.setattr(search, "TOLERATED", 0.0)
     monkeypatch.setattr(persistence, "SMOOTH", 0.0)
     assert not score(discover(t, bent(x, 0.001)), DUFFING).exact
 

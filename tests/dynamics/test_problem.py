@@ -9,7 +9,7 @@ import pytest
 from vidsindy_lite.dynamics.collocation import Fit, State, Status
 from vidsindy_lite.dynamics.errors import residual_noise
 from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
-from vidsindy_lite.dynamics.solver import _candidate, _closed, _variants
+from vidsindy_lite.dynamics.search import _candidate, _closed, _variants
 
 
 def posed(noise=0.0, seen=slice(None)):

@@ -1,10 +1,16 @@
 """Pixels and space: cameras, and what several of them that watch one target say of it.
 
+::
+
     geometry      rotations and planes
+    camera        what all cameras have in common: place, image, errors of what was measured
     models        the two models of camera: orthographic and perspective
+    lens          what a lens does to the image: distortion
     rig           the cameras that watch one scene, and their file
     unknowns      what is unknown of a rig: as one vector, and linear equations for it
- 1. synchronise   tracks -> when each camera started (`Lags`); tracks at the same instants
+ 1. synchronise   tracks -> when each camera started (`Lags`)
+    clocks        when the frames of each video were taken
+    alignment     tracks at the same instants, whatever the lags, rates and clocks of the videos
  2. calibrate     tracks -> the same `Rig`, with nothing unknown
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
@@ -14,11 +20,14 @@
 The other rooms import from here alone.
 """
 
+from .alignment import align
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
+from .clocks import Clock
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
-from .models import Camera, OrthographicCamera, PerspectiveCamera
+from .camera import Camera
+from .models import OrthographicCamera, PerspectiveCamera
 from .rig import Rig, rig_template
-from .synchronise import DISAGREEMENT, Lags, align, disagreement, learn_lags, list_lags
+from .synchronise import DISAGREEMENT, Lags, disagreement, learn_lags, list_lags
 from .triangulate import reconstruct, residuals
 from .uncertainty import systematic_errors, trailing_errors

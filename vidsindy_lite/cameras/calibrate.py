@@ -17,8 +17,9 @@ from scipy.optimize import least_squares
 
 from ..arrays import Floats
 from ..checks import check_instance, check_integer
+from .camera import Camera
 from .messages import unconverged_cameras, undecided_outliers, unsettled_points
-from .models import Camera, all_orthographic, independent
+from .models import all_orthographic, independent
 from .rig import Rig
 from .triangulate import (
     Views,

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..arrays import Floats
 from .calibrate import check_learnable
-from .models import Camera, independent
+from .camera import Camera
+from .models import independent
 from .rig import Rig
 from .triangulate import check_views
 from .unknowns import Complex, Equations, Unknowns, agreement, calibrated, names, solve

@@ -1,7 +1,8 @@
 """Rigs: the cameras that watch one scene, their file, and the template of such a file.
 
-A file holds one [[camera]] table per video, with the keys position, normal, scale, angle,
-image_size, and model unless it is orthographic; what is left out is learned (`learn_cameras`).
+A file holds one [[camera]] table per video, whose keys are the arguments of its model of camera,
+and model unless it is orthographic. Without scale and angle, or position, these are learned
+(`learn_cameras`); of the other keys, what is left out has its default.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from ..checks import (
     check_path,
     check_rows,
 )
-from .models import MODELS, Camera, OrthographicCamera, all_orthographic, independent
+from .camera import Camera
+from .models import MODELS, OrthographicCamera, all_orthographic, independent
 
-_KEYS = ("model", *(part.name for part in fields(Camera)))  # of a table of a file
 _MOST = 100  # cameras of a template
 _HEAD = """\
 # Rig file: one [[camera]] table per video, in the order of the videos.
@@ -274,11 +275,14 @@ def _vector(values: Floats) -> str:
 
 
 def _to_table(camera: Camera) -> dict[str, object]:
-    """A camera as plain numbers under the keys of the file; None is left out."""
-    known = {key: getattr(camera, key) for key in _KEYS}
-    if isinstance(camera, OrthographicCamera):
-        del known["model"]
-    return {key: np.asarray(value).tolist() for key, value in known.items() if value is not None}
+    """A camera as plain numbers under the keys of the file; defaults are left out."""
+    known = {} if isinstance(camera, OrthographicCamera) else {"model": camera.model}
+    for part in fields(camera):
+        value = getattr(camera, part.name)
+        default = isinstance(value, float) and value == part.default
+        if value is not None and not default:
+            known[part.name] = value
+    return {key: np.asarray(value).tolist() for key, value in known.items()}
 
 
 def _from_table(index: int, table: object) -> Camera:
@@ -286,14 +290,15 @@ def _from_table(index: int, table: object) -> Camera:
     try:
         if not isinstance(table, dict):
             raise ValueError(f"must be a table, got {table!r}")
-        for key in table:
-            if key not in _KEYS:
-                raise ValueError(f"{key}: must be one of {', '.join(_KEYS)}")
-        if "normal" not in table:
-            raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
         known = dict(table)
         model = known.pop("model", OrthographicCamera.model)
         check_choice("model", model, [*MODELS])
+        keys = ["model", *(part.name for part in fields(MODELS[model]))]
+        for key in table:
+            if key not in keys:
+                raise ValueError(f"{key}: must be one of {', '.join(keys)}")
+        if "normal" not in table:
+            raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
         return MODELS[model](**known)
     except ValueError as error:
         raise ValueError(f"camera {index}: {error}") from error

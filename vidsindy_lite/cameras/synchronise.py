@@ -1,8 +1,7 @@
-"""When each camera started: the lags of the videos, and their tracks at the same instants.
+"""When each camera started: the lags of the videos.
 
 The frames of the first video are the clock. Camera i starts `lag` of them later and takes `rate`
-frames during each, so that the instant k of the clock is its frame (k - lag) * rate. Between two
-frames a track is interpolated, so lags need not be whole.
+frames during each (`alignment`).
 
 Two cameras see one point only if they look at the same instant; otherwise their lines of sight miss
 each other, and no scale and angle can mend it. So the lags are found like the cameras, as those of
@@ -19,18 +18,17 @@ result says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import make_interp_spline
 
 from ..arrays import Bools, Floats
-from ..checks import check_positive, check_tracks, check_vector
+from .alignment import Curve, aligned, check_clocks, check_lags, check_rates, curve
 from .calibrate import cameras_of_views, check_learnable
+from .camera import Camera
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
-from .models import Camera
 from .rig import Rig
 from .triangulate import (
     Views,
@@ -56,8 +54,6 @@ PROBE = 0.05
 OUTLIER = 12.0
 """Medians of the residuals; one beyond that moves neither a lag nor its error."""
 
-_FARTHEST = 1e9  # frames by which a video may start later; and ...
-_FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _OVERLAP = 0.5  # share of the shorter of two videos that both must show
 _INSTANTS = 200  # at which the first step compares two views
 _PROMISING = 5  # lags of each camera that pass the first step
@@ -66,10 +62,6 @@ _STEPS = 10  # of one frame at most, from the best whole lags to the best ones
 _SETTLED = 1e-3  # frames
 _SHOWN = 3  # of the lags that fit equally well
 _ROUNDING = 1e-6  # pixels; residuals below that are none
-
-
-Curve = Callable[[Floats], Floats]
-"""A track as a function of the frame number, whole or not."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +82,8 @@ class Lags:
         The `disagreement` of the worst camera that is left, pixels.
     warnings : tuple of str
         Why the lags should not be trusted, with advice.
+    clocks : tuple of ndarray, shape (n_i,)
+        When each frame was taken, see `align`; empty if all videos are even.
     """
 
     frames: Floats
@@ -97,6 +91,7 @@ class Lags:
     errors: Floats
     residual: float
     warnings: tuple[str, ...] = ()
+    clocks: tuple[Floats, ...] = field(default=(), repr=False)
 
     @property
     def agree(self) -> bool:
@@ -105,39 +100,10 @@ class Lags:
 
     def frame_at(self, i: int, instant: int) -> int:
         """Which frame of video i is closest to one of the first."""
-        return int(np.rint((instant - self.frames[i]) * self.rates[i]))
-
-
-def align(
-    tracks: Sequence[Floats], lags: ArrayLike, rates: ArrayLike | None = None
-) -> tuple[Floats, ...]:
-    """Tracks of all videos at the instants of the first video's frames.
-
-    Parameters
-    ----------
-    tracks : sequence of ndarray, shape (n_i, 2)
-        One per video, frame by frame; NaN = not seen.
-    lags : array_like, shape (m,)
-        By how many frames of the first video each one starts later; only differences count.
-    rates : array_like, shape (m,), optional
-        Frames of each video in one frame of the first; by default one.
-
-    Returns
-    -------
-    tuple of ndarray, shape (n_0, 2)
-        NaN where a video has not begun, has ended, or does not show the target in the frames before
-        and after. At whole frames these are the tracks themselves.
-
-    Raises
-    ------
-    ValueError
-        If a track has a wrong shape or an infinite value, or there is not one finite lag, or
-        positive rate, per track, or one of them is absurdly large or small.
-    """
-    tracks = check_tracks(tracks)
-    shifts = _check_lags("lags", lags, len(tracks))
-    speeds = _check_rates(rates, len(tracks))
-    return _aligned([_curve(track) for track in tracks], shifts, speeds, len(tracks[0]))
+        if not self.clocks:
+            return int(np.rint((instant - self.frames[i]) * self.rates[i]))
+        sought = (self.clocks[0][instant] - self.frames[i]) * self.rates[i]
+        return int(np.abs(self.clocks[i] - sought).argmin())
 
 
 def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
@@ -163,6 +129,7 @@ def learn_lags(
     rig: Rig,
     rates: ArrayLike | None = None,
     start: ArrayLike | None = None,
+    clocks: Sequence[ArrayLike] | None = None,
 ) -> Lags:
     """Learn by how much each video starts later than the first.
 
@@ -177,6 +144,8 @@ def learn_lags(
     start : array_like, shape (m,), optional
         Lags that are tried first, by default zero: if they make the views agree to within
         `DISAGREEMENT`, only better ones close by are sought.
+    clocks : sequence of array_like, shape (n_i,), optional
+        See `align`.
 
     Returns
     -------
@@ -186,18 +155,20 @@ def learn_lags(
     Raises
     ------
     ValueError
-        If the rig has no calibrated camera, there is not one track, rate and lag per camera, a
-        track has a wrong shape, or a track never shows the target.
+        If the rig has no calibrated camera, there is not one track, rate, lag and clock per
+        camera, a track has a wrong shape, or a track never shows the target.
     """
     unknowns, tracks = check_learnable(rig), check_seen(tracks, rig)
-    first = _check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
-    videos = _Videos.of(tracks, unknowns, _check_rates(rates, len(tracks)))
+    first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
+    videos = _Videos.of(tracks, unknowns, check_rates(rates, len(tracks)), clocks)
+    ticks = () if clocks is None else videos.clocks
     residual = videos.disagreement(first)
     tried = [first] if residual <= DISAGREEMENT else _whole_lags(videos)
     refined = [_refined(videos, lags) for lags in tried]
     found = sorted((s for s in refined if s.agree), key=lambda s: s.residual)
     if not found:
-        return _untold(videos, first, no_lags(list_lags(first), residual))
+        best = _untold(videos, first, no_lags(list_lags(first), residual))
+        return replace(best, clocks=ticks)
     alike = [s for s in found if s.residual <= max(ALIKE * found[0].residual, FINE)]
     best = min(alike, key=lambda s: np.abs(s.frames).sum())
     warnings = list(best.warnings)
@@ -205,7 +176,7 @@ def learn_lags(
         warnings.append(ambiguous_lags([list_lags(s.frames) for s in alike[:_SHOWN]]))
     blurred = np.flatnonzero(best.errors > BLURRED)
     warnings += [blurred_lag(int(i) + 1, best.frames[i]) for i in blurred]
-    return replace(best, warnings=tuple(warnings))
+    return replace(best, warnings=tuple(warnings), clocks=ticks)
 
 
 def list_lags(lags: Sequence[float] | Floats) -> str:
@@ -218,31 +189,37 @@ class _Videos:
     """The tracks as functions of time, and how well they agree at given lags."""
 
     curves: tuple[Curve, ...]
-    frames: Floats  # of each video
+    clocks: tuple[Floats, ...]  # when each frame was taken
     rates: Floats
     unknowns: Unknowns
     speed: float  # pixels in a frame
     tried: dict[tuple[float, ...], Floats] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, tracks: Sequence[Floats], unknowns: Unknowns, rates: Floats) -> _Videos:
+    def of(
+        cls,
+        tracks: Sequence[Floats],
+        unknowns: Unknowns,
+        rates: Floats,
+        clocks: Sequence[ArrayLike] | None = None,
+    ) -> _Videos:
         """Of tracks, unknowns and rates that were checked."""
         seen = [track[np.isfinite(track).all(axis=1)] for track in tracks]
         steps = np.concatenate([np.hypot(*np.diff(track, axis=0).T) for track in seen])
         speed = float(np.quantile(steps, _TRIMMED)) if len(steps) else 0.0
-        lengths = np.array([float(len(track)) for track in tracks])
-        return cls(tuple(map(_curve, tracks)), lengths, rates, unknowns, speed)
+        ticks = check_clocks(clocks, tracks)
+        return cls(tuple(map(curve, tracks, ticks)), ticks, rates, unknowns, speed)
 
     @property
     def ends(self) -> Floats:
         """Durations on the clock."""
-        return self.frames / self.rates
+        return np.array([clock[-1] + 1 for clock in self.clocks]) / self.rates
 
     def residuals(self, lags: Floats) -> Floats:
         """Reprojection residuals of the cameras that fit best, (n_0, 2 m); NaN if none do."""
         key = tuple(lags.tolist())
         if key not in self.tried:
-            tracks = _aligned(self.curves, lags, self.rates, int(self.frames[0]))
+            tracks = aligned(self.curves, lags, self.rates, self.clocks[0])
             self.tried[key] = _best_residuals(tracks, self.unknowns)
         return self.tried[key]
 
@@ -352,7 +329,7 @@ def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
     shortest = min(videos.ends[known], videos.ends[other])
     margin = _OVERLAP * shortest
     lags = np.arange(np.ceil(margin - videos.ends[other]), videos.ends[known] - margin + 1)
-    frames = np.arange(0, videos.frames[known], max(1, int(shortest // _INSTANTS)))
+    frames = videos.clocks[known][:: max(1, int(shortest // _INSTANTS))]
     first, second = videos.unknowns.cameras[known], videos.unknowns.cameras[other]
     placed = first.is_placed and second.is_placed
     near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
@@ -388,52 +365,3 @@ def _pair_missed(
         missed = np.abs(design @ solution - target)
         fits = missed <= np.quantile(missed, _TRIMMED)
     return float(np.sqrt(np.mean(missed[fits] ** 2)))
-
-
-def _aligned(
-    curves: Sequence[Curve], lags: Floats, rates: Floats, frames: int
-) -> tuple[Floats, ...]:
-    """What each curve shows at so many frames of the clock."""
-    clock = np.arange(frames)
-    return tuple(c((clock - lag) * r) for c, lag, r in zip(curves, lags, rates, strict=True))
-
-
-def _curve(track: Floats) -> Curve:
-    """A track as a function of the frame number, whole or not: a cubic spline through its frames.
-
-    Its values are NaN outside, and unless the target is seen in the frames before and after.
-    """
-    shown = np.asarray(np.isfinite(track).all(axis=1))
-    seen = np.flatnonzero(shown)
-    if not seen.size:
-        return lambda frames: np.full((len(frames), 2), np.nan)
-    spline = make_interp_spline(seen, track[seen], k=min(3, len(seen) - 1))
-
-    def at(frames: Floats) -> Floats:
-        within = np.clip(frames, 0, len(track) - 1)
-        low, high = np.floor(within).astype(int), np.ceil(within).astype(int)
-        values = np.where((low == high)[:, None], track[low], spline(within))
-        values[~((frames == within) & shown[low] & shown[high])] = np.nan
-        return values
-
-    return at
-
-
-def _check_lags(name: str, lags: ArrayLike, count: int) -> Floats:
-    """One lag per video, counted from the first one's."""
-    checked = check_vector(name, lags, count)
-    far = np.abs(checked).max()
-    if far > _FARTHEST:
-        raise ValueError(f"{name}: must be at most {_FARTHEST:g} frames, got {far:g}")
-    return checked - checked[0]
-
-
-def _check_rates(given: ArrayLike | None, count: int) -> Floats:
-    """One rate per video, in units of the first one's."""
-    rates = np.ones(count) if given is None else check_vector("rates", given, count)
-    for rate in rates:
-        if not 1 / _FASTEST <= check_positive("rates", rate) <= _FASTEST:
-            raise ValueError(
-                f"rates: must be between {1 / _FASTEST:g} and {_FASTEST:g}, got {rate:g}"
-            )
-    return rates / rates[0]

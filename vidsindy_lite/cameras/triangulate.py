@@ -21,8 +21,9 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..checks import check_instance, check_tracks
+from .camera import Camera
 from .geometry import PARALLEL
-from .models import Camera, all_orthographic, independent
+from .models import all_orthographic, independent
 from .rig import Rig
 
 _STEPS = 30  # of Gauss and Newton; from the linear solution four or five are usual

@@ -24,8 +24,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
+from .alignment import align
 from .rig import Rig
-from .synchronise import OUTLIER, PROBE, Lags, align
+from .synchronise import OUTLIER, PROBE, Lags
 from .triangulate import Views, check_calibrated, check_views, points_of_views, residuals_of_views
 from .unknowns import Unknowns
 
@@ -55,7 +56,8 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     start = unknowns.read(learned.cameras)
     moving = np.flatnonzero((lags.errors > 0) & np.isfinite(lags.errors))
     steps = np.concatenate([np.full(len(start), _PROBE), np.full(len(moving), PROBE)])
-    still = Views.of(align(tracks, lags.frames, lags.rates))
+    clocks = lags.clocks or None
+    still = Views.of(align(tracks, lags.frames, lags.rates, clocks))
 
     def both(change: Floats) -> Floats:
         """Residuals and path, side by side, at other parameters."""
@@ -63,7 +65,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
         if shift.any():
             shifted = lags.frames.copy()
             shifted[moving] += shift
-            views = Views.of(align(tracks, shifted, lags.rates))
+            views = Views.of(align(tracks, shifted, lags.rates, clocks))
         cameras = unknowns.filled(start + change[: len(start)])
         return np.hstack((*residuals_of_views(views, cameras), points_of_views(views, cameras)))
 

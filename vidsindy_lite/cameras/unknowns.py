@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from ..arrays import Floats, Ints
+from .camera import Camera
 from .geometry import PARALLEL
-from .models import Camera
 from .rig import Rig
 from .triangulate import Views
 

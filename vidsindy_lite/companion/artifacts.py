@@ -1,6 +1,6 @@
 """What the notebooks produce: figures, tables, and the registry that keeps the folder honest.
 
-A notebook hands each result over under an id, the paper's number where there is one:
+A notebook hands each result over under an id, the paper's number where there is one::
 
     save_figure("fig_3", fig, caption="...", numbers={"noise": levels, "l2": errors})
     save_table("table_1", rows, caption="...")          # rows: a list of dicts
@@ -18,7 +18,6 @@ VIDSINDY_NOTEBOOK and VIDSINDY_STAMP. Without it, a cell that somebody runs by h
 build/interactive/figures: only the runner writes the committed ones.
 """
 
-import html
 import io
 import os
 import platform
@@ -36,6 +35,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ..stamp import LIBRARIES, repository_root, write_file
+from .pages import page
 from .records import RUN_TIMES, as_json, json_bytes, read_json, read_records
 
 INDEX = "README.md"
@@ -75,7 +75,7 @@ def versions() -> str:
 class Table:
     """A registered table, shown by a notebook as HTML and by a terminal as text.
 
-    Attributes
+    Parameters
     ----------
     table_id : str
     caption : str
@@ -144,19 +144,8 @@ class Table:
         return f"{self.markdown()}\n{self.caption}\n"
 
     def _repr_html_(self) -> str:
-        head, *body = [[html.escape(cell) for cell in line] for line in self._cells()]
-        style = ["left" if self._is_text(column) else "right" for column in self.columns]
-
-        def line(tag: str, cells: list[str]) -> str:
-            pairs = zip(style, cells, strict=True)
-            inner = "".join(f'<{tag} style="text-align:{s}">{c}</{tag}>' for s, c in pairs)
-            return f"<tr>{inner}</tr>\n"
-
-        return (
-            f"<table>\n<caption>{html.escape(self.caption)}</caption>\n"
-            f"<thead>\n{line('th', head)}</thead>\n"
-            f"<tbody>\n{''.join(line('td', cells) for cells in body)}</tbody>\n</table>"
-        )
+        align = ["left" if self._is_text(column) else "right" for column in self.columns]
+        return page("table.html", caption=self.caption, align=align, lines=self._cells())
 
 
 def save_figure(

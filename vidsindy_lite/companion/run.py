@@ -2,7 +2,7 @@
 
 The .py half of a pair is the source. The .ipynb half is made here: executed, stripped of all that
 differs between two runs, and stamped with a hash of the code that it depends on. The full profile
-writes notebooks/*.ipynb and figures/ of the repository, and the tables of its README; the quick
+writes ``notebooks/*.ipynb`` and figures/ of the repository, and the tables of its README; the quick
 profile writes the layout of the former two under build/quick/.
 
 A notebook is not executed again if its stamp and its source are the same, its prose included, and
@@ -90,7 +90,7 @@ class Report:
 
 
 def find_notebooks(root: str | os.PathLike) -> tuple[Path, ...]:
-    """The source halves (notebooks/*.py) of a repository's notebooks, in order."""
+    """The source halves (``notebooks/*.py``) of a repository's notebooks, in order."""
     return tuple(sorted((Path(root) / "notebooks").glob("*.py")))
 
 

@@ -1,8 +1,10 @@
 """A trajectory goes in, its law comes out.
 
-trajectories -> problem (smoothing: noise, gaps, units) -> solver -> discovery (diagnostics)
-solver: `discover`; its stages use collocation on splines, selection of terms, origin, gaps, errors
-that last, and persistence: which law stays the same while more error is tolerated
+trajectories -> problem (smoothing: noise, gaps, units; form: order, candidates, what is known)
+-> solver -> discovery (diagnostics)
+solver: `discover`; its stages (search, then polish and settle) use collocation on splines,
+selection of terms, origin, gaps, errors that last, and persistence: which law stays the same while
+more error is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings
 storage: the result as a file
 law: polynomials, on a library of monomials; integrate solves it
@@ -12,7 +14,7 @@ beside the way: cramer_rao, the least errors that any estimate could have
 
 from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao
-from .discovery import Discovery, Simulation
+from .discovery import Discovery
 from .integrate import runge_kutta_4
 from .library import monomial_exponents, monomial_gradients, monomials, variable_names
 from .origin import ShiftedLaw

@@ -155,18 +155,24 @@ class Collocation:
         The library.
     data_weights : ndarray, shape (d,)
         1 / variance of the measurement noise.
+    precision : ndarray, shape (n, d)
+        Weight of each measurement relative to these: 1 for most, 0 for what was not observed.
     physics_weights : ndarray, shape (d,)
         Weight of the mean-square residual of each equation per sample.
     systematic : ndarray, shape (n, d, k)
         Errors that all samples share: they are the curve plus noise plus a sum of these, each
         times an unknown number of mean 0 and variance 1.
+    known : ndarray, shape (l, d)
+        Coefficients of the law that are given; those of a `State` come on top.
     """
 
     grid: Grid
     exponents: Ints
     data_weights: Floats
+    precision: Floats
     physics_weights: Floats
     systematic: Floats
+    known: Floats
 
     @classmethod
     def of(
@@ -176,12 +182,20 @@ class Collocation:
         data_weights: Floats,
         physics_weights: Floats,
         systematic: Floats | None = None,
+        precision: Floats | None = None,
+        known: Floats | None = None,
     ) -> Collocation:
-        """The problem of these segments, by default without systematic errors."""
+        """The problem of these segments, by default without systematic errors or known terms.
+
+        NaN in the data are not observed; all else has a precision of 1 by default.
+        """
         grid = Grid.of(segments)
         shared = np.empty((*grid.x.shape, 0)) if systematic is None else systematic
         data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
-        return cls(grid, exponents, data, physics, shared)
+        relative = np.ones(grid.x.shape) if precision is None else precision
+        seen = np.where(np.isnan(grid.x), 0.0, relative)
+        given = np.zeros(exponents.shape) if known is None else known
+        return cls(grid, exponents, data, seen, physics, shared, given)
 
     def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
         """The same with other weights."""
@@ -201,17 +215,28 @@ class Collocation:
     def _generators(self) -> Floats:
         return shift_generators(self.exponents)
 
+    @property
+    def counts(self) -> Ints:
+        """How often each coordinate was observed, shape (d,)."""
+        return np.count_nonzero(self.precision, axis=0)
+
+    @cached_property
+    def _sample_weights(self) -> Floats:
+        """1 / variance of every measurement, shape (n, d)."""
+        return self.precision * self.data_weights
+
     @cached_property
     def _data_band(self) -> Floats:
         """Normal matrix of the data loss in the control points, in lower banded storage."""
         band = np.zeros((WIDTH * self.d, self.grid.r * self.d))
-        band[:: self.d] = np.kron(self.grid.sample_band, self.data_weights)
+        for j, weights in enumerate(self._sample_weights.T):
+            band[:: self.d, j :: self.d] = normal_band(self.grid.samples, weights)
         return band
 
     @cached_property
     def _shared(self) -> tuple[Floats, Floats]:
         """Weighted systematic errors, and the normal matrix of their sizes."""
-        weighted = self.data_weights[:, None] * self.systematic
+        weighted = self._sample_weights[:, :, None] * self.systematic
         information = np.einsum("nik,nil->kl", weighted, self.systematic)
         information += np.eye(self.systematic.shape[-1])
         return weighted, information
@@ -225,23 +250,27 @@ class Collocation:
         return self.grid.nodes @ control_points, self.grid.slopes @ control_points
 
     def data_residual(self, control_points: Floats) -> tuple[Floats, Floats]:
-        """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,)."""
-        residual = self.curve(control_points) - self.grid.x
+        """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,).
+
+        What was not observed has residual 0.
+        """
+        seen = self.precision > 0
+        residual = np.where(seen, self.curve(control_points) - self.grid.x, 0.0)
         weighted, information = self._shared
         sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
-        return residual + self.systematic @ sizes, sizes
+        return residual + seen * (self.systematic @ sizes), sizes
 
     def data_loss(self, control_points: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
         residual, sizes = self.data_residual(control_points)
-        return float((residual**2).sum(axis=0) @ self.data_weights + sizes @ sizes)
+        return float((residual**2 * self._sample_weights).sum() + sizes @ sizes)
 
     def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
         x, slope = self.node_states(state.control_points)
-        rows = state.active.any(axis=1)
-        terms = monomials(x - state.offset, self.exponents[rows])
-        return slope - terms @ state.coefficients[rows]
+        law = state.coefficients + self.known
+        rows = law.any(axis=1)
+        return slope - monomials(x - state.offset, self.exponents[rows]) @ law[rows]
 
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
@@ -272,7 +301,7 @@ class Collocation:
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
 
         right = physics.T @ unknowns
-        right[:, 0] += (self.grid.samples.T @ (data_residual * self.data_weights)).ravel()
+        right[:, 0] += (self.grid.samples.T @ (data_residual * self._sample_weights)).ravel()
         pull = self.grid.samples.T @ self._shared[0].reshape(len(self.grid.x), -1)
         right[:, 1 + len(columns) :] = pull.reshape(len(right), -1)
         solved = cho_solve_banded((factor, True), right, check_finite=False)
@@ -281,7 +310,7 @@ class Collocation:
         gram = self._gram(unknowns - physics @ solved, solved, data_residual, sizes)
         solved = solved.reshape(-1, self.d, solved.shape[1])
         gram, solved = _without_systematic(gram, solved, 1 + len(columns))
-        objective = (data_residual**2).sum(axis=0) @ self.data_weights
+        objective = (data_residual**2 * self._sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
         return Linearisation(
@@ -300,12 +329,13 @@ class Collocation:
         residual itself, its derivatives in the columns, and zeros for the systematic errors.
         """
         d, l = self.d, len(self.exponents)
+        law = state.coefficients + self.known
         x, slope = self.node_states(state.control_points)
         terms = monomials(x - state.offset, self.exponents)
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
-        residual = root * (slope - terms @ state.coefficients)
+        residual = root * (slope - terms @ law)
         # (nodes, equation, coordinate): how the law changes with the state.
-        rates = (terms @ (self._generators @ state.coefficients)).transpose(1, 2, 0)
+        rates = (terms @ (self._generators @ law)).transpose(1, 2, 0)
         jacobian = root[:, :, None] * rates
         # Minus the terms in their own equation, and the rates of the law for the offset.
         offset_columns = columns[columns >= d * l] - d * l
@@ -341,7 +371,7 @@ class Collocation:
         follow = -curve.reshape(-1, self.d, left.shape[1])
         follow[:, :, 0] += data_residual
         follow[:, :, shared] += self.systematic
-        follow *= np.sqrt(self.data_weights)[:, None]
+        follow *= np.sqrt(self._sample_weights)[:, :, None]
         follow = follow.reshape(-1, left.shape[1])
         gram += follow.T @ follow
         gram[shared, shared] += np.eye(len(sizes))

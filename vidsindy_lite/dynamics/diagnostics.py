@@ -13,7 +13,6 @@ from scipy.stats import chi2
 from ..arrays import Floats
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .errors import residual_noise
-from .library import variable_names
 from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
@@ -130,7 +129,7 @@ def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
     j = int(ratio.argmax())
     if not ratio[j] < MISFIT:
         yield (
-            f"the curve misses the data of {variable_names(problem.d)[j]} by {ratio[j]:.1f} times "
+            f"the curve misses the data of {problem.form.names[j]} by {ratio[j]:.1f} times "
             "the noise estimated beforehand: the law may lie outside the library (raise the "
             "degree), the motion may not be autonomous, or errors last for several samples"
         )
@@ -163,20 +162,20 @@ def _another_in_the_data(problem: Problem, fit: Fit, law: PolynomialSystem) -> I
 
 
 def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
-    yield from _contested(problem.law(fit.state).terms, fit.state, path)
+    yield from _contested(problem.law(fit.state), fit.state, path)
     if max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest:
         return  # weaker errors than those tolerated say nothing about the law
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
     # The offset stays where it is: with it free, the same law in another frame would count.
-    model = fit.collocation.linearise(fit.state, np.arange(problem.exponents.size))
+    model = fit.collocation.linearise(fit.state, problem.form.searched)
     yield from _left_over(model, fit.state)
     yield from _near_tie(problem, fit.state, model)
 
 
-def _contested(terms: Sequence[str], state: State, path: Path) -> Iterator[str]:
+def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]:
     """Is there another plateau nearly as wide as that of an equation's law?"""
-    names = variable_names(len(state.moving))
+    names, terms = law.names, law.terms
     for own, ranked in zip(path.of(state.active), path.ranked(), strict=True):
         others = [plateau for plateau in ranked if (plateau.terms != own.terms).any()]
         if others and others[0].decades > RIVAL * own.decades:
@@ -196,7 +195,7 @@ def _contested(terms: Sequence[str], state: State, path: Path) -> Iterator[str]:
 def _left_over(model: Linearisation, state: State) -> Iterator[str]:
     """Would all candidates together explain more than chance (Rao's score test)?"""
     gain = float(model.gradient @ model.newton()[0])
-    unused = int((~state.active).sum())
+    unused = len(model.columns) - int(state.active.sum())
     if unused and not chi2.sf(gain, unused) > CHANCE:
         yield (
             f"the terms left out explain more than chance (chi-square {gain:.0f} for {unused}): a "
@@ -209,13 +208,15 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[
     cost, dropped, added = closest_rival(
         model.information,
         model.gradient,
-        state.coefficients.T.ravel(),
-        np.tile(problem.penalties, law.d),
-        state.active.T.ravel(),
+        state.flat()[model.columns],
+        problem.prices[model.columns],
+        state.free()[model.columns],
     )
     if cost > NEAR_TIE:
         return
-    out, into = (" and ".join(_place(law, k) for k in entries) for entries in (dropped, added))
+    out, into = (
+        " and ".join(_place(law, k) for k in model.columns[entries]) for entries in (dropped, added)
+    )
     change = (
         f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
     )
@@ -227,6 +228,8 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[
 
 
 def _standstill(law: PolynomialSystem) -> Iterator[str]:
+    if law.order == 2:
+        return  # what moves without a force moves evenly
     for j in np.flatnonzero(~law.support.any(axis=0)):
         name = law.names[j]
         yield f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
@@ -253,7 +256,7 @@ def _sampling(trajectories: Sequence[Trajectory]) -> Iterator[str]:
     if turns < TURNS and trajectories[0][1].shape[1] > 1:  # on a line nothing turns
         yield (
             f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "
-            "indistinguishable on it; record longer"
+            "indistinguishable on it; record longer, or several runs from other starts"
         )
     step = typical_step(trajectories)
     if step > COARSE:

@@ -14,7 +14,7 @@ from ..checks import check_array
 from .collocation import Fit
 from .diagnostics import diagnose
 from .errors import residual_noise
-from .library import shift_generators, shift_matrix, variable_names
+from .library import shift_generators, shift_matrix
 from .persistence import Path, Plateau
 from .polynomials import PolynomialSystem
 from .problem import Problem, Units
@@ -69,7 +69,7 @@ class History:
                 stage=stage,
                 seconds=time.perf_counter() - self.began,
                 physics_weight=weight,
-                data_loss=data / collocation.grid.x.size,
+                data_loss=data / collocation.counts.sum(),
                 physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
                 terms=int(state.active.sum()),
                 offset=problem.units.point(state.offset),
@@ -178,11 +178,11 @@ class Discovery:
         law = self.native if native else self.system
         errors = self.native_standard_errors if native else self.standard_errors
         lines = []
-        for j, name in enumerate(law.names):
+        for j, side in law.sides().items():
             rows = np.flatnonzero(law.coefficients[:, j])
             terms = (_with_error(law.coefficients[r, j], errors[r, j], law.terms[r]) for r in rows)
             text = " ".join(terms).removeprefix("+ ") or "0"
-            lines.append(f"d{name}/dt = {text}")
+            lines.append(f"{side} = {text}")
         return "\n".join(lines)
 
     def curve(self, t: Floats) -> Floats:
@@ -228,6 +228,8 @@ class Discovery:
 
         Raises
         ------
+        FileNotFoundError
+            If there is no such file.
         ValueError
             If the file holds none.
         """
@@ -256,27 +258,28 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     """
     units, state, collocation = problem.units, fit.state, fit.collocation
     exponents, (l, d) = problem.exponents, state.coefficients.shape
-    names = variable_names(d)
+    form = problem.form
     covariance = _covariance(units, fit)
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
     # What the frame of the data needs is decided at the errors at which the terms were chosen.
     tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
-    prices = (problem.penalties * tolerated[:, None] ** 2).ravel()
+    prices = problem.prices * np.repeat(tolerated, l) ** 2
     moved, moved_covariance, margins = _pruned(moved, moved_covariance, prices)
     margins /= np.repeat(tolerated**2, l)
     if not state.moving.any():
         margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
-    law = PolynomialSystem(names, exponents, moved)
+    law = PolynomialSystem(form.names, exponents, moved + form.known)
+    seen = collocation.counts > 0
     return Discovery(
         system=law,
-        native=PolynomialSystem(names, exponents, coefficients),
+        native=PolynomialSystem(form.names, exponents, coefficients + form.known),
         offset=offset,
         covariance=moved_covariance,
         native_covariance=covariance[: l * d, : l * d],
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
-        noise=residual_noise(fit) * units.scale,
+        noise=np.where(seen, residual_noise(fit) * units.scale, np.nan),
         warnings=diagnose(problem, fit, path, law, margins),
         path=path.plateaus,
         history=tuple(history.steps),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from .collocation import CLEANEST, Fit
 
 CHANCE = 4.0
@@ -19,11 +19,23 @@ def residual_noise(fit: Fit) -> Floats:
 
 
 def _spread(fit: Fit) -> Floats:
-    """Standard deviation of the data residual, less the freedom that the fit used up."""
-    used = fit.state.free().sum() / len(fit.state.moving) + len(fit.collocation.segments)
-    residual, _ = fit.collocation.data_residual(fit.state.control_points)
-    squares = (residual**2).sum(axis=0)
-    return np.sqrt(squares / max(len(residual) - used, 1.0))
+    """Standard deviation of the data residual, less the freedom that the fit used up.
+
+    Of measurements of precision 1; for a coordinate that was never observed, as of the others.
+    """
+    collocation, seen = fit.collocation, fit.collocation.counts > 0
+    used = fit.state.free().sum() / seen.sum() + len(collocation.segments)
+    residual, _ = collocation.data_residual(fit.state.control_points)
+    squares = (residual**2 * collocation.precision).sum(axis=0)[seen]
+    spread = np.sqrt(squares / np.maximum(collocation.counts[seen] - used, 1.0))
+    return spread_to_unseen(spread, seen)
+
+
+def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
+    """The errors of the coordinates that were observed, their geometric mean for the others."""
+    filled = np.full(len(seen), np.exp(np.log(np.maximum(noise, CLEANEST)).mean()))
+    filled[seen] = noise
+    return filled
 
 
 def effective_noise(fit: Fit) -> Floats:
@@ -33,6 +45,7 @@ def effective_noise(fit: Fit) -> Floats:
     of their autocorrelations (`inflation`).
     """
     residual, _ = fit.collocation.data_residual(fit.state.control_points)
+    residual *= np.sqrt(fit.collocation.precision)
     ends = np.cumsum([len(segment.t) for segment in fit.collocation.segments])[:-1]
     lasting = np.sqrt(inflation(np.split(residual, ends)))
     return np.maximum(_spread(fit) * lasting, CLEANEST)

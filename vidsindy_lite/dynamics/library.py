@@ -103,14 +103,22 @@ def closure(exponents: Ints) -> Ints:
     return np.array(ordered, dtype=int).reshape(-1, exponents.shape[1])
 
 
-def divides(exponents: Ints) -> Bools:
-    """Which monomial (row) divides which (column), itself included; shape (l, l)."""
-    return np.all(exponents[:, None, :] <= exponents[None, :, :], axis=-1)
+def divides(exponents: Ints, axes: Bools | None = None) -> Bools:
+    """Which monomial (row) divides which (column), itself included; shape (l, l).
+
+    If axes are given, bool (d,), along these only: along the others both have the same power.
+    """
+    row, column = exponents[:, None, :], exponents[None, :, :]
+    lower = row < column if axes is None else axes & (row < column)
+    return np.all((row == column) | lower, axis=-1)
 
 
-def closure_mask(exponents: Ints, support: Bools) -> Bools:
-    """Widen a support (l, d) to all divisors of its terms: what any shift of it may contain."""
-    return divides(exponents) @ support
+def closure_mask(exponents: Ints, support: Bools, axes: Bools | None = None) -> Bools:
+    """Widen a support (l, d) to all divisors of its terms: what a shift of it may contain.
+
+    If axes are given, bool (d,), of a shift along these.
+    """
+    return divides(exponents, axes) @ support
 
 
 def shift_generators(exponents: Ints) -> Floats:

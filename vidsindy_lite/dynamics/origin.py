@@ -32,11 +32,14 @@ class ShiftedLaw:
         Estimate in the present frame.
     information : ndarray, shape (l d, l d)
         Its information matrix, equation by equation.
+    movable : ndarray of bool, shape (d,), optional
+        Along which axes its origin is sought; all by default.
     """
 
     exponents: Ints
     coefficients: Floats
     information: Floats
+    movable: Bools | None = None
 
     @property
     def d(self) -> int:
@@ -49,6 +52,11 @@ class ShiftedLaw:
         l, d = self.exponents.shape
         blocks = inverse(self.information).reshape(d, l, d, l)
         return np.stack([blocks[j, :, j, :] for j in range(d)])
+
+    @cached_property
+    def axes(self) -> Ints:
+        """The movable axes."""
+        return np.arange(self.d) if self.movable is None else np.flatnonzero(self.movable)
 
     @cached_property
     def _generators(self) -> Floats:
@@ -73,9 +81,10 @@ class ShiftedLaw:
         equations, terms = entries.T
         for _ in range(6):
             estimate = shift_matrix(self.exponents, -origin) @ self.coefficients
-            rates = (self._generators @ estimate)[:, terms, equations].T
+            rates = (self._generators[self.axes] @ estimate)[:, terms, equations].T
             step, *_ = np.linalg.lstsq(rates, -estimate[terms, equations], rcond=1e-6)
-            origin = origin + step
+            origin = origin.copy()
+            origin[self.axes] += step
             if not np.abs(origin).max() < 1e6:
                 return np.full(self.d, np.nan)
             if np.abs(step).max() < 1e-9:
@@ -95,8 +104,9 @@ class ShiftedLaw:
         score = estimate**2 / variance
         value = (score / (score + penalty))[mask].sum()
         weight = penalty / (score + penalty) ** 2
-        gradient = np.empty(self.d)
-        for i, generator in enumerate(self._generators):
+        gradient = np.zeros(self.d)
+        for i in self.axes:
+            generator = self._generators[i]
             estimate_rate = estimate @ generator.T
             variance_rate = 2 * np.einsum("ka,jak->jk", generator, covariance)
             rate = 2 * estimate * estimate_rate / variance - score * variance_rate / variance
@@ -170,12 +180,12 @@ def _starts(
     """Origins in the box near which a few coefficients drawn at random vanish."""
     low, high = box
     # Only what divides another term of its equation can vanish by a shift.
-    below = divides(law.exponents) & ~np.eye(len(law.exponents), dtype=bool)
+    below = divides(law.exponents, law.movable) & ~np.eye(len(law.exponents), dtype=bool)
     droppable = np.argwhere((active & (below @ active)).T)
     starts = []
     for draw in range(DRAWS if len(droppable) else 0):
         origin = home if draw % 2 else rng.uniform(low, high)
-        size = min(1 + draw % law.d, len(droppable))
+        size = min(1 + draw % len(law.axes), len(droppable))
         origin = law.vanish(origin, droppable[rng.permutation(len(droppable))[:size]])
         if np.isfinite(origin).all():
             starts.append(np.clip(origin, low, high))

@@ -73,6 +73,8 @@ class Path:
         Around which the laws are found.
     model : Linearisation
         Its quadratic model in all terms.
+    own : float
+        The errors that the fit was weighted with.
     level : float
         Errors that have to be tolerated: a plateau that begins above them is no law of these data.
     plateaus : tuple of tuple of Plateau
@@ -81,13 +83,9 @@ class Path:
 
     fit: Fit
     model: Linearisation
+    own: float
     level: float
     plateaus: tuple[tuple[Plateau, ...], ...]
-
-    @property
-    def own(self) -> float:
-        """The errors that the fit was weighted with."""
-        return typical(self.fit.collocation.data_weights**-0.5)
 
     @property
     def lowest(self) -> float:
@@ -110,7 +108,7 @@ class Path:
 
     def restricted(self, active: Bools) -> State:
         """The state that the quadratic model promises for other terms, (l, d)."""
-        support = np.append(active.T.ravel(), self.fit.state.moving[self.fit.state.moving])
+        support = np.append(active.T.ravel(), self.fit.state.moving)[self.model.columns]
         present = self.fit.state.flat()[self.model.columns]
         solution = minimiser(self.model.information, self.model.gradient, present, support)
         return self.model.along(self.fit.state, solution - present, 1.0).of_terms(active)
@@ -126,10 +124,9 @@ def follow(problem: Problem, fit: Fit) -> Path:
     fit : Fit
         Around which.
     """
-    size = problem.exponents.size
-    columns = np.concatenate([np.arange(size), size + np.flatnonzero(fit.state.moving)])
+    columns, terms_end = problem.columns(fit.state), len(problem.form.searched)
     model = fit.collocation.linearise(fit.state, columns)
-    prices = np.append(np.tile(problem.penalties, problem.d), np.full(len(columns) - size, -np.inf))
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
     own = typical(fit.collocation.data_weights**-0.5)
     lowest = min(typical(residual_noise(fit)), LARGEST / 10**STEP)
@@ -141,7 +138,9 @@ def follow(problem: Problem, fit: Fit) -> Path:
         support, _, _ = subset_search(
             share * model.information, share * model.gradient, present, prices, support
         )
-        for j, terms in enumerate(support[:size].reshape(problem.d, -1)):
+        active = np.zeros(problem.exponents.T.shape, dtype=bool)
+        active.flat[problem.form.searched] = support[:terms_end]
+        for j, terms in enumerate(active):
             if paths[j] and (paths[j][-1].terms == terms).all():
                 low_here = paths[j].pop().low
             else:
@@ -150,7 +149,7 @@ def follow(problem: Problem, fit: Fit) -> Path:
     single, lasting = residual_noise(fit), effective_noise(fit)
     smooth = bool((lasting > LASTING * single).any() or (single <= NOISELESS).all())
     level = max(lowest, typical(lasting), SMOOTH if smooth else 0.0)
-    return Path(fit, model, level, tuple(map(tuple, paths)))
+    return Path(fit, model, own, level, tuple(map(tuple, paths)))
 
 
 def typical(noise: Floats) -> float:

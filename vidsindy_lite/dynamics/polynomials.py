@@ -129,6 +129,19 @@ class PolynomialSystem:
         between = "" if all(len(name) == 1 for name in self.names) else " "
         return tuple(_term_text(e, self.names, "{}^{}", between) for e in self.exponents)
 
+    @cached_property
+    def order(self) -> int:
+        """2 if the second half of the variables are the velocities of the first, else 1.
+
+        Velocities are named like vx, and the first half of the law is ``dx/dt = vx``.
+        """
+        m = self.d // 2
+        if self.names[m:] != velocity_names(self.names[:m]):
+            return 1
+        tied = (self.exponents @ np.arange(self.d))[:, None] == np.arange(m, 2 * m)
+        tied &= self.exponents.sum(axis=1)[:, None] == 1
+        return 2 if (self.coefficients[:, :m] == tied).all() and tied.any(axis=0).all() else 1
+
     @property
     def support(self) -> Bools:
         """Where a coefficient is not zero, bool, shape (l, d)."""
@@ -214,20 +227,35 @@ class PolynomialSystem:
 
         return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
 
+    def sides(self) -> dict[int, str]:
+        """What stands left in text, by number of equation: ``dx/dt``, or ``x''`` of order 2."""
+        if self.order == 1:
+            return {j: f"d{name}/dt" for j, name in enumerate(self.names)}
+        m = self.d // 2
+        return {m + j: f"{name}''" for j, name in enumerate(self.names[:m])}
+
     def text(self, digits: int = 4) -> str:
-        """The equations as lines of plain text, e.g. ``dx/dt = -10 x + 10 y``."""
+        """The equations as lines of plain text, e.g. ``dx/dt = -10 x + 10 y``.
+
+        Of a law of second order its accelerations, e.g. ``x'' = -30 x - 0.25 vx``.
+        """
         return "\n".join(
-            f"d{name}/dt = {_sum_text(self.coefficients[:, j], self.terms, digits)}"
-            for j, name in enumerate(self.names)
+            f"{side} = {_sum_text(self.coefficients[:, j], self.terms, digits)}"
+            for j, side in self.sides().items()
         )
 
     def latex(self, digits: int = 4) -> str:
         """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
         names = tuple(map(_name_latex, self.names))
+        left = {j: rf"\dot{{{name}}}" for j, name in enumerate(names)}
+        if self.order == 2:
+            m = self.d // 2
+            names = names[:m] + tuple(left[j] for j in range(m))
+            left = {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
         terms = [_term_text(e, names, "{}^{{{}}}", " ") for e in self.exponents]
         rows = (
-            rf"\dot{{{name}}} &= " + _sum_text(self.coefficients[:, j], terms, digits, r"\,")
-            for j, name in enumerate(names)
+            f"{side} &= " + _sum_text(self.coefficients[:, j], terms, digits, r"\,")
+            for j, side in left.items()
         )
         return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
 
@@ -242,6 +270,11 @@ class PolynomialSystem:
         if x.ndim != 2 or x.shape[1] != self.d:
             raise ValueError(f"x: must have shape (n, {self.d}), got {x.shape}")
         return x
+
+
+def velocity_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of the velocities of variables: vx, vy, ..."""
+    return tuple(f"v{name}" for name in names)
 
 
 def _parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:

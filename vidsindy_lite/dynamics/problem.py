@@ -15,7 +15,9 @@ from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
 from .collocation import CLEANEST, Collocation, State
-from .library import monomial_exponents, monomials, variable_names
+from .errors import spread_to_unseen
+from .form import Form
+from .library import monomials
 from .polynomials import PolynomialSystem
 from .smoothing import smooth
 from .splines import DEGREE, Segment, clamped_knots
@@ -74,15 +76,18 @@ class Problem:
         The same in standard units.
     systematic : list of ndarray, shape (n, d, k)
         Errors that all samples share, for each trajectory.
+    precision : list of ndarray, shape (n, d)
+        Weight of each measurement relative to ``noise ** -2``, for each trajectory; 0 where it was
+        not observed.
     stretches : list of (int, Trajectory)
         The data between gaps, each with the number of its trajectory.
-    curves : list of BSpline
-        Each stretch smoothed, without a law.
+    curves : list of callable
+        Each stretch smoothed, without a law: from times (n,) to states (n, d).
     units : Units
     noise : ndarray, shape (d,)
         Noise of the data as the smoothing estimates it.
-    exponents : ndarray of int, shape (l, d)
-        The library.
+    form : Form
+        Which terms the law may have, and which it has.
     penalties : ndarray, shape (l,)
         Price of a term; see `term_penalties`.
     slack : ndarray, shape (d,)
@@ -92,11 +97,12 @@ class Problem:
     measured: list[Trajectory]
     trajectories: list[Trajectory]
     systematic: list[Floats]
+    precision: list[Floats]
     stretches: list[tuple[int, Trajectory]]
-    curves: list[BSpline]
+    curves: Sequence[Callable[[Floats], Floats]]
     units: Units
     noise: Floats
-    exponents: Ints
+    form: Form
     penalties: Floats
     slack: Floats
 
@@ -104,6 +110,26 @@ class Problem:
     def d(self) -> int:
         """Dimension of the state."""
         return self.exponents.shape[1]
+
+    @property
+    def exponents(self) -> Ints:
+        """The library, shape (l, d)."""
+        return self.form.exponents
+
+    @property
+    def known(self) -> Floats:
+        """Coefficients that are given, shape (l, d)."""
+        return self.form.known / self.units.factors(self.exponents)
+
+    @property
+    def prices(self) -> Floats:
+        """The penalties of all terms, equation by equation, shape (l d,)."""
+        return np.tile(self.penalties, self.d)
+
+    def columns(self, state: State) -> Ints:
+        """Entries of `State.flat` that may differ from zero: candidates and moving axes."""
+        size = self.exponents.size
+        return np.concatenate([self.form.searched, size + np.flatnonzero(state.moving)])
 
     @property
     def home(self) -> Floats:
@@ -126,14 +152,19 @@ class Problem:
 
     def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
         """Data and physics loss on segments; by default for the noise of the smoothing."""
-        shared = np.concatenate([self._shared(segment) for segment in segments])
+        shared, precision = (
+            np.concatenate([self._at(segment, values) for segment in segments])
+            for values in (self.systematic, self.precision)
+        )
         weights = (self.noise if noise is None else noise) ** -2
-        return Collocation.of(segments, self.exponents, weights, np.ones(self.d), shared)
+        return Collocation.of(
+            segments, self.exponents, weights, np.ones(self.d), shared, precision, self.known
+        )
 
-    def _shared(self, segment: Segment) -> Floats:
-        """Systematic errors at the samples of a segment, shape (n, d, k)."""
+    def _at(self, segment: Segment, values: Sequence[Floats]) -> Floats:
+        """What is given for all samples of each trajectory, at those of a segment."""
         t, _ = self.trajectories[segment.trajectory]
-        return self.systematic[segment.trajectory][np.searchsorted(t, segment.t)]
+        return values[segment.trajectory][np.searchsorted(t, segment.t)]
 
     def weighted(self, collocation: Collocation, weight: float) -> Collocation:
         """The same with another physics weight, relative to the slack."""
@@ -146,7 +177,7 @@ class Problem:
 
     def law(self, state: State) -> PolynomialSystem:
         """The law of a state in its own frame."""
-        return PolynomialSystem(variable_names(self.d), self.exponents, state.coefficients)
+        return PolynomialSystem(self.form.names, self.exponents, state.coefficients + self.known)
 
 
 def pose(
@@ -154,6 +185,7 @@ def pose(
     systematic: list[Floats],
     degree: int,
     rng: np.random.Generator,
+    order: int = 1,
 ) -> Problem:
     """Pose the problem of a discovery: standard units, gaps, noise, prices.
 
@@ -163,8 +195,8 @@ def pose(
         If a coordinate does not move, or there are fewer samples than unknowns.
     """
     x = np.concatenate([values for _, values in measured])
-    exponents = monomial_exponents(x.shape[1], degree)
-    unknowns = len(exponents) + 1
+    form = Form.of(x.shape[1], degree, order)
+    unknowns = len(form.exponents) + 1
     if len(x) < unknowns:
         raise ValueError(
             f"x: must hold at least as many samples as unknowns per equation "
@@ -183,15 +215,50 @@ def pose(
         measured=measured,
         trajectories=[(t * speed, values) for t, values in trajectories],
         systematic=[modes / scale[:, None] for modes in systematic],
+        precision=[np.ones(values.shape) for _, values in measured],
         stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
         curves=curves,
         units=Units(centre, scale, step / speed),
         noise=np.maximum(noise, CLEANEST),
-        exponents=exponents,
-        penalties=term_penalties(exponents),
-        slack=np.ones(x.shape[1]),
+        form=form,
+        penalties=term_penalties(form.exponents, x.shape[1]),
+        slack=np.ones(len(form.names)),
     )
+    if order == 2:
+        problem = _with_velocities(problem, curves)
     return replace(problem, slack=_slack(problem))
+
+
+def _with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
+    """The same with velocities as further states, which nobody has measured.
+
+    Their standard units have mean 0, so that a velocity of zero stays what it is.
+    """
+    units, m = problem.units, len(problem.noise)
+    slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in positions]
+    rms = np.sqrt((np.concatenate(slopes) ** 2).mean(axis=0))
+
+    def with_velocity(position: BSpline) -> Callable[[Floats], Floats]:
+        velocity = position.derivative()
+        return lambda t: np.hstack([position(t), velocity(t) / rms])
+
+    def unseen(values: Floats, filling: float) -> Floats:
+        return np.concatenate([values, np.full_like(values, filling)], axis=1)
+
+    return replace(
+        problem,
+        trajectories=[(t, unseen(x, np.nan)) for t, x in problem.trajectories],
+        systematic=[unseen(modes, 0.0) for modes in problem.systematic],
+        precision=[unseen(precision, 0.0) for precision in problem.precision],
+        stretches=[(i, (t, unseen(x, np.nan))) for i, (t, x) in problem.stretches],
+        curves=[with_velocity(spline) for spline in positions],
+        units=Units(
+            centre=np.append(units.centre, np.zeros(m)),
+            scale=np.append(units.scale, rms * units.scale / units.time),
+            time=units.time,
+        ),
+        noise=spread_to_unseen(problem.noise, problem.form.movable),
+    )
 
 
 def _smoothed(
@@ -230,7 +297,9 @@ def _slack(problem: Problem) -> Floats:
     x, slope = collocation.node_states(fit_curves(collocation, problem.curves))
     terms = monomials(x, problem.exponents)
     misfit = slope - terms @ np.linalg.lstsq(terms, slope, rcond=None)[0]
-    return np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
+    slack = np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
+    searched = problem.form.candidates.any(axis=0)
+    return np.where(searched, slack, slack[searched].min())
 
 
 def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Floats]]) -> Floats:
@@ -245,14 +314,15 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
     return np.concatenate(control)
 
 
-def term_penalties(exponents: Ints) -> Floats:
+def term_penalties(exponents: Ints, equations: int | None = None) -> Floats:
     """Price of a term of each kind: how much of the chi-square it has to explain, shape (l,).
 
     Half of `FALSE_ALARM` goes to the constants, half of the rest to the linear terms, and so on;
     the terms of one degree in all equations share evenly (Bonferroni). So a term has to be
     significant among all that could have been, and of two laws that fit alike the one of lower
-    degree wins.
+    degree wins. All equations are searched unless their number is given.
     """
-    d, degrees = exponents.shape[1], exponents.sum(axis=1)
-    rivals = d * np.bincount(degrees)[degrees] * 2.0 ** (degrees + 1)
+    degrees = exponents.sum(axis=1)
+    equations = exponents.shape[1] if equations is None else equations
+    rivals = equations * np.bincount(degrees)[degrees] * 2.0 ** (degrees + 1)
     return chi2.isf(FALSE_ALARM / rivals, df=1)

@@ -32,10 +32,14 @@ def read(path: str | os.PathLike) -> Discovery:
 
     Raises
     ------
+    FileNotFoundError
+        If there is no such file.
     ValueError
         If the file holds none.
     """
     file = check_path("path", path)
+    if not file.exists():
+        raise FileNotFoundError(f"path: must be a file that `save` has written, got no file {file}")
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         found = _decoded(content["discovery"]) if content["format"] == FORMAT else None

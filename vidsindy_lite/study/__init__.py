@@ -1,5 +1,7 @@
 """The paper's world: its systems, what was filmed of them, who found which law, and how well.
 
+::
+
     systems ----> films -------> trials -----------> tables
     Table S1      three videos,  noise or gaps,      one row a trial,
                   observed       one method's law    rows of the paper's tables

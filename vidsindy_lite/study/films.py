@@ -1,7 +1,7 @@
 """Films of the benchmark systems, and what `observe` makes of them.
 
 A benchmark is simulated in the reference frame and filmed by three cameras around it; its path is
-then recovered from the video files as a user's would be, with only the first camera calibrated:
+then recovered from the video files as a user's would be, with only the first camera calibrated::
 
     films = sweep(run_film, [FilmTask("Lorenz", trial) for trial in range(5)])
 """

@@ -49,15 +49,12 @@ class PublishedSystem:
 
     Parameters
     ----------
-    parameters : dict of str to float
-        By their printed names.
     x0 : tuple of float, length 3
         Initial condition.
     law : PolynomialSystem
         The printed equations with the printed parameters, in the native frame.
     """
 
-    parameters: dict[str, float]
     x0: tuple[float, float, float]
     law: PolynomialSystem
 
@@ -83,11 +80,10 @@ class PublishedPosition:
 
 def _law(equations: Mapping[str, Mapping[str, float | str]]) -> PolynomialSystem:
     """A law as it is printed; text is a fraction: "8/3"."""
-    return PolynomialSystem.from_terms({name: _numbers(row) for name, row in equations.items()})
-
-
-def _numbers(printed: Mapping[str, float | str]) -> dict[str, float]:
-    return {name: float(Fraction(value)) for name, value in printed.items()}
+    return PolynomialSystem.from_terms({
+        variable: {term: float(Fraction(value)) for term, value in row.items()}
+        for variable, row in equations.items()
+    })  # fmt: skip
 
 
 def _score(row: Sequence) -> PublishedScore:
@@ -106,7 +102,7 @@ LAB = PublishedPosition(**{name: tuple(point) for name, point in _PRINTED["lab"]
 """Lab experiment; the origin is a corner of the table."""
 
 SYSTEMS_S1: dict[str, PublishedSystem] = {
-    name: PublishedSystem(_numbers(system["parameters"]), tuple(system["x0"]), _law(system["law"]))
+    name: PublishedSystem(tuple(system["x0"]), _law(system["law"]))
     for name, system in _PRINTED["table_S1"].items()
 }
 """Table S1 by system, in the printed order."""

@@ -5,6 +5,8 @@ once: a target of irregular shape, random self-rotation, a size that changes as 
 and receded, image noise of variance 0.01, and a tree in front of each camera, behind which the
 target vanishes.
 
+::
+
     runs = sweep(run_scene, [SceneTask(trial) for trial in range(5)])
 
 Paper: section "Simulating Realistic Scenarios", Fig. 4.

@@ -1,7 +1,7 @@
 """Many independent tasks in parallel; what is finished is kept, so a stopped sweep goes on later.
 
 A task is a frozen dataclass that says all there is to say about it, its seed included, and what is
-done with it is a function of this package:
+done with it is a function of this package::
 
     results = sweep(run_trial, grid(["Lorenz"], {"noise": (0, 0.1, 0.2)}, range(5)))
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from ..arrays import Floats, Ints  # noqa: F401 (Ints: in the signature that is inherited)
 from ..checks import check_integer, check_positive, check_vector
-from ..dynamics import PolynomialSystem
-
-Terms = dict[str, float]  # coefficients of an equation by the name of the term
+from ..dynamics import PolynomialSystem, monomial_exponents
+from .metrics import coefficients_in
+from .published import SYSTEMS_S1
 
 REFERENCE_OFFSET = (10.0, 10.0, 0.0)
 """Shift from a system's native frame to the paper's reference frame, in scene units.
@@ -60,40 +60,19 @@ class Benchmark(PolynomialSystem):
         return t, self.simulate(t, np.array(self.x0))
 
 
-def _benchmark(name: str, x0: tuple[float, ...], period: float, **equations: Terms) -> Benchmark:
-    law = PolynomialSystem.from_terms(equations, degree=3)
-    return Benchmark(law.names, law.exponents, law.coefficients, name=name, x0=x0, period=period)
+PERIODS = {
+    "Lorenz": 1.50, "SprottE": 7.63, "RayleighBenard": 0.920, "SprottF": 19.2, "NoseHoover": 5.87,
+    "Tsucs2": 0.345, "WangSun": 6.0,
+}  # fmt: skip
+"""Characteristic periods, as in ``dysts``."""
 
 
-SYSTEMS: dict[str, Benchmark] = {system.name: system for system in (
-    _benchmark(
-        "Lorenz", (-8, 7, 27), 1.50,
-        x={"x": -10, "y": 10}, y={"x": 28, "xz": -1, "y": -1}, z={"xy": 1, "z": -8 / 3},
-    ),
-    _benchmark(
-        "SprottE", (-1, 1, 1), 7.63,
-        x={"yz": 1}, y={"x^2": 1, "y": -1}, z={"1": 1, "x": -4},
-    ),
-    _benchmark(
-        "RayleighBenard", (-16, -13, 27), 0.920,
-        x={"x": -30, "y": 30}, y={"y": 18, "xz": -1}, z={"xy": 1, "z": -5},
-    ),
-    _benchmark(
-        "SprottF", (-1, -1.4, 1), 19.2,
-        x={"y": 1, "z": 1}, y={"x": -1, "y": 0.5}, z={"x^2": 1, "z": -1},
-    ),
-    _benchmark(
-        "NoseHoover", (-2, 0.5, 1), 5.87,
-        x={"y": 1}, y={"x": -1, "yz": 1}, z={"1": 1.5, "y^2": -1},
-    ),
-    _benchmark(
-        "Tsucs2", (1, 1, 5), 0.345,
-        x={"x": -40, "y": 40, "xz": 0.5}, y={"x": 1, "y": 20, "xz": -1},
-        z={"z": 0.8, "xy": 1, "x^2": -0.65},
-    ),
-    _benchmark(
-        "WangSun", (1, 1, 0), 6.0,
-        x={"x": 0.5, "yz": 1}, y={"x": -1, "y": -0.5, "xz": -1}, z={"z": -1, "xy": -1},
-    ),
-)}  # fmt: skip
-"""The systems of Table S1 in their native frame, by name; periods as in ``dysts``."""
+def _benchmark(name: str) -> Benchmark:
+    """A system as Table S1 prints it."""
+    law, library = SYSTEMS_S1[name].law, monomial_exponents(3, degree=3)
+    coefficients = coefficients_in(law, library)
+    return Benchmark(law.names, library, coefficients, name, SYSTEMS_S1[name].x0, PERIODS[name])
+
+
+SYSTEMS: dict[str, Benchmark] = {name: _benchmark(name) for name in PERIODS}
+"""The systems of Table S1 in their native frame, by name."""

@@ -1,7 +1,7 @@
 """The paper's experiments on synthetic videos, as typed trials; protocol of the README.
 
 A `Trial` takes the path that was recovered from a film (`films`), adds noise or hides rows, and
-gives what is left to one method:
+gives what is left to one method::
 
     results = sweep(run_trial, grid(["Lorenz"], {"noise": (0, 0.1, 0.2)}, range(5)))
 

@@ -1,6 +1,6 @@
 """Files and pixels: where the target is in each frame of a video, and films of synthetic scenes.
 
-video       reading and writing of video files
+video       reading and writing of video files; stills reads films that are folders of images
 tracking    track: a video in, the target's pixels out, by one of
 background      what differs from a background at rest (the most exact)
 detector        what looks like a target in a single frame: our network, or any YOLO-v8
@@ -13,4 +13,4 @@ from .rendering import render, render_labelled, render_restless, render_video
 from .scenery import BACKGROUNDS
 from .scenes import SHAPES, Scene
 from .tracking import Track, check_detector, track
-from .video import VideoInfo, read_frame, read_video, video_info, write_video
+from .video import VideoInfo, frame_clock, read_frame, read_video, video_info, write_video

@@ -4,6 +4,8 @@ The background is the median over frames spread through the clip; the target is 
 differs from it. Where a frame mixes target and background, its colour lies on the line between the
 two, so that the *coverage* of each pixel,
 
+::
+
     alpha = <frame - background, target - background> / |target - background|^2,
 
 is known even along an anti-aliased edge, and the centroid is the mean of the pixel positions

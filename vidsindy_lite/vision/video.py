@@ -1,9 +1,12 @@
-"""Reading and writing of video files, through PyAV (ffmpeg).
+"""Reading and writing of video files, through PyAV (ffmpeg); films of single images are read, too.
 
 The files are lossless unless a lossy codec is asked for, because a lossy codec moves the edges of a
 small target by more than the tracker's own error. QuickTime's run-length code (.mov) writes of each
 frame only the pixels that differ from the last one: before a background at rest it is quick, and
 its files are small. FFV1 (.mkv) codes whole frames, in several times the time.
+
+What phones write is read as it was filmed: upright, each frame at the time that the file states,
+and of an interlaced frame, which shows two instants, the lines of one.
 
 PyAV is imported by the functions that need it, since who works with tracks needs none.
 """
@@ -19,11 +22,14 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
-from ..arrays import Image
+from ..arrays import Floats, Image
 from ..checks import check_choice, check_instance, check_integer, check_number, check_path
+from .interlaced import upper_field
+from .stills import find_stills, read_still, read_stills
+from .timing import Shown, cut_off, timing
 
 if TYPE_CHECKING:
-    from av import VideoFrame
+    from av import Packet, VideoFrame
     from av.container import InputContainer, OutputContainer
     from av.video.stream import VideoStream
 
@@ -58,7 +64,11 @@ _MOST_BITS = 2**30  # per second, of a lossy codec
 
 
 class VideoInfo(NamedTuple):
-    """Number of frames, frames per second and (width, height) of a video file."""
+    """Number of frames, frames per second and (width, height) of a film.
+
+    The rate is that of most frames if some were dropped or taken at uneven times, and zero if the
+    film does not state one.
+    """
 
     frames: int
     fps: float
@@ -194,22 +204,29 @@ def _add_stream(
 
 
 def read_video(path: str | os.PathLike) -> Iterator[Image]:
-    """Frames of a video file, one at a time, up to where it is cut off or damaged.
+    """Frames of a film, one at a time, up to where its file is cut off or damaged.
 
     Parameters
     ----------
     path : path
+        A video file, a folder of images, or a pattern of their names as ``shots/a_%04d.png`` or
+        ``shots/*.png``. The numbers in the names tell the order.
 
     Yields
     ------
     frame : ndarray, shape (height, width, 3), uint8
-        Blue-green-red, upright if the file says how the camera was held.
+        Blue-green-red, upright if the file says how the camera was held. Of an interlaced frame the
+        upper field, with the lines between interpolated.
 
     Raises
     ------
     FileNotFoundError, ValueError
         At once, if the file is missing, empty, not a video, or holds no frame.
     """
+    stills = find_stills(check_path("path", path))
+    if stills:
+        read_still(stills.files[0])
+        return read_stills(stills)
     with _opened(path) as (container, stream):
         _first(path, container, stream)
     return _images(path)
@@ -242,7 +259,7 @@ def read_frame(path: str | os.PathLike, number: int) -> Image:
 
 
 def video_info(path: str | os.PathLike) -> VideoInfo:
-    """Number of frames, frame rate and size of a video file.
+    """Number of frames, frame rate and size of a film.
 
     The number is what the file's header states, which is more than the frames that can be read if
     the file was cut off later. Where the header states none (.mkv), the frames are counted, and of
@@ -261,31 +278,59 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
     FileNotFoundError, ValueError
         If the file is missing, empty, not a video, or holds no frame.
     """
+    stills = find_stills(check_path("path", path))
+    if stills:
+        return VideoInfo(len(stills.files), 0.0, read_still(stills.files[0]).shape[1::-1])
     with _opened(path) as (container, stream):
         size = _first(path, container, stream).shape[1::-1]
-        fps = float(stream.guessed_rate or 0)
-        count = stream.frames
-    return VideoInfo(count or _count(path, fps), fps, size)
-
-
-def _count(path: str | os.PathLike, fps: float) -> int:
-    """Number of frames in a file, and of those that were cut off its end."""
     with _opened(path) as (container, stream):
-        packets = _packets(container, stream)
-        times = [time for time, _ in packets if time is not None]
-        # The duration of a file with sound may be that of the sound.
-        if len(container.streams) > 1 or not (container.duration and stream.time_base and times):
-            return len(packets)
-        after_last = container.duration / 1e6 - float(max(times) * stream.time_base)
-        return len(packets) + max(round(after_last * fps) - 1, 0)
+        stated = stream.frames
+        every = [packet for packet in container.demux(stream) if packet.size]
+        packets = _shown(every)
+        count = (
+            stated - (len(every) - len(packets))  # those before the start that an editor has set
+            if stated
+            else len(packets) + cut_off(packets, container, stream)
+        )
+        return VideoInfo(count, timing(packets, stream)[1], size)
+
+
+def frame_clock(path: str | os.PathLike) -> Floats:
+    """When each frame of a film was taken, in frames at the even rate that `video_info` tells.
+
+    Parameters
+    ----------
+    path : path
+        See `read_video`.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        0, 1, 2, ... if the frames are evenly spaced to within the ticks of the file's clock, or the
+        file states no times; 0, 1, 3, 4, ... if one was dropped. Divided by the rate, seconds.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        See `read_video`.
+    """
+    stills = find_stills(check_path("path", path))
+    if stills:
+        return stills.clock
+    with _opened(path) as (container, stream):
+        return timing(_packets(container, stream), stream)[0]
 
 
 def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Image]:
     """The frames of these increasing numbers, as far as the file holds them.
 
-    The packets say, without being decoded, when each frame is shown and where decoding can begin:
-    a jump then meets the right frame, also where frames are not evenly spaced in time.
+    In a video, the packets say, without being decoded, when each frame is shown and where decoding
+    can begin: a jump meets the right frame, also where frames are not evenly spaced in time.
     """
+    stills = find_stills(check_path("path", path))
+    if stills:
+        yield from (read_still(stills.files[k]) for k in numbers if k < len(stills.files))
+        return
     with _opened(path) as (container, stream):
         packets = _packets(container, stream)
         times = sorted(time for time, _ in packets if time is not None)
@@ -332,9 +377,14 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
         yield container, cast("VideoStream", stream)
 
 
-def _packets(container: InputContainer, stream: VideoStream) -> list[tuple[int | None, bool]]:
+def _packets(container: InputContainer, stream: VideoStream) -> list[Shown]:
     """When each frame is shown, in ticks, and whether decoding can begin there."""
-    packets = container.demux(stream)  # one a frame; the last one of a stream is empty
+    return _shown(container.demux(stream))  # one packet a frame
+
+
+def _shown(packets: Iterable[Packet]) -> list[Shown]:
+    """Time, and whether a decoder can begin there, of each packet that is shown."""
+    # The last one of a stream is empty.
     return [(p.pts, p.is_keyframe) for p in packets if p.size and not p.is_discard]
 
 
@@ -362,5 +412,10 @@ def _images(path: str | os.PathLike) -> Iterator[Image]:
 
 def _image(frame: VideoFrame) -> Image:
     """Blue, green and red of a decoded frame, upright."""
-    image = frame.to_ndarray(format="bgr24", threads=1)  # more threads cost more than they save
+    # More threads cost more than they save.
+    image = (
+        upper_field(frame)
+        if frame.interlaced_frame
+        else cast("Image", frame.to_ndarray(format="bgr24", threads=1))
+    )
     return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90)))

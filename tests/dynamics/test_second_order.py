@@ -1,0 +1,176 @@
+"""Laws of second order, x'' = f(x, x'), from positions alone: against laws that are known."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from vidsindy_lite.dynamics import Discovery, PolynomialSystem
+from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.solver import discover
+
+
+def moving(acceleration, x0, v0, t):
+    """Positions of a motion, (n, m)."""
+    m = len(x0)
+
+    def rate(_, state):
+        return np.append(state[m:], acceleration(state[:m], state[m:]))
+
+    start = np.append(x0, v0).astype(float)
+    return solve_ivp(rate, (t[0], t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-11).y[:m].T
+
+
+def noisy(x, share, seed=0):
+    return x + share * x.std(axis=0) * np.random.default_rng(seed).normal(size=x.shape)
+
+
+def duffing(x, v):
+    return x - x**3 - 0.1 * v
+
+
+def van_der_pol(x, v):
+    return -x + 1.5 * (1 - x**2) * v
+
+
+def found_terms(law):
+    """The terms of the accelerations, with their coefficients."""
+    m = law.d // 2
+    return {
+        (law.names[j], law.terms[k]): law.coefficients[k, j]
+        for j in range(m, law.d)
+        for k in np.flatnonzero(law.support[:, j])
+    }
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.05])
+def test_duffing_from_positions_alone(share):
+    t = np.linspace(0, 20, 1000)
+    found = discover(t, noisy(moving(duffing, [1.5], [0.0], t), share, seed=3), order=2)
+    truth = {("vx", "x"): 1.0, ("vx", "vx"): -0.1, ("vx", "x^3"): -1.0}
+    terms = found_terms(found.system)
+    assert terms.keys() == truth.keys()
+    for place, value in truth.items():
+        error = found.standard_errors[
+            found.terms.index(place[1]), found.system.names.index(place[0])
+        ]
+        assert abs(terms[place] - value) < 4 * error + 1e-6
+
+
+def test_the_printed_law_is_one_of_accelerations():
+    t = np.linspace(0, 20, 400)
+    found = discover(t, moving(van_der_pol, [0.5], [0.0], t), order=2)
+    assert found.status == "ok", found.warnings
+    assert found.system.order == 2
+    assert found.system.text(3) == "x'' = -x + 1.5 vx - 1.5 x^2 vx"
+    assert r"\ddot{x} &= -x + 1.5\,\dot{x}" in found.system.latex(3)
+    assert found.equations().startswith("x'' = - (1.0000")
+    assert np.isfinite(found.noise).tolist() == [True, False]
+
+
+def test_the_law_foretells_another_motion_and_survives_a_file(tmp_path):
+    t = np.linspace(0, 20, 600)
+    found = discover(t, moving(duffing, [1.5], [0.0], t), order=2)
+    later = found.simulate([0.3, 1.0], t)
+    np.testing.assert_allclose(later.x[:, :1], moving(duffing, [0.3], [1.0], t), atol=1e-3)
+    np.testing.assert_allclose(found.predict([0.3, 1.0]), [1.0, 0.3 - 0.027 - 0.1], atol=1e-4)
+    velocity = np.gradient(found.curve(t)[:, 0], t)
+    np.testing.assert_allclose(found.curve(t)[5:-5, 1], velocity[5:-5], atol=0.01)
+    found.save(tmp_path / "law.json")
+    again = Discovery.load(tmp_path / "law.json")
+    assert again.equations() == found.equations()
+
+
+def test_an_origin_away_from_home_is_found():
+    t = np.linspace(0, 20, 800)
+    x = noisy(moving(duffing, [1.5], [0.0], t), 0.01) + 7.0
+    found = discover(t, x, order=2)
+    assert found_terms(found.native).keys() == {("vx", "x"), ("vx", "vx"), ("vx", "x^3")}
+    assert abs(found.offset[0] - 7) < 4 * found.offset_errors[0]
+    assert found.offset[1] == 0  # that of a velocity is known
+
+
+def test_gaps_are_crossed():
+    t = np.linspace(0, 25, 1000)
+    x = noisy(moving(duffing, [1.5], [0.0], t), 0.01)
+    x[300:380] = x[600:640] = np.nan
+    found = discover(t, x, order=2)
+    assert found_terms(found.system).keys() == {("vx", "x"), ("vx", "vx"), ("vx", "x^3")}
+    assert len(found.curves) == 1
+
+
+def drag(_, v):
+    return np.array([0, 0, -9.81]) - 0.3 * v
+
+
+THROWS = [(4, 1, 8), (-2, 5, 6), (1, -4, 9), (-5, -3, 4)]
+
+
+def throws(acceleration, starts, share):
+    t = np.linspace(0, 1.5, 150)
+    paths = [moving(acceleration, [0, 0, 1], v0, t) for v0 in starts]
+    return [(t, noisy(x, share, seed)) for seed, x in enumerate(paths)]
+
+
+def test_four_throws_tell_gravity_and_drag():
+    found = discover(throws(drag, THROWS, 0.01), order=2, degree=2)
+    truth = {("vx", "vx"): -0.3, ("vy", "vy"): -0.3, ("vz", "vz"): -0.3, ("vz", "1"): -9.81}
+    terms = found_terms(found.system)
+    assert terms.keys() == truth.keys()
+    assert found.status == "ok", found.warnings
+    for place, value in truth.items():
+        assert terms[place] == pytest.approx(value, rel=0.05)
+
+
+def test_without_a_force_a_coordinate_moves_evenly():
+    found = discover(throws(lambda x, v: [0, 0, -9.81], THROWS, 0.01), order=2, degree=1)
+    assert found.status == "ok", found.warnings
+    assert found.system.text().splitlines()[:2] == ["x'' = 0", "y'' = 0"]
+
+
+@pytest.mark.parametrize("acceleration", [drag, lambda x, v: [0, 0, -9.81]])
+def test_one_throw_is_called_undetermined(acceleration):
+    found = discover(throws(acceleration, THROWS[:1], 0.01), order=2, degree=2)
+    assert found.status == "suspect"
+    assert any("several runs" in warning for warning in found.warnings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.05])
+def test_an_anharmonic_damped_spring_in_space(share):
+    stiff = np.array([30.0, 34.0, 40.0])
+    t = np.linspace(0, 12, 1500)
+
+    def spring(x, v):
+        return -stiff * x - 0.25 * v - 25 * x**3
+
+    x = noisy(moving(spring, [1, 0.5, -0.3], [0, 2, 1.5], t), share)
+    found = discover(t, x, order=2)
+    own = {(f"v{i}", term) for i in "xyz" for term in (i, f"v{i}", f"{i}^3")}
+    assert found_terms(found.system).keys() == own
+    assert found.status == "ok", found.warnings
+
+
+def test_an_order_that_is_none():
+    t = np.linspace(0, 1, 50)
+    for order in (3, 0, "second"):
+        with pytest.raises(ValueError, match=rf"order: must be 1 or 2, got {order!r}"):
+            discover(t, t[:, None] ** 2, order=order)
+
+
+def test_what_is_known_is_no_candidate():
+    form = Form.of(2, 2, order=2)
+    assert form.names == ("x", "y", "vx", "vy")
+    assert not form.candidates[form.known != 0].any()
+    assert form.candidates.sum() == len(form.searched) == 2 * len(form.exponents)
+    first = Form.of(3, 2, order=1)
+    assert first.candidates.all()
+    assert not first.known.any()
+    assert first.movable.all()
+
+
+def test_only_velocities_by_name_make_a_second_order():
+    tied = {"x": {"vx": 1.0}, "vx": {"x": -1.0}}
+    assert PolynomialSystem.from_terms(tied).order == 2
+    assert PolynomialSystem.from_terms({"x": {"y": 1.0}, "y": {"x": -1.0}}).order == 1
+    assert PolynomialSystem.from_terms({"x": {"vx": 2.0}, "vx": {"x": -1.0}}).order == 1
+    assert PolynomialSystem.from_terms({"x": {"vx": 1, "x": 1}, "vx": {"x": -1}}).order == 1

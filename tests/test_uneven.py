@@ -1,0 +1,90 @@
+"""Videos whose frames are not evenly spaced: each counts at the time that its file states."""
+
+import numpy as np
+import pytest
+from phones import waver, write_at
+from scipy.interpolate import CubicSpline
+
+import vidsindy_lite as vl
+from vidsindy_lite import study
+from vidsindy_lite.cameras import Clock
+from vidsindy_lite.vision import render
+
+RATE = 30.0  # frames a second
+LATER = (0, 0.21, 0.0)  # seconds by which each camera starts later
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """A system, its path over seconds of video, and a rig."""
+    truth = study.SYSTEMS["Lorenz"].shift(study.REFERENCE_OFFSET)
+    t, x = truth.trajectory(3600, 800)  # a frame of an even camera is eight of its rows
+    unit = RATE * (t[8] - t[0])
+    return truth, CubicSpline(t / unit, x), vl.Rig.around(x), unit
+
+
+def filmed(motion, clocks):
+    _, path, rig, _ = motion
+    parts = zip(rig.cameras, clocks, LATER, strict=True)
+    return [camera.project(path(seconds + later)) for camera, seconds, later in parts]
+
+
+def in_own_time(found, motion):
+    """The law that was found, in the unit of time of its system."""
+    truth, _, _, unit = motion
+    law = vl.discover(found.t * unit, found.x, systematic=found.systematic)
+    return study.score(law, truth)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_tracks_by_their_own_clocks_give_the_path(motion, seed):
+    rng = np.random.default_rng(seed)
+    clocks = [waver(rng, 300) for _ in range(3)]
+    seen = vl.observe_tracks(filmed(motion, clocks), motion[2].uncalibrated(0), clocks)
+    step = np.median(np.diff(clocks[0]))
+    np.testing.assert_allclose(seen.lags.frames * step, LATER, atol=1e-3)
+    np.testing.assert_array_equal(seen.t, clocks[0])
+    both = np.isfinite(seen.x).all(axis=1)
+    assert both.mean() > 0.9
+    assert np.abs(seen.x - motion[1](clocks[0]))[both].max() < 0.01
+    assert in_own_time(seen, motion).exact
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dropped", [False, True])
+def test_the_law_of_a_phones_films_is_exact(motion, tmp_path, dropped):
+    rng = np.random.default_rng(5)
+    clocks = [
+        np.delete(np.arange(400), rng.permutation(np.arange(1, 399))[:20]) / RATE
+        if dropped
+        else waver(rng, 350)
+        for _ in range(3)
+    ]
+    scene, paths = vl.Scene("sea", size=16), []
+    for i, track in enumerate(filmed(motion, clocks)):
+        frames = render(track, scene, seed=i)
+        paths.append(
+            write_at(tmp_path / f"{i}.mp4", clocks[i], frames, "libx264", "yuv420p", crf="10")
+        )
+    found = vl.discover_from_videos(paths, motion[2].uncalibrated(0))
+    assert np.abs(found.t - clocks[0]).max() < 1e-3
+    step = np.median(np.diff(clocks[0]))
+    np.testing.assert_allclose(found.lags.frames * step, LATER, atol=1e-3)
+    assert in_own_time(found, motion).exact
+
+
+def test_times_that_a_file_contradicts_are_refused(tmp_path):
+    kept = np.delete(np.arange(30.0), [7, 8])
+    Clock.of_videos([30, 30], [kept, np.arange(30.0)], kept / 240)  # slow motion
+    with pytest.raises(ValueError, match="t: must fit the times that the first video's file"):
+        Clock.of_videos([30, 30], [kept, np.arange(30.0)], np.arange(28) / 30)
+
+
+def test_the_times_of_each_track_are_checked():
+    tracks = [np.zeros((4, 2)), np.zeros((5, 2))]
+    clock = Clock.of_tracks([[0, 1, 2, 4], [0, 0.5, 1.0, 1.5, 3]], tracks)
+    assert clock.rates.tolist() == [1, 2]
+    assert [frames.tolist() for frames in clock.frames] == [[0, 1, 2, 4], [0, 1, 2, 3, 6]]
+    assert Clock.of_tracks(np.arange(4) / 30, tracks).uneven is None
+    with pytest.raises(ValueError, match=r"t: must have shape \(5,\), one per row of tracks\[1\]"):
+        Clock.of_tracks([range(4), range(4)], tracks)

@@ -1,0 +1,290 @@
+"""The search for the terms of a law: which of all candidates make the motion.
+
+Unpruned fits while the physics weight rises, a subset search in the small algebra that remains
+(`selection`) in every frame in which the law may be sparse (`origin`), refinement of the cheapest
+candidates, and bridges across gaps (`gaps`).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..arrays import Bools, Floats
+from .collocation import Collocation, Fit, State
+from .discovery import History
+from .errors import effective_noise
+from .gaps import Gap, gaps, join
+from .library import closure_mask, monomials, shift_matrix
+from .origin import ShiftedLaw, sparse_origins
+from .persistence import LARGEST, TOLERATED
+from .problem import Problem, fit_curves
+from .selection import subset_search
+
+FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
+"""Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
+SEARCH_WEIGHTS = (1e2, 1e4, 1e8)
+"""Physics weights of the subset searches in the law's own frame."""
+FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
+"""Weight at which the law holds exactly for all that the data can tell."""
+NEEDLESS_START = 0.1
+"""Chance that a second start, from terms of all degrees, is made though the first left nothing."""
+LONGEST_SEARCH = 10
+"""Most rounds of a subset search."""
+CONSISTENT = 1.5
+"""Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
+LONGEST_CLIMB = 4
+"""Most searches at larger errors."""
+
+
+def search(problem: Problem, degree: int, rng: np.random.Generator, history: History) -> Fit:
+    """The terms that make the motion: the cheapest law at a tolerated error.
+
+    If the law leaves larger errors than were tolerated, or errors that last, the search is made
+    again and tolerates them.
+    """
+    tolerated = np.maximum(problem.noise, TOLERATED)
+    for _ in range(LONGEST_CLIMB):
+        tolerant = replace(problem, noise=tolerated)
+        found = candidates(tolerant, degree, rng, history)
+        fit = bridge(tolerant, cheapest(tolerant, found, history), history)
+        left = effective_noise(fit)
+        if (left <= CONSISTENT * tolerated).all() or (tolerated >= LARGEST).all():
+            break
+        tolerated = np.maximum(tolerated, np.minimum(left, LARGEST))
+    return fit
+
+
+def candidates(
+    problem: Problem, degree: int, rng: np.random.Generator, history: History
+) -> list[Fit]:
+    """Supports worth refining, from all terms up to degree 2, and if need be from all terms."""
+    collocation = problem.collocation(problem.segments())
+    control = fit_curves(collocation, problem.curves)
+    found = []
+    for start in sorted({min(2, degree), degree}):
+        fit = unpruned(problem, collocation, control, start, history)
+        found += _in_sparse_frames(problem, fit, rng, history)
+        if not _leaves_something_over(problem, fit):
+            break
+    return found
+
+
+def unpruned(
+    problem: Problem, collocation: Collocation, control: Floats, degree: int, history: History
+) -> Fit:
+    """Fit all terms up to a degree while the physics weight rises."""
+    d, rows = problem.d, problem.exponents.sum(axis=1) <= degree
+    x, slope = collocation.node_states(control)
+    coefficients = np.zeros(problem.exponents.shape)
+    terms = monomials(x, problem.exponents[rows])
+    coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=problem.noise.min())[0]
+    active = rows[:, None] & problem.form.candidates
+    coefficients[~active] = 0.0
+    state = State(control, coefficients, active, np.zeros(d), np.zeros(d, dtype=bool))
+    for weight in FIRST_WEIGHTS:
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
+        state = fit.state
+        history.add(f"unpruned, degree {degree}", problem, fit, weight)
+    return fit
+
+
+def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
+    """Would the terms of higher degree together explain more of the data than chance does?"""
+    searched = problem.form.searched
+    left_out = len(searched) - int(fit.state.active.sum())
+    if not left_out:
+        return False
+    _, gain = fit.collocation.linearise(fit.state, searched).newton()
+    return bool(gain > chi2.isf(NEEDLESS_START, left_out))
+
+
+def _in_sparse_frames(
+    problem: Problem, fit: Fit, rng: np.random.Generator, history: History
+) -> list[Fit]:
+    """Supports in the frames where the law is sparsest, by the quadratic model."""
+    weight, stage = FIRST_WEIGHTS[-1], "subset search, centred frame"
+    fit = select(problem, fit, weight, stage, history)
+    closed, law = _closed(problem, fit, weight)
+    x, movable = fit.collocation.grid.x, problem.form.movable
+    low, high = (
+        np.where(movable, extreme.reduce(x), problem.home) for extreme in (np.fmin, np.fmax)
+    )
+    origins = sparse_origins(
+        law, closed.state.active, problem.home, (low, high),
+        problem.penalties.max(), keep=4, rng=rng,
+    )  # fmt: skip
+    unique = {
+        tuple(np.round(origin, 2)): (origin, moving)
+        for start in [problem.home, *origins]
+        for origin, moving in _variants(start, problem.home)
+    }
+    return [_candidate(problem, closed, law, *variant) for variant in unique.values()]
+
+
+def _variants(origin: Floats, home: Floats) -> list[tuple[Floats, Bools]]:
+    """An origin, and the same with some of its axes at home, where they cost nothing."""
+    masks = itertools.product(*((True, False) if away else (False,) for away in origin != home))
+    return [(np.where(mask, origin, home), np.array(mask)) for mask in masks]
+
+
+def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]:
+    """The law in the centred frame, all terms of its shift closure fitted."""
+    d, exponents = problem.d, problem.exponents
+    state = State(
+        fit.state.control_points,
+        shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
+        closure_mask(exponents, fit.state.active, problem.form.movable),
+        np.zeros(d),
+        np.zeros(d, dtype=bool),
+    )
+    collocation = problem.weighted(fit.collocation, weight)
+    # A law exact in another frame has no firm minimum here: some steps are near enough.
+    closed = collocation.solve(state, tolerance=0.1, max_steps=8)
+    state, columns = closed.state, np.flatnonzero(closed.state.free())
+    information = np.diag(np.where(state.free()[: exponents.size], 0.0, 1e30))
+    information[np.ix_(columns, columns)] = collocation.linearise(state, columns).information
+    return closed, ShiftedLaw(exponents, state.coefficients, information, problem.form.movable)
+
+
+def _candidate(
+    problem: Problem, closed: Fit, law: ShiftedLaw, origin: Floats, moving: Bools
+) -> Fit:
+    """The cheapest support at an origin, by the quadratic model around the closed law."""
+    coefficients, information = law.at(origin)
+    columns = np.flatnonzero(closed.state.free())
+    _, solution, value = subset_search(
+        information[np.ix_(columns, columns)],
+        np.zeros(len(columns)),
+        coefficients.T.ravel()[columns],
+        problem.prices[columns],
+        np.ones(len(columns), dtype=bool),
+    )
+    flat = np.zeros(problem.exponents.size)
+    flat[columns] = solution
+    coefficients = flat.reshape(problem.d, -1).T
+    state = State(
+        closed.state.control_points, coefficients, coefficients != 0, origin.copy(), moving
+    )
+    objective = closed.collocation.objective(closed.state)
+    cost = objective + value + problem.axis_penalty * moving.sum()
+    return replace(closed, state=state, criterion=cost)
+
+
+def select(problem: Problem, start: Fit, weight: float, stage: str, history: History) -> Fit:
+    """Alternate between the subset search and Gauss-Newton until the criterion stops falling.
+
+    The search runs over all terms, active or not, on the quadratic model with the curve
+    eliminated; its proposal is kept only if the true criterion falls after a refit.
+    """
+    weighted = problem.weighted(start.collocation, weight)
+
+    def refit(state: State) -> Fit:
+        fit = weighted.solve(state, tolerance=0.1)
+        return replace(fit, criterion=problem.criterion(weighted, fit.state))
+
+    best = refit(start.state)
+    history.add(stage, problem, best, weight)
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
+    for _ in range(LONGEST_SEARCH):
+        state = best.state
+        columns = problem.columns(state)
+        model = weighted.linearise(state, columns)
+        support, solution, _ = subset_search(
+            model.information, model.gradient, state.flat()[columns], prices[columns],
+            state.free()[columns],
+        )  # fmt: skip
+        if (support == state.free()[columns]).all():
+            break
+        promised = model.along(state, solution - state.flat()[columns], 1.0)
+        trial = refit(replace(promised, active=promised.coefficients != 0))
+        if not trial.criterion < best.criterion - 1e-6:
+            break
+        best = trial
+        history.add(stage, problem, best, weight)
+    return best
+
+
+def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
+    """Refine the cheapest candidates; the lowest criterion wins."""
+    ordered = sorted(found, key=lambda fit: fit.criterion)
+    kept = list({_key(fit.state): fit for fit in reversed(ordered)}.values())[::-1][:3]
+    for weight in SEARCH_WEIGHTS:
+        refined = [
+            select(problem, fit, weight, "subset search, own frame", history) for fit in kept
+        ]
+        limit = min(fit.criterion for fit in refined) + problem.penalties.max()
+        kept = list({_key(fit.state): fit for fit in refined if fit.criterion <= limit}.values())
+    settled = [come_home(problem, fit, history) for fit in kept]
+    return min(settled, key=lambda fit: fit.criterion)
+
+
+def _key(state: State) -> tuple[bytes, bytes]:
+    """Same for states with the same terms and axes."""
+    return state.active.tobytes(), state.moving.tobytes()
+
+
+def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
+    """Put axes of the offset back to where they cost nothing, if the criterion falls.
+
+    The frames were compared at a small physics weight, at which weak terms do not count.
+    """
+    state = fit.state
+    if not state.moving.any():
+        return fit
+    closed, law = _closed(problem, fit, FINAL_WEIGHT)
+    variants = _variants(state.offset, problem.home)
+    priced = [_candidate(problem, closed, law, *variant) for variant in variants]
+    closest = min(priced, key=lambda candidate: candidate.criterion)
+    if closest.criterion < fit.criterion and closest.state.moving.sum() < state.moving.sum():
+        trial = select(problem, closest, FINAL_WEIGHT, "offset home", history)
+        if trial.criterion < fit.criterion:
+            return trial
+    return fit
+
+
+def bridge(problem: Problem, fit: Fit, history: History) -> Fit:
+    """Integrate the law across gaps and search again with the physics enforced there.
+
+    A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut
+    at gaps. Groups of gaps are tried, shortest first; a group whose bridges spoil the fit is
+    halved, down to single gaps.
+    """
+    for _ in range(3):
+        open_gaps = gaps(fit.collocation.segments)
+        if not open_gaps:
+            break
+        before = fit.state.active
+        fit = _bridge_group(problem, fit, open_gaps)
+        fit = select(problem, fit, FINAL_WEIGHT, "subset search, bridged", history)
+        fit = come_home(problem, fit, history)
+        if (fit.state.active == before).all():
+            break
+    return fit
+
+
+def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
+    """The fit with these gaps crossed, or those of them that the data allow."""
+    law = problem.law(fit.state).shift(fit.state.offset)
+    splines = fit.collocation.grid.splines(fit.state.control_points)
+    joined, curves = join(
+        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing
+    )
+    bridged = problem.collocation(joined)
+    trial = replace(fit.state, control_points=fit_curves(bridged, curves))
+    for weight in SEARCH_WEIGHTS:
+        bridged = problem.weighted(bridged, weight)
+        trial = bridged.solve(trial, tolerance=1.0, max_steps=10).state
+    # A bridge takes away the freedom of one initial condition: so much may the fit lose.
+    freedom = problem.d * len(group) + (bridged.counts - fit.collocation.counts).sum()
+    loss = bridged.objective(trial) - fit.collocation.objective(fit.state)
+    if loss < freedom + 4 * np.sqrt(2 * freedom):
+        return replace(fit, state=trial, collocation=bridged)
+    if len(group) > 1:
+        for half in (group[: len(group) // 2], group[len(group) // 2 :]):
+            fit = _bridge_group(problem, fit, half)
+    return fit
