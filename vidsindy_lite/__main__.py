@@ -71,7 +71,7 @@ def _discover(options: argparse.Namespace) -> int:
     from .checks import check_positive
     from .companion.report import PAGE, check_folder_is_free, write_report
     from .pipeline import discover_from_videos
-    from .vision import check_detector, frame_clock
+    from .vision import check_detector, frame_clock, load_hints
 
     check_detector(options.detector)
     check_folder_is_free(options.out)
@@ -88,6 +88,7 @@ def _discover(options: argparse.Namespace) -> int:
         t,
         lags=options.lag,
         detector=options.detector,
+        hints=load_hints(options.rig),
         degree=options.degree,
         seed=options.seed,
         progress=True,

@@ -11,6 +11,7 @@ from .cameras import Rig
 from .checks import check_integer
 from .dynamics import Discovery, discover
 from .observation import Observation, observe
+from .vision import Hint
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,7 @@ def discover_from_videos(
     *,
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
+    hints: Sequence[Hint | None] | None = None,
     degree: int = 3,
     seed: int = 0,
     progress: bool = False,
@@ -47,7 +49,7 @@ def discover_from_videos(
 
     Parameters
     ----------
-    paths, rig, t, lags, detector, progress
+    paths, rig, t, lags, detector, hints, progress
         See `observe`. The unit of time is that of the equations.
     degree, seed : int
         See `discover`.
@@ -63,7 +65,9 @@ def discover_from_videos(
     """
     check_integer("degree", degree, 1)
     check_integer("seed", seed)
-    seen = observe(paths, rig, t, lags=lags, detector=detector, progress=progress)
+    seen = observe(
+        paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress
+    )
     found = discover(
         seen.t, seen.x, degree=degree, seed=seed, progress=progress, systematic=seen.systematic
     )

@@ -9,7 +9,6 @@ with its place, size, colour and the strength of its evidence. Which of them are
 All of this happens on reduced frames, whose longer side has at most 480 pixels.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -21,14 +20,14 @@ from .background import _median
 LONGEST = 480  # pixels of the longer side of a reduced frame
 _LARGEST = 2.5  # frames that the plate may hold, side by side
 _FEWEST = 3  # samples that must show a place of the plate
-_LEAST = 8.0  # grey levels, below which no difference counts
+_LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts, whatever the noise
 _EDGE = {False: 0.12, True: 0.5}  # pixels by which an edge may be displaced; if the camera moves
 _FILLS = 0.3  # share of the image that no target fills
 _STRIP = 128  # rows of a canvas whose median is taken at once
 _MOST = 40  # candidates of a frame that are looked at
-_KEPT = 10  # and that are kept, once it is known which of them stay where they are
-_STAYS = 1.5  # by how much of its quality a candidate loses that is there in all frames
-_WORTH = 0.25  # share of its quality that it keeps at least
+_KEPT = 12  # and that are kept, once it is known which of them stay where they are
+_STAYS = 1.0  # by how much of its quality a candidate loses that is there in all frames
+_WORTH = 0.4  # share of its quality that it keeps at least
 
 
 def reduction(size: tuple[int, int]) -> int:
@@ -97,9 +96,9 @@ class Plate:
         low, high = np.maximum(low, middle - 1.5 * reach), np.minimum(high, middle + 1.5 * reach)
         low = np.floor(low)
         self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
-        canvas = tuple(int(x) for x in np.ceil(high - low) + 1)
+        width, height = (int(x) for x in np.ceil(high - low) + 1)
         moves = [self.shift @ here for here in maps[known]]
-        self.image, count = _masked_median(list(samples[known]), moves, canvas)
+        self.image, count = _masked_median(list(samples[known]), moves, (width, height))
         self.valid = np.where(count >= _FEWEST, 255, 0).astype(np.uint8)
 
     def seen_from(self, here: Floats, corner: Floats, size: tuple[int, int]) -> tuple[Image, Bools]:
@@ -171,11 +170,13 @@ class Difference:
         grey = cv2.cvtColor(plate.image, cv2.COLOR_BGR2GRAY)
         kernel = np.ones((3, 3), np.uint8)
         slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, kernel).astype(np.float32)
-        self.tolerance = np.float32(max(_LEAST, 5 * noise)) + _EDGE[plate.moves] * slope
+        self.tolerance = (
+            np.float32(np.clip(5 * noise, _LEAST, _COARSE)) + _EDGE[plate.moves] * slope
+        )
         if plate.moves:
             self.tolerance[plate.valid == 0] = 1e3
         self.often = np.zeros(grey.shape, np.float32)
-        self.frames = 0
+        self.lights: list[Floats32] = []
 
     def candidates(self, frame: Image, here: Floats) -> list[Candidate]:
         """The blobs of a reduced frame, the plainest first, in its pixels."""
@@ -184,24 +185,27 @@ class Difference:
         tolerance = self.tolerance
         if self.plate.moves:
             back = np.linalg.inv(self.plate.shift @ here)
-            tolerance = cv2.warpPerspective(tolerance, back, (width, height), borderValue=1e3)
+            carried = cv2.warpPerspective(tolerance, back, (width, height), borderValue=1e3)
+            tolerance = np.asarray(carried, np.float32)
         now, then = frame.astype(np.float32), background.astype(np.float32)
         factor = light(now, then, known)
+        self.lights.append(factor)
         change = now - then * factor
         strength = np.sqrt(np.einsum("ijk,ijk->ij", change, change)) / tolerance
-        mask = ((strength > 1) & known).astype(np.uint8)
-        mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        differs = ((strength > 1) & known).astype(np.uint8)
+        closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        mask = np.asarray(closed, np.uint8)
         self._note(mask, here)
         return blobs(mask, strength, now / factor, then, frame.shape[:2])
 
-
     def _note(self, mask: Image, here: Floats) -> None:
         """Count how often each place of the plate differs from it."""
-        self.frames += 1
         if self.plate.moves:
             size = self.often.shape[1::-1]
-            mask = cv2.warpPerspective(mask, self.plate.shift @ here, size, flags=cv2.INTER_NEAREST)
-        self.often += mask
+            move = self.plate.shift @ here
+            self.often += cv2.warpPerspective(mask, move, size, flags=cv2.INTER_NEAREST)
+        else:
+            self.often += mask
 
     def travelling(self, found: list[Candidate], here: Floats) -> list[Candidate]:
         """The candidates of a frame, in the order of their quality, those that stay worth less.
@@ -218,10 +222,9 @@ class Difference:
 
     def _share(self, one: Candidate, here: Floats) -> float:
         """Share of the frames in which the middle of a candidate differs from the plate."""
-        u, v = _carry(self.plate.shift @ here, one.centre[None])[0].round().astype(int)
-        height, width = self.often.shape
+        u, v = (int(x) for x in _carry(self.plate.shift @ here, one.centre[None])[0].round())
         window = self.often[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2]
-        return float(window.mean() / self.frames) if window.size and 0 <= u < width else 0.0
+        return float(window.mean() / len(self.lights)) if window.size and u >= 0 and v >= 0 else 0.0
 
 
 def blobs(

@@ -24,15 +24,6 @@ _STATES = 4  # states of a candidate that are kept
 
 
 @dataclass(frozen=True)
-class Path:
-    """Candidates that are one motion: `frames` and which of each, `chosen`; what it is worth."""
-
-    frames: Ints
-    chosen: Ints
-    value: float
-
-
-@dataclass(frozen=True)
 class Sightings:
     """The candidates of all frames as rows of a table, in the order of their frames.
 
@@ -67,8 +58,15 @@ class Sightings:
 
     def only(self, rows: Ints) -> "Sightings":
         """Some of the rows."""
-        parts = (self.frame, self.which, self.centre, self.size, self.colour, self.quality)
-        return Sightings(*(part[rows] for part in parts), self.diagonal)
+        return Sightings(
+            self.frame[rows],
+            self.which[rows],
+            self.centre[rows],
+            self.size[rows],
+            self.colour[rows],
+            self.quality[rows],
+            self.diagonal,
+        )
 
 
 def _prices(seen: Sightings, old: Ints, new: Ints, speed: Floats, moving: Floats) -> Floats:

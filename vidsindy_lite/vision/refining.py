@@ -10,18 +10,17 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter
 
-from ..arrays import Bools, Floats, Floats32, Image
-from .candidates import Plate, light
+from ..arrays import Bools, Floats, Floats32, Image, Ints
+from .candidates import Plate
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
-_LEAST = 8.0  # grey levels, below which no difference counts
+_LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
 _GROW = 0.5  # of its size, by which a window exceeds the target; and
 _ROOM = 8  # pixels more
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
-_TURN = np.array([-1, 4, 0, 4, -1]) / 6  # the middle of a cubic through its four neighbours
 
 
 @dataclass(frozen=True)
@@ -47,18 +46,17 @@ class Lens:
 
     def __init__(self, plate: Plate, noise: float) -> None:
         self.plate = plate
-        self.least = max(_LEAST, 4 * noise)
+        self.least = float(np.clip(4 * noise, _LEAST, _COARSE))
         self.blur = 1.0 if noise > 2 else 0.6
 
-    def gain(self, frame: Image, here: Floats) -> Floats32:
-        """How much brighter the frame is than the plate, from one pixel in eight each way."""
-        size = tuple(int(x) for x in self.plate.size)
-        then, known = self.plate.seen_from(here, np.zeros(2), size)
-        step = np.s_[::8, ::8]
-        return light(frame[step].astype(np.float32), then[step].astype(np.float32), known[step])
-
     def look(
-        self, frame: Image, here: Floats, box: Floats, centre: Floats, colour: Floats, gain: Floats32
+        self,
+        frame: Image,
+        here: Floats,
+        box: Floats,
+        centre: Floats,
+        colour: Floats,
+        gain: Floats32,
     ) -> View | None:
         """The target near a box (left, top, width, height) around `centre`, if it is there."""
         spare = _GROW * box[2:].max() + _ROOM
@@ -133,14 +131,15 @@ def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Boo
             return good
         usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="nearest"))
         good = inside & (np.abs(logs - usual) < np.log(_WHOLE))
-    for _ in range(2):
-        use = np.flatnonzero(good)
-        if len(use) < 7:
-            return good
+    while (use := np.flatnonzero(good)).size >= 7:
         off = np.array([_leave_out(frames[use], places[use], i) for i in range(len(use))])
-        usual = max(float(np.nanmedian(off)), 0.05)
-        size = np.sqrt(areas[use])
-        good[use[off > np.maximum(10 * usual, 1 + 0.3 * size)]] = False
+        usual = max(float(np.median(off)), 0.05)
+        over = off / np.maximum(10 * usual, 1 + 0.3 * np.sqrt(areas[use]))
+        # A wrong place spoils what its neighbours seem to be: the worst of them goes first.
+        worst = (over > 1) & (over == maximum_filter1d(over, 7))
+        if not worst.any():
+            break
+        good[use[worst]] = False
     return good
 
 
@@ -153,3 +152,12 @@ def _leave_out(frames: Floats, places: Floats, i: int) -> float:
     basis = np.vander(t, 3)
     fit, *_ = np.linalg.lstsq(basis, places[others], rcond=None)
     return float(np.linalg.norm(fit[-1] - places[i]))
+
+
+def scatter(frames: Ints, places: Floats) -> float:
+    """Standard error of the places (n, 2) of a smooth motion, per axis: how rough they are."""
+    runs = np.flatnonzero(frames[4:] - frames[:-4] == 4)
+    if len(runs) < 3:
+        return float("inf")
+    fourth = sum(c * places[runs + k] for k, c in enumerate((1, -4, 6, -4, 1)))
+    return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70))

@@ -8,11 +8,12 @@ little is left of the last one.
 A camera is at rest unless its frames say otherwise: a map that is not needed only adds its errors.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image
 
@@ -52,7 +53,7 @@ def at_rest(n: int) -> CameraMotion:
     return CameraMotion(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros(n))
 
 
-def carry(maps: Floats, points: Floats) -> Floats:
+def carry(maps: NDArray, points: Floats) -> Floats:
     """Points (n, 2) taken through one map (3, 3), or each through its own (n, 3, 3)."""
     ends = np.einsum("...ij,...j->...i", maps, np.column_stack([points, np.ones(len(points))]))
     return ends[:, :2] / ends[:, 2:]
@@ -97,13 +98,14 @@ def _follow(before: Image, after: Image, points: Floats, guess: Floats) -> tuple
     """Where the corners are in another image, and which were found."""
     if not len(points):
         return points, np.zeros(0, bool)
-    ends, found, _ = cv2.calcOpticalFlowPyrLK(
+    flown, found, _ = cv2.calcOpticalFlowPyrLK(
         before, after, points.astype(np.float32)[:, None], guess.astype(np.float32)[:, None].copy(),
         winSize=(15, 15), maxLevel=3, flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )  # fmt: skip
-    ends = ends[:, 0].astype(float)
+    ends = np.asarray(flown[:, 0], float)
     size = np.array(after.shape[1::-1])
-    return ends, (found[:, 0] > 0) & ((ends >= 0) & (ends < size)).all(axis=1)
+    within = ((ends >= 0) & (ends < size)).all(axis=1)
+    return ends, (np.asarray(found)[:, 0] > 0) & within
 
 
 def stands_still(samples: Iterable[Image]) -> bool:
@@ -135,13 +137,15 @@ def _direct(before: Image, after: Image, guess: Floats) -> Floats | None:
 
     It must explain most of what differs between the two (enhanced correlation; Evangelidis 2008).
     """
-    a, b = (cv2.resize(x, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for x in (before, after))
-    a, b = (np.asarray(x, np.float32) for x in (a, b))
+    a, b = (
+        cv2.resize(x, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA).astype(np.float32)
+        for x in (before, after)
+    )
     halve = np.array([[0.5, 0, -0.25], [0, 0.5, -0.25], [0, 0, 1]])
     start = (halve @ guess @ np.linalg.inv(halve))[:2].astype(np.float32)
     stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, _STEPS, 1e-4)
     try:
-        alike, found = cv2.findTransformECC(a, b, start, cv2.MOTION_AFFINE, stop, None, 3)
+        alike, found = cv2.findTransformECC(a, b, start, cv2.MOTION_AFFINE, stop)
     except cv2.error:
         return None
     if alike < _ALIKE or 1 - alike > 0.5 * (1 - float(np.corrcoef(a.ravel(), b.ravel())[0, 1])):
@@ -191,7 +195,7 @@ class Steadying:
         if good.sum() >= _MANY:
             full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
             if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
-                best, good = full, obey[:, 0] > 0
+                best, good = np.asarray(full, float), obey[:, 0] > 0
         miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
         return best, a[good], float(np.sqrt(np.mean(miss**2)))
 

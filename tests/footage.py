@@ -153,8 +153,10 @@ def render_phone(phone: Phone, seed: int = 0):
         left = int(rng.uniform(0.35, 0.6) * width)
         post = np.s_[margin : margin + height, margin + left : margin + left + 36]
         texture = bark(rng, (36, height)).astype(np.float32)
-    twigs = [(rng.uniform(0, 1, 2) * [width, 0.3 * height] + margin, rng.uniform(0, 6), rng.uniform(5, 14))
-             for _ in range(25)] if phone.leaves else []  # fmt: skip
+    twigs = []
+    for _ in range(25 * phone.leaves):
+        place = rng.uniform(0, 1, 2) * [width, 0.3 * height] + margin
+        twigs.append((place, rng.uniform(0, 6), rng.uniform(5, 14)))
     green = leaves(rng, (64, 64)).reshape(-1, 3).mean(axis=0)
     shift = np.array([[1, 0, -margin], [0, 1, -margin], [0, 0, 1.0]])
     light = 1 + phone.flicker * np.sin(2 * np.pi * 0.37 * np.arange(phone.frames) + phase)
@@ -172,7 +174,9 @@ def render_phone(phone: Phone, seed: int = 0):
         here = places[use].mean(axis=0)
         around = 3 * phone.size * phone.nearness + np.ptp(places[use], axis=0).max() + 20
         low = np.clip(here + margin - around, 0, None).astype(int)
-        window = base[low[1] : int(here[1] + margin + around), low[0] : int(here[0] + margin + around)]
+        window = base[
+            low[1] : int(here[1] + margin + around), low[0] : int(here[0] + margin + around)
+        ]
         total = np.zeros_like(window)
         for k in use:
             image, size = window.copy(), phone.size * scale[k]
