@@ -1,7 +1,14 @@
 """The command line on one's own videos: from three lossy files to a report, or one clear error."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -178,3 +185,134 @@ def test_a_template_to_fill_in(tmp_path, capsys):
     assert rig.cameras[0].image_size == (640, 480)
     assert main(["rig-template", "--cameras", "1"]) == 2
     assert "cameras: must be an integer of at least 2" in capsys.readouterr().err
+
+
+# ------------------------------------------------------------------ tracks, refusals, interruptions
+
+
+@pytest.fixture
+def tracked(tmp_path, monkeypatch):
+    """Text files of tracks and a rig."""
+    monkeypatch.chdir(tmp_path)
+    truth = study.SYSTEMS["Lorenz"].shift(study.REFERENCE_OFFSET)
+    _, x = truth.trajectory(200)
+    rig = vl.Rig.around(x)
+    rig.uncalibrated(0).save("rig.toml")
+    for name, camera in zip("abc", rig.cameras, strict=True):
+        rows = (f"{i},{u:.9f},{v:.9f}" for i, (u, v) in enumerate(camera.project(x)))
+        (tmp_path / f"{name}.csv").write_text("\n".join(["frame,u,v", *rows]))
+    (tmp_path / "still.csv").write_text("u,v\n" + "200,200\n" * 200)
+    return tmp_path
+
+
+def test_from_tracks_to_a_report_and_back(tracked, capsys):
+    command = ["discover", "--rig", "rig.toml", "--degree", "2", "--tracks"]
+    assert main([*command, "a.csv", "b.csv", "c.csv", "--fps", "25"]) == 0
+    first = json.loads((tracked / "report" / "result.json").read_text())
+    assert "report: report/report.html" in capsys.readouterr().out
+    assert main([*command, "report/tracks.csv", "--out", "again"]) == 0
+    again = json.loads((tracked / "again" / "result.json").read_text())
+    both = (data["law"]["data"]["terms"] for data in (first, again))
+    for one, other in zip(*both, strict=True):
+        assert one["term"] == other["term"]
+        assert one["coefficient"] == pytest.approx(other["coefficient"], rel=1e-4)
+
+
+def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--tracks"]
+    assert main([*command, "a.csv", "still.csv", "c.csv"]) == 2
+    (line,) = [one for one in capsys.readouterr().err.splitlines() if one.startswith("error:")]
+    assert (
+        "likely causes, in this order: the tracker (look at still.csv), the lags, the rig" in line
+    )
+    assert line.endswith("; the tracks are drawn in report/report.html")
+    assert {path.name for path in (tracked / "report").iterdir()} == {
+        "report.html", "result.json", "tracks.csv",
+    }  # fmt: skip
+    assert main([*command, "a.csv", "b.csv", "c.csv", "--degree", "2"]) == 0  # takes its place
+    assert (tracked / "report" / "rig.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "videos: give either one video per camera, or --tracks"),
+        (["a.csv", "--tracks", "b.csv"], "videos: give either one video per camera, or --tracks"),
+        (["--tracks", "a.csv", "b.csv", "c.csv"], "t: must be given, or fps, as a.csv states no"),
+        (["--tracks", "a.csv", "none.csv"], "tracks: no such file, got 'none.csv'"),
+        (["--tracks", "a.csv", "--fps", "9"], "tracks: must be one per camera, got 1 for 3"),
+        (["--tracks", "rig.toml", "--fps", "9"], "tracks: rig.toml must"),
+    ],
+)
+def test_bad_tracks_are_told(tracked, capsys, options, message):
+    assert main(["discover", "--rig", "rig.toml", *options]) == 2
+    assert f"error: {message}" in capsys.readouterr().err
+    assert not (tracked / "report").exists()
+
+
+def test_a_full_disk_is_one_line_and_the_law_is_told(tracked, capsys, monkeypatch):
+    def full(path, *_):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--tracks"]
+    assert main([*command, "a.csv", "b.csv", "c.csv"]) == 2
+    shown = capsys.readouterr()
+    assert shown.out.startswith("dx/dt = ")
+    (line,) = [one for one in shown.err.splitlines() if one.startswith("error:")]
+    assert "No space left on device" in line
+    assert not list(tracked.glob("*report*"))
+
+
+@pytest.mark.slow
+def test_every_kind_of_film_under_any_name(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    long = "長" * 60 + "l" * 60 + ".avi"
+    (tmp_path / long).write_bytes((folder / "a.avi").read_bytes())
+    names = [long, "it's $5 「弾む球」", 'say "b_%04d.png"']
+    for video, prefix in zip("bc", (f"{names[1]}/", 'say "b_'), strict=True):
+        (tmp_path / names[1]).mkdir(exist_ok=True)
+        ending = '"' if "b_" in prefix else ""
+        for i, frame in enumerate(vl.read_video(folder / f"{video}.avi")):
+            path = tmp_path / f"{prefix}{i:04d}.png{ending}"
+            path.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
+    command = ["discover", *names, "--rig", str(folder / "rig.toml"), "--fps", "30"]
+    assert main([*command, "--degree", "2", "--out", "$報告 'r'"]) in (0, 1)
+    shown = capsys.readouterr().out
+    assert "report: $報告 'r'/report.html" in shown
+    data = json.loads((tmp_path / "$報告 'r'" / "result.json").read_text("utf-8"))
+    assert [camera["video"] for camera in data["cameras"]] == names
+    assert data["cameras"][1]["lag"] == pytest.approx(7, abs=0.1)
+
+
+def test_ctrl_c_ends_the_command_in_one_line(tracked):
+    command = [sys.executable, "-m", "vidsindy_lite", "discover", "--rig", "rig.toml", "--fps", "9"]
+    environment = os.environ | {"PYTHONPATH": str(Path(vl.__file__).parent.parent)}
+    with subprocess.Popen(
+        [*command, "--degree", "5", "--tracks", "a.csv", "b.csv", "c.csv"],
+        env=environment, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    ) as running:  # fmt: skip
+        running.stderr.read(1)  # of the progress bar
+        running.send_signal(signal.SIGINT)
+        _, shown = running.communicate(timeout=60)
+    assert "Traceback" not in shown
+    assert running.returncode == 130
+    assert not list(tracked.glob("*report*"))
+
+
+def test_the_version(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["--version"])
+    assert capsys.readouterr().out == f"vidsindy_lite {vl.__version__}\n"
+    project = tomllib.loads((Path(vl.__file__).parent.parent / "pyproject.toml").read_text())
+    assert project["project"]["version"] == vl.__version__
+
+
+def test_an_interruption_shows_no_traceback(tracked, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("vidsindy_lite.pipeline.discover_from_tracks", interrupted)
+    assert main(["discover", "--rig", "rig.toml", "--tracks", "a.csv"]) == 130
+    assert capsys.readouterr().err == "\nstopped; nothing was written\n"
+    assert not list(tracked.glob("*report*"))

@@ -27,7 +27,7 @@ from .cameras import (
 )
 from .dynamics import Discovery, PolynomialSystem, SplineSINDy, discover
 from .observation import Observation, observe, observe_tracks
-from .pipeline import VideoDiscovery, discover_from_videos
+from .pipeline import VideoDiscovery, discover_from_tracks, discover_from_videos
 from .vision import (
     Hint,
     Scene,
@@ -39,8 +39,11 @@ from .vision import (
     write_video,
 )
 
+__version__ = "0.2.0"
+
 __all__ = [
     "discover_from_videos",
+    "discover_from_tracks",
     "VideoDiscovery",
     "observe",
     "observe_tracks",

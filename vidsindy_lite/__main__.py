@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from . import __version__
 from .study import SYSTEMS
 
 
@@ -18,6 +19,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         return options.command(options)
+    except KeyboardInterrupt:
+        print("\nstopped; nothing was written", file=sys.stderr)
+        return 130
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -29,6 +33,7 @@ def _parser() -> argparse.ArgumentParser:
         description="From three videos of a moving target to its governing equations.",
         epilog="`python -m vidsindy_lite discover --help` says more, and so do the others.",
     )
+    parser.add_argument("--version", action="version", version=f"vidsindy_lite {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, command in COMMANDS.items():
         told = inspect.getdoc(command.work) or ""
@@ -54,51 +59,82 @@ def _discover(options: argparse.Namespace) -> int:
 
     There is one video per camera of the rig file, in its order: cameras at rest, one thing that
     moves. They may start at different times, differ in length and in frame rate; the first one is
-    the clock.
+    the clock. A video may be a file, a folder of images, or a pattern of their names in quotes.
+    Who has tracked the target elsewhere gives --tracks in place of videos: text files as DLTdv,
+    Tracker, DeepLabCut and this command write them.
 
     examples:
       python -m vidsindy_lite rig-template --cameras 3 > rig.toml      and fill it in
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml --lag 0,7,0 --degree 2
+      python -m vidsindy_lite discover "a/%04d.png" "b/%04d.png" c/ --rig rig.toml --fps 240
+      python -m vidsindy_lite discover --tracks a.csv b.csv c.csv --rig rig.toml --fps 30
 
-    The folder then holds report.html (one page, images included), result.json (the same as data)
-    and rig.toml (the learned cameras). If anything fails, it holds what it held before.
+    The folder then holds report.html (one page, images included), result.json (the same as data),
+    tracks.csv and rig.toml (the learned cameras). If tracks were found but no law, it holds a
+    picture of them; if anything else fails, what it held before.
 
     exit status: 0 if there is no reason to doubt the law, 1 if there is (the report says which),
-    2 if there is no report; the error says why.
+    2 if there is no law; the error says why.
     """
     from .cameras import Rig, list_lags
-    from .checks import check_positive
-    from .companion.report import PAGE, check_folder_is_free, write_report
-    from .pipeline import discover_from_videos
-    from .vision import check_detector, frame_clock, load_hints
+    from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
+    from .refusal import Refused
+    from .vision import check_detector
 
+    if bool(options.videos) == bool(options.tracks):
+        raise ValueError("videos: give either one video per camera, or --tracks")
     check_detector(options.detector)
     check_folder_is_free(options.out)
-    rig, t = Rig.load(options.rig), None
+    rig, videos = Rig.load(options.rig), options.videos or None
     told = {"rig file": options.rig, "degree": options.degree, "seed": options.seed}
     told |= {"lags": "learned" if options.lag is None else options.lag}
-    told |= {"detector": options.detector}
-    if options.fps is not None:
-        t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
-        told |= {"frames in a unit of time": options.fps}
-    found = discover_from_videos(
-        options.videos,
-        rig,
-        t,
-        lags=options.lag,
-        detector=options.detector,
-        hints=load_hints(options.rig),
-        degree=options.degree,
-        seed=options.seed,
-        progress=True,
-    )
+    told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
+    told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
+    try:
+        found = _found(options, rig)
+    except Refused as refused:
+        write_refusal(refused, videos, rig, options.out, told)
+        page = Path(options.out) / PAGE
+        raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
     # First the law: if the report cannot be written, it is not lost.
     lags = list_lags(found.lags.frames)
     print(f"{found}\nstatus: {found.status}; lags of the videos: {lags} frames", flush=True)
-    write_report(found, options.videos, options.out, told)
+    write_report(found, videos, options.out, told, progress=True)
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
+
+
+def _found(options: argparse.Namespace, rig: Any) -> Any:
+    """The law that videos or tracks obey."""
+    from .checks import check_positive
+    from .pipeline import discover_from_tracks, discover_from_videos
+    from .vision import frame_clock, load_hints
+
+    shared = {name: getattr(options, name) for name in ("degree", "seed")}
+    shared |= {"lags": options.lag, "progress": True}
+    if options.tracks:
+        return discover_from_tracks(options.tracks, rig, fps=options.fps, **shared)
+    t = None
+    if options.fps is not None:
+        t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
+    shared |= {"detector": options.detector, "hints": load_hints(options.rig)}
+    return discover_from_videos(options.videos, rig, t, **shared)
+
+
+def _pick(options: argparse.Namespace) -> int:
+    """Write a page on which you show the target, if the tracker takes something else for it.
+
+    Open the page in any browser, without a network: a box that is drawn around the target in one
+    frame becomes a line for the rig file, and one for Python.
+
+    examples:
+      python -m vidsindy_lite pick a.mp4 b.mp4 c.mp4
+    """
+    from .companion.pick import write_pick_page
+
+    print(f"open {write_pick_page(options.videos, options.out)} in a browser")
+    return 0
 
 
 def _rig_template(options: argparse.Namespace) -> int:
@@ -246,7 +282,11 @@ class _Command(NamedTuple):
 
 COMMANDS = {
     "discover": _Command(_discover, "from your own videos and a rig file to a report on the law", {
-        "videos": _text("VIDEO", "one per camera of the rig", nargs="+"),
+        "videos": _text("VIDEO", "one per camera of the rig", nargs="*"),
+        "--tracks": _text(
+            "FILE", "text files of tracks, one per camera of the rig or one of all, in place of "
+            "videos", nargs="+"
+        ),
         "--rig": _text("FILE", "where the cameras stand", required=True),
         "--out": _text("DIR", "folder of the report (default: report)", default="report"),
         "--lag": _text(
@@ -263,6 +303,10 @@ COMMANDS = {
             "ONNX file (default: auto)", default="auto"
         ),
         "--seed": _count(0, "of the search (default: 0)"),
+    }),
+    "pick": _Command(_pick, "a page on which you show the target in your videos", {
+        "videos": _text("VIDEO", "a file, a folder of images, or a pattern", nargs="+"),
+        "--out": _text("FILE", "the page (default: pick.html)", default="pick.html"),
     }),
     "rig-template": _Command(_rig_template, "print a rig file to fill in", {
         "--cameras": _count(3, "how many (default: 3)"),

@@ -29,6 +29,7 @@ from .cameras import (
     trailing_errors,
 )
 from .checks import check_path, check_tracks, check_vector
+from .refusal import Refused, refusing
 from .vision import Hint, Track, VideoInfo, check_detector, frame_clock, track, video_info
 
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
@@ -136,6 +137,7 @@ def observe(
         for (path, shot), hint in zip(videos, told, strict=True)
     ]
     tracks = [track.pixels for track in seen]
+    _check_found(tracks, names)
     doubts = [warning for track in seen for warning in track.warnings]
     return _observed(tracks, rig, clock, given, names, doubts)
 
@@ -146,6 +148,7 @@ def observe_tracks(
     t: ArrayLike | Sequence[ArrayLike],
     *,
     lags: Sequence[float] | None = None,
+    names: Sequence[str] | None = None,
 ) -> Observation:
     """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
 
@@ -159,6 +162,8 @@ def observe_tracks(
     t : array_like, shape (n_0,), or a sequence of such
         Time of each frame of the first track, increasing; all cameras then have its frame rate. Or
         the times of each track by its own clock, if rates differ or frames are missing.
+    names : sequence of str, optional
+        What messages call the tracks.
 
     Returns
     -------
@@ -172,7 +177,7 @@ def observe_tracks(
     check_learnable(rig)
     raw = check_tracks(tracks, len(rig.cameras))
     clock = Clock.of_tracks(t, raw)
-    names = [f"tracks[{i}]" for i in range(len(raw))]
+    names = names or [f"tracks[{i}]" for i in range(len(raw))]
     given = _check_lags(lags, clock, names)
     return _observed(raw, rig, clock, given, names)
 
@@ -186,12 +191,14 @@ def _observed(
     doubts: Sequence[str] = (),
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
-    best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven)
-    if lags is not None:
-        _refuse_wrong(lags, best)
+    with refusing("lags", raw, names):
+        best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven)
+        if lags is not None:
+            _refuse_wrong(lags, best)
     used = best.frames if lags is None else lags
     tracks = align(raw, used, clock.rates, clock.uneven)
-    learned = learn_cameras(tracks, rig)
+    with refusing("cameras", raw, names):
+        learned = learn_cameras(tracks, rig)
     missed = disagreement(tracks, learned)
     told = (
         best if lags is None else Lags(lags, clock.rates, 0 * lags, max(missed), clocks=best.clocks)
@@ -291,16 +298,23 @@ def _check_hints(
 def _track_one(
     path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None
 ) -> Track:
-    """Track a video that should have so many frames and one moving target."""
+    """Track a video that should have so many frames."""
     found = track(path, detector, hint)
     if len(found.pixels) != frames:
         raise ValueError(_cut_off(path, frames, len(found.pixels)))
-    if not np.isfinite(found.pixels).any():
-        raise ValueError(
-            f"paths: {path.name} must show one moving target, got none in any frame: what never "
-            "moves away from a place by about its own width is taken for background"
-        )
     return found
+
+
+def _check_found(tracks: Sequence[Floats], names: Sequence[str]) -> None:
+    """That each video shows a target: all are tracked first, so that all can be looked at."""
+    for pixels, name in zip(tracks, names, strict=True):
+        if not np.isfinite(pixels).any():
+            raise Refused(
+                f"paths: {name} must show one moving target, got none in any frame: what never "
+                "moves away from a place by about its own width is taken for background",
+                "track",
+                tracks,
+            )
 
 
 def _refuse_wrong(lags: Floats, learned: Lags) -> None:

@@ -2,16 +2,19 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .cameras import Rig
-from .checks import check_integer
+from .checks import check_integer, check_positive, check_rows
 from .dynamics import Discovery, discover
-from .observation import Observation, observe
-from .vision import Hint
+from .observation import Observation, observe, observe_tracks
+from .refusal import refusing
+from .vision import Hint, TrackFile, read_tracks
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +68,98 @@ def discover_from_videos(
     """
     check_integer("degree", degree, 1)
     check_integer("seed", seed)
-    seen = observe(
-        paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress
-    )
-    found = discover(
-        seen.t, seen.x, degree=degree, seed=seed, progress=progress, systematic=seen.systematic
-    )
+    seen = observe(paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress)
+    return _with_law(seen, [Path(path).name for path in paths], degree, seed, progress)
+
+
+def discover_from_tracks(
+    tracks: Sequence[ArrayLike | str | os.PathLike],
+    rig: Rig,
+    t: ArrayLike | Sequence[ArrayLike] | None = None,
+    *,
+    fps: float | None = None,
+    lags: Sequence[float] | None = None,
+    degree: int = 3,
+    seed: int = 0,
+    progress: bool = False,
+) -> VideoDiscovery:
+    """Discover the governing equations of a target from tracks that are there already.
+
+    This is `observe_tracks`, then `discover` on the path that it reconstructs.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n_i, 2), or of path
+        Pixels of the target, one track per camera of the rig, NaN where it was not seen; or text
+        files of them, as DLTdv, Tracker (OSP), DeepLabCut and this package write them. A file may
+        hold the tracks of several cameras.
+    rig, t, lags
+        See `observe_tracks`.
+    fps : float, optional
+        Frames of every camera in one unit of time, in place of ``t``. Without either, files have
+        to state the times of their rows.
+    degree, seed, progress
+        See `discover_from_videos`.
+
+    Returns
+    -------
+    VideoDiscovery
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If a file is missing or holds no track, if times are given twice or not at all, or as
+        `observe_tracks` and `discover` do.
+    """
+    check_integer("degree", degree, 1)
+    check_integer("seed", seed)
+    read = _read(tracks)
+    names, pixels = [track.name for track in read], [track.pixels for track in read]
+    seen = observe_tracks(pixels, rig, _times(read, t, fps), lags=lags, names=names)
+    doubts = tuple(warning for track in read for warning in track.warnings)
+    seen = replace(seen, warnings=(*seen.warnings, *doubts))
+    return _with_law(seen, names, degree, seed, progress)
+
+
+def _read(tracks: Sequence[ArrayLike | str | os.PathLike]) -> list[TrackFile]:
+    """All tracks, those of files read."""
+    if not isinstance(tracks, list | tuple | np.ndarray):
+        raise ValueError(f"tracks: must be a list of arrays or of files, got {tracks!r:.60}")
+    read: list[TrackFile] = []
+    for track in tracks:
+        if isinstance(track, str | os.PathLike):
+            read += read_tracks(track)
+        else:
+            name = f"tracks[{len(read)}]"
+            read.append(TrackFile(name, check_rows(name, cast("ArrayLike", track), 2), None))
+    return read
+
+
+def _times(
+    read: Sequence[TrackFile], t: ArrayLike | Sequence[ArrayLike] | None, fps: float | None
+) -> ArrayLike | Sequence[ArrayLike]:
+    """The times that are given, or those that files state."""
+    if t is not None and fps is not None:
+        raise ValueError(f"fps: must not be given with t, got {fps}")
+    if t is not None:
+        return t
+    if fps is not None:
+        rate = check_positive("fps", fps)
+        return [np.arange(len(track.pixels)) / rate for track in read]
+    stated = [track.t for track in read if track.t is not None]
+    if len(stated) < len(read):
+        silent = next(track.name for track in read if track.t is None)
+        raise ValueError(f"t: must be given, or fps, as {silent} states no times")
+    return stated
+
+
+def _with_law(
+    seen: Observation, names: Sequence[str], degree: int, seed: int, progress: bool
+) -> VideoDiscovery:
+    """An observation with the law that it obeys."""
+    with refusing("law", seen.tracks, names):
+        found = discover(
+            seen.t, seen.x, degree=degree, seed=seed, progress=progress, systematic=seen.systematic
+        )
     parts = vars(seen) | {"warnings": (*seen.warnings, *found.warnings)}
     return VideoDiscovery(**parts, discovery=found)

@@ -244,13 +244,14 @@ def test_covariance_of_independent_residuals_is_that_of_least_squares():
     rng = np.random.default_rng(3)
     slope = rng.normal(size=(4000, 3, 2))
     missed = 0.2 * rng.normal(size=(4000, 3))
-    factor = uncertainty._sandwich(missed, slope)
+    factor = uncertainty._sandwich(missed, slope, np.zeros(2), 0.2)
     flat = slope.reshape(-1, 2)
     expected = 0.2**2 * np.linalg.inv(flat.T @ flat)
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     assert np.abs(factor @ factor.T - expected).max() < 0.15 * size.max()
     # Every residual three times in a row: three times the variance for as many numbers.
-    tripled = uncertainty._sandwich(np.repeat(missed, 3, 0), np.repeat(slope, 3, 0))
+    thrice = np.repeat(missed, 3, 0), np.repeat(slope, 3, 0)
+    tripled = uncertainty._sandwich(*thrice, np.zeros(2), 0.2)
     grown = np.trace(tripled @ tripled.T) / np.trace(factor @ factor.T)
     assert 0.6 < grown < 1.1  # and a third if they were taken as independent
 

@@ -11,14 +11,25 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
+from browser import CHROMIUM, Browser
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
-from vidsindy_lite.companion.report import FILES, check_folder_is_free, summary, write_report
+from vidsindy_lite.companion import report
+from vidsindy_lite.companion.report import (
+    FILES,
+    check_folder_is_free,
+    summary,
+    write_refusal,
+    write_report,
+)
 from vidsindy_lite.observation import Observation
+from vidsindy_lite.refusal import Refused
+from vidsindy_lite.vision import read_tracks
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +84,9 @@ def test_the_page_needs_nothing_else(page):
     parser.feed(text)
     assert parser.open == []
     assert parser.images == 5
-    assert all(address.startswith("data:image/png;base64,") for address in parser.addresses)
+    kinds = [address.partition(",")[0] for address in parser.addresses]
+    assert sorted(set(kinds)) == ["data:image/png;base64", "data:video/webm;base64"]
+    assert kinds.count("data:video/webm;base64") == 1
     assert not re.search(r"https?:|@import|<script|<link", text)
     assert len(text) < 3_000_000
 
@@ -201,16 +214,138 @@ def test_a_notebook_still_shows_its_figures_after_a_report():
     assert "interactive: True" in done.stdout
 
 
-@pytest.mark.parametrize("name", ["a" * 200, r"\$a$", "$x^$", "line\nbreak", "{{ x }}"])
+@pytest.mark.parametrize(
+    "name", ["a" * 200, r"\$a$", "$x^$", "line\nbreak", "{{ x }}", "弾む球", "it's"]
+)
 def test_a_strange_name_does_not_spoil_the_report(case, tmp_path, name):
     found, paths = case
     copies = [shutil.copy(path, tmp_path / f"{name}{i}.mov") for i, path in enumerate(paths)]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         page = write_report(found, copies, tmp_path / "report")
-    assert f"<td>{name}1.mov</td>" in page.read_text("utf-8")
+    shown = name.replace("'", "&#39;")
+    assert f"<td>{shown}1.mov</td>" in page.read_text("utf-8")
 
 
 def test_one_video_per_camera(case, tmp_path):
     with pytest.raises(ValueError, match="paths: must be 3 videos, got 2"):
         write_report(case[0], case[1][:2], tmp_path / "report")
+
+
+# ---------------------------------------------------------------------------- data, and what failed
+
+
+def described():
+    return json.loads(Path(report.__file__).with_name("result.schema.json").read_text("utf-8"))
+
+
+def checked(folder):
+    """result.json, which the schema must describe, all of it."""
+    schema = described()
+    data = json.loads((folder / "result.json").read_text("utf-8"))
+    jsonschema.validate(data, schema)
+    told = next(
+        one for one in schema["oneOf"] if jsonschema.Draft202012Validator(one).is_valid(data)
+    )
+    assert data.keys() == told["properties"].keys()
+    return data
+
+
+def test_the_schema_describes_the_data(page):
+    data = checked(page.parent)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(data | {"status": "sure"}, described())
+
+
+def test_the_tracks_can_be_read_again(page, case):
+    tracks = read_tracks(page.parent / "tracks.csv")
+    for ours, theirs in zip(tracks, case[0].tracks, strict=True):
+        np.testing.assert_allclose(ours.pixels, theirs, rtol=1e-9)
+        np.testing.assert_allclose(ours.t, case[0].t, rtol=1e-9)
+
+
+def test_a_narrow_screen_is_enough(page):
+    text = page.read_text("utf-8")
+    assert '<meta name="viewport" content="width=device-width, initial-scale=1">' in text
+    assert "white-space: pre-wrap" in text
+    assert "table { display: block; overflow-x: auto }" in text
+
+
+def test_a_report_on_tracks_alone(case, tmp_path):
+    page = write_report(case[0], None, tmp_path / "report", {"degree": 2})
+    text = page.read_text("utf-8")
+    assert text.count("<img") == 4
+    assert "<td>camera 2</td>" in text
+    data = checked(page.parent)
+    assert data["cameras"][0]["fps"] == pytest.approx(1 / np.diff(case[0].t)[0])
+
+
+@pytest.mark.parametrize("with_videos", [True, False])
+def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos):
+    found, paths = case
+    tracks = [*(track[:20] for track in found.tracks[:2]), np.full((20, 2), np.nan)]
+    refused = Refused("paths: <b> shows nothing; likely causes: ...", "track", tracks)
+    page = write_refusal(
+        refused, paths if with_videos else None, found.rig, tmp_path / "out", {"degree": 2}
+    )
+    assert {path.name for path in page.parent.iterdir()} == {
+        "report.html", "result.json", "tracks.csv",
+    }  # fmt: skip
+    parser, text = Parser(), page.read_text("utf-8")
+    parser.feed(text)
+    assert (parser.open, parser.images) == ([], 1)
+    assert "A target was not found in every video." in text
+    assert "paths: &lt;b&gt; shows nothing" in text
+    data = checked(page.parent)
+    assert (data["status"], data["step"]) == ("refused", "track")
+    assert data["share_of_frames_seen"][2] == 0
+    check_folder_is_free(page.parent)  # the next run may replace it
+    np.testing.assert_allclose(read_tracks(page.parent / "tracks.csv")[0].pixels, tracks[0])
+
+
+def test_a_full_disk_leaves_what_was_there(case, tmp_path, monkeypatch):
+    folder = tmp_path / "report"
+    folder.mkdir()
+    (folder / "report.html").write_text("old")
+
+    def full(path, *rest):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match="No space left on device"):
+        write_report(*case, folder)
+    monkeypatch.undo()
+    assert (folder / "report.html").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_two_runs_on_one_folder_leave_one_whole_report(case, tmp_path, monkeypatch):
+    folder, rename, turns = tmp_path / "report", Path.rename, []
+
+    def beaten(path, target):
+        """The other run's folder is there first, once."""
+        if path.name == "new" and not turns:
+            turns.append(path)
+            folder.mkdir()
+            (folder / "report.html").write_text("theirs")
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", beaten)
+    write_report(*case, folder)
+    assert turns
+    assert {path.name for path in folder.iterdir()} == set(FILES)
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the page in")
+def test_a_telephone_shows_the_report_without_scrolling_sideways(page, case, tmp_path):
+    found, paths = case
+    tracks = [track[:20] for track in found.tracks]
+    refused = Refused("paths: " + "a" * 300, "law", tracks)
+    other = write_refusal(refused, paths, found.rig, tmp_path / "out")
+    (tmp_path / "profile").mkdir()
+    with Browser(tmp_path / "profile") as browser:
+        for one in (page, other):
+            seen = browser.open(one, 390)
+            assert seen["width"] <= 390
+            assert (seen["errors"], seen["requests"], seen["broken"]) == ([], [], [])

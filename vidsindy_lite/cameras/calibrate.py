@@ -9,15 +9,16 @@ Paper: Section "Coordinates Transformation", Eq. (4), (5).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ..arrays import Floats
 from ..checks import check_instance, check_integer
+from .adjust import Adjustment, adjust
 from .camera import Camera
+from .changes import PARTS, known_to
 from .messages import unconverged_cameras, undecided_outliers, unsettled_points
 from .models import all_orthographic, independent
 from .rig import Rig
@@ -29,12 +30,8 @@ from .triangulate import (
     epipolar_lines,
     intersect,
     points_of_views,
-    residuals_of_views,
 )
 from .unknowns import Unknowns, agreement, calibrated, names, solve
-
-# Relative, of the search for the smallest reprojection error.
-_TOLERANCES = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15}
 
 
 def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
@@ -48,8 +45,15 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     bias that pixel noise causes in a scale. With a perspective camera in the rig, the closed form
     goes from the known cameras to the others, and the refinement is the same.
 
-    Frames in which orthographic views contradict each other by more than eight robust standard
-    deviations are left out, so that a few outliers of the tracker do not bend the cameras.
+    What was measured with an error (`normal_error` and so on, see `Camera`) may change, too, by as
+    much as that: the refinement is a bundle adjustment of cameras and path with the measurements as
+    priors, in which half a degree of a normal is found to a hundredth. What neither tracks nor
+    measurements tell, such as a turn of the whole rig, stays uncertain; `observe` counts that among
+    the systematic errors of the path. Without errors, what is given stays as it is.
+
+    Frames that are missed by far pull with less weight the further they are off, and those in which
+    orthographic views of an exact rig contradict each other by more than eight robust standard
+    deviations are left out: a few outliers of the tracker do not bend the cameras.
 
     Two cameras are enough, but raise no alarm at a normal that is turned about the cross product of
     both: the path is then wrong without a residual. Three do.
@@ -59,7 +63,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     tracks : sequence of array_like, shape (n, 2)
         One track per camera of the rig, frame by frame the same instants; NaN = not seen.
     rig : Rig
-        At least one calibrated camera. What is given stays as it is. If a position is missing, two
+        At least one calibrated camera. If a position is missing, two
         others must be given, with independent normals, and all cameras be orthographic: in depth
         from a single camera nothing would fix the origin.
 
@@ -123,15 +127,9 @@ def _tilted(views: Views, unknowns: Unknowns, learned: Rig, index: int) -> Rig:
     """
     if learned.is_orthographic:
         views = views.only(agreement(views, Unknowns.of(learned))[0].frames)
-    before = learned.cameras[index]
-
-    def candidate(parameters: Floats) -> tuple[Camera, ...]:
-        cameras = list(unknowns.cameras)
-        normal = before.normal + parameters[:2] @ before.rows
-        cameras[index] = replace(cameras[index], normal=normal)
-        return replace(unknowns, cameras=tuple(cameras)).filled(parameters[2:])
-
-    return _closest(views, candidate, np.append([0.0, 0.0], unknowns.read(learned.cameras)))
+    errors = np.array([known_to(camera) for camera in unknowns.cameras])
+    errors[index, PARTS["normal"]] = np.inf
+    return _closest(views, learned.cameras, errors)[1]
 
 
 def check_learnable(rig: Rig) -> Unknowns:
@@ -197,30 +195,28 @@ def calibration_errors(rig: Rig, truth: Rig) -> Floats:
 
 def cameras_of_views(views: Views, unknowns: Unknowns) -> Rig:
     """`learn_cameras` of views and unknowns that were checked."""
-    if not unknowns.any:
+    errors = np.array([known_to(camera) for camera in unknowns.cameras])
+    if not errors.any():
         return Rig(unknowns.cameras)
     if all_orthographic(unknowns.cameras):
         equations, decided = agreement(views, unknowns)
         start = unknowns.vector(*solve(equations.design, equations.target, unknowns))
-        learned = _closest(views.only(equations.frames), unknowns.filled, start)
+        used = views if unknowns.measured else views.only(equations.frames)
+        _, learned = _closest(used, unknowns.filled(start), errors)
         doubts = () if decided else (undecided_outliers(),)
     else:
-        learned = _closest(views, unknowns.filled, unknowns.read(_spread(views, unknowns)))
+        _, learned = _closest(views, _spread(views, unknowns), errors)
         _, settled = intersect(learned.cameras, views.tracks)
         left = int((~settled).sum())
         doubts = (unsettled_points(left, views.frames),) if left else ()
     return replace(learned, warnings=learned.warnings + doubts)
 
 
-def _closest(views: Views, candidate: Callable[[Floats], tuple[Camera, ...]], start: Floats) -> Rig:
-    """The cameras `candidate(parameters)` of the smallest reprojection error in pixels."""
-
-    def missed(parameters: Floats) -> Floats:
-        return np.hstack(residuals_of_views(views, candidate(parameters)))
-
-    used = np.isfinite(missed(start))  # the same ones throughout
-    fit = least_squares(lambda parameters: missed(parameters)[used], start, **_TOLERANCES)
-    return Rig(candidate(fit.x), (unconverged_cameras(fit.nfev),) if fit.status == 0 else ())
+def _closest(views: Views, start: Sequence[Camera], errors: Floats) -> tuple[Adjustment, Rig]:
+    """The cameras of the smallest errors near a start, and the rig that they make."""
+    found = adjust(views, start, errors)
+    doubts = () if found.settled else (unconverged_cameras(found.steps),)
+    return found, Rig(found.cameras, doubts)
 
 
 def _spread(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:

@@ -227,7 +227,7 @@ class Camera(ABC):
 
     def seen(self, centred: Floats) -> Floats:
         """Pixels at which points x_c of the ideal image are seen through the lens, shape (n, 2)."""
-        u, v = self._centre
+        u, v = self.centre
         bent = self._bent(centred)
         return np.column_stack((u + bent[:, 0], v - self.aspect * bent[:, 1]))
 
@@ -236,11 +236,11 @@ class Camera(ABC):
 
         Shape (n, 2). Of a camera that is not calibrated, without its distortion.
         """
-        u, v = self._centre
+        u, v = self.centre
         return self._unbent(np.column_stack((pixels[:, 0] - u, (v - pixels[:, 1]) / self.aspect)))
 
     @property
-    def _centre(self) -> tuple[float, float]:
+    def centre(self) -> tuple[float, float]:
         """The principal point."""
         if self.principal_point is not None:
             return self.principal_point[0], self.principal_point[1]

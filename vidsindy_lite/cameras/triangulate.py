@@ -25,6 +25,7 @@ from .camera import Camera
 from .geometry import PARALLEL
 from .models import all_orthographic, independent
 from .rig import Rig
+from .shutter import steadied
 
 _STEPS = 30  # of Gauss and Newton; from the linear solution four or five are usual
 _SETTLED = 1e-11  # pixels
@@ -137,7 +138,7 @@ def check_views(tracks: Sequence[Floats], rig: Rig) -> Views:
     lengths = [len(track) for track in checked]
     if len(set(lengths)) > 1:
         raise ValueError(f"tracks: must have the same number of frames, got {lengths}")
-    return Views.of(checked)
+    return views_of(checked, rig.cameras)
 
 
 def check_calibrated(name: str, rig: Rig) -> None:
@@ -154,6 +155,12 @@ def check_calibrated(name: str, rig: Rig) -> None:
 
 
 # What follows takes its arguments as they are; `..._of_views`, views that were checked.
+
+
+def views_of(tracks: Sequence[Floats], cameras: Sequence[Camera]) -> Views:
+    """Views of tracks at the same instants, but for what rolling shutters do to these."""
+    pairs = zip(tracks, cameras, strict=True)
+    return Views.of([steadied(track, c.readout, c.image_size[1]) for track, c in pairs])
 
 
 def residuals_of_views(views: Views, cameras: Sequence[Camera]) -> list[Floats]:

@@ -11,7 +11,10 @@ the parameters it is the "sandwich"
     H^-1 M H^-1,   H = sum_n J_n' J_n,   M = sum_nm w(n - m) (J_n' r_n) (J_m' r_m)'
 
 with weights w that fall linearly to zero over as many frames as the residuals depend on each other
-(Newey and West 1987, Econometrica 55; their number after Andrews 1991, Econometrica 59).
+(Newey and West 1987, Econometrica 55; their number after Andrews 1991, Econometrica 59). What was
+measured with an error adds sigma^2 / error^2 to H and sigma^4 / error^2 to M, sigma being the noise
+of the residuals: so a direction that the tracks tell nothing of, such as a turn of the whole rig,
+is as uncertain as the measurements leave it.
 
 The tracks themselves may share an error, too: see `trailing_errors`.
 """
@@ -24,13 +27,21 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
+from .adjust import linearised
 from .alignment import align
+from .changes import known_to
 from .rig import Rig
 from .synchronise import OUTLIER, PROBE, Lags
-from .triangulate import Views, check_calibrated, check_views, points_of_views, residuals_of_views
-from .unknowns import Unknowns
+from .triangulate import (
+    Views,
+    check_calibrated,
+    check_views,
+    points_of_views,
+    residuals_of_views,
+    views_of,
+)
 
-_PROBE = 1e-5  # of log scales, angles in rad, and offsets over the image's width
+_SMALLEST = 1e-4  # of the largest mode
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 
 
@@ -50,34 +61,55 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     -------
     ndarray, shape (k, n, 3)
         Scene units; what k independent causes, each off by one standard error, add to the path.
-        Zero where nothing can be reconstructed.
+        Zero where nothing can be reconstructed. If something of the rig was measured with an error,
+        without what moves or stretches the whole path: no law's terms depend on the origin and the
+        unit of length, which are as uncertain as the measurements leave them.
     """
-    unknowns = Unknowns.of(rig)
-    start = unknowns.read(learned.cameras)
+    errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = np.flatnonzero((lags.errors > 0) & np.isfinite(lags.errors))
-    steps = np.concatenate([np.full(len(start), _PROBE), np.full(len(moving), PROBE)])
     clocks = lags.clocks or None
-    still = Views.of(align(tracks, lags.frames, lags.rates, clocks))
 
-    def both(change: Floats) -> Floats:
-        """Residuals and path, side by side, at other parameters."""
-        views, shift = still, change[len(start) :]
-        if shift.any():
-            shifted = lags.frames.copy()
-            shifted[moving] += shift
-            views = Views.of(align(tracks, shifted, lags.rates, clocks))
-        cameras = unknowns.filled(start + change[: len(start)])
-        return np.hstack((*residuals_of_views(views, cameras), points_of_views(views, cameras)))
+    def views(shift: Floats) -> Views:
+        return views_of(
+            align(tracks, lags.frames + shift, lags.rates, clocks), learned.cameras
+        )
 
-    here = both(0 * steps)
-    tried = [(both(e) - both(-e)) / (2 * h) for e, h in zip(np.diag(steps), steps, strict=True)]
-    slopes = np.reshape(tried, (len(steps), *here.shape))
-    missed, slope = here[:, :-3], np.moveaxis(slopes[:, :, :-3], 0, -1)
+    def both(shift: Floats) -> Floats:
+        """Residuals and path, side by side, at other lags."""
+        seen, cameras = views(shift), learned.cameras
+        return np.hstack((*residuals_of_views(seen, cameras), points_of_views(seen, cameras)))
+
+    still = views(0 * lags.frames)
+    near = linearised(still, learned.cameras, errors)
+    shifts = PROBE * np.eye(len(lags.frames))[moving]
+    late = [(both(shift) - both(-shift)) / (2 * PROBE) for shift in shifts]
+    slopes = np.concatenate((near.slopes, near.path_slopes), axis=1)
+    slopes = np.concatenate((slopes, *(part[..., None] for part in late)), axis=-1)
+    missed, slope = near.misses, slopes[:, :-3]
     used = np.isfinite(missed) & np.isfinite(slope).all(axis=-1)
     limit = OUTLIER * np.median(np.abs(missed[used])) if used.any() else 0.0
     used &= ~(np.abs(missed) > limit).any(axis=1, keepdims=True)
-    factor = _sandwich(np.where(used, missed, 0), np.where(used[..., None], slope, 0))
-    return np.einsum("ik,inj->knj", factor, np.nan_to_num(slopes[:, :, -3:]))
+    prior = np.append(near.prior, np.zeros(len(moving)))
+    factor = _sandwich(
+        np.where(used, missed, 0), np.where(used[..., None], slope, 0), prior, near.noise
+    )
+    modes = np.einsum("ik,nji->knj", factor, np.nan_to_num(slopes[:, -3:]))
+    return _of_shape(modes, points_of_views(still, learned.cameras)) if prior.any() else modes
+
+
+def _of_shape(modes: Floats, x: Floats) -> Floats:
+    """Modes, (k, n, 3), without moves and stretches of the whole path x, (n, 3), largest first.
+
+    What is smaller than `_SMALLEST` of the largest is left out.
+    """
+    seen = np.asarray(np.isfinite(x).all(axis=1))
+    centred = np.where(seen[:, None], x - x[seen].mean(axis=0), 0.0)
+    moves = [seen[:, None] * axis for axis in np.eye(3)]
+    frame, _ = np.linalg.qr(np.reshape([*moves, centred], (4, -1)).T)
+    flat = modes.reshape(len(modes), -1)
+    _, sizes, ways = np.linalg.svd(flat - flat @ frame @ frame.T, full_matrices=False)
+    kept = sizes > _SMALLEST * sizes[:1]
+    return (sizes[kept, None] * ways[kept]).reshape(-1, *x.shape)
 
 
 def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
@@ -118,12 +150,18 @@ def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
     return np.nan_to_num(np.array(modes))
 
 
-def _sandwich(missed: Floats, slope: Floats) -> Floats:
-    """A factor F of the covariance F F' of the parameters, from residuals (n, m) and slopes."""
-    bread = np.linalg.inv(np.einsum("nmk,nml->kl", slope, slope))
+def _sandwich(missed: Floats, slope: Floats, prior: Floats, noise: float) -> Floats:
+    """A factor F of the covariance F F' of the parameters, from residuals (n, m) and slopes.
+
+    `prior` is the information of measurements on the parameters, (k,).
+    """
+    information = np.einsum("nmk,nml->kl", slope, slope) + noise**2 * np.diag(prior)
+    size = np.sqrt(np.diag(information))  # of each parameter: units of pixels, metres and radians
+    bread = np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size)
     scores = np.einsum("nmk,nm->nk", slope, missed) @ bread
+    measured = noise**4 * bread @ np.diag(prior) @ bread
     # Not Cholesky's: exact tracks leave a covariance of zero but for rounding.
-    values, vectors = np.linalg.eigh(long_run_covariance(scores) * len(scores))
+    values, vectors = np.linalg.eigh(long_run_covariance(scores) * len(scores) + measured)
     return vectors * np.sqrt(np.maximum(values, 0.0))
 
 

@@ -65,6 +65,11 @@ class Unknowns:
         """Whether anything is unknown."""
         return bool(self.uncalibrated.size or self.unplaced.size)
 
+    @property
+    def measured(self) -> bool:
+        """Whether something that is given has an error."""
+        return any(any(camera.errors.values()) for camera in self.cameras)
+
     def vector(self, turned: Complex, offsets: Floats) -> Floats:
         """The vector of s exp(i theta), (u,), and offsets, (v, 2)."""
         return np.concatenate((np.log(turned).view(float), (offsets / self.width).ravel()))
@@ -200,7 +205,8 @@ def solve(design: Floats, target: Floats, unknowns: Unknowns) -> tuple[Complex, 
     misfit = np.sqrt(np.mean((design @ solution - target) ** 2)) / scale if scale > 0 else np.inf
     _, singular, right = np.linalg.svd(design, full_matrices=False)
     motion = singular / np.sqrt(len(design))
-    weak = motion <= max(1e-9 * motion[0], 2 * misfit)
+    # What is missed by measurements is no noise; a later search takes these for what they are.
+    weak = motion <= max(1e-9 * motion[0], 0.0 if unknowns.measured else 2 * misfit)
     if weak.any():
         share = np.linalg.norm(right[weak].reshape(weak.sum(), -1, 2), axis=(0, 2))
         raise ValueError(

@@ -1,8 +1,10 @@
 """The report on a law discovered from videos: a page to read, and the same as data.
 
-`write_report` makes a folder of three files: ``report.html``, which needs no other file and no
-network, ``result.json``, and ``rig.toml`` with the learned cameras. The folder appears under its
-name only when it is complete.
+`write_report` makes a folder of four files: ``report.html``, which needs no other file and no
+network, ``result.json`` (``result.schema.json`` beside this module says what is in it),
+``tracks.csv``, and ``rig.toml`` with the learned cameras. `write_refusal` does the same, without
+cameras, if there is no law to report: then a picture of the tracks is what helps. The folder
+appears under its name only when it is complete.
 """
 
 from __future__ import annotations
@@ -13,24 +15,38 @@ import json
 import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
+from tqdm import tqdm
 
 from ..arrays import Floats
-from ..cameras import DISAGREEMENT, residuals
+from ..cameras import DISAGREEMENT, Rig, residuals
 from ..checks import check_path
 from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
+from ..refusal import Refused
 from ..study.plots import plot_frames, plot_path, plot_plateaus, plot_residuals, plot_rig
-from ..vision import read_frame, video_info
+from ..vision import VideoInfo, read_frame, video_info
 from .pages import page
+from .play import law_over_videos
 from .records import as_json
 
 LONGEST_NAME = 30  # characters above a picture
-PAGE, DATA, RIG = FILES = ("report.html", "result.json", "rig.toml")
+PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tracks.csv")
+FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
+
+STEPS = {
+    "track": "A target was not found in every video.",
+    "lags": "When each camera started could not be told.",
+    "cameras": "The cameras could not be learned.",
+    "law": "The path has no law that could be found.",
+}
+_TURNS = 5  # attempts to put a folder in place while another run does
 
 
 def check_folder_is_free(folder: str | Path) -> Path:
@@ -60,21 +76,24 @@ def check_folder_is_free(folder: str | Path) -> Path:
 
 def write_report(
     found: VideoDiscovery,
-    paths: Sequence[str | Path],
+    paths: Sequence[str | Path] | None,
     folder: str | Path,
     options: Mapping[str, object] | None = None,
+    progress: bool = False,
 ) -> Path:
     """Write the report on a law.
 
     Parameters
     ----------
     found : VideoDiscovery
-    paths : sequence of path
-        The video files, one per camera.
+    paths : sequence of path, or None
+        The videos, one per camera; None if there are tracks alone.
     folder : path
         Where; an earlier report is replaced.
     options : mapping, optional
         How the law was asked for, to be told in the report.
+    progress : bool
+        Show a progress bar.
 
     Returns
     -------
@@ -87,28 +106,112 @@ def write_report(
         If there is not one video per camera, or the folder holds anything but a report.
     """
     folder = check_folder_is_free(folder).absolute()
-    if len(paths) != len(found.rig.cameras):
+    if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)
-    with tempfile.TemporaryDirectory(prefix=".report-", dir=folder.parent) as scratch:
-        new, old = Path(scratch) / "new", Path(scratch) / "old"
-        new.mkdir()
-        (new / DATA).write_text(json.dumps(content, allow_nan=False, indent=1) + "\n", "utf-8")
+    with _replacing(folder) as new:
+        _write_data(new, content, found.t, found.tracks)
         found.rig.save(new / RIG)
-        (new / PAGE).write_text(_page(found, paths, content), "utf-8")
-        if folder.exists():
-            folder.rename(old)
-        try:
-            new.rename(folder)
-        except OSError:
-            if old.exists():
-                old.rename(folder)
-            raise
+        (new / PAGE).write_text(_page(found, paths, content, progress), "utf-8")
     return folder / PAGE
 
 
+def write_refusal(
+    refused: Refused,
+    paths: Sequence[str | Path] | None,
+    rig: Rig,
+    folder: str | Path,
+    options: Mapping[str, object] | None = None,
+) -> Path:
+    """Write what is known where no law was found: the tracks over the videos, and what failed.
+
+    Parameters
+    ----------
+    refused : Refused
+    paths, folder, options
+        See `write_report`.
+    rig : Rig
+        As it was given.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    folder = check_folder_is_free(folder).absolute()
+    names = _names(paths, len(refused.tracks))
+    content: dict[str, object] = {
+        "format": FORMAT, "status": "refused", "step": refused.step, "error": str(refused),
+        "videos": names, "options": dict(options or {}),
+        "tracks": [as_json(track, "tracks") for track in refused.tracks],
+        "share_of_frames_seen": [float(np.isfinite(t).all(axis=1).mean()) for t in refused.tracks],
+    }  # fmt: skip
+    sizes = [camera.image_size for camera in rig.cameras]
+    # See `_figures`.
+    plt.draw_if_interactive()
+    with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
+        look = _encoded(_overview(refused.tracks, paths, names, sizes))
+    frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
+    with _replacing(folder) as new:
+        _write_data(new, content, frames, refused.tracks, "frame")
+        text = page("refusal.html", look=look, what=STEPS[refused.step], data_file=DATA, **content)
+        (new / PAGE).write_text(text, "utf-8")
+    return folder / PAGE
+
+
+@contextmanager
+def _replacing(folder: Path) -> Iterator[Path]:
+    """A new folder, which takes the place of another when all is written into it."""
+    with tempfile.TemporaryDirectory(prefix=".report-", dir=folder.parent) as scratch:
+        new = Path(scratch) / "new"
+        new.mkdir()
+        yield new
+        for turn in range(_TURNS):  # another run may put its folder there in between
+            old = Path(scratch) / f"old{turn}"
+            if folder.exists():
+                folder.rename(old)
+            try:
+                new.rename(folder)
+                return
+            except OSError:
+                if old.exists() and not folder.exists():
+                    old.rename(folder)
+                    raise
+                if turn == _TURNS - 1:
+                    raise
+
+
+def _write_data(
+    folder: Path,
+    content: Mapping[str, object],
+    instants: Floats,
+    tracks: Sequence[Floats],
+    instant: str = "t",
+) -> None:
+    """The data as JSON, and the tracks as a table that `discover --tracks` reads."""
+    (folder / DATA).write_text(json.dumps(content, allow_nan=False, indent=1) + "\n", "utf-8")
+    columns = [f"{axis}{i + 1}" for i in range(len(tracks)) for axis in "uv"]
+    longest = len(instants)
+    whole = [np.pad(t, ((0, longest - len(t)), (0, 0)), constant_values=np.nan) for t in tracks]
+    rows = (
+        ",".join(f"{value:.10g}" if np.isfinite(value) else "" for value in row)
+        for row in np.column_stack((instants, *whole))
+    )
+    lines = [",".join((instant, *columns)), *rows]
+    (folder / TRACKS).write_text("\n".join(lines) + "\n", "utf-8")
+
+
+def _names(paths: Sequence[str | Path] | None, count: int) -> list[str]:
+    """What the videos are called."""
+    if paths is None:
+        return [f"camera {i + 1}" for i in range(count)]
+    return [Path(path).name for path in paths]
+
+
 def summary(
-    found: VideoDiscovery, paths: Sequence[str | Path], options: Mapping[str, object] | None = None
+    found: VideoDiscovery,
+    paths: Sequence[str | Path] | None,
+    options: Mapping[str, object] | None = None,
 ) -> dict[str, object]:
     """All that the report tells, as plain data for JSON; None in place of NaN.
 
@@ -119,12 +222,13 @@ def summary(
     """
     missed = residuals(found.tracks, found.rig)
     cameras = []
-    for i, (path, camera) in enumerate(zip(paths, found.rig.cameras, strict=True)):
-        shot, seen = video_info(path), np.isfinite(found.tracks[i]).all(axis=1)
+    names = _names(paths, len(found.rig.cameras))
+    for i, camera in enumerate(found.rig.cameras):
+        shot, seen = _shot(found, paths, i), np.isfinite(found.tracks[i]).all(axis=1)
         length = np.hypot(*missed[i].T)
         length = length[np.isfinite(length)]
         cameras.append({
-            "video": Path(path).name, "frames": shot.frames, "fps": shot.fps,
+            "video": names[i], "frames": shot.frames, "fps": shot.fps,
             "image_size": list(shot.size), "model": camera.model,
             "position": camera.position, "normal": camera.normal,
             "scale": camera.scale, "angle": camera.angle,
@@ -135,6 +239,7 @@ def summary(
         })  # fmt: skip
     law = found.discovery
     content = {
+        "format": FORMAT,
         "status": found.status,
         "warnings": list(found.warnings),
         "law": {
@@ -151,6 +256,14 @@ def summary(
         "residuals": missed,
     }
     return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
+
+
+def _shot(found: VideoDiscovery, paths: Sequence[str | Path] | None, i: int) -> VideoInfo:
+    """What is known of a video, or of the track that there is in its place."""
+    if paths is not None:
+        return video_info(paths[i])
+    rate = found.lags.rates[i] / float(np.median(np.diff(found.t)))
+    return VideoInfo(len(found.tracks[i]), rate, found.rig.cameras[i].image_size)
 
 
 def _law(found: Discovery, frame: str, origin: Floats, errors: Floats) -> dict[str, object]:
@@ -175,13 +288,23 @@ def _law(found: Discovery, frame: str, origin: Floats, errors: Floats) -> dict[s
 # ---------------------------------------------------------------------------------------- the page
 
 
-def _page(found: VideoDiscovery, paths: Sequence[str | Path], content: Mapping[str, object]) -> str:
+def _page(
+    found: VideoDiscovery,
+    paths: Sequence[str | Path] | None,
+    content: Mapping[str, object],
+    progress: bool = False,
+) -> str:
     """The report as one HTML page."""
-    about = {"limit": DISAGREEMENT, "data_file": DATA, "rig_file": RIG}
-    return page("report.html", figures=_figures(found, paths), **about, **content)
+    total = 3 + (paths is not None) + found.rig.is_orthographic
+    figures = tqdm(_figures(found, paths), desc="report", total=total, disable=not progress)
+    about = {"limit": DISAGREEMENT, "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
+    film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
+    return page("report.html", figures=figures, film=film, **about, **content)
 
 
-def _figures(found: VideoDiscovery, paths: Sequence[str | Path]) -> Iterator[tuple[str, str]]:
+def _figures(
+    found: VideoDiscovery, paths: Sequence[str | Path] | None
+) -> Iterator[tuple[str, str]]:
     """The figures one after the other, each a PNG in base64, by their names in the template."""
     # The first use of pyplot switches the figures of a notebook on, the end of a style whatever was
     # switched on meanwhile off again: so this comes first.
@@ -189,7 +312,7 @@ def _figures(found: VideoDiscovery, paths: Sequence[str | Path]) -> Iterator[tup
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
         yield "path", _encoded(plot_path(found.t, found.x, found.discovery.curve(found.t)))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
-        if seen.any():
+        if seen.any() and paths is not None:
             yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
         if found.rig.is_orthographic:
             yield "rig", _encoded(plot_rig(found.rig, found.x))
@@ -202,12 +325,32 @@ def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int
     """The frames of all videos at one instant of the first."""
     places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
     images = [read_frame(path, frame) for path, frame in places]
-    titles = [f"{_short(path.name)}, frame {frame}" for path, frame in places]
+    titles = [f"{_short(path.name, i)}, frame {k}" for i, (path, k) in enumerate(places)]
     return plot_frames(images, titles, found.tracks, instant)
 
 
-def _short(name: str) -> str:
-    """A file's name as it fits above its picture, where a dollar sign would begin a formula."""
+def _overview(
+    tracks: Sequence[Floats],
+    paths: Sequence[str | Path] | None,
+    names: Sequence[str],
+    sizes: Sequence[tuple[int, int]],
+) -> Figure:
+    """A frame in the middle of what is seen of the target in each view, with its whole track."""
+    seen = [np.flatnonzero(np.isfinite(track).all(axis=1)) for track in tracks]
+    shown = [int(k[len(k) // 2]) if len(k) else 0 for k in seen]
+    images = [
+        np.full((height, width, 3), 255, np.uint8) if paths is None else read_frame(paths[i], k)
+        for i, ((width, height), k) in enumerate(zip(sizes, shown, strict=True))
+    ]
+    titles = [f"{_short(name, i)}, frame {shown[i]}" for i, name in enumerate(names)]
+    return plot_frames(images, titles, tracks, shown)
+
+
+def _short(name: str, i: int) -> str:
+    """A video's name as it fits above its picture, where a dollar sign would begin a formula."""
+    glyphs = get_font(findfont("sans")).get_charmap()
+    if any(ord(letter) not in glyphs for letter in name):
+        return f"video {i + 1}"
     fitting = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
     return fitting.replace("$", r"\$")
 

@@ -1,6 +1,7 @@
 """Files and pixels: where the target is in each frame of a video, and films of synthetic scenes.
 
 video       reading and writing of video files; stills reads films that are folders of images
+track_files tracks as text files: DLTdv's, Tracker's, DeepLabCut's and ours
 tracking    track: a video in, the target's pixels out, by one of
 background      what differs from a background at rest (the most exact)
 moving          what moves most plainly, if camera and background are not: steadying takes out the
@@ -15,5 +16,14 @@ from .hints import Hint, load_hints
 from .rendering import render, render_labelled, render_restless, render_video
 from .scenery import BACKGROUNDS
 from .scenes import SHAPES, Scene
+from .track_files import TrackFile, read_tracks
 from .tracking import Track, check_detector, track
-from .video import VideoInfo, frame_clock, read_frame, read_video, video_info, write_video
+from .video import (
+    VideoInfo,
+    frame_clock,
+    pick_frames,
+    read_frame,
+    read_video,
+    video_info,
+    write_video,
+)

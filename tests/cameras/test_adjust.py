@@ -1,0 +1,267 @@
+"""Bundle adjustment: rigs measured by hand, lenses and shutters learned, outliers, what remains."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import vidsindy_lite as vl
+from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
+from vidsindy_lite.cameras.adjust import adjust
+from vidsindy_lite.cameras.changes import PARTS, SIZE, changed, known_to
+from vidsindy_lite.cameras.shutter import steadied
+from vidsindy_lite.cameras.triangulate import Views
+
+SEEDS = st.integers(0, 2**32 - 1)
+HAND = {"normal_error": 2.0, "position_error": 0.03, "scale_error": 0.03}
+
+
+def walk(t):
+    """A path in a room, metres, that never repeats itself; t in frames of a video."""
+    t = np.asarray(t)[:, None] / 40
+    return np.array([0.6, 0.5, 0.4]) * np.sin(t * [1.0, 1.31, 0.77] + [0, 1, 2])
+
+
+def room(rng, cameras=3, **lens):
+    """Cameras with 60 degree lenses, 2 to 4 m from the middle of a room."""
+    views = []
+    turn = rng.uniform(0, 2 * np.pi)
+    for i in range(cameras):
+        azimuth, height = turn + 2 * np.pi * i / cameras, rng.uniform(0.1, 0.6)
+        away = np.array([np.cos(azimuth), np.sin(azimuth), height])
+        views.append(
+            vl.PerspectiveCamera(
+                position=rng.uniform(2, 4) * away / np.linalg.norm(away),
+                normal=away + 0.03 * rng.normal(size=3),
+                scale=1 / 1109,
+                angle=rng.uniform(-np.pi, np.pi),
+                image_size=(1280, 720),
+                **lens,
+            )
+        )
+    return vl.Rig(views)
+
+
+def by_hand(rng, rig, **more):
+    """The rig as a hand measures it: 2 degrees, 3 cm, 3 %."""
+    return vl.Rig(
+        replace(
+            c,
+            normal=c.normal + np.deg2rad(2) * rng.normal(size=2) @ c.rows,
+            position=c.position + 0.03 * rng.normal(size=3),
+            scale=c.scale * np.exp(0.03 * rng.normal()),
+            angle=c.angle + np.deg2rad(2) * rng.normal(),
+            **HAND | more,
+        )
+        for c in rig.cameras
+    )
+
+
+def film(rng, rig, noise=0.5, n=400):
+    """Path and tracks; rolling shutters look at each row when it is read."""
+    x, tracks = walk(np.arange(n)), []
+    for camera in rig.cameras:
+        height, seen = camera.image_size[1], camera.project(x)
+        for _ in range(10):
+            late = camera.readout * (seen[:, 1] - (height - 1) / 2) / height
+            seen = camera.project(walk(np.arange(n) + late))
+        tracks.append(seen + noise * rng.normal(size=seen.shape))
+    return x, tracks
+
+
+def aligned_error(found, x):
+    """Root mean square of what the best similarity leaves."""
+    a, b = found - found.mean(axis=0), x - x.mean(axis=0)
+    u, s, v = np.linalg.svd(b.T @ a)
+    s[2] *= (sign := np.sign(np.linalg.det(u @ v)))
+    turned = a @ (u @ np.diag([1, 1, sign]) @ v).T * s.sum() / np.sum(a**2)
+    return np.sqrt(np.mean(np.sum((turned - b) ** 2, axis=1)))
+
+
+@given(SEEDS, st.integers(3, 5))
+@settings(max_examples=8)
+def test_a_rig_measured_by_hand_becomes_as_good_as_the_true_one(seed, cameras):
+    rng = np.random.default_rng(seed)
+    rig = room(rng, cameras)
+    x, tracks = film(rng, rig)
+    given_rig = by_hand(rng, rig)
+    learned = learn_cameras(tracks, given_rig)
+    assert learned.warnings == ()
+    best = aligned_error(vl.reconstruct(tracks, rig), x)
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 1.1 * best + 1e-4
+    assert aligned_error(vl.reconstruct(tracks, given_rig), x) > 2 * best
+
+
+def test_cameras_stay_as_close_to_the_measurements_as_these_are_good():
+    rng = np.random.default_rng(5)
+    rig = room(rng, 4)
+    _, tracks = film(rng, rig)
+    learned = learn_cameras(tracks, by_hand(rng, rig))
+    for found, true in zip(learned.cameras, rig.cameras, strict=True):
+        assert np.linalg.norm(found.position - true.position) < 0.15
+        assert np.arccos(found.normal @ true.normal) < np.deg2rad(4)
+        assert abs(np.log(found.scale / true.scale)) < 0.1
+
+
+def test_exact_measurements_are_not_touched():
+    rng = np.random.default_rng(1)
+    rig = room(rng)
+    _, tracks = film(rng, rig)
+    assert learn_cameras(tracks, rig) == rig
+    learned = learn_cameras(tracks, rig.uncalibrated())
+    for found, true in zip(learned.cameras, rig.cameras, strict=True):
+        np.testing.assert_array_equal(found.position, true.position)
+        np.testing.assert_array_equal(found.normal, true.normal)
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_outliers_do_no_harm(measured):
+    rng = np.random.default_rng(2)
+    rig = room(rng)
+    x, tracks = film(rng, rig)
+    start = by_hand(rng, rig) if measured else rig.uncalibrated()
+    wild = [track.copy() for track in tracks]
+    far = rng.uniform(size=(len(wild), len(x))) < 0.05
+    for track, frames in zip(wild, far, strict=True):
+        track[frames] += 50 * rng.normal(size=(frames.sum(), 2))
+    clean = vl.reconstruct(tracks, learn_cameras(tracks, start))
+    learned = vl.reconstruct(tracks, learn_cameras(wild, start))
+    assert aligned_error(learned, x) < 1.05 * aligned_error(clean, x) + 1e-4
+
+
+def test_a_lens_is_learned_where_the_motion_tells():
+    rng = np.random.default_rng(3)
+    rig = room(rng, 4, distortion=(-0.1,))
+    x, tracks = film(rng, rig)
+    unknown = by_hand(rng, rig, distortion=None, distortion_error=0.2)
+    learned = learn_cameras(tracks, unknown)
+    best = aligned_error(vl.reconstruct(tracks, rig), x)
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 1.1 * best
+    blind = learn_cameras(tracks, by_hand(rng, rig, distortion=None))
+    assert aligned_error(vl.reconstruct(tracks, blind), x) > 1.3 * best
+
+
+def test_a_rolling_shutter_is_learned():
+    rng = np.random.default_rng(4)
+    rig = room(rng, 3, readout=0.3)
+    x, tracks = film(rng, rig)
+    learned = learn_cameras(tracks, by_hand(rng, rig, readout=0.0, readout_error=0.5))
+    np.testing.assert_allclose([c.readout for c in learned.cameras], 0.3, atol=0.15)
+    best = aligned_error(vl.reconstruct(tracks, rig), x)
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 1.1 * best
+
+
+@pytest.mark.parametrize("readout", [0.3, -0.8])
+def test_a_known_readout_is_undone(readout):
+    rng = np.random.default_rng(6)
+    rig = room(rng, 3, readout=readout)
+    x, tracks = film(rng, rig, noise=0)
+    # Inside, where the spline has neighbours on both sides.
+    np.testing.assert_allclose(vl.reconstruct(tracks, rig)[5:-5], x[5:-5], atol=1e-5)
+    still = vl.Rig(replace(c, readout=0.0) for c in rig.cameras)
+    assert np.abs(vl.reconstruct(tracks, still) - x).max() > 1e-3
+
+
+def test_a_global_shutter_and_gaps_stay_as_they_are():
+    track = np.cumsum(np.ones((9, 2)), axis=0)
+    track[4] = np.nan
+    assert steadied(track, 0.0, 100) is track
+    assert (
+        np.isnan(steadied(track, 0.5, 100)).any(axis=1).tolist()
+        == [False] * 4 + [True] + [False] * 4
+    )
+    short = np.full((9, 2), np.nan)
+    short[:3] = 1.0
+    assert steadied(short, 0.5, 100) is short
+
+
+@given(SEEDS)
+@settings(max_examples=20)
+def test_a_change_and_back(seed):
+    rng = np.random.default_rng(seed)
+    camera = room(rng).cameras[0]
+    change = 0.01 * rng.normal(size=SIZE)
+    change[PARTS["normal"]] = 0.0  # a tilt turns the axes of the next one
+    moved = changed(camera, change)
+    back = changed(moved, -change)
+    x = walk(np.arange(20))
+    np.testing.assert_allclose(back.project(x), camera.project(x), atol=1e-9)
+    assert changed(camera, np.zeros(SIZE)) is camera
+
+
+def test_what_is_known_of_a_camera():
+    rng = np.random.default_rng(0)
+    camera = replace(room(rng).cameras[0], **HAND, principal_point_error=3.0, distortion_error=0.1)
+    errors = known_to(camera)
+    np.testing.assert_allclose(errors[PARTS["normal"]], np.deg2rad(2))
+    np.testing.assert_allclose(errors[PARTS["angle"]], np.deg2rad(2))
+    np.testing.assert_allclose(errors[PARTS["scale"]], 0.03)
+    np.testing.assert_allclose(errors[PARTS["position"]], 0.03)
+    np.testing.assert_allclose(errors[PARTS["distortion"]], [0.1, 0.1, 0.01, 0.01])
+    assert np.isinf(known_to(replace(camera, scale=None, angle=None))[2:4]).all()
+    flat = vl.OrthographicCamera(normal=(0, 0, 1), scale=1.0, angle=0.0)
+    assert known_to(flat)[PARTS["position"]].tolist() == [np.inf, np.inf, 0.0]
+
+
+def test_orthographic_normals_measured_by_hand():
+    x = 10 * walk(np.arange(400))
+    rng = np.random.default_rng(8)
+    rig = vl.Rig.around(x)
+    tracks = [c.project(x) + 0.5 * rng.normal(size=(400, 2)) for c in rig.cameras]
+    tilted = vl.Rig(
+        replace(c, normal=c.normal + 0.03 * rng.normal(size=2) @ c.rows, normal_error=2.0)
+        for c in rig.cameras
+    ).uncalibrated()
+    learned = learn_cameras(tracks, tilted)
+    best = aligned_error(vl.reconstruct(tracks, rig), x)
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 2 * best
+    blind = vl.Rig(replace(c, normal_error=0.0) for c in tilted.cameras)
+    assert aligned_error(vl.reconstruct(tracks, learn_cameras(tracks, blind)), x) > 4 * best
+
+
+def test_what_remains_uncertain_is_as_large_as_the_error():
+    """Over many rigs the error of the path lies in the modes, and is as large as they say."""
+    size = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        rig = room(rng, 4)
+        x, tracks = film(rng, rig, n=200)
+        given_rig = by_hand(rng, rig)
+        learned = learn_cameras(tracks, given_rig)
+        still = Lags(np.zeros(4), np.ones(4), np.zeros(4), 0.0)
+        modes = systematic_errors(tracks, given_rig, learned, still)
+        exact = [camera.project(x) for camera in rig.cameras]
+        off = vl.reconstruct(exact, learned) - x
+        # Moves and stretches of the whole are no part of the modes.
+        frame = np.linalg.qr(
+            np.column_stack([*(np.tile(e, 200) for e in np.eye(3)), (x - x.mean(0)).ravel()])
+        )[0]
+        off = off.ravel() - frame @ (frame.T @ off.ravel())
+        flat = modes.reshape(len(modes), -1)
+        told = np.linalg.lstsq(flat.T, off)[0]
+        assert np.sum((off - told @ flat) ** 2) < 0.05 * np.sum(off**2) + 1e-8
+        size.append(told[:7] ** 2)
+    assert 0.3 < np.mean(size) < 3
+
+
+def test_a_still_target_tells_nothing():
+    rng = np.random.default_rng(9)
+    rig = room(rng)
+    spot = [np.tile(c.project(np.zeros((1, 3))), (50, 1)) for c in rig.cameras]
+    with pytest.raises(ValueError, match="the target's motion must determine scale and angle"):
+        learn_cameras(spot, by_hand(rng, rig).uncalibrated())
+
+
+def test_noise_and_outliers_are_told_apart():
+    rng = np.random.default_rng(10)
+    rig = room(rng, 4)
+    _, tracks = film(rng, rig, n=1000)
+    tracks[2][100] += 80
+    errors = np.array([known_to(c) for c in by_hand(rng, rig).cameras])
+    found = adjust(Views.of(tracks), rig.cameras, errors)
+    assert abs(found.noise - 0.5) < 0.03
+    assert found.weights[100] < 0.01
+    assert np.sum(found.weights < 1) < 5
+    assert found.settled

@@ -1,0 +1,79 @@
+"""What may be wrong of a camera, as one vector of changes, and by how much each is known.
+
+The vector holds two tilts of the normal and the in-plane angle (radians), the logarithm of the
+scale, the position along the axes of the view plane and along its normal (scene units), the
+principal point (pixels), k1, k2, p1, p2, and the readout of the shutter (frames).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from .camera import Camera
+from .models import OrthographicCamera, PerspectiveCamera
+
+PARTS = {
+    "normal": slice(0, 2),
+    "angle": slice(2, 3),
+    "scale": slice(3, 4),
+    "position": slice(4, 7),
+    "principal point": slice(7, 9),
+    "distortion": slice(9, 13),
+    "readout": slice(13, 14),
+}
+"""Which components of the vector belong to what."""
+
+SIZE = 14
+_TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
+
+
+def known_to(given: Camera) -> Floats:
+    """Standard errors of a camera of a rig: zero what is exact, infinite what is to be learned."""
+    errors = np.zeros(SIZE)
+    errors[PARTS["normal"]] = np.deg2rad(given.normal_error)
+    errors[PARTS["angle"]] = np.deg2rad(given.normal_error) if given.is_calibrated else np.inf
+    errors[PARTS["scale"]] = given.scale_error if given.is_calibrated else np.inf
+    errors[PARTS["position"]] = given.position_error if given.is_placed else np.inf
+    if isinstance(given, OrthographicCamera):
+        errors[PARTS["position"]][2] = 0.0  # it sees the same from anywhere on its axis
+    errors[PARTS["principal point"]] = given.principal_point_error
+    if isinstance(given, PerspectiveCamera):
+        errors[PARTS["distortion"]] = given.distortion_error * np.array(
+            [1, 1, _TANGENTIAL, _TANGENTIAL]
+        )
+    errors[PARTS["readout"]] = given.readout_error
+    return errors
+
+
+def units(width: float, image: float) -> Floats:
+    """Sizes of changes that matter about equally, for a scene and an image of these widths."""
+    sizes = np.ones(SIZE)
+    sizes[PARTS["position"]] = width
+    sizes[PARTS["principal point"]] = image
+    return sizes
+
+
+def changed(camera: Camera, change: Floats) -> Camera:
+    """A calibrated camera after a change. Its readout is that of the tracks, and not applied."""
+    part = {name: change[place] for name, place in PARTS.items()}
+    values: dict[str, Any] = {}
+    if part["normal"].any():
+        values["normal"] = camera.normal + part["normal"] @ camera.rows
+    if part["position"].any() and camera.position is not None:
+        axes = np.vstack((camera.rows, camera.normal))
+        values["position"] = camera.position + part["position"] @ axes
+    if part["principal point"].any():
+        values["principal_point"] = np.add(camera.centre, part["principal point"])
+    if part["distortion"].any() and isinstance(camera, PerspectiveCamera):
+        before = np.zeros(5) if camera.distortion is None else camera.distortion
+        values["distortion"] = before + np.append(part["distortion"], 0.0)
+    moved = replace(camera, **values) if values else camera
+    if part["angle"].any() or part["scale"].any():
+        scale, angle = camera.calibration
+        size, turn = np.exp(part["scale"][0]), np.exp(1j * (angle + part["angle"][0]))
+        moved = moved.calibrated(scale * size * turn)
+    return moved
