@@ -233,6 +233,14 @@ def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
     assert (tracked / "report" / "rig.toml").exists()
 
 
+def test_frames_of_files_count_from_the_start_of_their_videos(tracked):
+    for name, cut in (("a", 5), ("b", 9)):
+        header, *rows = (tracked / f"{name}.csv").read_text().split("\n")
+        (tracked / f"{name}.csv").write_text("\n".join([header, *rows[cut:]]))
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--lag", "0,0,0"]
+    assert main([*command, "--tracks", "a.csv", "b.csv", "c.csv"]) == 0
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -54,12 +54,15 @@ class TrackFile:
         Time of each row, if the file states it.
     warnings : tuple of str
         Why it may have been misunderstood.
+    start : int
+        Number of the frame of the first row.
     """
 
     name: str
     pixels: Floats
     t: Floats | None
     warnings: tuple[str, ...] = ()
+    start: int = 0
 
 
 def read_tracks(path: str | os.PathLike) -> list[TrackFile]:
@@ -250,7 +253,7 @@ def _whole(
     whole = (frames - frames[0]).astype(int)
     filled = np.full((whole[-1] + 1, 2), np.nan)
     filled[whole] = pixels
-    return TrackFile(name, filled, None, doubts)
+    return TrackFile(name, filled, None, doubts, int(frames[0]))
 
 
 def _unrounded(t: Floats) -> Floats:
