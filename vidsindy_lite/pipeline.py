@@ -72,14 +72,9 @@ def discover_from_videos(
     check_integer("degree", degree, 1)
     check_order(order)
     check_integer("seed", seed)
-<<<<<<< HEAD
     seen = observe(paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress)
-    return _with_law(seen, [Path(path).name for path in paths], degree, seed, progress)
-=======
-    seen = observe(paths, rig, t, lags=lags, detector=detector, progress=progress)
     names = [Path(path).name for path in paths]
     return _with_law(seen, names, degree=degree, order=order, seed=seed, progress=progress)
->>>>>>> next
 
 
 def discover_from_tracks(
