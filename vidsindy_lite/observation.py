@@ -14,17 +14,19 @@ from tqdm import tqdm
 from .arrays import Floats
 from .cameras import (
     DISAGREEMENT,
+    GROSS,
     Clock,
     Lags,
     Rig,
     align,
     check_learnable,
     disagreement,
+    explain,
     learn_cameras,
     learn_lags,
-    learn_normal,
     list_lags,
     reconstruct,
+    smooth,
     systematic_errors,
     trailing_errors,
 )
@@ -205,7 +207,7 @@ def _observed(
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
-            *_rig_warnings(missed, tracks, rig, names, best),
+            *_rig_warnings(tracks, rig, learned, names, best),
             *learned.warnings,
             *doubts,
             *told.warnings,
@@ -308,33 +310,35 @@ def _refuse_wrong(lags: Floats, learned: Lags) -> None:
 
 
 def _rig_warnings(
-    missed: Sequence[float], tracks: Sequence[Floats], given: Rig, names: Sequence[str], lags: Lags
+    tracks: Sequence[Floats],
+    given: Rig,
+    learned: Rig,
+    names: Sequence[str],
+    lags: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?
 
-    `missed` is their disagreement, `given` the rig before it was learned, `lags` are the best.
+    `lags` are the best ones.
     """
-    if max(missed) <= DISAGREEMENT:
-        return []
+    missed = disagreement(tracks, learned)
     sizes = ", ".join(f"{size:.1f}" for size in missed)
     apart = (
-        "in one frame of ten, tracked and reconstructed target lie more than "
-        f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
+        f"in one frame of ten, tracked and reconstructed target lie more than {sizes} pixels apart"
     )
-    if lags.agree:  # at lags that differ by too little from the given ones to refuse these
+    if max(missed) > DISAGREEMENT and lags.agree:  # others are too close to refuse the given ones
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
             f"({list_lags(lags.frames)}) would explain it best"
         ]
-    # The largest residual does not tell which camera is wrong: the others were fitted to it.
-    others = [learn_normal(tracks, given, i) for i in range(len(names))]
-    left = [max(disagreement(tracks, other)) for other in others]
-    i = int(np.argmin(left))
-    normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
-    advice = (
-        f"the normal ({normal}) of cameras[{i}] ({names[i]}) would explain it best"
-        if left[i] <= DISAGREEMENT
-        else "no single wrong normal explains it; check the positions, the scales and angles that "
-        "are given, and that at least half of the shortest video is in common with the others"
-    )
+    why = explain(tracks, given, learned)
+    if why is not None and why.left <= max(GROSS, max(missed) / 3):
+        advice = f"{why.text(names)} would explain it best"
+    elif max(missed) > GROSS and smooth(tracks, learned):
+        advice = (
+            "no single cause explains it; check the positions and normals, the scales and angles "
+            "that are given, and that at least half of the shortest video is in common with the "
+            "others; what was measured by hand should have its error in the rig file"
+        )
+    else:
+        return []
     return [f"the rig does not agree with the tracks: {apart}: {advice}"]
