@@ -1,9 +1,14 @@
 """The command line on one's own videos: from three lossy files to a report, or one clear error."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -228,6 +233,14 @@ def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):
     assert (tracked / "report" / "rig.toml").exists()
 
 
+def test_frames_of_files_count_from_the_start_of_their_videos(tracked):
+    for name, cut in (("a", 5), ("b", 9)):
+        header, *rows = (tracked / f"{name}.csv").read_text().split("\n")
+        (tracked / f"{name}.csv").write_text("\n".join([header, *rows[cut:]]))
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--lag", "0,0,0"]
+    assert main([*command, "--tracks", "a.csv", "b.csv", "c.csv"]) == 0
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -243,6 +256,56 @@ def test_bad_tracks_are_told(tracked, capsys, options, message):
     assert main(["discover", "--rig", "rig.toml", *options]) == 2
     assert f"error: {message}" in capsys.readouterr().err
     assert not (tracked / "report").exists()
+
+
+def test_a_full_disk_is_one_line_and_the_law_is_told(tracked, capsys, monkeypatch):
+    def full(path, *_):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--degree", "2", "--tracks"]
+    assert main([*command, "a.csv", "b.csv", "c.csv"]) == 2
+    shown = capsys.readouterr()
+    assert shown.out.startswith("dx/dt = ")
+    (line,) = [one for one in shown.err.splitlines() if one.startswith("error:")]
+    assert "No space left on device" in line
+    assert not list(tracked.glob("*report*"))
+
+
+@pytest.mark.slow
+def test_every_kind_of_film_under_any_name(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    long = "長" * 60 + "l" * 60 + ".avi"
+    (tmp_path / long).write_bytes((folder / "a.avi").read_bytes())
+    names = [long, "it's $5 「弾む球」", 'say "b_%04d.png"']
+    for video, prefix in zip("bc", (f"{names[1]}/", 'say "b_'), strict=True):
+        (tmp_path / names[1]).mkdir(exist_ok=True)
+        ending = '"' if "b_" in prefix else ""
+        for i, frame in enumerate(vl.read_video(folder / f"{video}.avi")):
+            path = tmp_path / f"{prefix}{i:04d}.png{ending}"
+            path.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
+    command = ["discover", *names, "--rig", str(folder / "rig.toml"), "--fps", "30"]
+    assert main([*command, "--degree", "2", "--out", "$報告 'r'"]) in (0, 1)
+    shown = capsys.readouterr().out
+    assert "report: $報告 'r'/report.html" in shown
+    data = json.loads((tmp_path / "$報告 'r'" / "result.json").read_text("utf-8"))
+    assert [camera["video"] for camera in data["cameras"]] == names
+    assert data["cameras"][1]["lag"] == pytest.approx(7, abs=0.1)
+
+
+def test_ctrl_c_ends_the_command_in_one_line(tracked):
+    command = [sys.executable, "-m", "vidsindy_lite", "discover", "--rig", "rig.toml", "--fps", "9"]
+    environment = os.environ | {"PYTHONPATH": str(Path(vl.__file__).parent.parent)}
+    with subprocess.Popen(
+        [*command, "--degree", "5", "--tracks", "a.csv", "b.csv", "c.csv"],
+        env=environment, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    ) as running:  # fmt: skip
+        running.stderr.read(1)  # of the progress bar
+        running.send_signal(signal.SIGINT)
+        _, shown = running.communicate(timeout=60)
+    assert "Traceback" not in shown
+    assert running.returncode == 130
+    assert not list(tracked.glob("*report*"))
 
 
 def test_the_version(capsys):

@@ -3,9 +3,11 @@
 import re
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from helpers import trajectory
+from phones import write_at
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
@@ -143,12 +145,42 @@ def occupied(studio):
     return told(check_folder_is_free, studio.folder)
 
 
+def dropping(studio):
+    """Even times for a video of which a frame was dropped."""
+    kept = np.delete(np.arange(FRAMES), 40)
+    frames = [frame for k, frame in enumerate(vl.read_video(studio.paths[0])) if k != 40]
+    path = write_at(studio.folder / "dropped.mov", kept / 25, frames)
+    return studio.says([path, *studio.paths[1:]], t=np.arange(len(kept)) / 25)
+
+
+def named_by_times(studio):
+    folder = studio.folder / "images"
+    folder.mkdir()
+    for milliseconds in (33, 67, 100):
+        cv2.imwrite(str(folder / f"{milliseconds}.png"), np.zeros((*SIZE, 3), np.uint8))
+    return studio.without_last(folder)
+
+
+def track_file(studio, text):
+    path = studio.folder / "track.txt"
+    path.write_text(text)
+    return told(vl.discover_from_tracks, [path], studio.rig, fps=30)
+
+
 TROUBLES = {
     "no such video file": lambda studio: studio.without_last(studio.folder / "none.mkv"),
     "must be a video file that PyAV can read": unreadable,
     "frames that its header states": damaged,
     "must show one moving target": still,
     "must have the image size of its camera": other_size,
+    "must fit the times that the first video's file states": dropping,
+    "the numbers of images must count frames": named_by_times,
+    "must hold one target": lambda studio: track_file(
+        studio, "pt1_cam1_X,pt1_cam1_Y,pt2_cam1_X,pt2_cam1_Y\n1,2,3,4\n"
+    ),
+    "got x and y of Tracker with another origin": lambda studio: track_file(
+        studio, "mass_A\nt,x,y\n0,-1.5,0.5\n1,-1.4,0.3\n"
+    ),
     "there must be one video per camera": lambda studio: studio.says(studio.paths[:2]),
     "at least one camera must be calibrated": uncalibrated,
     "the positions of two cameras with independent normals must be given": without_positions,

@@ -121,6 +121,21 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     return discover_from_videos(options.videos, rig, t, detector=options.detector, **shared)
 
 
+def _pick(options: argparse.Namespace) -> int:
+    """Write a page on which you show the target, if the tracker takes something else for it.
+
+    Open the page in any browser, without a network: a box that is drawn around the target in one
+    frame becomes a line for the rig file, and one for Python.
+
+    examples:
+      python -m vidsindy_lite pick a.mp4 b.mp4 c.mp4
+    """
+    from .companion.pick import write_pick_page
+
+    print(f"open {write_pick_page(options.videos, options.out)} in a browser")
+    return 0
+
+
 def _rig_template(options: argparse.Namespace) -> int:
     """Print a rig file with a comment on every value, to be filled in with what you measured."""
     from .cameras import rig_template
@@ -287,6 +302,10 @@ COMMANDS = {
             "ONNX file (default: auto)", default="auto"
         ),
         "--seed": _count(0, "of the search (default: 0)"),
+    }),
+    "pick": _Command(_pick, "a page on which you show the target in your videos", {
+        "videos": _text("VIDEO", "a file, a folder of images, or a pattern", nargs="+"),
+        "--out": _text("FILE", "the page (default: pick.html)", default="pick.html"),
     }),
     "rig-template": _Command(_rig_template, "print a rig file to fill in", {
         "--cameras": _count(3, "how many (default: 3)"),

@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import Floats
 from .cameras import Rig
 from .checks import check_integer, check_positive, check_rows
 from .dynamics import Discovery, discover
@@ -131,7 +132,14 @@ def _read(tracks: Sequence[ArrayLike | str | os.PathLike]) -> list[TrackFile]:
         else:
             name = f"tracks[{len(read)}]"
             read.append(TrackFile(name, check_rows(name, cast("ArrayLike", track), 2), None))
-    return read
+    # Files that count frames from the start of their videos may begin at different ones.
+    first = min((track.start for track in read), default=0)
+    return [replace(track, pixels=_later(track.pixels, track.start - first)) for track in read]
+
+
+def _later(pixels: Floats, frames: int) -> Floats:
+    """A track after so many frames without a target."""
+    return np.pad(pixels, ((frames, 0), (0, 0)), constant_values=np.nan)
 
 
 def _times(

@@ -25,9 +25,9 @@ LIBRARIES = (
 )  # fmt: skip
 
 BY_DEFINITION = tuple(
-    f"{NAME}.{module}" for module in ("study.plots", "companion.artifacts", "companion.records")
+    f"{NAME}.{module}." for module in ("study.plots", "companion.artifacts", "companion.records")
 )
-WITHOUT_RESULTS = (f"{NAME}.companion", f"{NAME}.stamp")  # but for those above
+WITHOUT_RESULTS = (f"{NAME}.companion.", f"{NAME}.stamp.")  # but for those above
 IMPORTS = (ast.Import, ast.ImportFrom)
 NO_DATA = {".py", ".pyc", ".checkpoint"}  # suffixes
 
@@ -89,7 +89,19 @@ def source_stamp(source: str, root: str | os.PathLike | None = None) -> str:
         part = _part(source, "", False, None)
     except SyntaxError:
         part = _Part("", frozenset({(NAME, ())}), frozenset())
-    return _digest(source, part, root)
+    parts, files = _reached(part)
+    digest = hashlib.sha256(source.encode())
+    for node in sorted(parts):
+        digest.update(f"\0{node}\0{parts[node].meaning}".encode())
+    for file in files:
+        digest.update(b"\0" + file.relative_to(PACKAGE).as_posix().encode() + b"\0")
+        digest.update(file.read_bytes())
+    if root is not None:
+        pins = (Path(root) / "requirements.txt").read_text("utf-8")
+        lines = re.findall(r"^[\w.-]+==[\w.+]+", pins, re.MULTILINE)
+        ours = sorted(line for line in lines if line.partition("==")[0] in LIBRARIES)
+        digest.update("\0".join(ours).encode())
+    return digest.hexdigest()[:16]
 
 
 def code_stamp(function: Callable, root: str | os.PathLike | None = None) -> str:
@@ -107,24 +119,7 @@ def code_stamp(function: Callable, root: str | os.PathLike | None = None) -> str
     str
         16 hexadecimal digits.
     """
-    home, name = function.__module__, function.__qualname__
-    return _digest(f"{home}.{name}", _Part("", frozenset({(home, (name,))}), frozenset()), root)
-
-
-def _digest(first: str, start: "_Part", root: str | os.PathLike | None) -> str:
-    parts, files = _reached(start)
-    digest = hashlib.sha256(first.encode())
-    for node in sorted(parts):
-        digest.update(f"\0{node}\0{parts[node].meaning}".encode())
-    for file in files:
-        digest.update(b"\0" + file.relative_to(PACKAGE).as_posix().encode() + b"\0")
-        digest.update(file.read_bytes())
-    if root is not None:
-        pins = (Path(root) / "requirements.txt").read_text("utf-8")
-        lines = re.findall(r"^[\w.-]+==[\w.+]+", pins, re.MULTILINE)
-        ours = sorted(line for line in lines if line.partition("==")[0] in LIBRARIES)
-        digest.update("\0".join(ours).encode())
-    return digest.hexdigest()[:16]
+    return source_stamp(f"from {function.__module__} import {function.__qualname__}", root)
 
 
 # -------------------------------------------------------------------------------- what is reached
@@ -194,13 +189,9 @@ def _nodes(module: str, names: tuple[str, ...]) -> Iterator[Reference]:
 
 def _node(module: str, names: tuple[str, ...]) -> Iterator[Reference]:
     """A definition, or all of its module where definitions do not count for themselves."""
-
-    def is_under(folders: Iterable[str]) -> bool:
-        return any(f"{module}.".startswith(f"{folder}.") for folder in folders)
-
-    if is_under(BY_DEFINITION):
+    if f"{module}.".startswith(BY_DEFINITION):
         yield module, names
-    elif not is_under(WITHOUT_RESULTS):
+    elif not f"{module}.".startswith(WITHOUT_RESULTS):
         yield module, ()
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from browser import CHROMIUM, Browser
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
@@ -83,7 +84,9 @@ def test_the_page_needs_nothing_else(page):
     parser.feed(text)
     assert parser.open == []
     assert parser.images == 5
-    assert all(address.startswith("data:image/png;base64,") for address in parser.addresses)
+    kinds = [address.partition(",")[0] for address in parser.addresses]
+    assert sorted(set(kinds)) == ["data:image/png;base64", "data:video/webm;base64"]
+    assert kinds.count("data:video/webm;base64") == 1
     assert not re.search(r"https?:|@import|<script|<link", text)
     assert len(text) < 3_000_000
 
@@ -332,3 +335,17 @@ def test_two_runs_on_one_folder_leave_one_whole_report(case, tmp_path, monkeypat
     assert turns
     assert {path.name for path in folder.iterdir()} == set(FILES)
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the page in")
+def test_a_telephone_shows_the_report_without_scrolling_sideways(page, case, tmp_path):
+    found, paths = case
+    tracks = [track[:20] for track in found.tracks]
+    refused = Refused("paths: " + "a" * 300, "law", tracks)
+    other = write_refusal(refused, paths, found.rig, tmp_path / "out")
+    (tmp_path / "profile").mkdir()
+    with Browser(tmp_path / "profile") as browser:
+        for one in (page, other):
+            seen = browser.open(one, 390)
+            assert seen["width"] <= 390
+            assert (seen["errors"], seen["requests"], seen["broken"]) == ([], [], [])

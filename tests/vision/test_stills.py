@@ -55,7 +55,7 @@ def test_names_without_numbers_are_in_the_order_of_letters(tmp_path):
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        ([], "path: must hold images or be a pattern of their names"),
+        ([], "path: must be a video file, or a folder of images, got .* without any"),
         (["a1.png", "b1.png", "b2.png"], "must have its own number, got .*1.png and .*1.png"),
         (["0033.png", "0066.png", "0101.png"], "the numbers of images must count frames"),
         (["1.png", "2.png", "900.png", "1800.png", "2700.png"], "must count frames"),
@@ -70,7 +70,9 @@ def test_folders_that_are_no_film(tmp_path, names, message):
 
 def test_a_pattern_that_nothing_fits(tmp_path):
     path = tmp_path / "none" / "a_%04d.png"
-    with pytest.raises(ValueError, match=re.escape(f"of their names, got '{path}'")):
+    with pytest.raises(
+        FileNotFoundError, match=re.escape(f"nor images of that name, got '{path}'")
+    ):
         vl.read_video(path)
 
 

@@ -79,3 +79,24 @@ def test_the_start_that_an_editor_has_cut_off_does_not_count(tmp_path):
     assert frame_clock(path).tolist() == list(range(20))
     assert np.array_equal(read_frame(path, 4), frames[4])
     assert np.array_equal(frames[0], list(read_video(whole))[10])
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "pixels"),
+    [
+        ("a.mp4", "libx264", "yuv420p"),
+        ("a.mp4", "libx265", "yuv420p"),
+        ("a.mov", "libx265", "yuv420p10le"),
+        ("a.mov", "prores_ks", "yuv422p10le"),
+    ],
+)
+@pytest.mark.parametrize("size", [(96, 64), pytest.param((3840, 2160), marks=pytest.mark.slow)])
+def test_what_phones_code_is_read_in_eight_bits(tmp_path, name, codec, pixels, size):
+    ramp = np.linspace(30, 220, size[0]).astype(np.uint8)
+    frames = [np.tile(ramp[None, :, None], (size[1], 1, 3)) for _ in range(3)]
+    quality = {"x265-params": "log-level=none:crf=10"} if codec == "libx265" else {}
+    path = write_at(tmp_path / name, np.arange(3) / 30, frames, codec, pixels, **quality)
+    assert video_info(path) == (3, 30, size)
+    for ours, true in zip(read_video(path), frames, strict=True):
+        assert ours.dtype == np.uint8
+        assert np.abs(ours.astype(int) - true).mean() < 4

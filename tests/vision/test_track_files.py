@@ -59,9 +59,9 @@ def test_every_kind_is_read(tmp_path, text):
 
 def test_times_are_kept(tmp_path):
     (track,) = read(tmp_path, TIMES)
-    np.testing.assert_allclose(track.t, [0, 0.1, 0.2, 0.3])
+    np.testing.assert_allclose(track.t, [0, 0.1, 0.2, 0.3], atol=1e-12)
     (track,) = read(tmp_path, TRACKER_6)
-    np.testing.assert_allclose(track.t, [0, 0.033, 0.066, 0.099])
+    np.testing.assert_allclose(track.t, [0, 0.033, 0.066, 0.099], atol=1e-12)
     assert read(tmp_path, OURS)[0].t is None
 
 
@@ -108,3 +108,21 @@ def test_files_that_hold_no_track(tmp_path, text, message):
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(FileNotFoundError, match="tracks: no such file"):
         read_tracks(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("text", ["u,v\n,\n1,2\n,\n3,4\n", "u\tv\n\t\n1\t2\n\t\n3\t4\n"])
+def test_empty_rows_are_frames_without_a_target(tmp_path, text):
+    (track,) = read(tmp_path, text)
+    nan = [np.nan, np.nan]
+    np.testing.assert_array_equal(track.pixels, [nan, [1, 2], nan, [3, 4]])
+
+
+@pytest.mark.parametrize("digits", [2, 3, 6])
+def test_rounded_times_of_an_even_clock_are_even_again(tmp_path, digits):
+    kept = np.delete(np.arange(90), [4, 30, 31])
+    rows = "".join(f"{k / 29.97:.{digits}f},1,2\n" for k in kept)
+    (track,) = read(tmp_path, "t,u,v\n" + rows)
+    np.testing.assert_allclose(track.t, kept / 29.97, atol=0.2 * 10.0**-digits)
+    wavering = "".join(f"{k / 30 + 0.004 * (k % 3):.6f},1,2\n" for k in range(30))
+    (track,) = read(tmp_path, "t,u,v\n" + wavering)
+    np.testing.assert_allclose(track.t, [round(k / 30 + 0.004 * (k % 3), 6) for k in range(30)])

@@ -33,6 +33,7 @@ from ..refusal import Refused
 from ..study.plots import plot_frames, plot_path, plot_plateaus, plot_residuals, plot_rig
 from ..vision import VideoInfo, read_frame, video_info
 from .pages import page
+from .play import law_over_videos
 from .records import as_json
 
 LONGEST_NAME = 30  # characters above a picture
@@ -297,7 +298,8 @@ def _page(
     total = 3 + (paths is not None) + found.rig.is_orthographic
     figures = tqdm(_figures(found, paths), desc="report", total=total, disable=not progress)
     about = {"limit": DISAGREEMENT, "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
-    return page("report.html", figures=figures, **about, **content)
+    film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
+    return page("report.html", figures=figures, film=film, **about, **content)
 
 
 def _figures(

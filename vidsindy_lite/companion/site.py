@@ -29,6 +29,7 @@ SETTINGS = {
         "exclude_patterns": ["**/__main__.py"],
     }],
     "default_role": "py:obj",
+    "napoleon_use_param": False,  # or "shape" in the type of an argument links to `Scene.shape`
     "suppress_warnings": ["ref.python"],  # one name, several places
     "html_theme": "furo",
     "html_title": PACKAGE.name,
@@ -91,6 +92,8 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
         parts = root / "README.md", Path(__file__).parent / "contents.md"
         first = "".join(part.read_text("utf-8") for part in parts)
         (pages / "index.md").write_text(first, "utf-8")
-        Sphinx(pages, None, output, doctrees, "html", SETTINGS, warning=sys.stderr).build()
-    sign(output)
+        try:
+            Sphinx(pages, None, output, doctrees, "html", SETTINGS, warning=sys.stderr).build()
+        finally:
+            sign(output)  # what was interrupted is ours, too, and may be replaced
     return sorted(output.rglob("*.html"))

@@ -15,4 +15,12 @@ from .scenery import BACKGROUNDS
 from .scenes import SHAPES, Scene
 from .track_files import TrackFile, read_tracks
 from .tracking import Track, check_detector, track
-from .video import VideoInfo, frame_clock, read_frame, read_video, video_info, write_video
+from .video import (
+    VideoInfo,
+    frame_clock,
+    pick_frames,
+    read_frame,
+    read_video,
+    video_info,
+    write_video,
+)

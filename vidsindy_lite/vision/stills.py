@@ -40,7 +40,7 @@ def find_stills(path: Path) -> Stills | None:
 
     Raises
     ------
-    ValueError
+    FileNotFoundError, ValueError
         If there are no such images, or their numbers do not tell their order.
     """
     if path.is_file() or not (path.is_dir() or re.search(r"[*?]|%\d*d", path.name)):
@@ -52,8 +52,12 @@ def find_stills(path: Path) -> Stills | None:
         folder = path.parent if path.parent.is_dir() else Path()
         named = re.compile(_expression(path.name))
         files = [file for file in folder.iterdir() if named.fullmatch(file.name)]
+    if not files and not path.is_dir():
+        raise FileNotFoundError(f"path: no such video file, nor images of that name, got '{path}'")
     if not files:
-        raise ValueError(f"path: must hold images or be a pattern of their names, got '{path}'")
+        raise ValueError(
+            f"path: must be a video file, or a folder of images, got '{path}' without any"
+        )
     numbers = [_number(file) for file in files]
     if None in numbers:
         return Stills(sorted(files), np.arange(len(files), dtype=float))

@@ -54,12 +54,15 @@ class TrackFile:
         Time of each row, if the file states it.
     warnings : tuple of str
         Why it may have been misunderstood.
+    start : int
+        Number of the frame of the first row.
     """
 
     name: str
     pixels: Floats
     t: Floats | None
     warnings: tuple[str, ...] = ()
+    start: int = 0
 
 
 def read_tracks(path: str | os.PathLike) -> list[TrackFile]:
@@ -107,15 +110,14 @@ def read_tracks(path: str | os.PathLike) -> list[TrackFile]:
 
 
 def _cells(path: Path) -> list[list[str]]:
-    """The cells of a text file, line by line, without the empty lines."""
+    """The cells of a text file, line by line; a line of empty cells is a frame without target."""
     raw = path.read_bytes()
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
-    lines = [line for line in text.splitlines() if line.strip(" ,;\t")]
-    body = lines[-1] if lines else ""
-    separator = next((mark for mark in "\t;," if mark in body), " ")
+    lines = [line for line in text.splitlines() if line.strip(" ")]
+    separator = next((mark for mark in "\t;," if any(mark in line for line in lines[-3:])), " ")
     if separator == " ":
         return [line.split() for line in lines]
     cells = list(csv.reader(lines, delimiter=separator))
@@ -133,11 +135,10 @@ def _split(path: Path, cells: list[list[str]]) -> tuple[list[list[str]], list[li
 
 
 def _is_of_numbers(row: Sequence[str]) -> bool:
-    """Whether a line holds values: numbers, but for a name of an image in front."""
-    told = [cell for cell in row if cell.strip()]
-    rest = row[1:] if told and told[0] == row[0] and _number(row[0]) is None else row
+    """Whether a line holds values: numbers or nothing, but for a name of an image in front."""
+    rest = row[1:] if len(row) > 1 and _number(row[0]) is None else row
     numbers = [_number(cell) for cell in rest if cell.strip()]
-    return bool(numbers) and None not in numbers
+    return None not in numbers and (bool(numbers) or rest is row)
 
 
 def _number(cell: str) -> float | None:
@@ -246,13 +247,25 @@ def _whole(
     if t is not None and (not np.isfinite(t).all() or (np.diff(t) <= 0).any()):
         raise ValueError(f"tracks: {name} must have increasing times")
     if frames is None or t is not None:
-        return TrackFile(name, pixels, t, doubts)
+        return TrackFile(name, pixels, None if t is None else _unrounded(t), doubts)
     if not _counts(frames):
         raise ValueError(f"tracks: {name} must have increasing whole numbers of frames")
     whole = (frames - frames[0]).astype(int)
     filled = np.full((whole[-1] + 1, 2), np.nan)
     filled[whole] = pixels
-    return TrackFile(name, filled, None, doubts)
+    return TrackFile(name, filled, None, doubts, int(frames[0]))
+
+
+def _unrounded(t: Floats) -> Floats:
+    """Times as they were before they were rounded for a file, if an even clock fits them all."""
+    if len(t) < 3:
+        return t
+    last_digit = 10.0 ** -max(len(f"{value:.9f}".rstrip("0").partition(".")[2]) for value in t)
+    steps = np.diff(t)
+    counted = np.concatenate(([0.0], np.cumsum(np.rint(steps / np.median(steps)))))
+    even = np.polynomial.Polynomial.fit(counted, t, 1)(counted)
+    fits = (np.diff(counted) > 0).all() and np.abs(even - t).max() < last_digit
+    return even if fits else t
 
 
 def _counts(frames: Floats) -> bool:

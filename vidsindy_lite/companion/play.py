@@ -1,0 +1,100 @@
+"""The found law over the raw videos, as a short film for the report."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import cast
+
+import cv2
+import numpy as np
+
+from ..arrays import Floats, Image
+from ..pipeline import VideoDiscovery
+from ..vision import pick_frames
+
+_FRAMES = 200  # of the film at most
+_RATE = 25  # frames a second
+_HEIGHT = 270  # pixels of each view, which stand side by side
+_TRAIL = 40  # frames of the film that the curve reaches back
+_CURVE = (178, 114, 0)  # blue-green-red, as in the figures
+_TUBE = 2.0  # standard deviations of the track around the law
+_FAINT = 0.4  # share of the tube's colour
+
+
+def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes:
+    """The curve that obeys the law, drawn over the frames of all views, as WebM (VP9).
+
+    Around the curve lies a tube of two standard deviations of the track around it.
+
+    Parameters
+    ----------
+    found : VideoDiscovery
+    paths : sequence of path
+        The videos, one per camera.
+
+    Returns
+    -------
+    bytes
+    """
+    import av
+
+    instants = range(0, len(found.t), -(-len(found.t) // _FRAMES))
+    curve = found.discovery.curve(found.t)
+    views = [_view(found, Path(path), i, instants, curve) for i, path in enumerate(paths)]
+    file = io.BytesIO()
+    with av.open(file, "w", format="webm") as container:
+        options = {"deadline": "realtime", "cpu-used": "8", "crf": "36", "b": "0"}
+        stream = container.add_stream("libvpx-vp9", _RATE, options=options)
+        for k, images in enumerate(zip(*views, strict=True)):
+            side_by_side = np.hstack(images)
+            if k == 0:
+                stream.width, stream.height = side_by_side.shape[1::-1]
+                stream.pix_fmt = "yuv420p"
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(side_by_side, "bgr24")))
+        container.mux(stream.encode(None))
+    return file.getvalue()
+
+
+def _view(
+    found: VideoDiscovery, path: Path, i: int, instants: range, curve: Floats
+) -> Iterator[Image]:
+    """What one camera saw at these instants, with what it would see of the law; small."""
+    camera = found.rig.cameras[i]
+    pixels = camera.project(curve)
+    spread = float(np.sqrt(np.nanmean((found.tracks[i] - pixels) ** 2)))
+    width, height = camera.image_size
+    scale = _HEIGHT / height
+    size = 2 * round(width * scale / 2), _HEIGHT
+    numbers = [found.lags.frame_at(i, k) for k in instants]
+    known = sorted({number for number in numbers if number >= 0})
+    frames = zip(known, pick_frames(path, known), strict=False)
+    grey = np.full((_HEIGHT, size[0], 3), 128, np.uint8)
+    now, image = -1, grey
+    for j, number in enumerate(numbers):
+        while now < number:
+            now, frame = next(frames, (number, None))
+            image = grey if frame is None else _small(frame, size)
+        trail = pixels[instants[max(j - _TRAIL, 0)] : instants[j] + 1]
+        yield _drawn(image if number >= 0 else grey, (trail + 0.5) * scale - 0.5, spread * scale)
+
+
+def _small(frame: Image, size: tuple[int, int]) -> Image:
+    return cast("Image", cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
+
+
+def _drawn(image: Image, trail: Floats, spread: float) -> Image:
+    """A frame with the last part of the curve, the tube around it, and a ring at its end."""
+    shown = trail[np.isfinite(trail).all(axis=1)]
+    shown = shown[(np.abs(shown) < 10 * _HEIGHT).all(axis=1)]
+    if not len(shown):
+        return image
+    line = [np.rint(shown).astype(np.int32)[:, None]]
+    width = int(np.clip(2 * _TUBE * spread, 3, _HEIGHT))
+    tube = cv2.polylines(image.copy(), line, False, _CURVE, width, cv2.LINE_AA)
+    drawn = cv2.addWeighted(tube, _FAINT, image, 1 - _FAINT, 0)
+    cv2.polylines(drawn, line, False, _CURVE, 1, cv2.LINE_AA)
+    u, v = line[0][-1, 0].tolist()
+    cv2.circle(drawn, (u, v), 7, (255, 255, 255), 3, cv2.LINE_AA)
+    return cast("Image", cv2.circle(drawn, (u, v), 7, _CURVE, 1, cv2.LINE_AA))
