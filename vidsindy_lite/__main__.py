@@ -88,6 +88,7 @@ def _discover(options: argparse.Namespace) -> int:
     check_folder_is_free(options.out)
     rig, videos = Rig.load(options.rig), options.videos or None
     told = {"rig file": options.rig, "degree": options.degree, "seed": options.seed}
+    told |= {"order": options.order}
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
     told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
@@ -112,6 +113,7 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     from .vision import frame_clock
 
     shared = {name: getattr(options, name) for name in ("degree", "seed")}
+    shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
     shared |= {"lags": options.lag, "progress": True}
     if options.tracks:
         return discover_from_tracks(options.tracks, rig, fps=options.fps, **shared)
@@ -297,6 +299,11 @@ COMMANDS = {
             "files say, which makes it a second of video)", type=float
         ),
         "--degree": _count(3, "highest degree of the polynomials (default: 3)"),
+        "--order": _choice(
+            "1", ("1", "2", "auto"),
+            "1 for x' = f(x) (default), 2 for laws of motion, x'' = f(x, x'), auto for the one to "
+            "be trusted"
+        ),
         "--detector": _text(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "
             "ONNX file (default: auto)", default="auto"

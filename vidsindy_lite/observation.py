@@ -34,6 +34,7 @@ from .checks import check_path, check_tracks, check_vector
 from .refusal import Refused, refusing
 from .vision import Track, VideoInfo, check_detector, frame_clock, track, video_info
 
+_OTHER_LAG = 0.02  # frames by which it may differ without a word
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
@@ -134,7 +135,7 @@ def observe(
     tracks = [track.pixels for track in seen]
     _check_found(tracks, names)
     doubts = [warning for track in seen for warning in track.warnings]
-    return _observed(tracks, rig, clock, given, names, doubts)
+    return _observed(tracks, rig, clock, given, names, doubts, progress)
 
 
 def observe_tracks(
@@ -184,19 +185,22 @@ def _observed(
     lags: Floats | None,
     names: Sequence[str],
     doubts: Sequence[str] = (),
+    progress: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     with refusing("lags", raw, names):
-        best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven)
+        best = learn_lags(
+            raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress
+        )
         if lags is not None:
             _refuse_wrong(lags, best)
     used = best.frames if lags is None else lags
-    tracks = align(raw, used, clock.rates, clock.uneven)
+    tracks = align(raw, used, best.rates, clock.uneven)
     with refusing("cameras", raw, names):
         learned = learn_cameras(tracks, rig)
     missed = disagreement(tracks, learned)
     told = (
-        best if lags is None else Lags(lags, clock.rates, 0 * lags, max(missed), clocks=best.clocks)
+        best if lags is None else Lags(lags, best.rates, 0 * lags, max(missed), clocks=best.clocks)
     )
     shared = systematic_errors(raw, rig, learned, told), trailing_errors(tracks, learned)
     return Observation(
@@ -207,7 +211,7 @@ def _observed(
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
-            *_rig_warnings(tracks, rig, learned, names, best),
+            *_rig_warnings(tracks, rig, learned, names, used, best),
             *learned.warnings,
             *doubts,
             *told.warnings,
@@ -301,12 +305,17 @@ def _check_found(tracks: Sequence[Floats], names: Sequence[str]) -> None:
 
 def _refuse_wrong(lags: Floats, learned: Lags) -> None:
     """Refuse given lags if others are clearly those of the tracks."""
-    apart = np.abs(learned.frames - lags) > _WRONG_LAG + 5 * learned.errors
-    if learned.agree and apart.any():
+    if _apart(lags, learned, _WRONG_LAG):
         raise ValueError(
             f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
             f"({list_lags(learned.frames)}) do: leave them out, or check them"
         )
+
+
+def _apart(lags: Floats, learned: Lags, limit: float) -> bool:
+    """Whether lags differ clearly, and by more than so many frames, from those of the tracks."""
+    apart = np.abs(learned.frames - lags) > limit + 5 * learned.errors
+    return learned.agree and bool(apart.any())
 
 
 def _rig_warnings(
@@ -314,21 +323,28 @@ def _rig_warnings(
     given: Rig,
     learned: Rig,
     names: Sequence[str],
-    lags: Lags,
+    lags: Floats,
+    best: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?
 
-    `lags` are the best ones.
+    The tracks are those at the lags, `best` are the lags that the tracks themselves tell.
     """
     missed = disagreement(tracks, learned)
+    wrong_lag = _apart(lags, best, _OTHER_LAG)
+    if wrong_lag and max(missed) <= DISAGREEMENT:
+        return [
+            "the lags that are given differ from those of the tracks: "
+            f"({list_lags(lags)}) for ({list_lags(best.frames)}) frames: leave them out, or check"
+        ]
     sizes = ", ".join(f"{size:.1f}" for size in missed)
     apart = (
         f"in one frame of ten, tracked and reconstructed target lie more than {sizes} pixels apart"
     )
-    if max(missed) > DISAGREEMENT and lags.agree:  # others are too close to refuse the given ones
+    if wrong_lag:  # by too little to refuse them
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({list_lags(lags.frames)}) would explain it best"
+            f"({list_lags(best.frames)}) would explain it best"
         ]
     why = explain(tracks, given, learned)
     if why is not None and why.left <= max(GROSS, max(missed) / 3):
