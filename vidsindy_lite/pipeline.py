@@ -31,9 +31,8 @@ class VideoDiscovery(Observation):
     discovery: Discovery
 
     def __str__(self) -> str:
-        note = [f"note: {self.discovery.note}"] if self.discovery.note else []
         warnings = (f"warning: {text}" for text in self.warnings)
-        return "\n".join([self.discovery.equations(), *note, *warnings])
+        return "\n".join([self.discovery.statement(), *warnings])
 
 
 def discover_from_videos(

@@ -245,7 +245,8 @@ class Discovery:
 
         return read(path)
 
-    def __str__(self) -> str:
+    def statement(self) -> str:
+        """The law as text, and what was found out beside it: all but the warnings."""
         lines = [self.equations()]
         if self.model_error.any():
             sizes = zip(self.model_error, self.system.names, strict=True)
@@ -253,7 +254,10 @@ class Discovery:
             lines.append(f"kicked at random, by {kicks} over a unit of time")
         if self.note:
             lines.append(f"note: {self.note}")
-        return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return "\n".join([self.statement(), *(f"warning: {text}" for text in self.warnings)])
 
 
 def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discovery:

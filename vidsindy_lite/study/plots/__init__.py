@@ -9,7 +9,7 @@ from .cameras import plot_model_errors, plot_orthographic_error, plot_reconstruc
 from .cameras import plot_residuals, plot_rig, plot_rotation_accuracy, plot_scale_error, plot_table
 from .cameras import plot_tracks, plot_view_plane
 from .paths import plot_attractors, plot_coefficients, plot_divergence, plot_gaps, plot_in_plane
-from .paths import plot_path, plot_sampling
+from .paths import plot_forecast, plot_path, plot_sampling
 from .robustness import plot_methods, plot_pull_distribution, plot_pulls, plot_ratios
 from .robustness import plot_recomputed, plot_robustness, plot_shares, plot_verdicts
 from .robustness import plot_what_l2_sees

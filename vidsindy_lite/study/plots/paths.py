@@ -108,6 +108,23 @@ def plot_path(t: Floats, x: Floats, curve: Floats) -> Figure:
     return _over_time_and_in_space(t, curves, "not seen", "units of the equations")
 
 
+def plot_forecast(t: Floats, truth: Floats, told: Floats) -> Figure:
+    """A true motion and what a law foretells of it, over time and in space.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Time units.
+    truth, told : ndarray, shape (n, 3)
+        Positions, scene units.
+    """
+    curves = {
+        "true motion": (truth, {"color": "0.75", "lw": 4}),
+        "foretold by the law": (told, {"color": "C0", "lw": 1}),
+    }
+    return _over_time_and_in_space(t, curves, "", "units of the equations")
+
+
 def plot_attractors(curves: Mapping[str, tuple[Floats, Floats]]) -> Figure:
     """True motions and those of the discovered laws, one panel a system (Fig. 2).
 
@@ -169,8 +186,12 @@ def plot_coefficients(found: Discovery, truth: PolynomialSystem) -> Figure:
 def _over_time_and_in_space(
     t: Floats, curves: Mapping[str, tuple[Floats, dict[str, Any]]], word: str, unit: str
 ) -> Figure:
-    """Curves over time and in space, by label, with their style; shaded where not reconstructed."""
-    missing = np.isnan(curves["reconstructed"][0]).any(axis=1)
+    """Curves over time and in space, by label, with their style.
+
+    Shaded, and called by ``word``, where what was reconstructed is missing.
+    """
+    measured = curves.get("reconstructed")
+    missing = np.isnan(measured[0]).any(axis=1) if measured else np.zeros(len(t), dtype=bool)
     figure = plt.figure(figsize=(10.5, 4.7))
     panels = figure.subplot_mosaic(
         [["x", "space"], ["y", "space"], ["z", "space"]],
@@ -189,7 +210,8 @@ def _over_time_and_in_space(
     panels["z"].set_xlabel(f"time ({unit}); x, y, z in scene units")
     for label, (curve, style) in curves.items():
         space.plot(*curve.T, label=label, **style)
-    space.plot([], [], color="0.85", lw=8, label=word)
+    if word:
+        space.plot([], [], color="0.85", lw=8, label=word)
     finish_space(space, azimuth=-60, elevation=25, zoom=0.85)
     figure.legend(*space.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
