@@ -3,12 +3,14 @@
 trajectories -> problem (smoothing: noise, gaps, units; form: order, candidates, what is known)
 -> solver -> discovery (diagnostics)
 solver: `discover`; its stages (search, then polish and settle) use collocation on splines,
-selection of terms, origin, gaps, errors that last, and persistence: which law stays the same while
-more error is tolerated
+selection of terms, origin, gaps, errors that last, precision (whom to trust how far),
+process_noise (is the motion kicked?), and persistence: which law stays the same while more error
+is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings
 storage: the result as a file
 law: polynomials, on a library of monomials; integrate solves it
 sindy: the same for code that is written for pysindy
+order: first or second, where that is left open
 beside the way: cramer_rao, the least errors that any estimate could have
 """
 
@@ -17,6 +19,7 @@ from .cramer_rao import cramer_rao
 from .discovery import Discovery
 from .integrate import runge_kutta_4
 from .library import monomial_exponents, monomial_gradients, monomials, variable_names
+from .order import check_order
 from .origin import ShiftedLaw
 from .persistence import Plateau
 from .polynomials import PolynomialSystem

@@ -22,12 +22,14 @@ from ..arrays import Floats
 from ..checks import check_integer
 from .collocation import Fit
 from .discovery import Discovery, History, conclude
-from .errors import effective_noise
+from .order import SETTLED, UNLIKELY, accelerated, advised, better, check_order
 from .persistence import Path, Plateau, follow, typical
+from .precision import with_precision
 from .problem import Problem, fit_curves, pose
+from .process_noise import rebalanced, with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, search
 from .selection import inverse
-from .trajectories import check_systematic, check_trajectories
+from .trajectories import Trajectory, check_systematic, check_trajectories
 
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
@@ -37,6 +39,8 @@ RICHEST = 2.0
 """Most terms of a law that refines another, over the terms of that."""
 MOST_HALVINGS = 4
 """Most halvings of the knot spans."""
+MOST_WEIGHINGS = 2
+"""Most laws of which the precision of the measurements is learned."""
 LONGEST_DESCENT = 3
 """Most laws at smaller errors."""
 
@@ -48,7 +52,7 @@ def discover(
     seed: int = 0,
     progress: bool = False,
     systematic: Floats | Sequence[Floats] | None = None,
-    order: int = 1,
+    order: int | str = 1,
 ) -> Discovery:
     """Discover the polynomial law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -68,9 +72,10 @@ def discover(
         Errors that all samples share, such as those of a scale: what k independent causes, each
         off by one standard error, add to ``x``; smooth like the path, and below its noise. One
         such array per trajectory if ``t`` is a list.
-    order : {1, 2}
+    order : {1, 2, "auto"}
         1 for ``x' = f(x)``; 2 for ``x'' = f(x, x')``, where ``x`` are positions alone: velocities
-        become states ``vx, ...`` of the law, after the positions.
+        become states ``vx, ...`` of the law, after the positions. ``"auto"`` looks for the second
+        where the first is doubtful, and says in `Discovery.note` which was taken and why.
 
     Returns
     -------
@@ -89,24 +94,54 @@ def discover(
     >>> print(vl.discover(t, x).equations())
     """
     degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
-    if order not in (1, 2):
-        raise ValueError(f"order: must be 1 or 2, got {order!r}")
+    check_order(order)
     trajectories = check_trajectories(t, x)
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
+    if order == 2:
+        return _solved(trajectories, shared, degree, 2, seed, progress)[0]
+    found, problem = _solved(trajectories, shared, degree, 1, seed, progress)
+    if order == 1:
+        return advised(found, problem.curves)
+    if not found.warnings or not accelerated(problem.curves):
+        return replace(found, note=UNLIKELY if found.warnings else SETTLED)
+    second, _ = _solved(trajectories, shared, degree, 2, seed, progress)
+    return better(found, second)
+
+
+def _solved(
+    trajectories: list[Trajectory],
+    shared: list[Floats],
+    degree: int,
+    order: int,
+    seed: int,
+    progress: bool,
+) -> tuple[Discovery, Problem]:
+    """The law of an order, and the problem that it solves."""
     starts, probes = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     history = History()
     problem = pose(trajectories, shared, degree, probes, order)
     with tqdm(total=3, disable=not progress, desc="discover", leave=False) as bar:
-        fit = search(problem, degree, starts, history)
+        fit = polish(problem, search(problem, degree, starts, history), history)
         bar.update()
-        fit = polish(problem, fit, history)
+        for _ in range(MOST_WEIGHINGS):
+            weighed = with_precision(problem, fit)
+            if weighed is problem:
+                break
+            problem = weighed
+            fit = polish(problem, search(problem, degree, starts, history), history)
+        if (problem.errors(fit) > CONSISTENT * problem.noise).any():
+            problem = with_process_noise(problem, fit, probes)
+        if problem.kicked:
+            fit = search(problem, degree, starts, history)
+            problem = rebalanced(problem, fit, probes)
+            fit = polish(problem, fit, history)
         bar.update()
         fit, path = settle(problem, fit, history)
         bar.update()
-    return conclude(problem, fit, path, history)
+    return conclude(problem, fit, path, history), problem
 
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
@@ -116,7 +151,7 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     for _ in range(MOST_HALVINGS):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
-        finer = problem.collocation(segments, effective_noise(fit))
+        finer = problem.collocation(segments, problem.errors(fit))
         splines = fit.collocation.grid.splines(fit.state.control_points)
         state = replace(fit.state, control_points=fit_curves(finer, splines))
         fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
@@ -130,10 +165,10 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     return fit
 
 
-def at_own_noise(fit: Fit) -> Fit:
+def at_own_noise(problem: Problem, fit: Fit) -> Fit:
     """The same fit, weighted with the errors that it leaves."""
     collocation = fit.collocation
-    weighted = collocation.weighted(effective_noise(fit) ** -2, collocation.physics_weights)
+    weighted = collocation.weighted(problem.errors(fit) ** -2, collocation.physics_weights)
     return weighted.solve(fit.state, EXACT)
 
 
@@ -171,10 +206,10 @@ def _refitted(
     for weight in SEARCH_WEIGHTS:
         collocation = problem.weighted(collocation, weight)
         state = collocation.solve(state, tolerance=1.0, max_steps=10).state
-    fit = at_own_noise(collocation.solve(state, EXACT))
+    fit = at_own_noise(problem, collocation.solve(state, EXACT))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     largest = max(plateau.low for plateau in changed)
-    return fit if typical(effective_noise(fit)) <= CONSISTENT * largest else None
+    return fit if typical(problem.errors(fit)) <= CONSISTENT * largest else None
 
 
 def _changed(fit: Fit, goal: Sequence[Plateau]) -> list[Plateau]:
