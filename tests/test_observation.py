@@ -26,6 +26,15 @@ def test_a_hopeless_lag_is_named(case, lag):
         vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0, lag))
 
 
+def test_given_lags_that_are_off_by_a_fraction_are_told(case):
+    rig, tracks = case
+    for off, told in ((0.0, False), (0.01, False), (0.05, True)):
+        found = vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, off, 0))
+        warned = [w for w in found.warnings if "at are given" in w]
+        assert bool(warned) == told
+        assert all("(0, 0, 0)" in w for w in warned)
+
+
 def test_the_residual_is_that_of_the_given_lags(case):
     rig, tracks = case
     learned = vl.observe_tracks(tracks, rig, np.arange(150))

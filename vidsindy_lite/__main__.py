@@ -88,6 +88,7 @@ def _discover(options: argparse.Namespace) -> int:
     check_folder_is_free(options.out)
     rig, videos = Rig.load(options.rig), options.videos or None
     told = {"rig file": options.rig, "degree": options.degree, "seed": options.seed}
+    told |= {"order": options.order}
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
     told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
@@ -112,16 +113,18 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     """The law that videos or tracks obey."""
     from .checks import check_positive
     from .pipeline import discover_from_tracks, discover_from_videos
-    from .vision import frame_clock
+    from .vision import frame_clock, load_hints
 
     shared = {name: getattr(options, name) for name in ("degree", "seed")}
+    shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
     shared |= {"lags": options.lag, "progress": True}
     if options.tracks:
         return discover_from_tracks(options.tracks, rig, fps=options.fps, **shared)
     t = None
     if options.fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
-    return discover_from_videos(options.videos, rig, t, detector=options.detector, **shared)
+    shared |= {"detector": options.detector, "hints": load_hints(options.rig)}
+    return discover_from_videos(options.videos, rig, t, **shared)
 
 
 def _pick(options: argparse.Namespace) -> int:
@@ -300,6 +303,11 @@ COMMANDS = {
             "files say, which makes it a second of video)", type=float
         ),
         "--degree": _count(3, "highest degree of the polynomials (default: 3)"),
+        "--order": _choice(
+            "1", ("1", "2", "auto"),
+            "1 for x' = f(x) (default), 2 for laws of motion, x'' = f(x, x'), auto for the one to "
+            "be trusted"
+        ),
         "--detector": _text(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "
             "ONNX file (default: auto)", default="auto"

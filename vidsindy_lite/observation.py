@@ -30,8 +30,9 @@ from .cameras import (
 )
 from .checks import check_path, check_tracks, check_vector
 from .refusal import Refused, refusing
-from .vision import Track, VideoInfo, check_detector, frame_clock, track, video_info
+from .vision import Hint, Track, VideoInfo, check_detector, frame_clock, track, video_info
 
+_OTHER_LAG = 0.02  # frames by which it may differ without a word
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
@@ -79,6 +80,7 @@ def observe(
     *,
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
+    hints: Sequence[Hint | None] | None = None,
     progress: bool = False,
 ) -> Observation:
     """Track a target in the videos of several fixed cameras and reconstruct its path.
@@ -102,6 +104,8 @@ def observe(
         default they are learned, see `learn_lags`.
     detector : str or path
         See `track`.
+    hints : sequence of Hint or None, optional
+        Which of the things that move is the target, one per video: see `track`.
     progress : bool
         Show progress bars.
 
@@ -128,11 +132,15 @@ def observe(
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     given = _check_lags(lags, clock, names)
     videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
-    seen = [_track_one(path, shot.frames, detector) for path, shot in videos]
+    told = _check_hints(hints, files)
+    seen = [
+        _track_one(path, shot.frames, detector, hint)
+        for (path, shot), hint in zip(videos, told, strict=True)
+    ]
     tracks = [track.pixels for track in seen]
     _check_found(tracks, names)
     doubts = [warning for track in seen for warning in track.warnings]
-    return _observed(tracks, rig, clock, given, names, doubts)
+    return _observed(tracks, rig, clock, given, names, doubts, progress)
 
 
 def observe_tracks(
@@ -182,19 +190,20 @@ def _observed(
     lags: Floats | None,
     names: Sequence[str],
     doubts: Sequence[str] = (),
+    progress: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     with refusing("lags", raw, names):
-        best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven)
+        best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress)
         if lags is not None:
             _refuse_wrong(lags, best)
     used = best.frames if lags is None else lags
-    tracks = align(raw, used, clock.rates, clock.uneven)
+    tracks = align(raw, used, best.rates, clock.uneven)
     with refusing("cameras", raw, names):
         learned = learn_cameras(tracks, rig)
     missed = disagreement(tracks, learned)
     told = (
-        best if lags is None else Lags(lags, clock.rates, 0 * lags, max(missed), clocks=best.clocks)
+        best if lags is None else Lags(lags, best.rates, 0 * lags, max(missed), clocks=best.clocks)
     )
     shared = systematic_errors(raw, rig, learned, told), trailing_errors(tracks, learned)
     return Observation(
@@ -205,7 +214,7 @@ def _observed(
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
-            *_rig_warnings(missed, tracks, rig, names, best),
+            *_rig_warnings(missed, tracks, rig, names, used, best),
             *learned.warnings,
             *doubts,
             *told.warnings,
@@ -261,9 +270,20 @@ def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
     return shots
 
 
-def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
+def _check_hints(
+    hints: Sequence[Hint | None] | None, files: Sequence[Path]
+) -> Sequence[Hint | None]:
+    """One hint per video, or none."""
+    if hints is None:
+        return [None] * len(files)
+    if not isinstance(hints, Sequence) or len(hints) != len(files):
+        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {hints!r:.60}")
+    return hints
+
+
+def _track_one(path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None) -> Track:
     """Track a video that should have so many frames."""
-    found = track(path, detector)
+    found = track(path, detector, hint)
     if len(found.pixels) != frames:
         raise ValueError(
             f"paths: {path.name} must hold the {frames} frames that its header states, got "
@@ -287,32 +307,49 @@ def _check_found(tracks: Sequence[Floats], names: Sequence[str]) -> None:
 
 def _refuse_wrong(lags: Floats, learned: Lags) -> None:
     """Refuse given lags if others are clearly those of the tracks."""
-    apart = np.abs(learned.frames - lags) > _WRONG_LAG + 5 * learned.errors
-    if learned.agree and apart.any():
+    if _apart(lags, learned, _WRONG_LAG):
         raise ValueError(
             f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
             f"({list_lags(learned.frames)}) do: leave them out, or check them"
         )
 
 
+def _apart(lags: Floats, learned: Lags, limit: float) -> bool:
+    """Whether lags differ clearly, and by more than so many frames, from those of the tracks."""
+    apart = np.abs(learned.frames - lags) > limit + 5 * learned.errors
+    return learned.agree and bool(apart.any())
+
+
 def _rig_warnings(
-    missed: Sequence[float], tracks: Sequence[Floats], given: Rig, names: Sequence[str], lags: Lags
+    missed: Sequence[float],
+    tracks: Sequence[Floats],
+    given: Rig,
+    names: Sequence[str],
+    lags: Floats,
+    best: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?
 
-    `missed` is their disagreement, `given` the rig before it was learned, `lags` are the best.
+    `missed` is their disagreement at these lags, `given` the rig before it was learned, `best` are
+    the lags of the tracks.
     """
+    wrong_lag = _apart(lags, best, _OTHER_LAG)
     if max(missed) <= DISAGREEMENT:
-        return []
+        if not wrong_lag:
+            return []
+        return [
+            "the lags that are given differ from those of the tracks: "
+            f"({list_lags(lags)}) for ({list_lags(best.frames)}) frames: leave them out, or check"
+        ]
     sizes = ", ".join(f"{size:.1f}" for size in missed)
     apart = (
         "in one frame of ten, tracked and reconstructed target lie more than "
         f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
     )
-    if lags.agree:  # at lags that differ by too little from the given ones to refuse these
+    if wrong_lag:  # by too little to refuse them
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
-            f"({list_lags(lags.frames)}) would explain it best"
+            f"({list_lags(best.frames)}) would explain it best"
         ]
     # The largest residual does not tell which camera is wrong: the others were fitted to it.
     others = [learn_normal(tracks, given, i) for i in range(len(names))]

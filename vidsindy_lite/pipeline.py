@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from .arrays import Floats
 from .cameras import Rig
 from .checks import check_integer, check_positive, check_rows
-from .dynamics import Discovery, discover
+from .dynamics import Discovery, check_order, discover
 from .observation import Observation, observe, observe_tracks
 from .refusal import refusing
-from .vision import TrackFile, read_tracks
+from .vision import Hint, TrackFile, read_tracks
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +31,9 @@ class VideoDiscovery(Observation):
     discovery: Discovery
 
     def __str__(self) -> str:
+        note = [f"note: {self.discovery.note}"] if self.discovery.note else []
         warnings = (f"warning: {text}" for text in self.warnings)
-        return "\n".join([self.discovery.equations(), *warnings])
+        return "\n".join([self.discovery.equations(), *note, *warnings])
 
 
 def discover_from_videos(
@@ -42,7 +43,9 @@ def discover_from_videos(
     *,
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
+    hints: Sequence[Hint | None] | None = None,
     degree: int = 3,
+    order: int | str = 1,
     seed: int = 0,
     progress: bool = False,
 ) -> VideoDiscovery:
@@ -52,9 +55,9 @@ def discover_from_videos(
 
     Parameters
     ----------
-    paths, rig, t, lags, detector, progress
+    paths, rig, t, lags, detector, hints, progress
         See `observe`. The unit of time is that of the equations.
-    degree, seed : int
+    degree, order, seed
         See `discover`.
 
     Returns
@@ -67,9 +70,11 @@ def discover_from_videos(
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
     check_integer("degree", degree, 1)
+    check_order(order)
     check_integer("seed", seed)
-    seen = observe(paths, rig, t, lags=lags, detector=detector, progress=progress)
-    return _with_law(seen, [Path(path).name for path in paths], degree, seed, progress)
+    seen = observe(paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress)
+    names = [Path(path).name for path in paths]
+    return _with_law(seen, names, degree=degree, order=order, seed=seed, progress=progress)
 
 
 def discover_from_tracks(
@@ -80,6 +85,7 @@ def discover_from_tracks(
     fps: float | None = None,
     lags: Sequence[float] | None = None,
     degree: int = 3,
+    order: int | str = 1,
     seed: int = 0,
     progress: bool = False,
 ) -> VideoDiscovery:
@@ -98,7 +104,7 @@ def discover_from_tracks(
     fps : float, optional
         Frames of every camera in one unit of time, in place of ``t``. Without either, files have
         to state the times of their rows.
-    degree, seed, progress
+    degree, order, seed, progress
         See `discover_from_videos`.
 
     Returns
@@ -112,13 +118,14 @@ def discover_from_tracks(
         `observe_tracks` and `discover` do.
     """
     check_integer("degree", degree, 1)
+    check_order(order)
     check_integer("seed", seed)
     read = _read(tracks)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
     seen = observe_tracks(pixels, rig, _times(read, t, fps), lags=lags, names=names)
     doubts = tuple(warning for track in read for warning in track.warnings)
     seen = replace(seen, warnings=(*seen.warnings, *doubts))
-    return _with_law(seen, names, degree, seed, progress)
+    return _with_law(seen, names, degree=degree, order=order, seed=seed, progress=progress)
 
 
 def _read(tracks: Sequence[ArrayLike | str | os.PathLike]) -> list[TrackFile]:
@@ -161,12 +168,19 @@ def _times(
 
 
 def _with_law(
-    seen: Observation, names: Sequence[str], degree: int, seed: int, progress: bool
+    seen: Observation,
+    names: Sequence[str],
+    *,
+    degree: int,
+    order: int | str,
+    seed: int,
+    progress: bool,
 ) -> VideoDiscovery:
     """An observation with the law that it obeys."""
     with refusing("law", seen.tracks, names):
         found = discover(
-            seen.t, seen.x, degree=degree, seed=seed, progress=progress, systematic=seen.systematic
-        )
+            seen.t, seen.x, degree=degree, order=order, seed=seed, progress=progress,
+            systematic=seen.systematic,
+        )  # fmt: skip
     parts = vars(seen) | {"warnings": (*seen.warnings, *found.warnings)}
     return VideoDiscovery(**parts, discovery=found)

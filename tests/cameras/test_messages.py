@@ -77,7 +77,16 @@ def test_lags_at_which_nothing_fits():
     assert found.errors.tolist() == [0, np.inf, np.inf]
     (warning,) = found.warnings
     assert "no lags of the videos make the views agree: (0, 0, 0) frames were taken" in warning
-    assert "which no cameras fit; check the rig" in warning
+    assert "pixels; check the rig" in warning
+
+
+def test_lags_at_which_there_are_no_cameras():
+    rig, tracks = filmed()
+    tracks[1][:60], tracks[2][60:] = np.nan, np.nan
+    tracks[0][::2] = np.nan
+    tracks[0][1:115] = np.nan
+    found = vl.learn_lags(tracks, rig.uncalibrated())
+    assert not found.agree
 
 
 def test_warnings_are_no_part_of_a_rig(tmp_path):

@@ -1,12 +1,17 @@
 """Laws of second order, x'' = f(x, x'), from positions alone: against laws that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem
 from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.order import ADVICE, SETTLED, accelerated, better, unexplained
+from vidsindy_lite.dynamics.smoothing import smooth
 from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.study import SYSTEMS
 
 
 def moving(acceleration, x0, v0, t):
@@ -153,7 +158,7 @@ def test_an_anharmonic_damped_spring_in_space(share):
 def test_an_order_that_is_none():
     t = np.linspace(0, 1, 50)
     for order in (3, 0, "second"):
-        with pytest.raises(ValueError, match=rf"order: must be 1 or 2, got {order!r}"):
+        with pytest.raises(ValueError, match=rf"order: must be 1, 2 or 'auto', got {order!r}"):
             discover(t, t[:, None] ** 2, order=order)
 
 
@@ -174,3 +179,65 @@ def test_only_velocities_by_name_make_a_second_order():
     assert PolynomialSystem.from_terms({"x": {"y": 1.0}, "y": {"x": -1.0}}).order == 1
     assert PolynomialSystem.from_terms({"x": {"vx": 2.0}, "vx": {"x": -1.0}}).order == 1
     assert PolynomialSystem.from_terms({"x": {"vx": 1, "x": 1}, "vx": {"x": -1}}).order == 1
+
+
+@pytest.mark.parametrize("acceleration", [duffing, van_der_pol])
+def test_auto_takes_the_second_order_for_a_body(acceleration):
+    t = np.linspace(0, 20, 500)
+    x = noisy(moving(acceleration, [1.5], [0.5], t), 0.01)
+    found = discover(t, x, order="auto")
+    assert found.system.order == 2
+    assert found.note == "order 2: the law of order 1 misses the data"
+    assert "note: order 2" in str(found)
+
+
+def test_auto_takes_the_second_order_for_throws():
+    found = discover(throws(drag, THROWS, 0.01), order="auto", degree=2)
+    assert found.system.order == 2
+    assert found.status == "ok", found.warnings
+
+
+def test_auto_stays_with_the_first_order_for_a_flow():
+    t, x = SYSTEMS["Lorenz"].trajectory(800)
+    found = discover(t, x, order="auto")
+    assert found.system.order == 1
+    assert found.note == SETTLED
+    assert found.equations() == discover(t, x).equations()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_no_flow_of_the_paper_looks_like_a_body(name, share):
+    t, x = SYSTEMS[name].trajectory(1500)
+    curves = smooth([(t / t[-1] * 100, noisy(x, share))], np.random.default_rng(0)).splines
+    assert not accelerated(curves)
+
+
+def test_a_doubtful_law_of_first_order_names_the_second():
+    t = np.linspace(0, 20, 500)
+    x = moving(duffing, [1.5], [0.5], t)
+    assert ADVICE in discover(t, x).warnings
+    t, x = SYSTEMS["Lorenz"].trajectory(800)
+    assert ADVICE not in discover(t, noisy(x, 0.6)).warnings
+
+
+def test_which_of_two_laws_is_better():
+    t = np.linspace(0, 20, 300)
+    second = discover(t, moving(duffing, [1.5], [0.0], t), order=2)
+    doubtful = replace(second, warnings=("doubtful",))
+    line = PolynomialSystem.from_terms({"x": {"x": 1.0}})
+    first = replace(second, system=line, native=line, noise=second.noise[:1])
+    assert better(first, second).note == "order 1: the law of order 2 has 3 terms, not 1"
+    assert better(first, doubtful).note == "order 1: the law of order 2 is doubtful, too"
+    missed = replace(first, noise=2 * first.noise)
+    assert better(missed, doubtful).system.order == 2
+    dense = PolynomialSystem(("x",), [[0], [1], [2], [3]], np.ones((4, 1)))
+    assert better(replace(first, system=dense, native=dense), second).system.order == 2
+    assert better(replace(first, system=dense, native=dense), doubtful).system.order == 1
+
+
+def test_too_few_points_explain_nothing():
+    assert np.isnan(unexplained(np.ones((4, 2)), np.ones((4, 1))))
+    line = np.arange(10.0)[:, None]
+    assert unexplained(line, 2 * line) < 1e-20
+    assert unexplained(line, np.ones((10, 1))) > 0.1

@@ -11,6 +11,8 @@
  1. synchronise   tracks -> when each camera started (`Lags`)
     clocks        when the frames of each video were taken
     alignment     tracks at the same instants, whatever the lags, rates and clocks of the videos
+    pairs         lags that are promising, from two views at a time
+    joint         cameras, lags and points together, from tracks and a start
  2. calibrate     tracks -> the same `Rig`, with nothing unknown
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
@@ -20,7 +22,7 @@
 The other rooms import from here alone.
 """
 
-from .alignment import align
+from .alignment import Lags, align, list_lags
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
 from .clocks import Clock
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
@@ -28,6 +30,6 @@ from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z,
 from .camera import Camera
 from .models import OrthographicCamera, PerspectiveCamera
 from .rig import Rig, rig_template
-from .synchronise import DISAGREEMENT, Lags, disagreement, learn_lags, list_lags
+from .synchronise import DISAGREEMENT, disagreement, learn_lags
 from .triangulate import reconstruct, residuals
 from .uncertainty import systematic_errors, trailing_errors

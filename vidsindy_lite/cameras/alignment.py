@@ -1,4 +1,4 @@
-"""Tracks of all videos at the same instants: the frames of the first video.
+"""Lags and clocks of videos, and their tracks at the same instants: the frames of the first video.
 
 Camera i starts `lag` frames of the first video later and takes `rate` frames during each, so that
 the instant k is its frame (k - lag) * rate. Between two frames a track is interpolated, so lags
@@ -8,21 +8,63 @@ camera would have given them: that is the video's `clock`, 0, 1, 2, ... for an e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from ..checks import check_positive, check_tracks, check_vector
 
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _WIDEST = 2.5  # frames between two that a track is interpolated from: one of them may be dropped
 
-Curve = Callable[[Floats], Floats]
-"""A track as a function of the frame number, whole or not."""
+
+@dataclass(frozen=True)
+class Lags:
+    """Lags of the videos.
+
+    Parameters
+    ----------
+    frames : ndarray, shape (m,)
+        By how many frames of the first video each one starts later than the first.
+    rates : ndarray, shape (m,)
+        Frames of each video in one frame of the first: as given, or as learned where a clock runs
+        fast or slow.
+    errors : ndarray, shape (m,)
+        Standard errors of the lags; infinite if the tracks do not tell them, zero if they were
+        given. Lags that whole numbers fit as well are whole.
+    residual : float
+        Residual of the worst camera that one frame in ten exceeds, pixels, with the cameras that
+        fit these lags best; see `learn_lags`.
+    warnings : tuple of str
+        Why the lags should not be trusted, with advice.
+    clocks : tuple of ndarray, shape (n_i,)
+        When each frame was taken, see `align`; empty if all videos are even.
+    """
+
+    frames: Floats
+    rates: Floats
+    errors: Floats
+    residual: float
+    warnings: tuple[str, ...] = ()
+    clocks: tuple[Floats, ...] = field(default=(), repr=False)
+
+    @property
+    def agree(self) -> bool:
+        """Whether the lags are known: the views agree at these and not at others."""
+        return bool(np.isfinite(self.errors).all())
+
+    def frame_at(self, i: int, instant: int) -> int:
+        """Which frame of video i is closest to one of the first."""
+        if not self.clocks:
+            return int(np.rint((instant - self.frames[i]) * self.rates[i]))
+        sought = (self.clocks[0][instant] - self.frames[i]) * self.rates[i]
+        return int(np.abs(self.clocks[i] - sought).argmin())
 
 
 def align(
@@ -62,40 +104,76 @@ def align(
     shifts = check_lags("lags", lags, len(tracks))
     speeds = check_rates(rates, len(tracks))
     ticks = check_clocks(clocks, tracks)
-    return aligned(tuple(map(curve, tracks, ticks)), shifts, speeds, ticks[0])
+    curves = map(Curve, tracks, ticks)
+    return tuple(
+        curve.at((ticks[0] - lag) * rate)
+        for curve, lag, rate in zip(curves, shifts, speeds, strict=True)
+    )
 
 
-def aligned(
-    curves: Sequence[Curve], lags: Floats, rates: Floats, clock: Floats
-) -> tuple[Floats, ...]:
-    """What each curve shows at the instants of the clock."""
-    return tuple(c((clock - lag) * r) for c, lag, r in zip(curves, lags, rates, strict=True))
+def list_lags(lags: Sequence[float] | Floats) -> str:
+    """Lags as text, to a hundredth of a frame, e.g. ``0, 7, -12.5``."""
+    return ", ".join(f"{round(lag, 2) + 0.0:g}" for lag in lags)
 
 
-def curve(track: Floats, clock: Floats) -> Curve:
+@dataclass(frozen=True, eq=False)
+class Curve:
     """A track as a function of the frame number, whole or not: a spline through its frames.
 
-    Its values are NaN outside, and unless the target is seen in the frames before and after, and
-    these are close to each other.
+    Parameters
+    ----------
+    track : ndarray, shape (n, 2)
+        NaN where the target is not seen.
+    clock : ndarray, shape (n,)
+        Numbers of its frames.
     """
-    shown = np.asarray(np.isfinite(track).all(axis=1))
-    seen = np.flatnonzero(shown)
-    if not seen.size:
-        return lambda frames: np.full((len(frames), 2), np.nan)
-    # Where a frame was dropped, a cubic is off by some ten times as much as between two frames.
-    degree = 3 if (clock == np.arange(len(clock))).all() else 5
-    spline = make_interp_spline(clock[seen], track[seen], k=min(degree, len(seen) - 1))
 
-    def at(frames: Floats) -> Floats:
-        within = np.clip(frames, clock[0], clock[-1])
-        low = np.searchsorted(clock, within, "right") - 1
-        high = np.searchsorted(clock, within, "left")
-        values = np.where((low == high)[:, None], track[low], spline(within))
-        near = clock[high] - clock[low] <= _WIDEST
-        values[~((frames == within) & shown[low] & shown[high] & near)] = np.nan
+    track: Floats
+    clock: Floats
+
+    @cached_property
+    def shown(self) -> Bools:
+        """Frames that show the target."""
+        return np.asarray(np.isfinite(self.track).all(axis=1))
+
+    @cached_property
+    def _spline(self) -> BSpline | None:
+        count = int(self.shown.sum())
+        if not count:
+            return None
+        # Where a frame was dropped, a cubic is off by some ten times as much as between two frames.
+        degree = 3 if (self.clock == np.arange(len(self.clock))).all() else 5
+        seen = self.clock[self.shown], self.track[self.shown]
+        return make_interp_spline(*seen, k=min(degree, count - 1))
+
+    def at(self, frames: Floats) -> Floats:
+        """Pixels, (..., 2).
+
+        NaN outside, and unless the target is seen in the frames before and after, and these are
+        close to each other.
+        """
+        if self._spline is None:
+            return np.full((*np.shape(frames), 2), np.nan)
+        within = np.clip(frames, self.clock[0], self.clock[-1])
+        low = np.searchsorted(self.clock, within, "right") - 1
+        high = np.searchsorted(self.clock, within, "left")
+        values = np.where((low == high)[..., None], self.track[low], self._spline(within))
+        near = self.clock[high] - self.clock[low] <= _WIDEST
+        values[~((frames == within) & self.shown[low] & self.shown[high] & near)] = np.nan
         return values
 
-    return at
+    def slope(self, frames: Floats) -> Floats:
+        """Pixels a frame, (n, 2), from the frame before to the frame after; finite everywhere.
+
+        Over whole frames, the noise of such a difference does not depend on that of the value
+        between them: both ends share as much with it.
+        """
+        if self._spline is None:
+            return np.zeros((*np.shape(frames), 2))
+        seen = self.clock[self.shown]
+        back, on = (np.clip(frames + step, seen[0], seen[-1]) for step in (-1, 1))
+        width = np.maximum(on - back, 1)[..., None]
+        return (self._spline(on) - self._spline(back)) / width
 
 
 def check_lags(name: str, lags: ArrayLike, count: int) -> Floats:

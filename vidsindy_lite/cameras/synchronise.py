@@ -1,16 +1,18 @@
-"""When each camera started: the lags of the videos.
-
-The frames of the first video are the clock. Camera i starts `lag` of them later and takes `rate`
-frames during each (`alignment`).
+"""When each camera started, and how fast its clock runs: the lags of the videos.
 
 Two cameras see one point only if they look at the same instant; otherwise their lines of sight miss
-each other, and no scale and angle can mend it. So the lags are found like the cameras, as those of
-the smallest reprojection error, in three steps:
+each other, and no camera can mend it. So the lags are those of the smallest reprojection error, and
+are found in three steps:
 
 1. pair by pair, with a calibrated camera: the epipolar equation (`triangulate.epipolar_lines`) is
-   linear in what is unknown of the other camera, and is tried at every whole lag;
-2. all cameras together (`learn_cameras`) at the most promising whole lags;
-3. from there, fractions by Gauss-Newton, with all that is unknown of the cameras projected out.
+   linear in what is unknown of the other camera, and is solved at all whole lags at once. It is
+   solved a second time with a shift of the other image, which takes up most of what a badly
+   measured normal or position does;
+2. all cameras together (`joint`), in some of the frames, from the most promising whole lags;
+3. from the best of these, in all frames.
+
+If cameras that may turn and zoom a little explain the tracks far better than those of the rig, the
+lags are taken from these: a wrong normal is no reason for a wrong lag.
 
 A motion that repeats itself fits at several lags, one that hardly moves at all of them: then the
 result says so.
@@ -19,25 +21,21 @@ result says so.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from tqdm import tqdm
 
-from ..arrays import Bools, Floats
-from .alignment import Curve, aligned, check_clocks, check_lags, check_rates, curve
-from .calibrate import cameras_of_views, check_learnable
-from .camera import Camera
+from ..arrays import Floats
+from .alignment import Curve, Lags, check_clocks, check_lags, check_rates, list_lags
+from .calibrate import check_learnable
+from .joint import WAYS, Fit, Scene, fit, roughly_fit
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
+from .pairs import promising_lags, rough_cameras
 from .rig import Rig
-from .triangulate import (
-    Views,
-    check_seen,
-    epipolar_design,
-    epipolar_lines,
-    residuals,
-    residuals_of_views,
-)
+from .triangulate import Views, check_seen, residuals
+from .uncertainty import long_run_covariance
 from .unknowns import Unknowns
 
 DISAGREEMENT = 1.0
@@ -46,64 +44,22 @@ less than half of that."""
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
 ALIKE = 2.0
-"""Ratio of disagreements up to which two lags fit equally well, ..."""
+"""Ratio of residuals up to which two lags fit equally well, ..."""
 FINE = 0.05
-"""... and disagreement in pixels below which all do: real tracks are no better than that."""
-PROBE = 0.05
-"""Frames; slopes in a lag are taken over twice that."""
-OUTLIER = 12.0
-"""Medians of the residuals; one beyond that moves neither a lag nor its error."""
+"""... and residual in pixels below which all do: real tracks are no better than that."""
 
-_OVERLAP = 0.5  # share of the shorter of two videos that both must show
-_INSTANTS = 200  # at which the first step compares two views
-_PROMISING = 5  # lags of each camera that pass the first step
+_INSTANTS = 300  # at which all cameras are compared in the second step
+_ROUNDS = 8  # of the second step
 _TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
-_STEPS = 10  # of one frame at most, from the best whole lags to the best ones
-_SETTLED = 1e-3  # frames
+_BETTER_PART = 0.7  # of all frames, in which no view is an outlier
+_APART = 1.0  # frames; lags closer than that are one and the same
 _SHOWN = 3  # of the lags that fit equally well
-_ROUNDING = 1e-6  # pixels; residuals below that are none
-
-
-@dataclass(frozen=True)
-class Lags:
-    """Lags of the videos.
-
-    Parameters
-    ----------
-    frames : ndarray, shape (m,)
-        By how many frames of the first video each one starts later than the first.
-    rates : ndarray, shape (m,)
-        Frames of each video in one frame of the first.
-    errors : ndarray, shape (m,)
-        Standard errors of the lags, if the errors of the tracks are independent; infinite if the
-        tracks do not tell them, zero if they were given. Lags that whole numbers fit as well are
-        whole.
-    residual : float
-        The `disagreement` of the worst camera that is left, pixels.
-    warnings : tuple of str
-        Why the lags should not be trusted, with advice.
-    clocks : tuple of ndarray, shape (n_i,)
-        When each frame was taken, see `align`; empty if all videos are even.
-    """
-
-    frames: Floats
-    rates: Floats
-    errors: Floats
-    residual: float
-    warnings: tuple[str, ...] = ()
-    clocks: tuple[Floats, ...] = field(default=(), repr=False)
-
-    @property
-    def agree(self) -> bool:
-        """Whether all views agree on one target to within what tracking can be blamed for."""
-        return bool(self.residual <= DISAGREEMENT)
-
-    def frame_at(self, i: int, instant: int) -> int:
-        """Which frame of video i is closest to one of the first."""
-        if not self.clocks:
-            return int(np.rint((instant - self.frames[i]) * self.rates[i]))
-        sought = (self.clocks[0][instant] - self.frames[i]) * self.rates[i]
-        return int(np.abs(self.clocks[i] - sought).argmin())
+_SETTLED = 1e-2  # frames, of the last step in a lag
+_PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
+_LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
+_BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
+_CLEAR = 5.0  # standard errors by which a clock must drift, ...
+_DRIFT = 0.05  # ... and frames over the whole video
 
 
 def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
@@ -130,8 +86,13 @@ def learn_lags(
     rates: ArrayLike | None = None,
     start: ArrayLike | None = None,
     clocks: Sequence[ArrayLike] | None = None,
+    *,
+    progress: bool = False,
 ) -> Lags:
-    """Learn by how much each video starts later than the first.
+    """Learn by how much each video starts later than the first, and whether its clock drifts.
+
+    The rig need not be exact. If cameras that turn and zoom by some degrees and per cent explain
+    the tracks far better, the lags are taken from those.
 
     Parameters
     ----------
@@ -140,12 +101,14 @@ def learn_lags(
     rig : Rig
         As for `learn_cameras`.
     rates : array_like, shape (m,), optional
-        Frames of each video in one frame of the first; by default one.
+        Frames of each video in one frame of the first; by default one. Small errors of these are
+        learned where the videos are long enough to tell them.
     start : array_like, shape (m,), optional
-        Lags that are tried first, by default zero: if they make the views agree to within
-        `DISAGREEMENT`, only better ones close by are sought.
+        Lags that are tried first, by default zero; of several that fit equally well, these win.
     clocks : sequence of array_like, shape (n_i,), optional
         See `align`.
+    progress : bool
+        Show a progress bar if it takes longer than two seconds.
 
     Returns
     -------
@@ -160,208 +123,281 @@ def learn_lags(
     """
     unknowns, tracks = check_learnable(rig), check_seen(tracks, rig)
     first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
-    videos = _Videos.of(tracks, unknowns, check_rates(rates, len(tracks)), clocks)
-    ticks = () if clocks is None else videos.clocks
-    residual = videos.disagreement(first)
-    tried = [first] if residual <= DISAGREEMENT else _whole_lags(videos)
-    refined = [_refined(videos, lags) for lags in tried]
-    found = sorted((s for s in refined if s.agree), key=lambda s: s.residual)
-    if not found:
-        best = _untold(videos, first, no_lags(list_lags(first), residual))
-        return replace(best, clocks=ticks)
-    alike = [s for s in found if s.residual <= max(ALIKE * found[0].residual, FINE)]
-    best = min(alike, key=lambda s: np.abs(s.frames).sum())
-    warnings = list(best.warnings)
-    if len(alike) > 1:
-        warnings.append(ambiguous_lags([list_lags(s.frames) for s in alike[:_SHOWN]]))
-    blurred = np.flatnonzero(best.errors > BLURRED)
-    warnings += [blurred_lag(int(i) + 1, best.frames[i]) for i in blurred]
-    return replace(best, warnings=tuple(warnings), clocks=ticks)
+    given = check_rates(rates, len(tracks))
+    with tqdm(desc="synchronise", unit="fit", delay=2, disable=not progress) as bar:
+        curves = tuple(map(Curve, tracks, check_clocks(clocks, tracks)))
+        found = _learned(_Videos(curves, unknowns, given, bar), first)
+    return found if clocks is None else replace(found, clocks=tuple(c.clock for c in curves))
 
 
-def list_lags(lags: Sequence[float] | Floats) -> str:
-    """Lags as text, to a hundredth of a frame, e.g. ``0, 7, -12.5``."""
-    return ", ".join(f"{round(lag, 2) + 0.0:g}" for lag in lags)
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Videos:
-    """The tracks as functions of time, and how well they agree at given lags."""
+    """The tracks as functions of time, what is known of the cameras, and a bar to move."""
 
     curves: tuple[Curve, ...]
-    clocks: tuple[Floats, ...]  # when each frame was taken
-    rates: Floats
     unknowns: Unknowns
-    speed: float  # pixels in a frame
-    tried: dict[tuple[float, ...], Floats] = field(default_factory=dict)
-
-    @classmethod
-    def of(
-        cls,
-        tracks: Sequence[Floats],
-        unknowns: Unknowns,
-        rates: Floats,
-        clocks: Sequence[ArrayLike] | None = None,
-    ) -> _Videos:
-        """Of tracks, unknowns and rates that were checked."""
-        seen = [track[np.isfinite(track).all(axis=1)] for track in tracks]
-        steps = np.concatenate([np.hypot(*np.diff(track, axis=0).T) for track in seen])
-        speed = float(np.quantile(steps, _TRIMMED)) if len(steps) else 0.0
-        ticks = check_clocks(clocks, tracks)
-        return cls(tuple(map(curve, tracks, ticks)), ticks, rates, unknowns, speed)
+    rates: Floats
+    bar: tqdm
 
     @property
-    def ends(self) -> Floats:
-        """Durations on the clock."""
-        return np.array([clock[-1] + 1 for clock in self.clocks]) / self.rates
+    def step(self) -> int:
+        """Frames from one to the next of those in which all cameras are compared."""
+        return max(1, len(self.curves[0].clock) // _INSTANTS)
 
-    def residuals(self, lags: Floats) -> Floats:
-        """Reprojection residuals of the cameras that fit best, (n_0, 2 m); NaN if none do."""
-        key = tuple(lags.tolist())
-        if key not in self.tried:
-            tracks = aligned(self.curves, lags, self.rates, self.clocks[0])
-            self.tried[key] = _best_residuals(tracks, self.unknowns)
-        return self.tried[key]
+    def scene(self, lags: Floats, step: int = 1, loose: bool = False) -> Scene | None:
+        """Every so many instants, with the cameras that the closed form finds at these lags.
 
-    def disagreement(self, lags: Floats) -> float:
-        """The worst camera's, pixels; infinite where no cameras fit."""
-        missed = self.residuals(lags)
-        if np.isnan(missed).all():
-            return np.inf
-        return max(_trimmed(part) for part in np.split(missed, len(self.curves), axis=1))
+        None if it finds none.
+        """
+        count, unknowns = len(self.curves), self.unknowns
+        instants = self.curves[0].clock[::step]
+        at = [
+            c.at((instants - k) * r) for c, k, r in zip(self.curves, lags, self.rates, strict=True)
+        ]
+        if not all(np.isfinite(track).any() for track in at):
+            return None
+        cameras = rough_cameras(Views.of(at), unknowns)
+        if cameras is None:
+            return None
+        spreads = np.zeros((count, WAYS))
+        spreads[:, :4] = _LOOSE * loose
+        spreads[unknowns.uncalibrated, 2:4] = np.inf
+        spreads[unknowns.unplaced, 4:] = np.inf
+        still = np.zeros(count, bool)
+        return Scene(self.curves, instants, self.rates, cameras, spreads, unknowns.width, still)
+
+    def fitted(self, lags: Floats, step: int = 1, loose: bool = False) -> _Fitted | None:
+        """The best lags near given ones; None if nothing fits."""
+        self.bar.update()
+        scene = self.scene(lags, step, loose)
+        if scene is None:
+            return None
+        start = scene.start(lags)
+        found = fit(scene, start) if step == 1 else roughly_fit(scene, start, _ROUNDS)
+        return None if found is None else _Fitted(scene, found)
 
 
-def _best_residuals(tracks: Sequence[Floats], unknowns: Unknowns) -> Floats:
-    """Residuals of the cameras that fit aligned tracks best, (n, 2 m); NaN if none do."""
-    if all(np.isfinite(track).any() for track in tracks):
-        views = Views.of(tracks)
-        try:
-            return np.hstack(residuals_of_views(views, cameras_of_views(views, unknowns).cameras))
-        except ValueError:  # these lags leave too little in common, or nothing that agrees
-            pass
-    return np.full_like(np.hstack(tracks), np.nan)
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """What was fitted, and how."""
+
+    scene: Scene
+    fit: Fit
+
+    @property
+    def lags(self) -> Floats:
+        """In frames."""
+        return self.fit.estimate.lags
+
+    @property
+    def residual(self) -> float:
+        """The worst camera's, pixels."""
+        return max(_trimmed(part) for part in np.moveaxis(self.fit.missed, 1, 0))
+
+    @property
+    def score(self) -> float:
+        """The same, if errors are normal but for some outliers: from the better part of them."""
+        return max(_trimmed(part, _BETTER_PART) for part in np.moveaxis(self.fit.missed, 1, 0))
+
+    @property
+    def persists(self) -> bool:
+        """Whether residuals are like those of the next frame, as tracking errors are not."""
+        missed = self.fit.missed[self.fit.used].reshape(self.fit.used.sum(), -1)
+        now, then = missed[:-1], missed[1:]
+        both = np.isfinite(now) & np.isfinite(then)
+        return bool(np.sum((now * then)[both]) > _PERSISTENT * np.sum((now**2)[both]))
+
+    def near(self, lags: Floats) -> bool:
+        """Whether its lags are those."""
+        return bool(np.abs(self.lags - lags).max() < _APART)
 
 
-def _trimmed(residual: Floats) -> float:
-    """Length of the residuals, (n, 2), that one frame in ten exceeds."""
+def _trimmed(residual: Floats, share: float = _TRIMMED) -> float:
+    """Length of the residuals, (n, 2), that one frame in ten exceeds.
+
+    From another share of them if they are normal: their lengths are then Rayleigh's.
+    """
     seen = residual[np.isfinite(residual).all(axis=1)]
-    return float(np.quantile(np.hypot(*seen.T), _TRIMMED)) if len(seen) else 0.0
+    if not len(seen):
+        return 0.0
+    ratio = np.sqrt(np.log(1 - _TRIMMED) / np.log(1 - share))
+    return float(ratio * np.quantile(np.hypot(*seen.T), share))
 
 
-def _refined(videos: _Videos, whole: Floats) -> Lags:
-    """The lags of the smallest reprojection error near whole ones."""
-    lags = whole.copy()
-    shifts = PROBE * np.eye(len(lags))[1:]  # the first video is the clock
-    for _ in range(_STEPS):
-        tried = np.array([videos.residuals(lags + s) for s in (0 * lags, *shifts, *-shifts)])
-        here, ahead, behind = tried[0], *np.split(tried[1:], 2)
-        used = np.isfinite(tried).all(axis=0)
-        if not used.any():
-            return _untold(videos, lags)
-        limit = max(OUTLIER * np.median(np.abs(here[used])), _ROUNDING)
-        used &= np.abs(np.where(used, here, 0)) <= limit
-        slope = (ahead - behind)[:, used].T / (2 * PROBE)
-        step, *_ = np.linalg.lstsq(slope, -here[used])
-        size = np.abs(step).max()
-        lags[1:] += step / max(size, 1)  # further than a frame the slope does not hold
-        if size < _SETTLED:
+# ------------------------------------------------------------------------------------- the search
+
+
+def _learned(videos: _Videos, first: Floats) -> Lags:
+    """`learn_lags` of what was checked."""
+    begun = videos.fitted(first)
+    fits = begun is not None and begun.score <= DISAGREEMENT and not begun.persists
+    if begun is not None and fits and (begun.near(first) or not _shares(begun).all()):
+        return _told(videos, _drifted(begun), first)
+    loose, sampled = _searched(videos, first)
+    if not sampled:
+        return _untold(videos, first, False)
+    close = [s for s in sampled if s.score <= max(2 * ALIKE * sampled[0].score, FINE)]
+    small = sorted(close, key=lambda s: np.abs(s.lags).sum())
+    chosen = _different(close[:_SHOWN] + small[:_SHOWN])
+    every = [videos.fitted(s.lags, loose=loose) for s in chosen]
+    found = sorted(_different([f for f in every if f]), key=lambda f: f.score)
+    if not found:
+        return _untold(videos, first, False)
+    alike = [f for f in found if f.score <= max(ALIKE * found[0].score, FINE)]
+    if len(alike) > 1 and found[0].score > DISAGREEMENT:
+        return _untold(videos, first, False)
+    best = min(alike, key=lambda f: (not f.near(first), np.abs(f.lags).sum()))
+    told = _told(videos, _drifted(best), first)
+    if len(alike) > 1 and not best.near(first):
+        choices = [best, *(f for f in alike if f is not best)][:_SHOWN]
+        warning = ambiguous_lags([list_lags(f.lags) for f in choices])
+        told = replace(told, warnings=(warning, *told.warnings))
+    return told
+
+
+def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[_Fitted]]:
+    """Whether cameras should be loose, and fits to some of the instants, the best first."""
+    promising = promising_lags(videos.curves, videos.rates, videos.unknowns)
+    exact = _climbed(videos, promising, first, False)
+    if not exact or exact[0].score <= FINE:
+        return False, exact
+    if exact[0].score <= DISAGREEMENT:
+        other = videos.fitted(exact[0].lags, videos.step, True)
+        if other is None or other.score * _BETTER >= exact[0].score:
+            return False, exact
+    # Where the rig is wrong, its best lags may be wrong as well: so all are tried again.
+    loose = _climbed(videos, promising, first, True)
+    if loose and loose[0].score * _BETTER < exact[0].score:
+        return True, loose
+    return False, exact
+
+
+def _climbed(
+    videos: _Videos, promising: list[list[float]], first: Floats, loose: bool
+) -> list[_Fitted]:
+    """Fits to some instants from the most promising lags and all that differ from the best in one.
+
+    The best are tried in all combinations with the others' until none is better.
+    """
+    count = len(promising)
+    tried: dict[tuple[float, ...], _Fitted | None] = {}
+
+    def fits(lags: Floats) -> float:
+        key = tuple((lags - lags[0]).tolist())
+        if key not in tried:
+            tried[key] = videos.fitted(np.array(key), videos.step, loose)
+        found = tried[key]
+        return np.inf if found is None else found.score
+
+    best = np.array([lags[0] for lags in promising])
+    fits(first)
+    while True:
+        others = [(i, lag) for i in range(count) for lag in promising[i] if lag != best[i]]
+        every = [best, *(np.where(np.arange(count) == i, lag, best) for i, lag in others)]
+        winner = int(np.argmin([fits(lags) for lags in every]))
+        if winner == 0:
             break
-    noise = max(np.mean((here[used] + slope @ step) ** 2), _ROUNDING**2)
-    told = _told(videos, lags, used, noise, np.sum(slope**2, axis=0))
-    if not told.all():
-        return _untold(videos, whole)
-    information = slope.T @ slope / noise * np.sqrt(np.outer(told, told))
-    errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information)))))
+        best = every[winner]
+    found = sorted((f for f in tried.values() if f is not None), key=lambda f: f.score)
+    return _different(found)
+
+
+def _different(found: list[_Fitted]) -> list[_Fitted]:
+    """The first of all that have the same lags."""
+    kept: list[_Fitted] = []
+    for one in found:
+        if not any(one.near(other.lags) for other in kept):
+            kept.append(one)
+    return kept
+
+
+# --------------------------------------------------------------------- drifts, errors, what is told
+
+
+def _drifted(found: _Fitted) -> _Fitted:
+    """The same with the drifts of clocks that are clear and large enough to matter, if any are."""
+    scene, count = found.scene, len(found.lags)
+    tried = replace(scene, drifting=np.arange(count) > 0)
+    free = fit(tried, found.fit.estimate)
+    if free is None:
+        return found
+    span = np.ptp(scene.instants)
+    drift, errors = free.estimate.drifts * span, np.zeros(count)
+    covariance = _covariance(tried, free)
+    errors[1:] = np.sqrt(np.diag(covariance))[count - 1 :] * 1.0
+    clear = np.abs(drift) > np.maximum(_CLEAR * errors, _DRIFT)
+    if not clear.any():
+        return found
+    kept = replace(scene, drifting=clear)
+    start = replace(free.estimate, drifts=np.where(clear, free.estimate.drifts, 0))
+    again = fit(kept, start)
+    return found if again is None else _Fitted(kept, again)
+
+
+def _covariance(scene: Scene, found: Fit) -> Floats:
+    """Of lags and drifts, if that of cameras is known as well as the tracks tell it.
+
+    Residuals may depend on those of the frames beside: the larger of both variances counts.
+    """
+    slopes, missed = found.slopes[found.used], np.nan_to_num(found.missed[found.used])
+    square = np.einsum("nik,nil->kl", slopes, slopes)
+    spreads = scene.spreads[scene.spreads > 0]
+    square[np.diag_indices(len(spreads))] += found.noise / spreads**2
+    bread = np.linalg.pinv(square, hermitian=True)
+    scores = np.einsum("nik,ni->nk", slopes, missed.reshape(len(missed), -1)) @ bread
+    white, robust = found.noise * bread, long_run_covariance(scores) * len(scores)
+    more = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(white), 1e-300), 1))
+    return (white * np.outer(more, more))[len(spreads) :, len(spreads) :]
+
+
+def _told(videos: _Videos, found: _Fitted, first: Floats) -> Lags:
+    """What a fit tells of the lags, or that it tells nothing."""
+    lags, rates = found.lags.copy(), videos.rates * (1 + found.fit.estimate.drifts)
+    count = len(lags) - 1
+    covariance = _covariance(found.scene, found.fit)[:count, :count]
+    share = _shares(found)
+    if not share.all():
+        return _untold(videos, first, found.score <= DISAGREEMENT)
+    information = np.linalg.pinv(covariance, hermitian=True) * np.sqrt(np.outer(share, share))
+    errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information, hermitian=True)))))
     # Schwarz's criterion: a fraction is one more unknown per video.
     rounded = np.rint(lags) + 0.0  # and not -0
     beside = (rounded - lags)[1:]
-    if beside @ information @ beside < len(beside) * np.log(used.sum()):
+    if beside @ information @ beside < count * np.log(found.fit.used.sum()):
         lags = rounded
-    warnings = () if size < _SETTLED else (unsettled_lags(size),)
-    return Lags(lags, videos.rates, errors, videos.disagreement(lags), warnings)
+    blurred = np.flatnonzero(errors > BLURRED)
+    warnings = [blurred_lag(int(i) + 1, lags[i]) for i in blurred]
+    if found.fit.last > _SETTLED:
+        warnings.append(unsettled_lags(found.fit.last))
+    return Lags(lags, rates, errors, found.residual, tuple(warnings))
 
 
-def _untold(videos: _Videos, lags: Floats, *warnings: str) -> Lags:
-    """Lags of which the tracks tell nothing; that of the first video is zero in any case."""
-    errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-    return Lags(lags, videos.rates, errors, videos.disagreement(lags), warnings)
-
-
-def _told(videos: _Videos, lags: Floats, used: Bools, noise: float, slopes: Floats) -> Floats:
+def _shares(found: _Fitted) -> Floats:
     """Share of each lag's squared slope that is motion and not noise, between 0 and 1.
 
-    Interpolated noise has a slope, too. But whole frames beside the lags its size is the same
-    as at them: there only motion makes the residuals larger.
+    Interpolated noise has a slope, too: with a variance of half of the noise's, as it is taken
+    between two frames that are two apart.
     """
-    shares = []
-    for one, slope in zip(np.eye(len(lags))[1:], slopes, strict=True):
-        tried = np.array([videos.residuals(lags + shift) for shift in (0 * one, one, -one)])
-        both = used & np.isfinite(tried).all(axis=0)
-        here, ahead, behind = (np.sum(part[both] ** 2) for part in tried)
-        chance = 2 * noise * np.sqrt(2 * both.sum())  # two standard deviations of such a sum
-        rise = ((ahead + behind) / 2 - here - chance) / slope
-        shares.append(rise if both.any() else 1.0)  # a frame beside, nothing fits at all
-    return np.clip(shares, 0, 1)
+    scene, fit = found.scene, found.fit
+    ways = int((scene.spreads > 0).sum())
+    slopes = fit.slopes[fit.used].reshape(-1, fit.slopes.shape[-1])
+    lags = slopes[:, ways : ways + len(found.lags) - 1]
+    others = slopes[:, :ways]
+    lags = lags - others @ np.linalg.lstsq(others, lags)[0] if ways else lags
+    freedom = np.maximum(fit.freedom[fit.used].sum(axis=0)[1:], 1e-9)
+    chance = 0.5 * fit.noise * scene.rates[1:] ** 2 * (freedom + 2 * np.sqrt(2 * freedom))
+    total = np.sum(lags**2, axis=0)
+    return np.clip((total - chance) / np.maximum(total, 1e-300), 0, 1)
 
 
-def _whole_lags(videos: _Videos) -> list[Floats]:
-    """Whole lags at which all cameras agree as well as they can between two frames."""
-    cameras = videos.unknowns.cameras
-    known = next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
-    count = len(cameras)
-    promising = [[0.0] if i == known else _pair_lags(videos, known, i) for i in range(count)]
-    best = np.array([lags[0] for lags in promising])
-    while True:
-        others = [(i, lag) for i in range(count) for lag in promising[i] if lag != best[i]]
-        tried = [best, *(np.where(np.arange(count) == i, lag, best) for i, lag in others)]
-        missed = np.array([videos.disagreement(lags) for lags in tried])
-        winner = int(missed.argmin())
-        if winner == 0:
-            break
-        best = tried[winner]
-    # Half a frame beside the right lag, the views miss each other by half a frame of motion.
-    limit = max(missed.min(), DISAGREEMENT + videos.speed / 2)
-    return [lags - lags[0] for lags, value in zip(tried, missed, strict=True) if value <= limit]
-
-
-def _pair_lags(videos: _Videos, known: int, other: int) -> list[float]:
-    """The most promising lags of one camera behind a calibrated one, best first."""
-    shortest = min(videos.ends[known], videos.ends[other])
-    margin = _OVERLAP * shortest
-    lags = np.arange(np.ceil(margin - videos.ends[other]), videos.ends[known] - margin + 1)
-    frames = videos.clocks[known][:: max(1, int(shortest // _INSTANTS))]
-    first, second = videos.unknowns.cameras[known], videos.unknowns.cameras[other]
-    placed = first.is_placed and second.is_placed
-    near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
-    lines = epipolar_lines(near, videos.curves[known](frames), far)
-    instants, rate = frames / videos.rates[known], videos.rates[other]
-    theirs = [videos.curves[other]((instants - k) * rate) for k in lags]
-    missed = np.array([_pair_missed(second, placed, lines, pixels) for pixels in theirs])
-    padded = np.concatenate(([np.inf], missed, [np.inf]))
-    dips = (missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed)
-    ranked = sorted(np.flatnonzero(dips), key=lambda k: missed[k])
-    return [float(lags[k]) for k in ranked[:_PROMISING]] or [0.0]
-
-
-def _pair_missed(
-    other: Camera, placed: bool, lines: tuple[Floats, Floats], theirs: Floats
-) -> float:
-    """By how much its pixels miss the epipolar lines of a known camera at best, scene units rms.
-
-    `placed` says whether both positions are known. One instant in ten is left out.
-    """
-    design, target = epipolar_design(lines, other, theirs)
-    if other.is_calibrated:
-        scale, angle = other.calibration
-        turned = scale * np.array([np.cos(angle), np.sin(angle)])
-        design, target = design[:, :0], target - design @ turned
-    if not placed:  # the offset adds the same to all equations
-        design = np.column_stack((design, np.ones(len(design))))
-    fits = np.ones(len(target), bool)
-    for _ in range(2):
-        if fits.sum() <= 2 * design.shape[1]:
-            return np.inf
-        solution = np.linalg.lstsq(design[fits], target[fits])[0]
-        missed = np.abs(design @ solution - target)
-        fits = missed <= np.quantile(missed, _TRIMMED)
-    return float(np.sqrt(np.mean(missed[fits] ** 2)))
+def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
+    """Lags of which the tracks tell nothing, as all agree or none; the first one is the clock."""
+    errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
+    residual, scene = np.inf, videos.scene(lags)
+    if scene is not None:
+        missed = scene.missed(scene.start(lags))
+        residual = max(_trimmed(part) for part in np.moveaxis(missed, 1, 0))
+    warnings = [blurred_lag(i + 1, lags[i]) for i in range(1, len(lags))]
+    if not agree:
+        warnings = [no_lags(list_lags(lags), residual)]
+    return Lags(lags, videos.rates, errors, residual, tuple(warnings))

@@ -282,10 +282,23 @@ def epipolar_design(
     s T (X, Y) = [[X, Y], [Y, -X]] (s cos theta, s sin theta). Design, (k, 2), in pixels, and
     target, (k,); frames without a line or pixel are left out.
     """
+    design, target = epipolar_rows(lines, camera, pixels)
+    common = np.isfinite(design).all(axis=1) & np.isfinite(target)
+    return design[common], target[common]
+
+
+def epipolar_rows(
+    lines: tuple[Floats, Floats], camera: Camera, pixels: Floats
+) -> tuple[Floats, Floats]:
+    """The same for several choices of pixels, (..., n, 2), frame by frame: (..., n, 2), (..., n).
+
+    NaN in the design where there is no line or pixel.
+    """
     normals, constants = lines
-    common = np.isfinite(normals[:, 0]) & np.isfinite(pixels).all(axis=1)
-    (a, b), (x, y) = normals[common].T, camera.centred(pixels[common]).T
-    return np.column_stack((a * y - b * x, -a * x - b * y)), constants[common]
+    (a, b), centred = normals.T, camera.centred(pixels.reshape(-1, 2)).reshape(pixels.shape)
+    x, y = centred[..., 0], centred[..., 1]
+    design = np.stack((a * y - b * x, -a * x - b * y), axis=-1)
+    return design, np.broadcast_to(constants, x.shape)
 
 
 def _lines(matrices: Floats, scales: Floats, turned: Floats) -> tuple[Floats, Floats]:

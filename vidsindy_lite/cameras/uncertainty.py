@@ -28,10 +28,10 @@ import numpy as np
 
 from ..arrays import Floats
 from .adjust import linearised
-from .alignment import align
+from .alignment import Lags, align
 from .changes import known_to
+from .joint import OUTLIER
 from .rig import Rig
-from .synchronise import OUTLIER, PROBE, Lags
 from .triangulate import (
     Views,
     check_calibrated,
@@ -40,6 +40,9 @@ from .triangulate import (
     residuals_of_views,
     views_of,
 )
+
+PROBE = 0.05
+"""Frames; slopes in a lag are taken over twice that."""
 
 _SMALLEST = 1e-4  # of the largest mode
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1

@@ -243,7 +243,7 @@ def summary(
         "status": found.status,
         "warnings": list(found.warnings),
         "law": {
-            "data": _law(law, "data", np.zeros(3), np.zeros(3)),
+            "data": _law(law, "data", np.zeros(law.system.d), np.zeros(law.system.d)),
             "native": _law(law, "native", law.offset, law.offset_errors),
         },
         "noise": law.noise,
@@ -275,10 +275,10 @@ def _law(found: Discovery, frame: str, origin: Floats, errors: Floats) -> dict[s
     )
     terms = [
         {
-            "equation": f"d{name}/dt", "term": law.terms[row],
+            "equation": side, "term": law.terms[row],
             "coefficient": law.coefficients[row, j], "standard_error": deviations[row, j],
         }
-        for j, name in enumerate(law.names)
+        for j, side in law.sides().items()
         for row in np.flatnonzero(law.coefficients[:, j])
     ]  # fmt: skip
     equations = found.equations(frame)
@@ -310,7 +310,7 @@ def _figures(
     # switched on meanwhile off again: so this comes first.
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        yield "path", _encoded(plot_path(found.t, found.x, found.discovery.curve(found.t)))
+        yield "path", _encoded(plot_path(found.t, found.x, found.discovery.curve(found.t)[:, :3]))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
             yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))

@@ -9,6 +9,7 @@ discovery: the result, with error bars from the last fit; diagnostics: all its w
 storage: the result as a file
 law: polynomials, on a library of monomials; integrate solves it
 sindy: the same for code that is written for pysindy
+order: first or second, where that is left open
 beside the way: cramer_rao, the least errors that any estimate could have
 """
 
@@ -17,6 +18,7 @@ from .cramer_rao import cramer_rao
 from .discovery import Discovery
 from .integrate import runge_kutta_4
 from .library import monomial_exponents, monomial_gradients, monomials, variable_names
+from .order import check_order
 from .origin import ShiftedLaw
 from .persistence import Plateau
 from .polynomials import PolynomialSystem

@@ -125,6 +125,8 @@ class Discovery:
         How the fit went.
     curves : tuple of scipy.interpolate.BSpline
         The fitted curve, one spline per stretch of data, in units of the data.
+    note : str
+        Which order the law has and why, where that was left open.
     """
 
     system: PolynomialSystem
@@ -138,6 +140,7 @@ class Discovery:
     path: tuple[tuple[Plateau, ...], ...]
     history: tuple[Step, ...]
     curves: tuple[BSpline, ...]
+    note: str = ""
 
     @property
     def status(self) -> str:
@@ -238,7 +241,8 @@ class Discovery:
         return read(path)
 
     def __str__(self) -> str:
-        return "\n".join([self.equations(), *(f"warning: {text}" for text in self.warnings)])
+        note = [f"note: {self.note}"] if self.note else []
+        return "\n".join([self.equations(), *note, *(f"warning: {text}" for text in self.warnings)])
 
 
 def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discovery:

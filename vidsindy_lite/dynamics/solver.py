@@ -23,11 +23,12 @@ from ..checks import check_integer
 from .collocation import Fit
 from .discovery import Discovery, History, conclude
 from .errors import effective_noise
+from .order import SETTLED, UNLIKELY, accelerated, advised, better, check_order
 from .persistence import Path, Plateau, follow, typical
 from .problem import Problem, fit_curves, pose
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, search
 from .selection import inverse
-from .trajectories import check_systematic, check_trajectories
+from .trajectories import Trajectory, check_systematic, check_trajectories
 
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
@@ -48,7 +49,7 @@ def discover(
     seed: int = 0,
     progress: bool = False,
     systematic: Floats | Sequence[Floats] | None = None,
-    order: int = 1,
+    order: int | str = 1,
 ) -> Discovery:
     """Discover the polynomial law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -68,9 +69,10 @@ def discover(
         Errors that all samples share, such as those of a scale: what k independent causes, each
         off by one standard error, add to ``x``; smooth like the path, and below its noise. One
         such array per trajectory if ``t`` is a list.
-    order : {1, 2}
+    order : {1, 2, "auto"}
         1 for ``x' = f(x)``; 2 for ``x'' = f(x, x')``, where ``x`` are positions alone: velocities
-        become states ``vx, ...`` of the law, after the positions.
+        become states ``vx, ...`` of the law, after the positions. ``"auto"`` looks for the second
+        where the first is doubtful, and says in `Discovery.note` which was taken and why.
 
     Returns
     -------
@@ -89,11 +91,30 @@ def discover(
     >>> print(vl.discover(t, x).equations())
     """
     degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
-    if order not in (1, 2):
-        raise ValueError(f"order: must be 1 or 2, got {order!r}")
+    check_order(order)
     trajectories = check_trajectories(t, x)
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
+    if order == 2:
+        return _solved(trajectories, shared, degree, 2, seed, progress)[0]
+    found, problem = _solved(trajectories, shared, degree, 1, seed, progress)
+    if order == 1:
+        return advised(found, problem.curves)
+    if not found.warnings or not accelerated(problem.curves):
+        return replace(found, note=UNLIKELY if found.warnings else SETTLED)
+    second, _ = _solved(trajectories, shared, degree, 2, seed, progress)
+    return better(found, second)
+
+
+def _solved(
+    trajectories: list[Trajectory],
+    shared: list[Floats],
+    degree: int,
+    order: int,
+    seed: int,
+    progress: bool,
+) -> tuple[Discovery, Problem]:
+    """The law of an order, and the problem that it solves."""
     starts, probes = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
@@ -106,7 +127,7 @@ def discover(
         bar.update()
         fit, path = settle(problem, fit, history)
         bar.update()
-    return conclude(problem, fit, path, history)
+    return conclude(problem, fit, path, history), problem
 
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:

@@ -250,17 +250,18 @@ def plot_plateaus(found: Discovery) -> Figure:
     found : Discovery
         Its path; the plateaus of the law itself are drawn broad.
     """
-    path, names = found.path, found.system.names
+    sides = found.system.sides()
     figure, panels = plt.subplots(
-        1, len(path), figsize=(2.9 * len(path), 2.8), sharex=True, sharey=True, squeeze=False
+        1, len(sides), figsize=(2.9 * len(sides), 2.8), sharex=True, sharey=True, squeeze=False
     )
-    for j, (axes, plateaus) in enumerate(zip(panels[0], path, strict=True)):
+    for axes, (j, side) in zip(panels[0], sides.items(), strict=True):
+        plateaus = found.path[j]
         edges = [plateaus[0].low, *(plateau.high for plateau in plateaus)]
         counts = [int(plateau.terms.sum()) for plateau in plateaus]
         axes.stairs(counts, edges, color="0.4", baseline=None, label="all laws")
         for own in (p for p in plateaus if (p.terms == found.native.support[:, j]).all()):
             axes.hlines(own.terms.sum(), own.low, own.high, color="C1", lw=5, label="the law")
-        axes.set(xscale="log", xlabel="tolerated error / spread", title=f"d{names[j]}/dt")
+        axes.set(xscale="log", xlabel="tolerated error / spread", title=side)
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     panels[0, 0].set(ylabel="terms", ylim=(0, None))
     handles, labels = panels[0, 0].get_legend_handles_labels()
