@@ -14,17 +14,19 @@ from tqdm import tqdm
 from .arrays import Floats
 from .cameras import (
     DISAGREEMENT,
+    GROSS,
     Clock,
     Lags,
     Rig,
     align,
     check_learnable,
     disagreement,
+    explain,
     learn_cameras,
     learn_lags,
-    learn_normal,
     list_lags,
     reconstruct,
+    smooth,
     systematic_errors,
     trailing_errors,
 )
@@ -214,7 +216,7 @@ def _observed(
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
-            *_rig_warnings(missed, tracks, rig, names, used, best),
+            *_rig_warnings(tracks, rig, learned, names, used, best),
             *learned.warnings,
             *doubts,
             *told.warnings,
@@ -321,45 +323,42 @@ def _apart(lags: Floats, learned: Lags, limit: float) -> bool:
 
 
 def _rig_warnings(
-    missed: Sequence[float],
     tracks: Sequence[Floats],
     given: Rig,
+    learned: Rig,
     names: Sequence[str],
     lags: Floats,
     best: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?
 
-    `missed` is their disagreement at these lags, `given` the rig before it was learned, `best` are
-    the lags of the tracks.
+    The tracks are those at the lags, `best` are the lags that the tracks themselves tell.
     """
+    missed = disagreement(tracks, learned)
     wrong_lag = _apart(lags, best, _OTHER_LAG)
-    if max(missed) <= DISAGREEMENT:
-        if not wrong_lag:
-            return []
+    if wrong_lag and max(missed) <= DISAGREEMENT:
         return [
             "the lags that are given differ from those of the tracks: "
             f"({list_lags(lags)}) for ({list_lags(best.frames)}) frames: leave them out, or check"
         ]
     sizes = ", ".join(f"{size:.1f}" for size in missed)
     apart = (
-        "in one frame of ten, tracked and reconstructed target lie more than "
-        f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
+        f"in one frame of ten, tracked and reconstructed target lie more than {sizes} pixels apart"
     )
     if wrong_lag:  # by too little to refuse them
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
             f"({list_lags(best.frames)}) would explain it best"
         ]
-    # The largest residual does not tell which camera is wrong: the others were fitted to it.
-    others = [learn_normal(tracks, given, i) for i in range(len(names))]
-    left = [max(disagreement(tracks, other)) for other in others]
-    i = int(np.argmin(left))
-    normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
-    advice = (
-        f"the normal ({normal}) of cameras[{i}] ({names[i]}) would explain it best"
-        if left[i] <= DISAGREEMENT
-        else "no single wrong normal explains it; check the positions, the scales and angles that "
-        "are given, and that at least half of the shortest video is in common with the others"
-    )
+    why = explain(tracks, given, learned)
+    if why is not None and why.left <= max(GROSS, max(missed) / 3):
+        advice = f"{why.text(names)} would explain it best"
+    elif max(missed) > GROSS and smooth(tracks, learned):
+        advice = (
+            "no single cause explains it; check the positions and normals, the scales and angles "
+            "that are given, and that at least half of the shortest video is in common with the "
+            "others; what was measured by hand should have its error in the rig file"
+        )
+    else:
+        return []
     return [f"the rig does not agree with the tracks: {apart}: {advice}"]

@@ -16,6 +16,9 @@
  2. calibrate     tracks -> the same `Rig`, with nothing unknown
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
+    adjust        bundle adjustment: cameras and path together (`changes`: of what), `shutter`
+    causes        why views do not agree, by trying one thing at a time
+    covariance    of errors that depend on their neighbours
     messages      all warnings
     eq4           beside the way: calibration as the paper writes it, to compare
 
@@ -25,6 +28,7 @@ The other rooms import from here alone.
 from .alignment import Lags, align, list_lags
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
 from .clocks import Clock
+from .causes import GROSS, explain, smooth
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .camera import Camera
