@@ -95,7 +95,10 @@ def _discover(options: argparse.Namespace) -> int:
     try:
         found = _found(options, rig)
     except Refused as refused:
-        write_refusal(refused, videos, rig, options.out, told)
+        try:
+            write_refusal(refused, videos, rig, options.out, told)
+        except (ValueError, OSError) as error:
+            raise ValueError(f"{refused}; the tracks could not be drawn: {error}") from None
         page = Path(options.out) / PAGE
         raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
     # First the law: if the report cannot be written, it is not lost.
