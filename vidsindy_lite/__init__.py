@@ -29,6 +29,7 @@ from .dynamics import Discovery, PolynomialSystem, SplineSINDy, discover
 from .observation import Observation, observe, observe_tracks
 from .pipeline import VideoDiscovery, discover_from_tracks, discover_from_videos
 from .vision import (
+    Hint,
     Scene,
     Track,
     read_frame,
@@ -49,6 +50,7 @@ __all__ = [
     "Observation",
     "track",
     "Track",
+    "Hint",
     "read_video",
     "read_frame",
     "write_video",

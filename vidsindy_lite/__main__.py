@@ -110,7 +110,7 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     """The law that videos or tracks obey."""
     from .checks import check_positive
     from .pipeline import discover_from_tracks, discover_from_videos
-    from .vision import frame_clock
+    from .vision import frame_clock, load_hints
 
     shared = {name: getattr(options, name) for name in ("degree", "seed")}
     shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
@@ -120,7 +120,8 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     t = None
     if options.fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
-    return discover_from_videos(options.videos, rig, t, detector=options.detector, **shared)
+    shared |= {"detector": options.detector, "hints": load_hints(options.rig)}
+    return discover_from_videos(options.videos, rig, t, **shared)
 
 
 def _pick(options: argparse.Namespace) -> int:

@@ -30,7 +30,7 @@ from .cameras import (
 )
 from .checks import check_path, check_tracks, check_vector
 from .refusal import Refused, refusing
-from .vision import Track, VideoInfo, check_detector, frame_clock, track, video_info
+from .vision import Hint, Track, VideoInfo, check_detector, frame_clock, track, video_info
 
 _OTHER_LAG = 0.02  # frames by which it may differ without a word
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
@@ -80,6 +80,7 @@ def observe(
     *,
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
+    hints: Sequence[Hint | None] | None = None,
     progress: bool = False,
 ) -> Observation:
     """Track a target in the videos of several fixed cameras and reconstruct its path.
@@ -103,6 +104,8 @@ def observe(
         default they are learned, see `learn_lags`.
     detector : str or path
         See `track`.
+    hints : sequence of Hint or None, optional
+        Which of the things that move is the target, one per video: see `track`.
     progress : bool
         Show progress bars.
 
@@ -129,7 +132,11 @@ def observe(
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     given = _check_lags(lags, clock, names)
     videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
-    seen = [_track_one(path, shot.frames, detector) for path, shot in videos]
+    told = _check_hints(hints, files)
+    seen = [
+        _track_one(path, shot.frames, detector, hint)
+        for (path, shot), hint in zip(videos, told, strict=True)
+    ]
     tracks = [track.pixels for track in seen]
     _check_found(tracks, names)
     doubts = [warning for track in seen for warning in track.warnings]
@@ -281,9 +288,22 @@ def _cut_off(path: Path, stated: int, read: int) -> str:
     )
 
 
-def _track_one(path: Path, frames: int, detector: str | os.PathLike) -> Track:
+def _check_hints(
+    hints: Sequence[Hint | None] | None, files: Sequence[Path]
+) -> Sequence[Hint | None]:
+    """One hint per video, or none."""
+    if hints is None:
+        return [None] * len(files)
+    if not isinstance(hints, Sequence) or len(hints) != len(files):
+        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {hints!r:.60}")
+    return hints
+
+
+def _track_one(
+    path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None
+) -> Track:
     """Track a video that should have so many frames."""
-    found = track(path, detector)
+    found = track(path, detector, hint)
     if len(found.pixels) != frames:
         raise ValueError(_cut_off(path, frames, len(found.pixels)))
     return found

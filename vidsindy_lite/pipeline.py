@@ -15,7 +15,7 @@ from .checks import check_integer, check_positive, check_rows
 from .dynamics import Discovery, check_order, discover
 from .observation import Observation, observe, observe_tracks
 from .refusal import refusing
-from .vision import TrackFile, read_tracks
+from .vision import Hint, TrackFile, read_tracks
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +43,7 @@ def discover_from_videos(
     *,
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
+    hints: Sequence[Hint | None] | None = None,
     degree: int = 3,
     order: int | str = 1,
     seed: int = 0,
@@ -54,7 +55,7 @@ def discover_from_videos(
 
     Parameters
     ----------
-    paths, rig, t, lags, detector, progress
+    paths, rig, t, lags, detector, hints, progress
         See `observe`. The unit of time is that of the equations.
     degree, order, seed
         See `discover`.
@@ -71,7 +72,7 @@ def discover_from_videos(
     check_integer("degree", degree, 1)
     check_order(order)
     check_integer("seed", seed)
-    seen = observe(paths, rig, t, lags=lags, detector=detector, progress=progress)
+    seen = observe(paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress)
     names = [Path(path).name for path in paths]
     return _with_law(seen, names, degree=degree, order=order, seed=seed, progress=progress)
 

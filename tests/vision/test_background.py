@@ -10,11 +10,11 @@ from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
     _background_motion,
-    _camera_motion,
     _largest_component,
     _median,
     _reduce,
     _shape,
+    camera_motion,
     sample_frames,
     track_blobs,
     view_distances,
@@ -54,10 +54,10 @@ def test_a_displaced_view_is_measured(texture, shift):
     rng = np.random.default_rng(1)
     change = -(shift[0] * slope[0] + shift[1] * slope[1])
     changes = [(change + rng.normal(0, 0.1, change.shape)).astype(np.float32)] * 3
-    found = _camera_motion(texture, changes, 1e3)
+    found = camera_motion(texture, changes, 1e3)
     assert found == pytest.approx(4 * np.hypot(*shift), rel=0.05)  # in pixels of the video
     still = [rng.normal(0, 1, texture.shape).astype(np.float32) for _ in range(5)]
-    assert _camera_motion(texture, still, 1e3) == 0
+    assert camera_motion(texture, still, 1e3) == 0
 
 
 def test_what_differs_far_from_the_target_is_motion_of_the_background():

@@ -2,6 +2,8 @@
 
 Wanted are the changes p of the cameras (`changes`) and the points x of the path that make
 
+::
+
     sum_frames w / sigma^2 |track - image(x, p)|^2  +  sum (p / error)^2
 
 smallest: pixels and measurements, each in units of its error. Each step of Gauss and Newton takes

@@ -1,7 +1,8 @@
 """Rigs: the cameras that watch one scene, their file, and the template of such a file.
 
 A file holds one [[camera]] table per video, whose keys are the arguments of its model of camera,
-and model unless it is orthographic. Without scale and angle, or position, these are learned
+and model unless it is orthographic; target is a hint for the tracker, e.g. {frame = 10, box =
+[120, 80, 24, 24]}. Without scale and angle, or position, these are learned
 (`learn_cameras`); of the other keys, what is left out has its default.
 """
 
@@ -292,8 +293,9 @@ def _from_table(index: int, table: object) -> Camera:
             raise ValueError(f"must be a table, got {table!r}")
         known = dict(table)
         model = known.pop("model", OrthographicCamera.model)
+        known.pop("target", None)  # for the tracker
         check_choice("model", model, [*MODELS])
-        keys = ["model", *(part.name for part in fields(MODELS[model]))]
+        keys = ["model", "target", *(part.name for part in fields(MODELS[model]))]
         for key in table:
             if key not in keys:
                 raise ValueError(f"{key}: must be one of {', '.join(keys)}")

@@ -4,12 +4,15 @@ video       reading and writing of video files; stills reads films that are fold
 track_files tracks as text files: DLTdv's, Tracker's, DeepLabCut's and ours
 tracking    track: a video in, the target's pixels out, by one of
 background      what differs from a background at rest (the most exact)
+moving          what moves most plainly, if camera and background are not: steadying takes out the
+                camera's motion, candidates are what differs, linking joins them, refining measures
 detector        what looks like a target in a single frame: our network, or any YOLO-v8
 network     that network, in PyTorch; training trained it, on frames that are drawn here
 scenes      what a camera sees; scenery draws its backgrounds, rendering its frames
 """
 
 from .detector import WEIGHTS, LearnedDetector, detections
+from .hints import Hint, load_hints
 from .rendering import render, render_labelled, render_restless, render_video
 from .scenery import BACKGROUNDS
 from .scenes import SHAPES, Scene

@@ -29,7 +29,9 @@ from scipy.spatial.distance import cdist
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .video import pick_frames, video_info
 
-_SAMPLES = 21  # frames whose median is the background
+SAMPLES = 21
+"""Frames whose median is the background."""
+
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
 _BORDER = 3  # coarse pixels around a place that show how its surroundings continue
@@ -51,8 +53,8 @@ Window = tuple[slice, slice]
 
 
 def sample_frames(path: str | os.PathLike) -> NDArray[np.uint8]:
-    """About `_SAMPLES` frames spread evenly over the clip, (m, height, width, 3)."""
-    spread = np.linspace(0, video_info(path).frames - 1, _SAMPLES).round().astype(int)
+    """About `SAMPLES` frames spread evenly over the clip, (m, height, width, 3)."""
+    spread = np.linspace(0, video_info(path).frames - 1, SAMPLES).round().astype(int)
     return np.stack(list(pick_frames(path, np.unique(spread).tolist())))
 
 
@@ -122,7 +124,7 @@ def _background_motion(changes: list[Floats32], floor: float) -> float:
     return float(np.median(shares)) if shares else 0.0
 
 
-def _camera_motion(background: Floats32, changes: list[Floats32], floor: float) -> float:
+def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -> float:
     """Pixels by which the whole background is displaced, where that is certain, else 0.
 
     To first order a displacement changes the image by minus that times its slope: least squares,
@@ -132,6 +134,8 @@ def _camera_motion(background: Floats32, changes: list[Floats32], floor: float) 
     displaced: list[float] = []
     for change in changes:
         calm = np.linalg.norm(change, axis=-1) <= floor
+        if not calm.any():
+            continue
         g, d = slope[:, calm].reshape(2, -1), change[calm].ravel()
         variance = d.var() + _ROUNDING
         information = g @ g.T / variance + np.eye(2)
@@ -139,7 +143,7 @@ def _camera_motion(background: Floats32, changes: list[Floats32], floor: float) 
         error = np.sqrt(np.trace(np.linalg.inv(information)))
         distance = float(np.linalg.norm(displacement))
         displaced.append(_COARSE * distance if distance > 5 * error else 0.0)
-    return float(np.median(displaced))
+    return float(np.median(displaced)) if displaced else 0.0
 
 
 # --------------------------------------------------------------------------------------- the model
@@ -149,13 +153,15 @@ def _camera_motion(background: Floats32, changes: list[Floats32], floor: float) 
 class Blob:
     """One look at the target: centroid (2,) in pixels, visible area, clear of the image border?
 
-    `shape` is None where frame, background and target do not fit together.
+    `shape` is None where frame, background and target do not fit together. `softness` is how much
+    of it is covered in part, over the root of its area: 0.6 for a sharp disc.
     """
 
     centroid: Floats
     area: float
     inside: bool
     shape: Floats | None
+    softness: float = 0.0
 
 
 class BackgroundModel:
@@ -177,7 +183,7 @@ class BackgroundModel:
         self.coarse_background = _reduce(self.background)
         changes = [_reduce(sample) - self.coarse_background for sample in samples]
         self.background_motion = _background_motion(changes, self.coarse_floor)
-        self.camera_motion = _camera_motion(self.coarse_background, changes, self.coarse_floor)
+        self.camera_motion = camera_motion(self.coarse_background, changes, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         self.blur = 1.2 if self.noise > _QUIET else 0.0
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
@@ -265,7 +271,8 @@ class BackgroundModel:
         blind = self.blind[window][near & (label == 0)].mean() > _BLIND
         sound = not blind and (alpha**2).sum() < 1.2 * area
         shape = _shape(alpha, u - centre[0], v - centre[1]) if sound else None
-        return Blob(low + centre, area, inside, shape)
+        softness = float((alpha * (1 - alpha)).sum() / np.sqrt(area))
+        return Blob(low + centre, area, inside, shape, softness)
 
 
 def _erode(label: Image) -> Image:

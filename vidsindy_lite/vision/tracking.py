@@ -1,10 +1,12 @@
 """Where the moving target is in each frame of a video file, to a fraction of a pixel.
 
-Two ways to find it stand behind one call. A *background model* (`background`) knows all frames and
-finds what differs from what is at rest: to 1/100 of a pixel, as long as camera and background stay
-as they are. A *detector* (`detector`) knows what targets look like and finds it in each frame on
-its own, whatever the background does, to a few tenths of a pixel. The paper has one of that kind,
-YOLO-v8; what such a detector sees in the single frames is linked here to one motion.
+Three ways to find it stand behind one call. A *background model* (`background`) knows all frames
+and finds what differs from what is at rest: to 1/100 of a pixel, as long as camera and background
+stay as they are. Where they do not, `moving` takes out the camera's motion and the light's, and
+follows what moves most plainly of all that does. A *detector* (`detector`) knows what targets
+look like and finds it in each frame on its own, whatever the background does, to a few tenths of a
+pixel. The paper has one of that kind, YOLO-v8; what such a detector sees in the single frames is
+linked here to one motion.
 
 A frame gets NaN where the target is not seen, or not for sure.
 """
@@ -16,16 +18,23 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Image
+from ..checks import check_instance
 from .background import BackgroundModel, sample_frames, track_blobs, view_distances, whole_views
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
+from .hints import Hint
+from .moving import follow
+from .refining import scatter
+from .steadying import carry
 from .video import read_video
 
 DETECTORS = ("auto", "background", "learned")
 
 _RESTLESS = 0.3  # motion above which a background is not at rest; before one at rest it is 0.03
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
-_SAME = 3.0  # pixels, within which two tracks are of the same thing
+_SOFT = 1.0  # of a sharp outline it is 0.6, see `Blob`
+_FEW = 0.95  # share of views that are whole, below which a blurred outline cannot be trusted
+_ROUGH = 1.0  # pixels that a track may scatter about a smooth motion
 _GAIN = 0.15  # of confidence, that a sighting has to exceed to be worth anything
 _GAP = 1.0  # price of a gap, in units of confidence: what is seen for a single frame is an error
 _JUMP = 2.0  # price of a jump
@@ -40,44 +49,61 @@ class Track:
     Parameters
     ----------
     pixels : ndarray, shape (n, 2)
-        Centroid of the target, (u right, v down) in pixels, pixel centres at integers; NaN in
-        frames where it is not seen, or only a part of it, or not for sure.
+        Centroid of the target, (u right, v down) in pixels of the first frame, pixel centres at
+        integers; NaN in frames where it is not seen, or only a part of it, or not for sure.
     confidence : ndarray, shape (n,)
         From 0, nothing seen, to 1. A detector says how sure it is of each frame; the background
         model how much the view is like those of the whole target.
     detector : str
-        What found it: "background", "learned" or the name of an .onnx file.
+        What found it: "background", "motion", "learned" or the name of an .onnx file.
     warnings : tuple of str
         Reasons not to trust the track.
+    maps : ndarray, shape (n, 3, 3), optional
+        Where each frame lies in the first one, homogeneous, if the camera moved.
     """
 
     pixels: Floats
     confidence: Floats
     detector: str
     warnings: tuple[str, ...] = ()
+    maps: Floats | None = None
+
+    @property
+    def in_frames(self) -> Floats:
+        """The target in the pixels of each frame itself, (n, 2): to be drawn there."""
+        if self.maps is None:
+            return self.pixels
+        return carry(np.linalg.inv(self.maps), self.pixels)
 
 
-def track(path: str | os.PathLike, detector: str | os.PathLike = "auto") -> Track:
+def track(
+    path: str | os.PathLike, detector: str | os.PathLike = "auto", target: Hint | None = None
+) -> Track:
     """Track the one moving target of a video.
 
     Parameters
     ----------
     path : path
-        A video of one target in colours unlike the background's.
+        A video of a target that moves. Other things may move, too, and the camera may tremble or
+        be held in the hand.
     detector : {"auto", "background", "learned"} or path
+        * "auto": "background" as long as camera, light and background are at rest. Else the
+          camera's motion and the light's are taken out, and of all that moves the plainest path is
+          followed: something that travels, keeps its colour and turns gently.
         * "background": for a camera at rest, the most exact. The target may turn and change its
           size, not its shape, and is whole in at least a quarter of the frames that show any of
           it. It must stay away from each place for at least a fifth of the frames: what never
           moves away by about its own width is background.
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
-        * "auto": "background"; if the background is not at rest, both, and "learned" is taken
-          unless the other finds the same target in as many frames.
+    target : Hint, optional
+        Which of the things that move is the target, for "auto".
 
     Returns
     -------
     Track
-        Its warnings say whether the camera or the background is not at rest.
+        Its warnings say where something else might be the target; of "background", whether the
+        camera or the background is not at rest.
 
     Raises
     ------
@@ -86,33 +112,54 @@ def track(path: str | os.PathLike, detector: str | os.PathLike = "auto") -> Trac
         detector or .onnx file.
     """
     check_detector(detector)
+    if target is not None:
+        check_instance("target", target, Hint)
+        if detector != "auto":
+            raise ValueError(f"target: may be given for detector='auto', got {detector!r:.60}")
     if detector not in ("auto", "background"):
         return _link_detections(path, detector)
-    model = BackgroundModel(sample_frames(path))
-    found = _track_blobs(path, model)
-    name, doubts = Path(path).name, []
-    if model.camera_motion > _SHAKY:
+    samples, name = sample_frames(path), Path(path).name
+    model = BackgroundModel(samples)
+    shaky, restless = model.camera_motion > _SHAKY, model.background_motion > _RESTLESS
+    if detector == "auto" and (shaky or restless):
+        return _follow(path, samples, target)
+    found, blurred = _track_blobs(path, model)
+    if detector == "auto" and (blurred or not _plausible(found, target)):
+        return _follow(path, samples, target)
+    doubts = []
+    if shaky:
         doubts.append(
             f"{name}: the camera moves, typically by {model.camera_motion:.1f} px or more; "
             "its motion is part of the track"
         )
-    if model.background_motion > _RESTLESS:
+    if restless:
         doubts.append(
             f"{name}: the background is not at rest; far from the largest thing that moves, "
             f"{model.background_motion:.1f} times its area changes in a typical frame"
         )
-        if detector == "auto":
-            found = _surer(found, _link_detections(path, "learned"))
     return replace(found, warnings=tuple(doubts))
 
 
-def _surer(model: Track, learned: Track) -> Track:
-    """The background model's track if it agrees with the other and has as many frames."""
-    apart = np.linalg.norm(model.pixels - learned.pixels, axis=1)
-    both = np.isfinite(apart)
-    agree = both.any() and np.median(apart[both]) < _SAME
-    more = np.isfinite(model.pixels).sum() >= np.isfinite(learned.pixels).sum()
-    return model if agree and more else learned
+def _follow(path: str | os.PathLike, samples: Image, hint: Hint | None) -> Track:
+    """The plainest motion, with the camera's taken out."""
+    found = follow(path, samples, hint)
+    seen = np.isfinite(found.pixels[:, 0])
+    confidence = np.where(seen, np.exp(-found.errors / 3), 0.0)
+    doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in found.doubts)
+    moves = not np.array_equal(found.maps, np.broadcast_to(np.eye(3), found.maps.shape))
+    return Track(found.pixels, confidence, "motion", doubts, found.maps if moves else None)
+
+
+def _plausible(found: Track, hint: Hint | None) -> bool:
+    """Is it a smooth motion, and that of what the hint says?"""
+    at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
+    if hint is None:
+        rough = scatter(at, found.pixels[at])
+        return not np.isfinite(rough) or rough < _ROUGH
+    if hint.box is None or hint.frame not in at:
+        return False
+    middle = np.array(hint.box[:2]) + (np.array(hint.box[2:]) - 1) / 2
+    return bool((np.abs(found.pixels[hint.frame] - middle) <= np.array(hint.box[2:]) / 2).all())
 
 
 def check_detector(name: str | os.PathLike) -> None:
@@ -134,12 +181,21 @@ def check_detector(name: str | os.PathLike) -> None:
         raise FileNotFoundError(f"detector: no such file, got '{name}'")
 
 
-def _track_blobs(path: str | os.PathLike, model: BackgroundModel) -> Track:
+def _track_blobs(path: str | os.PathLike, model: BackgroundModel) -> tuple[Track, bool]:
+    """The background model's track, and whether outlines are too blurred for it.
+
+    It tells whole views by their outlines: where these are blurred, by motion or a codec, and many
+    views are left out, it is by the blur that they differ.
+    """
     blobs = list(track_blobs(model, read_video(path)))
     distance = view_distances(blobs)
+    whole = whole_views(distance)
     centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)
-    centroids[~whole_views(distance)] = np.nan
-    return Track(centroids, np.exp(-distance), "background")
+    centroids[~whole] = np.nan
+    inside = np.array([b is not None and b.inside for b in blobs])
+    soft = [b.softness for b in blobs if b is not None and b.inside]
+    blurred = bool(inside.any() and np.median(soft) > _SOFT and whole[inside].mean() < _FEW)
+    return Track(centroids, np.exp(-distance), "background"), blurred
 
 
 def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:

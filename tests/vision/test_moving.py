@@ -1,0 +1,248 @@
+"""The tracker for films that people make: phone footage with known truth, hints, real clips."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from footage import Phone, camera_maps, write_phone
+
+import vidsindy_lite
+from vidsindy_lite import Hint, track, write_video
+from vidsindy_lite.vision.candidates import Candidate, Plate, light, reduce
+from vidsindy_lite.vision.hints import load_hints
+from vidsindy_lite.vision.linking import Sightings, best_path
+from vidsindy_lite.vision.refining import fitting, scatter
+from vidsindy_lite.vision.steadying import Steadying, carry, stands_still
+
+REAL = Path(vidsindy_lite.__file__).parents[2] / "shared" / "real"
+SMALL = {"image_size": (320, 240), "frames": 60}
+
+
+def errors(path, truth, target=None):
+    found = track(path, target=target)
+    return found, np.linalg.norm(found.pixels - truth, axis=1)
+
+
+# --------------------------------------------------------------------------------- phone footage
+
+
+@pytest.mark.parametrize(
+    "phone",
+    [
+        Phone("bricks", 14, shadow=True, **SMALL),
+        Phone("wood", 20, flicker=0.1, colour=(15, 225, 250), **SMALL),
+        Phone("bricks", 18, camera="trembling", **SMALL),
+        Phone("wood", 16, camera="held", flicker=0.03, colour=(235, 240, 240), **SMALL),
+        Phone("plain", 20, colour=(115, 118, 116), noise=1, **SMALL),
+        Phone("hills", 60, nearness=1.2, bitrate=1_500_000, **SMALL),
+    ],
+    ids=["shadow", "flicker", "trembling", "held", "grey", "large"],
+)
+def test_phone_footage(tmp_path, phone):
+    truth, _ = write_phone(tmp_path / "clip.mp4", phone, 1)
+    found, error = errors(tmp_path / "clip.mp4", truth)
+    assert np.isfinite(error).mean() >= 0.95
+    assert np.nanmedian(error) < 0.3
+    assert np.nanpercentile(error, 95) < 1.5
+
+
+@pytest.mark.slow
+def test_twenty_films(tmp_path):
+    medians, wrong = [], []
+    for seed in range(20):
+        phone = Phone.random(np.random.default_rng(seed))
+        truth, _ = write_phone(tmp_path / "clip.mp4", phone, seed)
+        found, error = errors(tmp_path / "clip.mp4", truth)
+        medians.append(np.nanmedian(error))
+        if np.nanpercentile(error, 90) > phone.size and not found.warnings:
+            wrong.append(seed)
+    assert not wrong
+    assert np.median(medians) < 0.3
+
+
+def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
+    n = 60
+    t = np.arange(n)
+    places = [np.column_stack([40 + 4 * t, 60 + 30 * np.sin(t / (6 + k)) + 80 * k]) for k in (0, 1)]
+    rng = np.random.default_rng(0)
+    ground = cv2.GaussianBlur(rng.uniform(0, 255, (240, 320, 3)).astype(np.float32), (0, 0), 4)
+
+    def frames():
+        for i in range(n):
+            frame = 60 + ground.copy() / 2
+            for place in places:
+                cv2.circle(frame, tuple(np.rint(16 * place[i]).astype(int)), 16 * 8,
+                           (30, 30, 210), -1, cv2.LINE_AA, 4)  # fmt: skip
+            yield np.clip(frame + rng.normal(0, 2, frame.shape), 0, 255).astype(np.uint8)
+
+    path = write_video(tmp_path / "clip.mov", frames())
+    assert any("something else moves" in warning for warning in track(path).warnings)
+    for truth in places:
+        hint = Hint(frame=20, box=(*(truth[20] - 9), 19, 19))
+        found, error = errors(path, truth, hint)
+        assert np.isfinite(error).mean() > 0.9
+        assert np.nanmax(error) < 1
+        assert not any("something else moves" in warning for warning in found.warnings)
+
+
+# --------------------------------------------------------------------------------------- its parts
+
+
+@pytest.mark.parametrize("camera", ["trembling", "held"])
+def test_the_camera_is_followed(camera):
+    phone = Phone(camera=camera, **SMALL)
+    rng = np.random.default_rng(3)
+    maps = camera_maps(phone, rng)[4::8]
+    scene = cv2.GaussianBlur(rng.uniform(0, 255, (340, 420, 3)).astype(np.float32), (0, 0), 2)
+    scene = np.clip(128 + 6 * (scene - 128), 0, 255)
+    move = np.array([[1, 0, -50], [0, 1, -50], [0, 0, 1.0]])
+    steadying = Steadying(1)
+    views = [cv2.warpPerspective(scene, m @ move, (320, 240)).astype(np.uint8) for m in maps]
+    for view in views:
+        steadying.add(view)
+    motion = steadying.motion()
+    points = np.array([[40, 40], [280, 40], [40, 200], [280, 200.0]])
+    for here, true in zip(motion.maps, maps, strict=True):
+        assert np.abs(carry(here, carry(true, points)) - points).max() < 0.5
+    assert motion.moves
+    assert not stands_still(views[::6])
+    assert stands_still([views[0]] * 5)
+
+
+def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
+    def one(u, v, quality=0.9):
+        centre = np.array([u, v], float)
+        box = np.array([u - 4, v - 4, 9, 9])
+        return Candidate(centre, box, 60.0, np.array([30.0, 30, 200]), quality)
+
+    rng = np.random.default_rng(0)
+    found = [[one(10 + 5 * i, 50), one(*rng.uniform(0, 200, 2), 0.6)] for i in range(30)]
+    found[12] = found[13] = []
+    places = [np.array([c.centre for c in f]).reshape(-1, 2) for f in found]
+    seen = Sightings.of(found, places, 400.0)
+    rows, value = best_path(seen)
+    np.testing.assert_array_equal(seen.frame[rows], [i for i in range(30) if i not in (12, 13)])
+    np.testing.assert_array_equal(seen.which[rows], 0)
+    assert value > 15
+    assert best_path(seen.only(np.zeros(0, int)))[1] == 0
+
+
+def test_partial_views_and_jumps_are_left_out():
+    frames = np.arange(40)
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    areas = np.full(40, 100.0)
+    areas[10] = 40
+    places[25] += 15
+    good = fitting(frames, places, areas, np.arange(40) != 5)
+    np.testing.assert_array_equal(np.flatnonzero(~good), [5, 10, 25])
+
+
+def test_scatter_is_the_noise_of_a_smooth_motion():
+    rng = np.random.default_rng(0)
+    frames = np.arange(400)
+    places = np.column_stack([100 * np.sin(frames / 20), 0.5 * frames])
+    noisy = places + rng.normal(0, 0.2, places.shape)
+    assert scatter(frames, places) < 0.01
+    assert scatter(frames, noisy) == pytest.approx(0.2, rel=0.15)
+
+
+def test_light_is_measured_where_most_of_the_image_agrees():
+    then = np.full((60, 80, 3), 100, np.float32)
+    now = 0.9 * then
+    now[10:20, 10:20] = 255
+    np.testing.assert_allclose(light(now, then, np.ones((60, 80), bool)), 0.9, rtol=1e-6)
+    dark = np.full((60, 80, 3), 5, np.float32)
+    np.testing.assert_array_equal(light(2 * dark, dark, np.ones((60, 80), bool)), 1)
+
+
+def test_the_plate_of_a_moving_camera():
+    rng = np.random.default_rng(0)
+    scene = cv2.GaussianBlur(rng.uniform(0, 255, (200, 300, 3)).astype(np.float32), (0, 0), 3)
+    scene = np.clip(128 + 5 * (scene - 128), 0, 255).astype(np.uint8)
+    maps = np.array([[[1, 0, 4.0 * k], [0, 1, 0], [0, 0, 1]] for k in range(9)])
+    samples = np.array([scene[20:120, 20 + 4 * k : 140 + 4 * k] for k in range(9)])
+    samples[4, 40:60, 40:60] = 0  # the target, once
+    plate = Plate(samples, maps, np.ones(9, bool))
+    for sample, here in zip(samples[[0, 4, 8]], maps[[0, 4, 8]], strict=True):
+        view, known = plate.seen_from(here, np.zeros(2), (120, 100))
+        difference = np.abs(view.astype(int) - sample)[known]
+        assert known.mean() > 0.8
+        assert np.median(difference) == 0
+    assert plate.seen_from(maps[4], np.array([40, 40]), (20, 20))[0].min() > 0
+
+
+def test_reduced_pixels_are_means():
+    image = np.random.default_rng(0).integers(0, 256, (8, 12, 3), np.uint8)
+    means = image.reshape(4, 2, 6, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(reduce(image, 2), means, atol=0.5)
+    assert reduce(image, 1) is image
+
+
+# ------------------------------------------------------------------------------------------- hints
+
+
+@pytest.mark.parametrize(
+    ("told", "message"),
+    [
+        ({}, "target: must be a frame and a box"),
+        ({"frame": 3}, "box: must come with its frame"),
+        ({"box": (1, 2, 3, 4)}, "box: must come with its frame"),
+        ({"frame": -1, "box": (1, 2, 3, 4)}, "frame: must be an integer of at least 0"),
+        ({"frame": 1, "box": (1, 2, 3)}, "box: must be"),
+        ({"frame": 1, "box": (1, 2, 0, 4)}, "box: must be two pixels"),
+        ({"colour": (1, 2)}, "colour: must be"),
+        ({"colour": (1, 2, 300)}, "colour: must be"),
+    ],
+)
+def test_bad_hints(told, message):
+    with pytest.raises(ValueError, match=message):
+        Hint(**told)
+
+
+def test_hints_of_a_rig_file(tmp_path):
+    file = tmp_path / "rig.toml"
+    file.write_text(
+        "[[camera]]\nnormal = [1, 0, 0]\ntarget = {frame = 10, box = [1, 2, 30, 40]}\n"
+        "[[camera]]\nnormal = [0, 1, 0]\n"
+        "[[camera]]\nnormal = [0, 0, 1]\ntarget = {colour = [255, 0, 0]}\n"
+    )
+    assert load_hints(file) == (Hint(10, (1, 2, 30, 40)), None, Hint(colour=(255, 0, 0)))
+    assert len(vidsindy_lite.Rig.load(file).cameras) == 3
+    file.write_text("[[camera]]\nnormal = [1, 0, 0]\ntarget = {place = 10}\n")
+    with pytest.raises(ValueError, match="camera 0: target: must be a table of frame, box, colour"):
+        load_hints(file)
+
+
+def test_a_hint_is_for_auto_and_must_be_one(tmp_path):
+    with pytest.raises(ValueError, match="target: may be given for detector='auto'"):
+        track(tmp_path / "a.mov", "learned", Hint(colour=(1, 2, 3)))
+    with pytest.raises(ValueError, match="target: must be of type Hint"):
+        track(tmp_path / "a.mov", target=(1, 2, 3, 4))
+
+
+# --------------------------------------------------------------------------------------- real clips
+
+
+def real(name):
+    path = REAL / f"{name}.mp4"
+    if not path.is_file():
+        pytest.skip("no real footage here")
+    return path
+
+
+def test_the_toss():
+    path = real("toss")
+    truth = np.genfromtxt(path.with_suffix(".csv"), delimiter=",", skip_header=1)[:, 1:]
+    error = np.linalg.norm(track(path).in_frames - truth, axis=1)
+    shown = np.isfinite(truth[:, 0])
+    assert (error[shown] < 1).mean() >= 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "first"), [("diabolo", 15), ("pendulum", 17)])
+def test_clips_without_reference_have_smooth_tracks(name, first):
+    found = track(real(name))
+    at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
+    assert (at >= first).sum() >= 0.8 * (len(found.pixels) - first)
+    assert scatter(at, found.pixels[at]) < 2

@@ -1,0 +1,270 @@
+"""What may be the target in each frame: all that differs from the steadied background.
+
+The *plate* is the background as no single frame shows it: the median over frames spread through the
+clip, each carried into the first frame by the camera's motion. What differs from it, beyond noise
+and beyond what an edge does that is displaced a little, falls apart into blobs, each a candidate
+with its place, size, colour and the strength of its evidence. Which of them are the target is for
+`linking` to say.
+
+All of this happens on reduced frames, whose longer side has at most 480 pixels.
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from ..arrays import Bools, Floats, Floats32, Image
+from .background import _median
+
+LONGEST = 480  # pixels of the longer side of a reduced frame
+_LARGEST = 2.5  # frames that the plate may hold, side by side
+_FEWEST = 3  # samples that must show a place of the plate
+_LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts, whatever the noise
+_EDGE = {False: 0.12, True: 0.5}  # pixels by which an edge may be displaced; if the camera moves
+_FILLS = 0.3  # share of the image that no target fills
+_STRIP = 128  # rows of a canvas whose median is taken at once
+_MOST = 40  # candidates of a frame that are looked at
+_KEPT = 12  # and that are kept, once it is known which of them stay where they are
+_STAYS = 1.0  # by how much of its quality a candidate loses that is there in all frames
+_WORTH = 0.4  # share of its quality that it keeps at least
+
+
+def reduction(size: tuple[int, int]) -> int:
+    """By how much frames of this size are reduced."""
+    return max(1, -(-max(size) // LONGEST))
+
+
+def reduce(image: Image, factor: int) -> Image:
+    """The means over squares of `factor` pixels."""
+    if factor == 1:
+        return image
+    size = (-(-image.shape[1] // factor), -(-image.shape[0] // factor))
+    padded = cv2.copyMakeBorder(
+        image, 0, size[1] * factor - image.shape[0], 0, size[0] * factor - image.shape[1],
+        cv2.BORDER_REPLICATE,
+    )  # fmt: skip
+    return np.asarray(cv2.resize(padded, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Something that differs from the background, in pixels of its frame.
+
+    `centre` (2,), `box` (left, top, width, height), area, mean colour (3,), quality in [0, 1].
+    """
+
+    centre: Floats
+    box: Floats
+    area: float
+    colour: Floats
+    quality: float
+
+
+def enlarged(factor: float) -> Floats:
+    """The map of pixels of an image reduced by a factor to those of the image."""
+    k = factor
+    return np.array([[k, 0, (k - 1) / 2], [0, k, (k - 1) / 2], [0, 0, 1.0]])
+
+
+class Plate:
+    """The steadied background, of frames of one size.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (m, height, width, 3), uint8
+    maps : ndarray, shape (m, 3, 3)
+        Where each lies in the first frame.
+    known : ndarray, shape (m,), bool
+        Which of the maps can be trusted.
+    """
+
+    def __init__(self, samples: Image, maps: Floats, known: Bools) -> None:
+        size = np.array(samples.shape[2:0:-1])
+        self.size = size
+        self.moves = not np.allclose(maps, np.eye(3))
+        if not self.moves:
+            self.shift, self.image = np.eye(3), _median(samples)
+            self.valid = np.full(self.image.shape[:2], 255, np.uint8)
+            return
+        corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (size - 1.0)
+        ends = [_carry(h, corners) for h in maps[known]]
+        low = np.floor(np.percentile([e.min(axis=0) for e in ends], 5, axis=0))
+        high = np.ceil(np.percentile([e.max(axis=0) for e in ends], 95, axis=0))
+        middle = _carry(maps[known][len(maps[known]) // 2], corners).mean(axis=0)
+        reach = size * np.sqrt(_LARGEST) / 2
+        low, high = np.maximum(low, middle - 1.5 * reach), np.minimum(high, middle + 1.5 * reach)
+        low = np.floor(low)
+        self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
+        width, height = (int(x) for x in np.ceil(high - low) + 1)
+        moves = [self.shift @ here for here in maps[known]]
+        self.image, count = _masked_median(list(samples[known]), moves, (width, height))
+        self.valid = np.where(count >= _FEWEST, 255, 0).astype(np.uint8)
+
+    def seen_from(self, here: Floats, corner: Floats, size: tuple[int, int]) -> tuple[Image, Bools]:
+        """The background in a window of the frame that the map carries; where it is known."""
+        left, top = (int(x) for x in corner)
+        if not self.moves:
+            window = np.s_[top : top + size[1], left : left + size[0]]
+            return self.image[window], self.valid[window] > 0
+        to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, 1.0]])
+        back = to_window @ np.linalg.inv(self.shift @ here)
+        image = cv2.warpPerspective(self.image, back, size, flags=cv2.INTER_LINEAR)
+        valid = cv2.warpPerspective(self.valid, back, size, flags=cv2.INTER_NEAREST)
+        return np.asarray(image, np.uint8), np.asarray(valid) > 0
+
+
+def _carry(here: Floats, points: Floats) -> Floats:
+    ends = np.column_stack([points, np.ones(len(points))]) @ here.T
+    return ends[:, :2] / ends[:, 2:]
+
+
+def _masked_median(
+    samples: list[Image], moves: list[Floats], size: tuple[int, int]
+) -> tuple[Image, Image]:
+    """The median of the samples that show each pixel of a canvas, by how many it is shown.
+
+    Strip by strip, as the samples that are carried there would fill the memory. Where a sample
+    shows nothing, black and white take turns, which does not move the median.
+    """
+    width, height = size
+    result = np.zeros((height, width, 3), np.uint8)
+    count = np.zeros((height, width), np.uint8)
+    for top in range(0, height, _STRIP):
+        strip = (width, min(_STRIP, height - top))
+        up = np.array([[1, 0, 0], [0, 1, -top], [0, 0, 1.0]])
+        layers = np.empty((len(samples), strip[1], width, 3), np.uint8)
+        here = np.zeros((strip[1], width), np.uint8)
+        for k, (sample, move) in enumerate(zip(samples, moves, strict=True)):
+            layers[k] = cv2.warpPerspective(sample, up @ move, strip)
+            full = np.full(sample.shape[:2], 255, np.uint8)
+            shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST) > 0
+            missing = k - here  # samples before it that show nothing
+            layers[k][~shown] = np.where(missing[~shown] % 2, 255, 0)[:, None]
+            here += shown
+        result[top : top + strip[1]] = _median(layers)
+        count[top : top + strip[1]] = here
+    return result, count
+
+
+def light(frame: Floats32, background: Floats32, known: Bools) -> Floats32:
+    """By what factor each colour of a frame is brighter than the background, (3,).
+
+    The median over pixels that are neither dark nor saturated nor, probably, the target's.
+    """
+    step = max(1, int(np.sqrt(known.size / 4000)))
+    a, b = frame[::step, ::step], background[::step, ::step]
+    use = known[::step, ::step] & (b.min(axis=-1) > 40) & (b.max(axis=-1) < 240)
+    if use.mean() < 0.1:
+        return np.ones(3, np.float32)
+    ratio = np.median(a[use] / b[use], axis=0)
+    ratio[np.abs(ratio - 1) < 0.01] = 1  # what rounding and compression do
+    return np.clip(ratio, 0.4, 2.5).astype(np.float32)
+
+
+class Difference:
+    """What differs from the plate, in reduced frames one at a time."""
+
+    def __init__(self, plate: Plate, noise: float) -> None:
+        self.plate = plate
+        grey = cv2.cvtColor(plate.image, cv2.COLOR_BGR2GRAY)
+        kernel = np.ones((3, 3), np.uint8)
+        slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, kernel).astype(np.float32)
+        self.tolerance = (
+            np.float32(np.clip(5 * noise, _LEAST, _COARSE)) + _EDGE[plate.moves] * slope
+        )
+        if plate.moves:
+            self.tolerance[plate.valid == 0] = 1e3
+        self.often = np.zeros(grey.shape, np.float32)
+        self.lights: list[Floats32] = []
+
+    def candidates(self, frame: Image, here: Floats) -> list[Candidate]:
+        """The blobs of a reduced frame, the plainest first, in its pixels."""
+        height, width = frame.shape[:2]
+        background, known = self.plate.seen_from(here, np.zeros(2), (width, height))
+        tolerance = self.tolerance
+        if self.plate.moves:
+            back = np.linalg.inv(self.plate.shift @ here)
+            carried = cv2.warpPerspective(tolerance, back, (width, height), borderValue=1e3)
+            tolerance = np.asarray(carried, np.float32)
+        now, then = frame.astype(np.float32), background.astype(np.float32)
+        factor = light(now, then, known)
+        self.lights.append(factor)
+        change = now - then * factor
+        strength = np.sqrt(np.einsum("ijk,ijk->ij", change, change)) / tolerance
+        differs = ((strength > 1) & known).astype(np.uint8)
+        closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        mask = np.asarray(closed, np.uint8)
+        self._note(mask, here)
+        return blobs(mask, strength, now / factor, then, frame.shape[:2])
+
+    def _note(self, mask: Image, here: Floats) -> None:
+        """Count how often each place of the plate differs from it."""
+        if self.plate.moves:
+            size = self.often.shape[1::-1]
+            move = self.plate.shift @ here
+            self.often += cv2.warpPerspective(mask, move, size, flags=cv2.INTER_NEAREST)
+        else:
+            self.often += mask
+
+    def travelling(self, found: list[Candidate], here: Floats) -> list[Candidate]:
+        """The candidates of a frame, in the order of their quality, those that stay worth less.
+
+        To be called when all frames have been seen: what differs from the plate in a place in many
+        frames, e.g. leaves that sway or the ghost of what has left, is hardly the target.
+        """
+        kept = []
+        for one in found:
+            often = self._share(one, here)
+            worth = one.quality * max(1 - _STAYS * often, _WORTH)
+            kept.append(replace(one, quality=worth))
+        return sorted(kept, key=lambda one: -one.quality)[:_KEPT]
+
+    def _share(self, one: Candidate, here: Floats) -> float:
+        """Share of the frames in which the middle of a candidate differs from the plate."""
+        u, v = (int(x) for x in _carry(self.plate.shift @ here, one.centre[None])[0].round())
+        window = self.often[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2]
+        return float(window.mean() / len(self.lights)) if window.size and u >= 0 and v >= 0 else 0.0
+
+
+def blobs(
+    mask: Image, strength: Floats32, now: Floats32, then: Floats32, shape: tuple[int, ...]
+) -> list[Candidate]:
+    """The connected parts of a mask as candidates."""
+    count, labels, stats, centres = cv2.connectedComponentsWithStats(mask)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    total = np.bincount(labels.ravel(), strength.ravel(), count)[1:]
+    plain = (total / np.maximum(areas, 1) - 1) * np.sqrt(np.minimum(areas, 25))
+    order = 1 + np.argsort(-plain)[:_MOST]
+    found = []
+    for k in order:
+        left, top, width, height, area = stats[k]
+        mean = total[k - 1] / area
+        if area < 2 and mean < 3:
+            continue
+        window = np.s_[top : top + height, left : left + width]
+        here = labels[window] == k
+        weight = np.where(here, strength[window], 0)
+        inner = here & (strength[window] >= 0.7 * np.percentile(strength[window][here], 90))
+        colour = now[window][inner].mean(axis=0)
+        ground = then[window][inner].mean(axis=0)
+        quality = 1 - np.exp(-(mean - 1) * np.sqrt(min(area, 25)) / 4)
+        if area > _FILLS * mask.size:
+            continue
+        if left == 0 or top == 0 or left + width == shape[1] or top + height == shape[0]:
+            quality *= 0.6
+        if _is_shadow(colour, ground):
+            quality *= 0.5
+        u, v = np.arange(width), np.arange(height)
+        centre = np.array([weight.sum(axis=0) @ u, weight.sum(axis=1) @ v]) / weight.sum()
+        box = np.array([left, top, width, height], float)
+        found.append(
+            Candidate(centre + [left, top], box, float(area), colour.astype(float), float(quality))
+        )
+    return found
+
+
+def _is_shadow(colour: Floats32, ground: Floats32) -> bool:
+    """The same surface in less light: darker by about the same factor in all colours."""
+    ratio = (colour + 4) / (ground + 4)
+    return bool(0.35 < ratio.mean() < 0.95 and np.ptp(ratio) < 0.1 * ratio.mean())

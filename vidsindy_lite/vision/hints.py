@@ -1,0 +1,95 @@
+"""What a user can say of the target: where it is in one frame, or its colour."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+from ..checks import check_integer, check_number, check_path
+
+
+@dataclass(frozen=True)
+class Hint:
+    """Which of the things that move is the target: a box around it in one frame, or its colour.
+
+    Parameters
+    ----------
+    frame : int, optional
+        Number of the frame in which the box is drawn, from 0.
+    box : (u, v, width, height), optional
+        Around the target in that frame, close to it: left and upper edge, width and height, pixels.
+    colour : (red, green, blue), optional
+        Of the target, 0 to 255 each.
+
+    Raises
+    ------
+    ValueError
+        If there is neither a box with its frame nor a colour, or one of them breaks its rule.
+    """
+
+    frame: int | None = None
+    box: tuple[float, float, float, float] | None = None
+    colour: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if (self.frame is None) != (self.box is None):
+            raise ValueError(
+                f"box: must come with its frame, got frame={self.frame!r}, box={self.box!r:.60}"
+            )
+        if self.box is None and self.colour is None:
+            raise ValueError("target: must be a frame and a box in it, or a colour, got neither")
+        if self.frame is not None:
+            object.__setattr__(self, "frame", check_integer("frame", self.frame))
+            box = _numbers("box", self.box, 4, "(u, v, width, height) in pixels")
+            if min(box[2:]) < 2:
+                raise ValueError(f"box: must be two pixels wide and high or more, got {box}")
+            object.__setattr__(self, "box", box)
+        if self.colour is not None:
+            colour = _numbers("colour", self.colour, 3, "(red, green, blue), 0 to 255 each")
+            if not 0 <= min(colour) <= max(colour) <= 255:
+                raise ValueError(f"colour: must be red, green, blue, 0 to 255 each, got {colour}")
+            object.__setattr__(self, "colour", colour)
+
+
+def _numbers(name: str, values: object, count: int, what: str) -> tuple[float, ...]:
+    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != count:
+        raise ValueError(f"{name}: must be {what}, got {values!r:.60}")
+    return tuple(check_number(name, value) for value in values)
+
+
+def load_hints(path: str | os.PathLike) -> tuple[Hint | None, ...]:
+    """The hints of a rig file, one per camera: ``target = {frame = 10, box = [u, v, w, h]}``.
+
+    Parameters
+    ----------
+    path : path
+        A rig file that `Rig.load` reads.
+
+    Returns
+    -------
+    tuple of Hint or None
+
+    Raises
+    ------
+    ValueError
+        If a target is no hint; names file, camera and key.
+    """
+    tables = tomllib.loads(check_path("path", path).read_text(encoding="utf-8"))["camera"]
+    return tuple(_from_table(f"{path}: camera {i}", table) for i, table in enumerate(tables))
+
+
+def _from_table(where: str, table: Mapping[str, object]) -> Hint | None:
+    told = table.get("target")
+    if told is None:
+        return None
+    known = [field.name for field in fields(Hint)]
+    if not isinstance(told, dict) or not set(told) <= set(known):
+        raise ValueError(
+            f"{where}: target: must be a table of {', '.join(known)}, got {told!r:.60}"
+        )
+    try:
+        return Hint(**told)
+    except ValueError as error:
+        raise ValueError(f"{where}: target: {error}") from None

@@ -1,0 +1,328 @@
+"""What moves before a background that is steadied: the tracker for films that people make.
+
+Candidates of all frames (`candidates`) are linked to paths (`linking`); the plainest path is the
+target's, and its places are refined in whole frames (`refining`). The camera's motion (`steadying`)
+is taken out, so that tracks come in the first frame's pixels.
+"""
+
+import os
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats, Floats32, Image, Ints
+from .background import SAMPLES, camera_motion
+from .candidates import Candidate, Difference, Plate, enlarged, light, reduce, reduction
+from .hints import Hint
+from .linking import Sightings, best_path
+from .refining import Lens, View, fitting, scatter
+from .steadying import CameraMotion, Steadying, at_rest, carry, stands_still
+from .video import read_frame, read_video, video_info
+
+_PATHS = 5  # paths among which the target's is chosen
+_SHORTEST = 5  # frames of a path
+_AS_PLAIN = 0.5  # rating of another path, relative to the best, above which there is doubt
+_BEYOND = 3  # frames by which a path is carried on at its ends
+_PLAIN = 0.2  # quality of the candidates of a path that is worth anything
+_SWAYS = 0.5  # pixels of a camera's displacement that are more than doubtful
+_LOOSE = 1.0  # pixels to which a camera's motion should be known
+_COLOUR = 70.0  # grey levels between colours that are not alike
+_TOLD = 100.0  # quality of the candidate that a user points at
+_LARGE = 0.03  # share of the image that a target hardly fills
+
+
+class Rated(NamedTuple):
+    """A path: rows of the sightings, how plainly it is a target's."""
+
+    rows: Ints
+    rating: float
+
+
+def rate(seen: Sightings, rows: Ints, value: float) -> float:
+    """How plainly a path is that of a target: something that travels and stays what it is.
+
+    What stands still, flickers or is a part of something larger that changes is worth little.
+    """
+    centre, size = seen.centre[rows], np.median(seen.size[rows])
+    low, high = np.percentile(centre, [5, 95], axis=0)
+    extent = float(np.linalg.norm(high - low) / size)
+    colour = seen.colour[rows]
+    recolour = np.median(np.linalg.norm(colour - np.median(colour, axis=0), axis=1))
+    speed = np.diff(centre, axis=0) / np.diff(seen.frame[rows])[:, None]
+    turn = np.median(np.linalg.norm(np.diff(speed, axis=0), axis=1))
+    jitter = turn / (np.median(np.linalg.norm(speed, axis=1)) + 0.5)
+    large = size**2 / seen.diagonal**2
+    doubts = (1 + recolour / 30) * (1 + jitter) * (1 + large / _LARGE)
+    return float(value * extent / (extent + 2) / doubts)
+
+
+def plainest_paths(seen: Sightings, boxes: Floats) -> list[Rated]:
+    """Several paths that have nothing in common, the plainest first."""
+    left, found = np.arange(len(seen.frame)), []
+    for _ in range(_PATHS):
+        rows, value = best_path(seen.only(left))
+        rows = left[rows]
+        if len(rows) < _SHORTEST:
+            break
+        found.append(Rated(rows, rate(seen, rows, value)))
+        around = np.full((seen.frame[-1] + 1, 4), np.nan)
+        around[seen.frame[rows]] = boxes[rows]
+        low = around[seen.frame[left], :2]
+        middle = boxes[left, :2] + boxes[left, 2:] / 2
+        with np.errstate(invalid="ignore"):
+            part = ((middle >= low) & (middle <= low + around[seen.frame[left], 2:])).all(axis=1)
+        left = left[~part & ~np.isin(left, rows)]
+    return sorted(found, key=lambda path: -path.rating)
+
+
+class Followed(NamedTuple):
+    """What was found: pixels (n, 2) of the first frame, their errors (n,), doubts.
+
+    `maps` (n, 3, 3) say where each frame lies in the first.
+    """
+
+    pixels: Floats
+    errors: Floats
+    maps: Floats
+    doubts: tuple[str, ...]
+
+
+def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
+    """Of a pixel, in grey levels: of the quieter samples, which differ from the plate by that."""
+    found = []
+    for sample, here in zip(samples, maps, strict=True):
+        then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1])
+        a, b = sample.astype(np.float32)[::3, ::3], then.astype(np.float32)[::3, ::3]
+        known = known[::3, ::3]
+        if known.any():
+            found.append(1.4826 * np.median(np.abs(a - b * light(a, b, known))[known]))
+    return float(np.median(found)) if found else 0.0
+
+
+def _sways(samples: Image, plate: Plate, noise: float) -> float:
+    """Pixels by which a camera that is taken to be at rest typically seems to be displaced."""
+    then = plate.image.astype(np.float32)
+    known = plate.valid > 0
+    changes = []
+    for sample in samples:
+        now = sample.astype(np.float32)
+        changes.append((now / light(now, then, known) - then)[::2, ::2])
+    return 0.5 * camera_motion(then[::2, ::2], changes, max(6 * noise, 8.0))
+
+
+def _camera(path: str | os.PathLike, small: Image, frames: int, factor: int) -> CameraMotion:
+    """The camera's motion, read from all frames unless some of them show it at rest."""
+    if stands_still(small):
+        return at_rest(frames)
+    steadying = Steadying(factor)
+    for frame in read_video(path):
+        steadying.add(reduce(frame, factor))
+    return steadying.motion()
+
+
+def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) -> Followed:
+    """Track what moves in a film, the target if there is a hint which it is.
+
+    `samples` are frames spread evenly over the film, see `sample_frames`.
+    """
+    film = _Film.of(path, samples)
+    found, lights = _candidates(path, film, hint)
+    n = len(found)
+    places = [
+        carry(film.maps[i], np.array([c.centre for c in f])) for i, f in enumerate(found) if f
+    ]
+    seen = Sightings.of(found, places, float(np.hypot(*film.plate.size)))
+    boxes = np.array([c.box for f in found for c in f]).reshape(-1, 4)
+    paths = plainest_paths(seen, boxes)
+    if hint is not None and hint.box is not None:
+        paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
+    if not paths or (hint is None and not _travels(seen, paths[0].rows)):
+        return nothing(film.motion, n)
+    doubts = _rivals(seen, paths, film.factor) if hint is None else ()
+    if film.sways > _SWAYS:
+        doubts += ("the camera seems to move, but not clearly enough to be followed: its motion is "
+                   "part of the track",)  # fmt: skip
+    ways = expected(seen, boxes, paths[0].rows, film, n)
+    return _finished(_views(path, samples, film, ways, lights), film.motion, doubts)
+
+
+class _Film(NamedTuple):
+    """What is known of a film before its target: `maps` and `plate` are of reduced frames."""
+
+    factor: int
+    motion: CameraMotion
+    maps: Floats
+    plate: Plate
+    noise: float
+    sampled: Ints
+    sways: float
+
+    @classmethod
+    def of(cls, path: str | os.PathLike, samples: Image) -> "_Film":
+        """From its sampled frames, and from all of them if its camera moves."""
+        frames = video_info(path).frames
+        factor = reduction((samples.shape[2], samples.shape[1]))
+        small = np.array([reduce(sample, factor) for sample in samples])
+        motion = _camera(path, small, frames, factor)
+        sampled = np.unique(np.linspace(0, frames - 1, SAMPLES).round().astype(int))
+        sampled = np.minimum(sampled[: len(samples)], len(motion.maps) - 1)
+        larger = enlarged(factor)
+        maps = np.linalg.inv(larger) @ motion.maps @ larger
+        plate = Plate(small, maps[sampled], np.isfinite(motion.errors[sampled]))
+        noise = _noise(small, maps[sampled], plate)
+        sways = 0.0 if motion.moves else _sways(small, plate, noise)
+        return cls(factor, motion, maps, plate, noise, sampled, factor * sways)
+
+
+def _candidates(
+    path: str | os.PathLike, film: _Film, hint: Hint | None
+) -> tuple[list[list[Candidate]], list[Floats32]]:
+    """What may be the target in each frame, and how bright the frame is."""
+    difference = Difference(film.plate, film.noise)
+    found = [
+        difference.candidates(reduce(frame, film.factor), here)
+        for frame, here in zip(read_video(path), film.maps, strict=False)
+    ]
+    if hint is not None:
+        return hinted(found, hint, film.factor, path), difference.lights
+    kept = [difference.travelling(f, here) for f, here in zip(found, film.maps, strict=False)]
+    return kept, difference.lights
+
+
+def _views(
+    path: str | os.PathLike, samples: Image, film: _Film, ways: "Ways", lights: list[Floats32]
+) -> list[View | None]:
+    """The target in whole frames, near where it is expected."""
+    known = np.isfinite(film.motion.errors[film.sampled])
+    maps = film.motion.maps[film.sampled]
+    plate = Plate(samples, maps, known)
+    lens = Lens(plate, _noise(samples, maps, plate))
+    views = []
+    for i, (frame, here) in enumerate(zip(read_video(path), film.motion.maps, strict=False)):
+        view = None
+        if np.isfinite(ways.centre[i, 0]):
+            view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])
+        views.append(view)
+    return views
+
+
+def nothing(motion: CameraMotion, n: int) -> Followed:
+    """Of a film of n frames in which no target was found."""
+    none = "nothing was found that moves like one target"
+    return Followed(np.full((n, 2), np.nan), np.full(n, np.inf), motion.maps[:n], (none,))
+
+
+def hinted(
+    found: list[list[Candidate]], hint: Hint, factor: int, path: str | os.PathLike
+) -> list[list[Candidate]]:
+    """Candidates as far as they are what a hint says: of its colour, in its box in its frame."""
+    if hint.box is not None and hint.frame is not None:
+        box = (np.array(hint.box) - [(factor - 1) / 2, (factor - 1) / 2, 0, 0]) / factor
+        middle = box[:2] + (box[2:] - 1) / 2
+        if hint.frame >= len(found):
+            raise ValueError(f"target: its frame must be one of {len(found)}, got {hint.frame}")
+        here = [c for c in found[hint.frame] if _fits(c, box, middle)]
+        if here:
+            one = here[int(np.argmin([np.linalg.norm(c.centre - middle) for c in here]))]
+        else:
+            one = _boxed(reduce(read_frame(path, hint.frame), factor), box, middle)
+        found = list(found)
+        found[hint.frame] = [replace(one, quality=_TOLD)]
+        colour = one.colour
+    if hint.colour is not None:
+        colour = np.array(hint.colour[::-1], float)
+    return [
+        [replace(c, quality=c.quality * _alike(c.colour, colour)) for c in some] for some in found
+    ]
+
+
+def _fits(one: Candidate, box: Floats, middle: Floats) -> bool:
+    """Has a candidate about the place and the size of a box?"""
+    near = (np.abs(one.centre - middle) <= box[2:] / 2 + 1).all()
+    return bool(near and (one.box[2:] <= 1.6 * box[2:] + 4).all())
+
+
+def _boxed(frame: Image, box: Floats, middle: Floats) -> Candidate:
+    """What is in a box, where nothing differs from the background."""
+    low, high = middle - box[2:] / 4, middle + box[2:] / 4
+    rows = slice(max(int(low[1]), 0), int(high[1]) + 1)
+    inner = frame[rows, max(int(low[0]), 0) : int(high[0]) + 1].reshape(-1, 3)
+    if not len(inner):
+        raise ValueError(f"box: must lie in the image, got {box.tolist()}")
+    return Candidate(middle, box, 0.8 * box[2] * box[3], np.median(inner, axis=0).astype(float), 1)
+
+
+def _alike(colour: Floats, told: Floats) -> float:
+    """How alike two colours are, from 0 to 1, also in another light."""
+    shade = np.clip(float(colour @ told) / max(float(colour @ colour), 1.0), 0.7, 1.4)
+    return float(np.exp(-((np.linalg.norm(shade * colour - told) / _COLOUR) ** 2)))
+
+
+def _travels(seen: Sightings, rows: Ints) -> bool:
+    """Does a path leave its place, and is it worth its candidates?"""
+    extent = float(np.linalg.norm(np.ptp(seen.centre[rows], axis=0)))
+    return bool(extent > np.median(seen.size[rows]) and np.median(seen.quality[rows]) > _PLAIN)
+
+
+def _rivals(seen: Sightings, paths: list[Rated], factor: int) -> tuple[str, ...]:
+    """What else moves about as plainly."""
+    best = paths[0].rating
+    others = [p for p in paths[1:] if p.rating > _AS_PLAIN * best and _travels(seen, p.rows)]
+    if not others:
+        return ()
+    row = others[0].rows[len(others[0].rows) // 2]
+    u, v = factor * seen.centre[row]
+    return (
+        f"something else moves about as plainly, e.g. in frame {seen.frame[row]} at "
+        f"({u:.0f}, {v:.0f}): if that is the target, say so, target=Hint(frame=, box=)",
+    )
+
+
+class Ways(NamedTuple):
+    """Where to look in each frame, in its own pixels: centre (n, 2), box (n, 4), colour (n, 3)."""
+
+    centre: Floats
+    box: Floats
+    colour: Floats
+
+
+def expected(seen: Sightings, boxes: Floats, rows: Ints, film: _Film, n: int) -> Ways:
+    """Where a path leads in all frames from its first to its last, and a little beyond."""
+    at, place = seen.frame[rows], seen.centre[rows]
+    frames = np.arange(max(at[0] - _BEYOND, 0), min(at[-1] + _BEYOND, n - 1) + 1)
+    along = np.column_stack([np.interp(frames, at, x) for x in place.T])
+    for outside, end in ((frames < at[0], slice(0, 4)), (frames > at[-1], slice(-4, None))):
+        if outside.any():
+            fit = np.polyfit(at[end] - at[end][0], place[end], min(2, len(at[end]) - 1))
+            t = frames[outside] - at[end][0]
+            along[outside] = np.column_stack([np.polyval(fit[:, k], t) for k in (0, 1)])
+    extent = np.column_stack([np.interp(frames, at, x) for x in boxes[rows, 2:].T])
+    centre, box, colour = np.full((n, 2), np.nan), np.full((n, 4), np.nan), np.zeros((n, 3))
+    centre[frames] = carry(np.linalg.inv(film.maps[frames]), along)
+    box[frames] = np.column_stack([centre[frames] - extent / 2, extent])
+    colour[:] = np.median(seen.colour[rows], axis=0)
+    near = np.column_stack([np.interp(frames, at, x) for x in seen.colour[rows].T])
+    colour[frames] = 0.5 * colour[frames] + 0.5 * near
+    k = film.factor
+    return Ways(k * centre + (k - 1) / 2, k * box, colour)
+
+
+def _finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]) -> Followed:
+    """The views of the whole target as a track."""
+    n = len(views)
+    pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
+    at = np.array([i for i, view in enumerate(views) if view], int)
+    if len(at) < _SHORTEST:
+        return nothing(motion, n)
+    shown = [view for view in views if view]
+    steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
+    areas = np.array([view.area for view in shown])
+    inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
+    good = fitting(at, steady, areas, inside)
+    pixels[at[good]] = steady[good]
+    errors[at[good]] = np.hypot(scatter(at[good], steady[good]), motion.errors[at[good]])
+    if good.any() and np.median(motion.errors[at[good]]) > _LOOSE:
+        error = np.median(motion.errors[at[good]])
+        doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
+    return Followed(pixels, errors, motion.maps[:n], doubts)

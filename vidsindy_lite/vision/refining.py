@@ -1,0 +1,163 @@
+"""From a path of candidates to the target's centroid, to a fraction of a pixel, in whole frames.
+
+Near each place of the path, what differs from the steadied background and has the target's colour
+is taken apart from the rest; its *coverage* of each pixel (see `background`) gives the centroid. A
+view whose size or place does not fit those around it is of a part, or of something else, and is
+left out.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter
+
+from ..arrays import Bools, Floats, Floats32, Image, Ints
+from .candidates import Plate
+
+_EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
+_LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
+_GROW = 0.5  # of its size, by which a window exceeds the target; and
+_ROOM = 8  # pixels more
+_WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
+_AROUND = 9  # views around one that say how large it should be
+
+
+@dataclass(frozen=True)
+class View:
+    """One look at the target: its centroid (2,) in the frame, its area, and whether it is whole."""
+
+    centroid: Floats
+    area: float
+    colour: Floats
+    inside: bool
+
+
+class Lens:
+    """Looks at the target in whole frames, before the plate.
+
+    Parameters
+    ----------
+    plate : Plate
+        Of whole frames.
+    noise : float
+        Of a pixel, in grey levels.
+    """
+
+    def __init__(self, plate: Plate, noise: float) -> None:
+        self.plate = plate
+        self.least = float(np.clip(4 * noise, _LEAST, _COARSE))
+        self.blur = 1.0 if noise > 2 else 0.6
+
+    def look(
+        self,
+        frame: Image,
+        here: Floats,
+        box: Floats,
+        centre: Floats,
+        colour: Floats,
+        gain: Floats32,
+    ) -> View | None:
+        """The target near a box (left, top, width, height) around `centre`, if it is there."""
+        spare = _GROW * box[2:].max() + _ROOM
+        low = np.clip(np.floor(box[:2] - spare), 0, self.plate.size - 1).astype(int)
+        high = np.clip(np.ceil(box[:2] + box[2:] + spare), low + 1, self.plate.size).astype(int)
+        then, known = self.plate.seen_from(here, low, tuple(high - low))
+        now = frame[low[1] : high[1], low[0] : high[0]].astype(np.float32) / gain
+        ground = then.astype(np.float32)
+        change = now - ground
+        smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), self.blur))
+        differs = np.sqrt(np.einsum("ijk,ijk->ij", smooth, smooth))
+        mask = (differs > self._tolerance(then)) & known
+        contrast = colour.astype(np.float32) - ground
+        square = np.einsum("ijk,ijk->ij", contrast, contrast)
+        share = np.einsum("ijk,ijk->ij", smooth, contrast) / np.maximum(square, self.least**2)
+        miss = np.linalg.norm(smooth - share[..., None] * contrast, axis=2)
+        # What is of another colour, e.g. a shadow or a hand: off the line from ground to target.
+        own = mask & (share > 0.25) & (miss < np.maximum(0.45 * np.sqrt(square), 2 * self.least))
+        label = _nearest(own, centre - low)
+        if label is None:
+            return None
+        return self._measure(label, change, contrast, square, low, high, now)
+
+    def _tolerance(self, then: Image) -> Floats32:
+        grey = cv2.cvtColor(then, cv2.COLOR_BGR2GRAY)
+        slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
+        return self.least + _EDGE[self.plate.moves] * slope.astype(np.float32)
+
+    def _measure(
+        self, label: Bools, change: Floats32, contrast: Floats32, square: Floats32,
+        low: Floats, high: Floats, now: Floats32,
+    ) -> View:  # fmt: skip
+        """Centroid and area of one connected part."""
+        near = cv2.dilate(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        core = cv2.erode(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        alpha = np.einsum("ijk,ijk->ij", change, contrast) / np.maximum(square, self.least**2)
+        alpha = np.clip(alpha, 0, 1)
+        alpha[core] = 1
+        alpha[~near] = 0
+        alpha = alpha.astype(float)
+        area = float(alpha.sum())
+        u, v = np.arange(alpha.shape[1]), np.arange(alpha.shape[0])
+        centroid = np.array([alpha.sum(axis=0) @ u, alpha.sum(axis=1) @ v]) / max(area, 1e-9)
+        rows, columns = np.flatnonzero(label.any(axis=1)), np.flatnonzero(label.any(axis=0))
+        first = low + [columns[0], rows[0]]
+        last = low + [columns[-1], rows[-1]]
+        inside = bool((first > 0).all() and (last < self.plate.size - 1).all())
+        shade = now[core if core.any() else label].mean(axis=0)
+        return View(low + centroid, area, shade, inside)
+
+
+def _nearest(mask: Bools, centre: Floats) -> Bools | None:
+    """The connected part of a mask that is largest for its distance from a place."""
+    count, labels, stats, centres = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
+    if count < 2:
+        return None
+    area = stats[1:, cv2.CC_STAT_AREA]
+    apart = np.linalg.norm(centres[1:] - centre, axis=1)
+    best = 1 + int(np.argmax(area / (1 + (apart / (2 + np.sqrt(area))) ** 2)))
+    if stats[best, cv2.CC_STAT_AREA] < 4:
+        return None
+    return labels == best
+
+
+def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Bools:
+    """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2)."""
+    good = inside.copy()
+    logs = np.log(np.maximum(areas, 1e-3))
+    for _ in range(2):
+        use = np.flatnonzero(good)
+        if len(use) < 3:
+            return good
+        usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="nearest"))
+        good = inside & (np.abs(logs - usual) < np.log(_WHOLE))
+    while (use := np.flatnonzero(good)).size >= 7:
+        off = np.array([_leave_out(frames[use], places[use], i) for i in range(len(use))])
+        usual = max(float(np.median(off)), 0.05)
+        over = off / np.maximum(10 * usual, 1 + 0.3 * np.sqrt(areas[use]))
+        # A wrong place spoils what its neighbours seem to be: the worst of them goes first.
+        worst = (over > 1) & (over == maximum_filter1d(over, 7))
+        if not worst.any():
+            break
+        good[use[worst]] = False
+    return good
+
+
+def _leave_out(frames: Floats, places: Floats, i: int) -> float:
+    """How far a place is from the parabola through the three on both sides of it."""
+    others = np.array([j for j in range(max(i - 3, 0), min(i + 4, len(frames))) if j != i])
+    t = frames[others] - frames[i]
+    if len(others) < 4 or np.ptp(t) > 15:
+        return 0.0
+    basis = np.vander(t, 3)
+    fit, *_ = np.linalg.lstsq(basis, places[others], rcond=None)
+    return float(np.linalg.norm(fit[-1] - places[i]))
+
+
+def scatter(frames: Ints, places: Floats) -> float:
+    """Standard error of the places (n, 2) of a smooth motion, per axis: how rough they are."""
+    runs = np.flatnonzero(frames[4:] - frames[:-4] == 4)
+    if len(runs) < 3:
+        return float("inf")
+    fourth = sum(c * places[runs + k] for k, c in enumerate((1, -4, 6, -4, 1)))
+    return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70))

@@ -1,0 +1,225 @@
+"""Motion of the camera: where each frame of a trembling or held camera lies in the first one.
+
+Corners of a key frame are followed into the frames after it (Lucas-Kanade); the homography that
+most of them obey, counted by the parts of the image that they cover, is the camera's motion, since
+the target is in few of these parts however much texture it has. A new key frame is taken when
+little is left of the last one.
+
+A camera is at rest unless its frames say otherwise: a map that is not needed only adds its errors.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Bools, Floats, Floats32, Image
+
+_PARTS = 12  # parts into which each side of the image is cut; one corner is followed in each
+_WIDTHS = 21, 81  # reduced pixels: what is smoother than this is light
+_CONTRAST, _DARK = 250.0, 20.0  # of the relief; grey levels below which all is dark
+_FLAT = 2.0  # smallest eigenvalue of the gradient's covariance in a corner, grey levels squared
+_EXACT = 1.0  # reduced pixels by which a corner may miss its place
+_STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
+_FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
+_SOME = 20  # corners, below which all pixels tell more
+_MANY = 60  # corners for a homography
+_TELLING = 10  # corners that must share a motion, if it is to be the camera's
+_ALIKE = 0.9  # correlation of two reliefs that lie on each other
+_STEPS = 15  # by which two reliefs are laid on each other at most
+_LEFT = 0.5  # share of a key frame's corners below which there must be a new one
+
+
+class CameraMotion(NamedTuple):
+    """Where each frame lies in the first one.
+
+    `maps` (n, 3, 3) take homogeneous pixels of a frame to pixels of the first; `errors` (n,) are
+    the standard errors of the places that they give, in pixels: infinite where nothing is known.
+    """
+
+    maps: Floats
+    errors: Floats
+
+    @property
+    def moves(self) -> bool:
+        """Does the camera move at all?"""
+        return not np.array_equal(self.maps, np.broadcast_to(np.eye(3), self.maps.shape))
+
+
+def at_rest(n: int) -> CameraMotion:
+    """The motion of a camera that stands still."""
+    return CameraMotion(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros(n))
+
+
+def carry(maps: NDArray, points: Floats) -> Floats:
+    """Points (n, 2) taken through one map (3, 3), or each through its own (n, 3, 3)."""
+    ends = np.einsum("...ij,...j->...i", maps, np.column_stack([points, np.ones(len(points))]))
+    return ends[:, :2] / ends[:, 2:]
+
+
+class _Relief(NamedTuple):
+    """What stands out from its surroundings, whatever the light: grey levels around 128.
+
+    `fine` is for corners, `broad` also shows what is smooth, e.g. clouds.
+    """
+
+    fine: Image
+    broad: Image
+
+    @classmethod
+    def of(cls, small: Image) -> "_Relief":
+        grey = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)
+        grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 1))
+        return cls(*(_stand_out(grey, width) for width in _WIDTHS))
+
+
+def _stand_out(grey: Floats32, width: int) -> Image:
+    mean = cv2.blur(cv2.blur(grey, (width, width)), (width, width))
+    return np.clip(128 + _CONTRAST * (grey - mean) / (mean + _DARK), 0, 255).astype(np.uint8)
+
+
+def _corners(grey: Image) -> Floats:
+    """The best corner of each part of the image that has one, (m, 2): none counts twice."""
+    sharp = cv2.cornerMinEigenVal(grey, 9, ksize=3)
+    height, width = (side // _PARTS for side in grey.shape)
+    if not height or not width:
+        return np.zeros((0, 2))
+    whole = np.asarray(sharp)[: height * _PARTS, : width * _PARTS]
+    parts = whole.reshape(_PARTS, height, _PARTS, width).swapaxes(1, 2).reshape(_PARTS**2, -1)
+    best = parts.argmax(axis=1)
+    row, column = np.divmod(np.arange(_PARTS**2), _PARTS)
+    found = np.column_stack([column * width + best % width, row * height + best // width])
+    return found[parts.max(axis=1) > _FLAT / 255**2].astype(float)
+
+
+def _follow(before: Image, after: Image, points: Floats, guess: Floats) -> tuple[Floats, Bools]:
+    """Where the corners are in another image, and which were found."""
+    if not len(points):
+        return points, np.zeros(0, bool)
+    flown, found, _ = cv2.calcOpticalFlowPyrLK(
+        before, after, points.astype(np.float32)[:, None], guess.astype(np.float32)[:, None].copy(),
+        winSize=(15, 15), maxLevel=3, flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+    )  # fmt: skip
+    ends = np.asarray(flown[:, 0], float)
+    size = np.array(after.shape[1::-1])
+    within = ((ends >= 0) & (ends < size)).all(axis=1)
+    return ends, (np.asarray(found)[:, 0] > 0) & within
+
+
+def stands_still(samples: Iterable[Image]) -> bool:
+    """Do most pairs of successive reduced samples show a camera at rest?
+
+    It moves if clearly more corners share a motion than stay where they are.
+    """
+    reliefs = [_Relief.of(sample) for sample in samples]
+    pairs = list(zip(reliefs, reliefs[1:], strict=False))
+    return sum(_moved(before, after) for before, after in pairs) <= 0.5 * len(pairs)
+
+
+def _moved(before: _Relief, after: _Relief) -> bool:
+    points = _corners(before.fine)
+    ends, found = _follow(before.fine, after.fine, points, points)
+    a, b = points[found], ends[found]
+    similar, _ = _similar(a, b, 2 * _STILL)
+    if similar is None:
+        return _direct(before.broad, after.broad, np.eye(3)) is not None
+    still = np.linalg.norm(b - a, axis=1) < _STILL
+    share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
+    if share.sum() < _TELLING:
+        return _direct(before.broad, after.broad, np.eye(3)) is not None
+    return bool(still.sum() < 0.7 * share.sum())
+
+
+def _direct(before: Image, after: Image, guess: Floats) -> Floats | None:
+    """The affine map of one relief to another by all of their pixels, where corners are few.
+
+    It must explain most of what differs between the two (enhanced correlation; Evangelidis 2008).
+    """
+    a, b = (
+        cv2.resize(x, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA).astype(np.float32)
+        for x in (before, after)
+    )
+    halve = np.array([[0.5, 0, -0.25], [0, 0.5, -0.25], [0, 0, 1]])
+    start = (halve @ guess @ np.linalg.inv(halve))[:2].astype(np.float32)
+    stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, _STEPS, 1e-4)
+    try:
+        alike, found = cv2.findTransformECC(a, b, start, cv2.MOTION_AFFINE, stop)
+    except cv2.error:
+        return None
+    if alike < _ALIKE or 1 - alike > 0.5 * (1 - float(np.corrcoef(a.ravel(), b.ravel())[0, 1])):
+        return None
+    return np.linalg.inv(halve) @ np.vstack([found, [0, 0, 1]]) @ halve
+
+
+def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
+    """The shift, turn and scale that most corners share, and which do."""
+    if len(a) < _FEWEST:
+        return None, np.zeros(len(a), bool)
+    found, obey = cv2.estimateAffinePartial2D(a, b, ransacReprojThreshold=exact)
+    if found is None:
+        return None, np.zeros(len(a), bool)
+    return np.vstack([found, [0, 0, 1]]), obey[:, 0] > 0
+
+
+class Steadying:
+    """Follows a camera through reduced frames, one at a time.
+
+    `factor` is by how much they are reduced.
+    """
+
+    def __init__(self, factor: int) -> None:
+        self.factor = factor
+        self.key: _Relief | None = None
+        self.maps: list[Floats] = []
+        self.errors: list[float] = []
+
+    def _start(self, relief: _Relief, base: Floats, error: float) -> None:
+        self.key, self.points, self.base, self.drift = relief, _corners(relief.fine), base, error
+        self.last = np.eye(3)  # from the key frame to the newest
+
+    def _locate(self, relief: _Relief) -> tuple[Floats, Floats, float] | None:
+        """Map from the key frame, the corners that obey it, their scatter about it."""
+        assert self.key is not None
+        guess = carry(self.last, self.points) if len(self.points) else self.points
+        ends, found = _follow(self.key.fine, relief.fine, self.points, guess)
+        a, b = self.points[found], ends[found]
+        best, good = _similar(a, b, 2 * _EXACT)
+        if good.sum() < _SOME:
+            direct = _direct(self.key.broad, relief.broad, self.last)
+            if direct is not None:
+                return direct, self.points, _STILL
+        if best is None or good.sum() < _FEWEST:
+            return None
+        if good.sum() >= _MANY:
+            full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
+            if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
+                best, good = np.asarray(full, float), obey[:, 0] > 0
+        miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
+        return best, a[good], float(np.sqrt(np.mean(miss**2)))
+
+    def add(self, small: Image) -> None:
+        """The next frame."""
+        relief = _Relief.of(small)
+        if self.key is None:
+            self._start(relief, np.eye(3), 0.0)
+        located = self._locate(relief)
+        if located is None:  # nothing in common with the key frame
+            self.maps.append(self.maps[-1] if self.maps else np.eye(3))
+            self.errors.append(0.0 if len(self.maps) == 1 else np.inf)
+            self._start(relief, self.maps[-1], np.inf if len(self.maps) > 1 else 0.0)
+            return
+        self.last, obeying, scatter = located
+        error = float(np.hypot(self.drift, scatter * np.sqrt(4 / max(len(obeying), 4))))
+        self.maps.append(self.base @ np.linalg.inv(self.last))
+        self.errors.append(error)
+        if len(obeying) < _LEFT * len(self.points):
+            self._start(relief, self.maps[-1], error)
+
+    def motion(self) -> CameraMotion:
+        """The motion so far, in pixels of the frames."""
+        k = self.factor
+        enlarge = np.array([[k, 0, (k - 1) / 2], [0, k, (k - 1) / 2], [0, 0, 1]])
+        maps = enlarge @ np.array(self.maps) @ np.linalg.inv(enlarge)
+        return CameraMotion(maps / maps[:, 2:, 2:], k * np.array(self.errors))
