@@ -181,6 +181,10 @@ class Rig:
         path : path-like
             Overwritten if it exists.
         """
+        check_path("path", path).write_text(self.text(), encoding="utf-8")
+
+    def text(self) -> str:
+        """What `save` writes."""
         lines = [
             "# Cameras of a rig; scale in scene units per pixel (of a perspective camera: at "
             "distance 1), angle in radians."
@@ -189,7 +193,7 @@ class Rig:
             lines += ["", "[[camera]]"]
             # repr of a float is its shortest exact decimal form, and valid TOML.
             lines += [f"{key} = {value!r}" for key, value in _to_table(camera).items()]
-        check_path("path", path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return "\n".join(lines) + "\n"
 
     def uncalibrated(self, keep: int = 0) -> Rig:
         """The same rig with scale and angle forgotten in all cameras but one.

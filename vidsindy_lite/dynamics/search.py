@@ -17,7 +17,6 @@ from scipy.stats import chi2
 from ..arrays import Bools, Floats
 from .collocation import Collocation, Fit, State
 from .discovery import History
-from .errors import effective_noise
 from .gaps import Gap, gaps, join
 from .library import closure_mask, divides, monomials, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
@@ -47,14 +46,14 @@ def search(problem: Problem, degree: int, rng: np.random.Generator, history: His
     """The terms that make the motion: the cheapest law at a tolerated error.
 
     If the law leaves larger errors than were tolerated, or errors that last, the search is made
-    again and tolerates them.
+    again and tolerates them. Kicks are tolerated as they are.
     """
-    tolerated = np.maximum(problem.noise, TOLERATED)
+    tolerated = problem.noise if problem.kicked else np.maximum(problem.noise, TOLERATED)
     for _ in range(LONGEST_CLIMB):
         tolerant = replace(problem, noise=tolerated)
         found = candidates(tolerant, degree, rng, history)
         fit = bridge(tolerant, cheapest(tolerant, found, history), history)
-        left = effective_noise(fit)
+        left = problem.errors(fit)
         if (left <= CONSISTENT * tolerated).all() or (tolerated >= LARGEST).all():
             break
         tolerated = np.maximum(tolerated, np.minimum(left, LARGEST))
