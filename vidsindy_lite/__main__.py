@@ -360,8 +360,8 @@ COMMANDS = {
     "rig-template": _Command(_rig_template, "print a rig file to fill in", {
         "--cameras": _count(3, "how many (default: 3)"),
         "--model": _choice(
-            "orthographic", ("orthographic", "perspective"),
-            "orthographic for far cameras with long lenses (default), perspective for near ones"
+            "perspective", ("perspective", "orthographic"),
+            "perspective (default), or orthographic for far cameras with long lenses"
         ),
         "--size": _text(
             "WxH", "of the videos in pixels (default: 1920x1080)", type=_size, default=(1920, 1080)
