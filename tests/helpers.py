@@ -1,8 +1,11 @@
-"""Random curves, and a repository of tiny notebooks."""
+"""Random curves, a room with cameras, and a repository of tiny notebooks."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+
+import vidsindy_lite as vl
 
 HEADER = """\
 # ---
@@ -36,6 +39,50 @@ def trajectory(rng, n):
         rng.normal(size=3) / k * np.sin(k * t + rng.uniform(0, 2 * np.pi, 3)) for k in range(1, 6)
     )
     return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
+
+
+HAND = {"normal_error": 2.0, "position_error": 0.03, "scale_error": 0.03}
+
+
+def walk(t):
+    """A path in a room, metres, that never repeats itself; t in frames of a video."""
+    t = np.asarray(t)[:, None] / 40
+    return np.array([0.6, 0.5, 0.4]) * np.sin(t * [1.0, 1.31, 0.77] + [0, 1, 2])
+
+
+def room(rng, cameras=3, **lens):
+    """Cameras with 60 degree lenses, 2 to 4 m from the middle of a room."""
+    views = []
+    turn = rng.uniform(0, 2 * np.pi)
+    for i in range(cameras):
+        azimuth, height = turn + 2 * np.pi * i / cameras, rng.uniform(0.1, 0.6)
+        away = np.array([np.cos(azimuth), np.sin(azimuth), height])
+        views.append(
+            vl.PerspectiveCamera(
+                position=rng.uniform(2, 4) * away / np.linalg.norm(away),
+                normal=away + 0.03 * rng.normal(size=3),
+                scale=1 / 1109,
+                angle=rng.uniform(-np.pi, np.pi),
+                image_size=(1280, 720),
+                **lens,
+            )
+        )
+    return vl.Rig(views)
+
+
+def by_hand(rng, rig, **more):
+    """The rig as a hand measures it: 2 degrees, 3 cm, 3 %."""
+    return vl.Rig(
+        replace(
+            c,
+            normal=c.normal + np.deg2rad(2) * rng.normal(size=2) @ c.rows,
+            position=c.position + 0.03 * rng.normal(size=3),
+            scale=c.scale * np.exp(0.03 * rng.normal()),
+            angle=c.angle + np.deg2rad(2) * rng.normal(),
+            **HAND | more,
+        )
+        for c in rig.cameras
+    )
 
 
 class TinyRepository:

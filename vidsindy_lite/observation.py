@@ -14,17 +14,19 @@ from tqdm import tqdm
 from .arrays import Floats
 from .cameras import (
     DISAGREEMENT,
+    GROSS,
     Clock,
     Lags,
     Rig,
     align,
     check_learnable,
     disagreement,
+    explain,
     learn_cameras,
     learn_lags,
-    learn_normal,
     list_lags,
     reconstruct,
+    smooth,
     systematic_errors,
     trailing_errors,
 )
@@ -128,7 +130,7 @@ def observe(
     files = _check_paths(paths, rig)
     shots = _check_shots(files, rig)
     names = [path.name for path in files]
-    clocks = _check_clocks(files, shots)
+    clocks = [frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     given = _check_lags(lags, clock, names)
     videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
@@ -194,9 +196,7 @@ def _observed(
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     with refusing("lags", raw, names):
-        best = learn_lags(
-            raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress
-        )
+        best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress)
         if lags is not None:
             _refuse_wrong(lags, best)
     used = best.frames if lags is None else lags
@@ -216,7 +216,7 @@ def _observed(
         x=reconstruct(tracks, learned),
         systematic=np.concatenate(shared),
         warnings=(
-            *_rig_warnings(missed, tracks, rig, names, used, best),
+            *_rig_warnings(tracks, rig, learned, names, used, best),
             *learned.warnings,
             *doubts,
             *told.warnings,
@@ -272,22 +272,6 @@ def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
     return shots
 
 
-def _check_clocks(files: Sequence[Path], shots: Sequence[VideoInfo]) -> list[Floats]:
-    """When the frames of each file were taken, in frames."""
-    clocks = [frame_clock(path) for path in files]
-    for path, shot, clock in zip(files, shots, clocks, strict=True):
-        if len(clock) != shot.frames:
-            raise ValueError(_cut_off(path, shot.frames, len(clock)))
-    return clocks
-
-
-def _cut_off(path: Path, stated: int, read: int) -> str:
-    return (
-        f"paths: {path.name} must hold the {stated} frames that its header states, got {read} "
-        "that can be read: the file is cut off or damaged, or its header wrong"
-    )
-
-
 def _check_hints(
     hints: Sequence[Hint | None] | None, files: Sequence[Path]
 ) -> Sequence[Hint | None]:
@@ -299,13 +283,15 @@ def _check_hints(
     return hints
 
 
-def _track_one(
-    path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None
-) -> Track:
+def _track_one(path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None) -> Track:
     """Track a video that should have so many frames."""
     found = track(path, detector, hint)
     if len(found.pixels) != frames:
-        raise ValueError(_cut_off(path, frames, len(found.pixels)))
+        raise ValueError(
+            f"paths: {path.name} must hold the {frames} frames that its header states, got "
+            f"{len(found.pixels)} that can be read: the file is cut off or damaged, or its header "
+            "wrong"
+        )
     return found
 
 
@@ -337,45 +323,42 @@ def _apart(lags: Floats, learned: Lags, limit: float) -> bool:
 
 
 def _rig_warnings(
-    missed: Sequence[float],
     tracks: Sequence[Floats],
     given: Rig,
+    learned: Rig,
     names: Sequence[str],
     lags: Floats,
     best: Lags,
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?
 
-    `missed` is their disagreement at these lags, `given` the rig before it was learned, `best` are
-    the lags of the tracks.
+    The tracks are those at the lags, `best` are the lags that the tracks themselves tell.
     """
+    missed = disagreement(tracks, learned)
     wrong_lag = _apart(lags, best, _OTHER_LAG)
-    if max(missed) <= DISAGREEMENT:
-        if not wrong_lag:
-            return []
+    if wrong_lag and max(missed) <= DISAGREEMENT:
         return [
             "the lags that are given differ from those of the tracks: "
             f"({list_lags(lags)}) for ({list_lags(best.frames)}) frames: leave them out, or check"
         ]
     sizes = ", ".join(f"{size:.1f}" for size in missed)
     apart = (
-        "in one frame of ten, tracked and reconstructed target lie more than "
-        f"{sizes} pixels apart, where tracking explains {DISAGREEMENT:g}"
+        f"in one frame of ten, tracked and reconstructed target lie more than {sizes} pixels apart"
     )
     if wrong_lag:  # by too little to refuse them
         return [
             f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
             f"({list_lags(best.frames)}) would explain it best"
         ]
-    # The largest residual does not tell which camera is wrong: the others were fitted to it.
-    others = [learn_normal(tracks, given, i) for i in range(len(names))]
-    left = [max(disagreement(tracks, other)) for other in others]
-    i = int(np.argmin(left))
-    normal = ", ".join(f"{value:.3f}" for value in others[i].cameras[i].normal)
-    advice = (
-        f"the normal ({normal}) of cameras[{i}] ({names[i]}) would explain it best"
-        if left[i] <= DISAGREEMENT
-        else "no single wrong normal explains it; check the positions, the scales and angles that "
-        "are given, and that at least half of the shortest video is in common with the others"
-    )
+    why = explain(tracks, given, learned)
+    if why is not None and why.left <= max(GROSS, max(missed) / 3):
+        advice = f"{why.text(names)} would explain it best"
+    elif max(missed) > GROSS and smooth(tracks, learned):
+        advice = (
+            "no single cause explains it; check the positions and normals, the scales and angles "
+            "that are given, and that at least half of the shortest video is in common with the "
+            "others; what was measured by hand should have its error in the rig file"
+        )
+    else:
+        return []
     return [f"the rig does not agree with the tracks: {apart}: {advice}"]

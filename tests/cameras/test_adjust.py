@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import HAND, by_hand, room, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,48 +16,6 @@ from vidsindy_lite.cameras.shutter import steadied
 from vidsindy_lite.cameras.triangulate import Views
 
 SEEDS = st.integers(0, 2**32 - 1)
-HAND = {"normal_error": 2.0, "position_error": 0.03, "scale_error": 0.03}
-
-
-def walk(t):
-    """A path in a room, metres, that never repeats itself; t in frames of a video."""
-    t = np.asarray(t)[:, None] / 40
-    return np.array([0.6, 0.5, 0.4]) * np.sin(t * [1.0, 1.31, 0.77] + [0, 1, 2])
-
-
-def room(rng, cameras=3, **lens):
-    """Cameras with 60 degree lenses, 2 to 4 m from the middle of a room."""
-    views = []
-    turn = rng.uniform(0, 2 * np.pi)
-    for i in range(cameras):
-        azimuth, height = turn + 2 * np.pi * i / cameras, rng.uniform(0.1, 0.6)
-        away = np.array([np.cos(azimuth), np.sin(azimuth), height])
-        views.append(
-            vl.PerspectiveCamera(
-                position=rng.uniform(2, 4) * away / np.linalg.norm(away),
-                normal=away + 0.03 * rng.normal(size=3),
-                scale=1 / 1109,
-                angle=rng.uniform(-np.pi, np.pi),
-                image_size=(1280, 720),
-                **lens,
-            )
-        )
-    return vl.Rig(views)
-
-
-def by_hand(rng, rig, **more):
-    """The rig as a hand measures it: 2 degrees, 3 cm, 3 %."""
-    return vl.Rig(
-        replace(
-            c,
-            normal=c.normal + np.deg2rad(2) * rng.normal(size=2) @ c.rows,
-            position=c.position + 0.03 * rng.normal(size=3),
-            scale=c.scale * np.exp(0.03 * rng.normal()),
-            angle=c.angle + np.deg2rad(2) * rng.normal(),
-            **HAND | more,
-        )
-        for c in rig.cameras
-    )
 
 
 def film(rng, rig, noise=0.5, n=400):
@@ -265,3 +224,14 @@ def test_noise_and_outliers_are_told_apart():
     assert found.weights[100] < 0.01
     assert np.sum(found.weights < 1) < 5
     assert found.settled
+
+
+def test_a_measurement_that_is_far_off_is_told():
+    rng = np.random.default_rng(12)
+    rig = room(rng, 4)
+    _, tracks = film(rng, rig)
+    first, *others = by_hand(rng, rig).cameras
+    wrong = replace(first, position=first.position + [0.0, 0.0, 1.5])
+    (warning,) = learn_cameras(tracks, vl.Rig([wrong, *others])).warnings
+    assert "of cameras[0] is" in warning
+    assert "times its error from what was measured" in warning

@@ -1,5 +1,7 @@
 """The report of a fit: units, error bars, frames, pruning."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -146,3 +148,33 @@ def test_a_file_that_holds_no_discovery_is_refused(tmp_path, text):
 def test_a_missing_file_is_told_with_the_argument(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"path: must be .*, got no file .*law\.json"):
         Discovery.load(tmp_path / "law.json")
+
+
+def test_steps_are_timed_from_the_beginning():
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
+    t = np.linspace(0, 15, 150)
+    began = time.perf_counter()
+    history = discover(t, law.simulate(t, (1.0, 0.0)), degree=1).history
+    ended = time.perf_counter() - began
+    seconds = [step.seconds for step in history]
+    assert 0 <= seconds[0] <= seconds[-1] <= ended
+
+
+def test_turns_are_counted_from_the_first_sample_to_the_last():
+    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
+    t = np.linspace(0, 5, 100)
+    x = law.simulate(t, (1.0, 0.0))
+    told = [
+        [text for text in discover(times, x, degree=1).warnings if "turns of the motion" in text]
+        for times in (t, t + 50)
+    ]
+    assert len(told[0]) == 1
+    assert told[1] == told[0]
+
+
+def test_a_curve_forgives_the_rounding_of_its_ends_in_proportion_to_its_length(found):
+    low, high = found.curves[0].t[[0, -1]]
+    near, far = (share * (high - low) for share in (1e-10, 1e-6))
+    inside = found.curve(np.array([low - near, high + near]))
+    np.testing.assert_array_equal(inside, found.curve(np.array([low, high])))
+    assert np.isnan(found.curve(np.array([low - far, high + far]))).all()

@@ -2,6 +2,8 @@
 
 Wanted are the changes p of the cameras (`changes`) and the points x of the path that make
 
+::
+
     sum_frames w / sigma^2 |track - image(x, p)|^2  +  sum (p / error)^2
 
 smallest: pixels and measurements, each in units of its error. Each step of Gauss and Newton takes
@@ -22,8 +24,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats
 from .camera import Camera
-from .changes import PARTS, changed, units
-from .shutter import steadied
+from .changes import PARTS, at_once, changed, units
 from .triangulate import Views, points_of_views
 
 _OUTLIER = 6.0  # sigma
@@ -126,7 +127,7 @@ class _State:
 
 @dataclass(frozen=True)
 class _Problem:
-    """Tracks of the frames in which a point can be found, the start, and what is free of it."""
+    """The tracks, the start, what is free of it, and the frames in which a point can be found."""
 
     tracks: tuple[Floats, ...]
     start: tuple[Camera, ...]
@@ -145,8 +146,7 @@ class _Problem:
         reach = float(np.sqrt(np.mean(np.var(begin, axis=0)))) if len(begin) else 1.0
         reach = reach or 1.0
         sizes = np.array([units(reach, float(camera.image_size[0])) for camera in start])
-        tracks = tuple(track[found] for track in views.tracks)
-        return cls(tracks, tuple(start), errors, found, begin, sizes[errors > 0], reach)
+        return cls(views.tracks, tuple(start), errors, found, begin, sizes[errors > 0], reach)
 
     def full(self, change: Floats) -> Floats:
         """Changes of all components, (m, SIZE), from those of the free ones."""
@@ -165,8 +165,8 @@ class _Problem:
 
     def _missed(self, i: int, camera: Camera, points: Floats, change: Floats) -> Floats:
         """Track minus image of one camera, (n, 2)."""
-        late = float(change[PARTS["readout"]][0])
-        return steadied(self.tracks[i], late, camera.image_size[1]) - camera.image(points)
+        track = at_once(self.tracks[i], change, camera.image_size[1])
+        return track[self.found] - camera.image(points)
 
     def slopes(self, state: _State) -> tuple[Floats, Floats]:
         """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""

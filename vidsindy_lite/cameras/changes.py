@@ -2,12 +2,15 @@
 
 The vector holds two tilts of the normal and the in-plane angle (radians), the logarithm of the
 scale, the position along the axes of the view plane and along its normal (scene units), the
-principal point (pixels), k1, k2, p1, p2, and the readout of the shutter (frames).
+principal point (pixels), k1, k2, p1, p2, the readout of the shutter (frames); and what no rig file
+holds, but may be the reason why views do not agree: by how many frames the video is late, by how
+many more at its end than at its start, and how near an orthographic camera is to what it sees (the
+inverse of its distance; zero is infinitely far).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +18,7 @@ import numpy as np
 from ..arrays import Floats
 from .camera import Camera
 from .models import OrthographicCamera, PerspectiveCamera
+from .shutter import steadied
 
 PARTS = {
     "normal": slice(0, 2),
@@ -24,10 +28,14 @@ PARTS = {
     "principal point": slice(7, 9),
     "distortion": slice(9, 13),
     "readout": slice(13, 14),
+    "lag": slice(14, 15),
+    "drift": slice(15, 16),
+    "nearness": slice(16, 17),
 }
 """Which components of the vector belong to what."""
 
-SIZE = 14
+SIZE = 17
+_LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
 _TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 
 
@@ -49,16 +57,30 @@ def known_to(given: Camera) -> Floats:
     return errors
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NearCamera(OrthographicCamera):
+    """What an orthographic camera would be that is not infinitely far from the point `about`."""
+
+    about: Floats
+    nearness: float = 0.0
+
+    @property
+    def _last_row(self) -> Floats:
+        away = self.nearness * self.normal
+        return np.append(-away, 1 + away @ self.about)
+
+
 def units(width: float, image: float) -> Floats:
     """Sizes of changes that matter about equally, for a scene and an image of these widths."""
     sizes = np.ones(SIZE)
     sizes[PARTS["position"]] = width
     sizes[PARTS["principal point"]] = image
+    sizes[PARTS["nearness"]] = 1 / width
     return sizes
 
 
 def changed(camera: Camera, change: Floats) -> Camera:
-    """A calibrated camera after a change. Its readout is that of the tracks, and not applied."""
+    """A calibrated camera after a change. What changes the instants, `at_once` does to a track."""
     part = {name: change[place] for name, place in PARTS.items()}
     values: dict[str, Any] = {}
     if part["normal"].any():
@@ -71,9 +93,18 @@ def changed(camera: Camera, change: Floats) -> Camera:
     if part["distortion"].any() and isinstance(camera, PerspectiveCamera):
         before = np.zeros(5) if camera.distortion is None else camera.distortion
         values["distortion"] = before + np.append(part["distortion"], 0.0)
+    if part["nearness"].any() and isinstance(camera, NearCamera):
+        values["nearness"] = camera.nearness + part["nearness"][0]
     moved = replace(camera, **values) if values else camera
     if part["angle"].any() or part["scale"].any():
         scale, angle = camera.calibration
-        size, turn = np.exp(part["scale"][0]), np.exp(1j * (angle + part["angle"][0]))
-        moved = moved.calibrated(scale * size * turn)
+        grown = np.clip(part["scale"][0], -_LARGEST, _LARGEST)
+        moved = moved.calibrated(scale * np.exp(grown + 1j * (angle + part["angle"][0])))
     return moved
+
+
+def at_once(track: Floats, change: Floats, height: int) -> Floats:
+    """A track whose rows are seen at the instants that they belong to after a change."""
+    part = {name: float(change[place][0]) for name, place in PARTS.items()}
+    middle = np.linspace(-0.5, 0.5, len(track))
+    return steadied(track, part["readout"], height, part["lag"] + part["drift"] * middle)

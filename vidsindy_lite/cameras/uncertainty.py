@@ -30,6 +30,7 @@ from ..arrays import Floats
 from .adjust import linearised
 from .alignment import Lags, align
 from .changes import known_to
+from .covariance import long_run_covariance
 from .joint import OUTLIER
 from .rig import Rig
 from .triangulate import (
@@ -166,28 +167,3 @@ def _sandwich(missed: Floats, slope: Floats, prior: Floats, noise: float) -> Flo
     # Not Cholesky's: exact tracks leave a covariance of zero but for rounding.
     values, vectors = np.linalg.eigh(long_run_covariance(scores) * len(scores) + measured)
     return vectors * np.sqrt(np.maximum(values, 0.0))
-
-
-def long_run_covariance(series: Floats) -> Floats:
-    """Covariance of the mean of a stationary series of mean zero, times its length.
-
-    Parameters
-    ----------
-    series : ndarray, shape (n, k)
-
-    Returns
-    -------
-    ndarray, shape (k, k)
-        ``sum_h w_h E[s_n s_(n+h)']`` with Bartlett's weights; their width is that which is best
-        for autoregressive series of first order.
-    """
-    n = len(series)
-    power = np.maximum((series**2).sum(axis=0), 1e-300)
-    rho = np.clip((series[1:] * series[:-1]).sum(axis=0) / power, -0.97, 0.97)
-    curvature = np.mean(4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)) if len(rho) else 0.0
-    width = 1.1447 * (curvature * n) ** (1 / 3)
-    total = series.T @ series
-    for lag in range(1, min(int(np.ceil(width)), n - 1) + 1):
-        product = series[lag:].T @ series[:-lag]
-        total += (1 - lag / (width + 1)) * (product + product.T)
-    return total / n

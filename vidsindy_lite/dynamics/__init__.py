@@ -3,8 +3,9 @@
 trajectories -> problem (smoothing: noise, gaps, units; form: order, candidates, what is known)
 -> solver -> discovery (diagnostics)
 solver: `discover`; its stages (search, then polish and settle) use collocation on splines,
-selection of terms, origin, gaps, errors that last, and persistence: which law stays the same while
-more error is tolerated
+selection of terms, origin, gaps, errors that last, precision (whom to trust how far),
+process_noise (is the motion kicked?), and persistence: which law stays the same while more error
+is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings
 storage: the result as a file
 law: polynomials, on a library of monomials; integrate solves it

@@ -221,7 +221,7 @@ class Collocation:
         return np.count_nonzero(self.precision, axis=0)
 
     @cached_property
-    def _sample_weights(self) -> Floats:
+    def sample_weights(self) -> Floats:
         """1 / variance of every measurement, shape (n, d)."""
         return self.precision * self.data_weights
 
@@ -229,14 +229,14 @@ class Collocation:
     def _data_band(self) -> Floats:
         """Normal matrix of the data loss in the control points, in lower banded storage."""
         band = np.zeros((WIDTH * self.d, self.grid.r * self.d))
-        for j, weights in enumerate(self._sample_weights.T):
+        for j, weights in enumerate(self.sample_weights.T):
             band[:: self.d, j :: self.d] = normal_band(self.grid.samples, weights)
         return band
 
     @cached_property
     def _shared(self) -> tuple[Floats, Floats]:
         """Weighted systematic errors, and the normal matrix of their sizes."""
-        weighted = self._sample_weights[:, :, None] * self.systematic
+        weighted = self.sample_weights[:, :, None] * self.systematic
         information = np.einsum("nik,nil->kl", weighted, self.systematic)
         information += np.eye(self.systematic.shape[-1])
         return weighted, information
@@ -263,7 +263,7 @@ class Collocation:
     def data_loss(self, control_points: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
         residual, sizes = self.data_residual(control_points)
-        return float((residual**2 * self._sample_weights).sum() + sizes @ sizes)
+        return float((residual**2 * self.sample_weights).sum() + sizes @ sizes)
 
     def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
@@ -296,12 +296,10 @@ class Collocation:
         """
         physics, unknowns = self._derivatives(state, columns)
         data_residual, sizes = self.data_residual(state.control_points)
-        band = self._data_band + normal_band(physics)
-        band[0] += damping * band[0] + 1e-12 * band[0].max()
-        factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+        factor = self._factor(physics, damping)
 
         right = physics.T @ unknowns
-        right[:, 0] += (self.grid.samples.T @ (data_residual * self._sample_weights)).ravel()
+        right[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
         pull = self.grid.samples.T @ self._shared[0].reshape(len(self.grid.x), -1)
         right[:, 1 + len(columns) :] = pull.reshape(len(right), -1)
         solved = cho_solve_banded((factor, True), right, check_finite=False)
@@ -310,7 +308,7 @@ class Collocation:
         gram = self._gram(unknowns - physics @ solved, solved, data_residual, sizes)
         solved = solved.reshape(-1, self.d, solved.shape[1])
         gram, solved = _without_systematic(gram, solved, 1 + len(columns))
-        objective = (data_residual**2 * self._sample_weights).sum()
+        objective = (data_residual**2 * self.sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
         return Linearisation(
@@ -321,6 +319,17 @@ class Collocation:
             curve_step=-solved[:, :, 0],
             curve_response=-solved[:, :, 1:],
         )
+
+    def _factor(self, physics: sparse.csr_array, damping: float = 0.0) -> Floats:
+        """Cholesky factor of the normal matrix of the control points, in lower banded storage."""
+        band = self._data_band + normal_band(physics)
+        band[0] += damping * band[0] + 1e-12 * band[0].max()
+        return cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+
+    def factor(self, state: State) -> tuple[Floats, sparse.csr_array]:
+        """That factor at a state, and the Jacobian of the weighted physics residual, (k d, r d)."""
+        physics, _ = self._derivatives(state, np.array([], dtype=int))
+        return self._factor(physics), physics
 
     def _derivatives(self, state: State, columns: Ints) -> tuple[sparse.csr_array, Floats]:
         """The weighted physics residual around a state.
@@ -371,7 +380,7 @@ class Collocation:
         follow = -curve.reshape(-1, self.d, left.shape[1])
         follow[:, :, 0] += data_residual
         follow[:, :, shared] += self.systematic
-        follow *= np.sqrt(self._sample_weights)[:, :, None]
+        follow *= np.sqrt(self.sample_weights)[:, :, None]
         follow = follow.reshape(-1, left.shape[1])
         gram += follow.T @ follow
         gram[shared, shared] += np.eye(len(sizes))

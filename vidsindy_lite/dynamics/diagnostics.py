@@ -41,6 +41,8 @@ RIVAL = 0.5
 """Width of another plateau, over that of the law's own, from which on the law is contested."""
 UNMET = 1e-2
 """Root mean square residual of the law along the curve, relative to the speed."""
+WILD = 2.0
+"""The same residual over that of the kicks of the motion."""
 APART = 0.2
 """Root mean square distance of the law's two frames along the curve, relative to the speed: more
 than terms that cannot be told from zero make."""
@@ -76,7 +78,7 @@ def diagnose(
         *outliers(problem.measured),
         *_misfit(problem, fit),
         *_unfinished(fit),
-        *_unmet(fit),
+        *_unmet(problem, fit),
         *_another_in_the_data(problem, fit, law),
         *_selection(problem, fit, path),
         *_sampling(problem.trajectories),
@@ -140,9 +142,9 @@ def _unfinished(fit: Fit) -> Iterator[str]:
         yield f"the last fit did not converge ({fit.status.value}): {ADVICE[fit.status]}"
 
 
-def _unmet(fit: Fit) -> Iterator[str]:
+def _unmet(problem: Problem, fit: Fit) -> Iterator[str]:
     residual = float(np.sqrt((fit.collocation.physics_residual(fit.state) ** 2).mean()))
-    if not residual < UNMET:
+    if not residual < max(UNMET, WILD * float(problem.process_noise.max())):
         yield (
             f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit "
             "did not converge; use more or cleaner samples, or another degree"
@@ -178,6 +180,8 @@ def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]
     names, terms = law.names, law.terms
     for own, ranked in zip(path.of(state.active), path.ranked(), strict=True):
         others = [plateau for plateau in ranked if (plateau.terms != own.terms).any()]
+        same = [plateau for plateau in ranked if (plateau.terms == own.terms).all()]
+        own = same[0] if same else own
         if others and others[0].decades > RIVAL * own.decades:
             rival = others[0]
             changed = np.flatnonzero(rival.terms != own.terms).tolist()

@@ -115,6 +115,10 @@ class Discovery:
         Standard errors of the offset; zero along an axis that was not moved.
     noise : ndarray, shape (d,)
         Estimated standard deviation of the errors of single samples, in units of the data.
+    model_error : ndarray, shape (d,)
+        How far the motion departs from the law by itself: what random kicks add to each
+        coordinate in a unit of time (standard deviation, in units of the data over the square root
+        of time). Zero where the data agree with a law that holds exactly.
     warnings : tuple of str
         Why the law should not be trusted, with advice; empty if nothing was found.
     path : tuple of tuple of Plateau
@@ -136,6 +140,7 @@ class Discovery:
     native_covariance: Floats
     offset_errors: Floats
     noise: Floats
+    model_error: Floats
     warnings: tuple[str, ...]
     path: tuple[tuple[Plateau, ...], ...]
     history: tuple[Step, ...]
@@ -241,8 +246,14 @@ class Discovery:
         return read(path)
 
     def __str__(self) -> str:
-        note = [f"note: {self.note}"] if self.note else []
-        return "\n".join([self.equations(), *note, *(f"warning: {text}" for text in self.warnings)])
+        lines = [self.equations()]
+        if self.model_error.any():
+            sizes = zip(self.model_error, self.system.names, strict=True)
+            kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
+            lines.append(f"kicked at random, by {kicks} over a unit of time")
+        if self.note:
+            lines.append(f"note: {self.note}")
+        return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
 
 
 def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discovery:
@@ -283,7 +294,10 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
         covariance=moved_covariance,
         native_covariance=covariance[: l * d, : l * d],
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
-        noise=np.where(seen, residual_noise(fit) * units.scale, np.nan),
+        noise=np.where(
+            seen, (problem.noise if problem.kicked else residual_noise(fit)) * units.scale, np.nan
+        ),
+        model_error=_kicks(problem, fit),
         warnings=diagnose(problem, fit, path, law, margins),
         path=path.plateaus,
         history=tuple(history.steps),
@@ -292,6 +306,13 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
             for s in collocation.grid.splines(state.control_points)
         ),
     )
+
+
+def _kicks(problem: Problem, fit: Fit) -> Floats:
+    """Standard deviation of what the kicks of a unit of time add, in units of the data, (d,)."""
+    grid, units = fit.collocation.grid, problem.units
+    span = sum(s.breakpoints[-1] - s.breakpoints[0] for s in grid.segments) / len(grid.x)
+    return problem.process_noise * units.scale * np.sqrt(span / units.time)
 
 
 def _covariance(units: Units, fit: Fit) -> Floats:

@@ -11,6 +11,8 @@ from .collocation import CLEANEST, Fit
 
 CHANCE = 4.0
 """Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent."""
+ORDER = 40
+"""Most errors that foretell the next."""
 
 
 def residual_noise(fit: Fit) -> Floats:
@@ -75,3 +77,29 @@ def inflation(pieces: Sequence[Floats]) -> Floats:
             positive = len(pairs) if (pairs > 0).all() else int((pairs <= 0).argmax())
             result[j] = max(2 * pairs[:positive].sum() - 1, 1.0)
     return result
+
+
+def prediction_gain(fit: Fit) -> Floats:
+    """By how much the errors before it foretell an error: n times its log variance ratio, (d,).
+
+    Minus twice the log likelihood of an autoregressive model of the residual over that of white
+    noise (Levinson's recursion; its order by the Bayesian information criterion).
+    """
+    residual, _ = fit.collocation.data_residual(fit.state.control_points)
+    n = len(residual)
+    covariances = np.stack(
+        [(residual[k:] * residual[: n - k]).sum(axis=0) for k in range(ORDER + 1)]
+    )
+    return np.array([_levinson(covariance, n) for covariance in covariances.T])
+
+
+def _levinson(covariance: Floats, n: int) -> float:
+    if not covariance[0] > 0:
+        return 0.0  # of what was never observed
+    best, variance, weights = 0.0, covariance[0], np.zeros(0)
+    for order in range(1, min(ORDER, n // 10) + 1):
+        reflection = (covariance[order] - weights @ covariance[order - 1 : 0 : -1]) / variance
+        weights = np.append(weights - reflection * weights[::-1], reflection)
+        variance *= 1 - reflection**2
+        best = min(best, n * np.log(variance / covariance[0]) + order * np.log(n))
+    return best

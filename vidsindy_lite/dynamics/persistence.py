@@ -74,7 +74,7 @@ class Path:
     model : Linearisation
         Its quadratic model in all terms.
     own : float
-        The errors that the fit was weighted with.
+        The errors that the fit was weighted with; those of the law, where kicks are larger.
     level : float
         Errors that have to be tolerated: a plateau that begins above them is no law of these data.
     plateaus : tuple of tuple of Plateau
@@ -128,8 +128,10 @@ def follow(problem: Problem, fit: Fit) -> Path:
     model = fit.collocation.linearise(fit.state, columns)
     prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
-    own = typical(fit.collocation.data_weights**-0.5)
-    lowest = min(typical(residual_noise(fit)), LARGEST / 10**STEP)
+    own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))
+    single = np.full(problem.d, own) if problem.kicked else residual_noise(fit)
+    lasting = single if problem.kicked else effective_noise(fit)
+    lowest = min(typical(single), LARGEST / 10**STEP)
     count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
     levels = np.geomspace(lowest, LARGEST, count + 1)
     paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
@@ -146,7 +148,6 @@ def follow(problem: Problem, fit: Fit) -> Path:
             else:
                 low_here = low
             paths[j].append(Plateau(j, low_here, high, terms))
-    single, lasting = residual_noise(fit), effective_noise(fit)
     smooth = bool((lasting > LASTING * single).any() or (single <= NOISELESS).all())
     level = max(lowest, typical(lasting), SMOOTH if smooth else 0.0)
     return Path(fit, model, own, level, tuple(map(tuple, paths)))

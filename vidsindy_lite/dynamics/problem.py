@@ -14,8 +14,8 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
-from .collocation import CLEANEST, Collocation, State
-from .errors import spread_to_unseen
+from .collocation import CLEANEST, Collocation, Fit, State
+from .errors import effective_noise, spread_to_unseen
 from .form import Form
 from .library import monomials
 from .polynomials import PolynomialSystem
@@ -92,6 +92,9 @@ class Problem:
         Price of a term; see `term_penalties`.
     slack : ndarray, shape (d,)
         Misfit of a plain regression on the smoothed curves: the scale of physics weights.
+    process_noise : ndarray, shape (d,)
+        What random kicks leave of each equation, root mean square over a sample; zero for a law
+        that holds exactly.
     """
 
     measured: list[Trajectory]
@@ -105,6 +108,7 @@ class Problem:
     form: Form
     penalties: Floats
     slack: Floats
+    process_noise: Floats
 
     @property
     def d(self) -> int:
@@ -167,8 +171,21 @@ class Problem:
         return values[segment.trajectory][np.searchsorted(t, segment.t)]
 
     def weighted(self, collocation: Collocation, weight: float) -> Collocation:
-        """The same with another physics weight, relative to the slack."""
-        return collocation.weighted(collocation.data_weights, weight / self.slack**2)
+        """The same with another physics weight, relative to the slack, as far as kicks allow."""
+        physics = 1.0 / np.maximum(self.slack**2 / weight, self.process_noise**2)
+        return collocation.weighted(collocation.data_weights, physics)
+
+    @property
+    def kicked(self) -> bool:
+        """Whether the law holds but for random kicks."""
+        return bool(self.process_noise.any())
+
+    def errors(self, fit: Fit) -> Floats:
+        """How large the errors of the data are by a fit, (d,), were they independent.
+
+        A curve that may leave its law follows the errors, too: then they are as estimated.
+        """
+        return self.noise if self.kicked else effective_noise(fit)
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
@@ -223,6 +240,7 @@ def pose(
         form=form,
         penalties=term_penalties(form.exponents, x.shape[1]),
         slack=np.ones(len(form.names)),
+        process_noise=np.zeros(len(form.names)),
     )
     if order == 2:
         problem = _with_velocities(problem, curves)

@@ -22,10 +22,11 @@ from ..arrays import Floats
 from ..checks import check_integer
 from .collocation import Fit
 from .discovery import Discovery, History, conclude
-from .errors import effective_noise
 from .order import SETTLED, UNLIKELY, accelerated, advised, better, check_order
 from .persistence import Path, Plateau, follow, typical
+from .precision import with_precision
 from .problem import Problem, fit_curves, pose
+from .process_noise import rebalanced, with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, search
 from .selection import inverse
 from .trajectories import Trajectory, check_systematic, check_trajectories
@@ -38,6 +39,8 @@ RICHEST = 2.0
 """Most terms of a law that refines another, over the terms of that."""
 MOST_HALVINGS = 4
 """Most halvings of the knot spans."""
+MOST_WEIGHINGS = 2
+"""Most laws of which the precision of the measurements is learned."""
 LONGEST_DESCENT = 3
 """Most laws at smaller errors."""
 
@@ -121,9 +124,20 @@ def _solved(
     history = History()
     problem = pose(trajectories, shared, degree, probes, order)
     with tqdm(total=3, disable=not progress, desc="discover", leave=False) as bar:
-        fit = search(problem, degree, starts, history)
+        fit = polish(problem, search(problem, degree, starts, history), history)
         bar.update()
-        fit = polish(problem, fit, history)
+        for _ in range(MOST_WEIGHINGS):
+            weighed = with_precision(problem, fit)
+            if weighed is problem:
+                break
+            problem = weighed
+            fit = polish(problem, search(problem, degree, starts, history), history)
+        if (problem.errors(fit) > CONSISTENT * problem.noise).any():
+            problem = with_process_noise(problem, fit, probes)
+        if problem.kicked:
+            fit = search(problem, degree, starts, history)
+            problem = rebalanced(problem, fit, probes)
+            fit = polish(problem, fit, history)
         bar.update()
         fit, path = settle(problem, fit, history)
         bar.update()
@@ -137,7 +151,7 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     for _ in range(MOST_HALVINGS):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
-        finer = problem.collocation(segments, effective_noise(fit))
+        finer = problem.collocation(segments, problem.errors(fit))
         splines = fit.collocation.grid.splines(fit.state.control_points)
         state = replace(fit.state, control_points=fit_curves(finer, splines))
         fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
@@ -151,10 +165,10 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     return fit
 
 
-def at_own_noise(fit: Fit) -> Fit:
+def at_own_noise(problem: Problem, fit: Fit) -> Fit:
     """The same fit, weighted with the errors that it leaves."""
     collocation = fit.collocation
-    weighted = collocation.weighted(effective_noise(fit) ** -2, collocation.physics_weights)
+    weighted = collocation.weighted(problem.errors(fit) ** -2, collocation.physics_weights)
     return weighted.solve(fit.state, EXACT)
 
 
@@ -192,10 +206,10 @@ def _refitted(
     for weight in SEARCH_WEIGHTS:
         collocation = problem.weighted(collocation, weight)
         state = collocation.solve(state, tolerance=1.0, max_steps=10).state
-    fit = at_own_noise(collocation.solve(state, EXACT))
+    fit = at_own_noise(problem, collocation.solve(state, EXACT))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     largest = max(plateau.low for plateau in changed)
-    return fit if typical(effective_noise(fit)) <= CONSISTENT * largest else None
+    return fit if typical(problem.errors(fit)) <= CONSISTENT * largest else None
 
 
 def _changed(fit: Fit, goal: Sequence[Plateau]) -> list[Plateau]:

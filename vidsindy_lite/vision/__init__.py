@@ -1,14 +1,16 @@
 """Files and pixels: where the target is in each frame of a video, and films of synthetic scenes.
 
-video       reading and writing of video files; stills reads films that are folders of images
-track_files tracks as text files: DLTdv's, Tracker's, DeepLabCut's and ours
-tracking    track: a video in, the target's pixels out, by one of
-background      what differs from a background at rest (the most exact)
-moving          what moves most plainly, if camera and background are not: steadying takes out the
-                camera's motion, candidates are what differs, linking joins them, refining measures
-detector        what looks like a target in a single frame: our network, or any YOLO-v8
-network     that network, in PyTorch; training trained it, on frames that are drawn here
-scenes      what a camera sees; scenery draws its backgrounds, rendering its frames
+::
+
+  video       reading and writing of video files; stills reads films that are folders of images
+  track_files tracks as text files: DLTdv's, Tracker's, DeepLabCut's and ours
+  tracking    track: a video in, the target's pixels out, by one of
+  background      what differs from a background at rest (the most exact)
+  moving          what moves most plainly, if camera and background are not: steadying takes out the
+                  camera's motion, candidates are what differs, linking joins, refining measures
+  detector        what looks like a target in a single frame: our network, or any YOLO-v8
+  network     that network, in PyTorch; training trained it, on frames that are drawn here
+  scenes      what a camera sees; scenery draws its backgrounds, rendering its frames
 """
 
 from .detector import WEIGHTS, LearnedDetector, detections

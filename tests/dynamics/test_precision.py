@@ -1,0 +1,109 @@
+"""Measurements are weighed by the errors that a law leaves them: against known variances."""
+
+import numpy as np
+import pytest
+
+import vidsindy_lite as vl
+from vidsindy_lite import study
+from vidsindy_lite.dynamics import PolynomialSystem
+from vidsindy_lite.dynamics import precision as weighing
+
+LAW = PolynomialSystem.from_terms(
+    {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3
+)
+TIMES = np.linspace(0.0, 40.0, 1000)
+PATH = LAW.simulate(TIMES, [2.0, 0.0])
+
+
+def uneven(kind, rng):
+    """The path with errors of mean size .02 and more, and their standard deviations."""
+    if kind == "growing":
+        size = 0.02 + 0.1 * np.abs(PATH)
+    elif kind == "for a while":
+        size = np.where(TIMES > 28, 0.2, 0.02)[:, None] * np.ones(2)
+    elif kind == "faster":
+        size = 0.01 + 0.1 * np.abs(LAW(PATH))
+    return PATH + size * rng.standard_normal(PATH.shape), size
+
+
+@pytest.fixture(params=["growing", "for a while", "faster"])
+def measured(request):
+    return uneven(request.param, np.random.default_rng(2))
+
+
+def test_law_is_exact_and_its_errors_are_right(measured):
+    x, _ = measured
+    found = vl.discover(TIMES, x)
+    assert (found.system.support == LAW.support).all()
+    assert found.status == "ok"
+    kept = LAW.support
+    off = (found.coefficients - LAW.coefficients)[kept] / found.standard_errors[kept]
+    assert (np.abs(off) < 4).all()
+
+
+def test_error_bars_are_smaller_than_by_one_variance(measured, monkeypatch):
+    x, _ = measured
+    weighed = vl.discover(TIMES, x).standard_errors[LAW.support]
+    monkeypatch.setattr(weighing, "LIKELY", np.inf)
+    even = vl.discover(TIMES, x).standard_errors[LAW.support]
+    assert np.exp(np.log(even / weighed).mean()) > 1.1
+
+
+@pytest.mark.parametrize("kind", ["growing", "for a while", "faster"])
+def test_variance_is_that_of_the_errors(kind):
+    rng = np.random.default_rng(4)
+    x, size = uneven(kind, rng)
+    causes = [PATH[:, 0] ** 2, LAW(PATH)[:, 0] ** 2]
+    factors = weighing._factors((x - PATH)[:, 0], causes)
+    expected = np.median(size[:, 0] ** 2) / size[:, 0] ** 2
+    assert np.corrcoef(np.log(factors), np.log(expected))[0, 1] > 0.85
+
+
+def test_gross_errors_do_no_harm():
+    rng = np.random.default_rng(6)
+    x = PATH + 0.02 * rng.standard_normal(PATH.shape)
+    clean = vl.discover(TIMES, x)
+    wrong = rng.permutation(len(x))[:20]
+    x[wrong] += rng.choice([-1.0, 1.0], (20, 2)) * rng.uniform(1.0, 3.0, (20, 2))
+    found = vl.discover(TIMES, x)
+    assert (found.system.support == LAW.support).all()
+    assert found.status == "ok"
+    off = np.abs(found.coefficients - clean.coefficients)[LAW.support]
+    assert (off < 3 * clean.standard_errors[LAW.support]).all()
+    assert (found.noise < 1.3 * clean.noise).all()
+
+
+def test_even_noise_is_left_as_it_is():
+    rng = np.random.default_rng(8)
+    for _ in range(20):
+        residual = rng.standard_normal(1000)
+        factors = weighing._factors(residual, [PATH[:, 0] ** 2, LAW(PATH)[:, 0] ** 2])
+        np.testing.assert_array_equal(factors, 1.0)
+
+
+def test_what_lasts_is_no_noise():
+    smooth = np.sin(TIMES) * np.where(TIMES > 28, 1.0, 0.05)
+    factors = weighing._factors(smooth, [PATH[:, 0] ** 2, LAW(PATH)[:, 0] ** 2])
+    np.testing.assert_array_equal(factors, 1.0)
+
+
+def test_a_spike_of_many_samples_is_no_gross_error():
+    rng = np.random.default_rng(3)
+    spike = rng.standard_normal(1000) + 50 * np.exp(-(((np.arange(1000) - 500) / 8.0) ** 2))
+    factors = weighing._factors(spike, [PATH[:, 0] ** 2])
+    assert (factors[490:510] > 0).all()
+
+
+def test_where_too_much_is_wrong_nothing_is_left_out():
+    rng = np.random.default_rng(9)
+    residual = rng.standard_normal(1000)
+    residual[rng.permutation(1000)[:200]] *= 1e3
+    factors = weighing._factors(residual, [PATH[:, 0] ** 2])
+    assert (factors > 0).all()
+
+
+def test_benchmarks_from_clean_data_are_not_weighed():
+    t, x = study.SYSTEMS["SprottE"].trajectory(600)
+    found = vl.discover(t, x)
+    assert found.status == "ok"
+    assert np.abs(found.native.coefficients).max() == pytest.approx(4.0, abs=1e-4)

@@ -1,0 +1,144 @@
+"""A kicked motion is told from a badly measured one, and its law is found all the same."""
+
+import numpy as np
+import pytest
+
+import vidsindy_lite as vl
+from vidsindy_lite.dynamics import PolynomialSystem
+from vidsindy_lite.dynamics.collocation import Collocation, Fit, State, Status
+from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.process_noise import evidence
+from vidsindy_lite.dynamics.splines import Segment
+
+LAW = PolynomialSystem.from_terms(
+    {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3
+)
+TIMES = np.linspace(0.0, 60.0, 1500)
+
+
+def kicked(law, start, times, size, rng):
+    """A path that is kicked ten times between two samples, by ``size`` over a unit of time."""
+    step, state, path = (times[1] - times[0]) / 10, np.array(start, dtype=float), []
+    for _ in times:
+        path.append(state.copy())
+        for _ in range(10):
+            middle = state + step / 2 * law(state)
+            state = state + step * law(middle)
+            state += size * np.sqrt(step) * rng.standard_normal(len(state))
+    return np.array(path)
+
+
+def exact(found, law):
+    return bool((found.system.support == law.support).all())
+
+
+@pytest.fixture(scope="module")
+def found_kicked():
+    rng = np.random.default_rng(11)
+    x = kicked(LAW, [2.0, 0.0], TIMES, 0.05, rng)
+    return vl.discover(TIMES, x + 0.002 * rng.standard_normal(x.shape))
+
+
+def test_law_of_a_kicked_motion_is_found(found_kicked):
+    assert exact(found_kicked, LAW)
+    assert found_kicked.status == "ok"
+
+
+def test_kicks_are_as_large_as_they_were(found_kicked):
+    np.testing.assert_allclose(found_kicked.model_error, 0.05, rtol=0.3)
+    # Between two knots a kick cannot be told from noise: it is at most that of one sample.
+    assert (found_kicked.noise < 0.05 * np.sqrt(TIMES[1])).all()
+
+
+def test_error_bars_count_the_kicks_in(found_kicked):
+    kept = LAW.support
+    off = (found_kicked.coefficients - LAW.coefficients)[kept]
+    assert (np.abs(off / found_kicked.standard_errors[kept]) < 4).all()
+
+
+def test_kicks_are_printed_and_saved(found_kicked, tmp_path):
+    assert "kicked at random" in str(found_kicked)
+    found_kicked.save(tmp_path / "law.json")
+    again = vl.Discovery.load(tmp_path / "law.json")
+    np.testing.assert_array_equal(again.model_error, found_kicked.model_error)
+
+
+def lasting(n, d, correlation, rng):
+    errors = rng.standard_normal((n, d))
+    for i in range(1, n):
+        errors[i] = correlation * errors[i - 1] + np.sqrt(1 - correlation**2) * errors[i]
+    return errors
+
+
+@pytest.mark.parametrize("kind", ["independent", "lasting", "bent space"])
+def test_errors_of_the_measurement_are_no_kicks(kind):
+    rng = np.random.default_rng(5)
+    x = LAW.simulate(TIMES, [2.0, 0.0])
+    if kind == "independent":
+        x = x + 0.05 * rng.standard_normal(x.shape)
+    elif kind == "lasting":
+        x = x + 0.05 * lasting(*x.shape, 0.9, rng)
+    else:
+        x = x + 0.01 * x[:, ::-1] ** 2
+    found = vl.discover(TIMES, x)
+    assert not found.model_error.any()
+    assert "kicked" not in str(found)
+    if kind != "bent space":
+        assert exact(found, LAW)
+
+
+def test_velocities_are_kicked_where_positions_are_seen():
+    spring = PolynomialSystem.from_terms(
+        {"x": {"y": 1.0}, "y": {"x": -4.0, "y": -0.2, "x^3": -3.0}}, degree=3
+    )
+    rng, times = np.random.default_rng(3), np.linspace(0.0, 30.0, 1500)
+    step, state, path = (times[1] - times[0]) / 10, np.array([1.5, 0.0]), []
+    for _ in times:
+        path.append(state[0])
+        for _ in range(10):
+            state = state + step * spring(state + step / 2 * spring(state))
+            state[1] += 0.1 * np.sqrt(step) * rng.standard_normal()
+    noisy = np.array(path)[:, None] + 0.003 * rng.standard_normal((len(times), 1))
+    found = vl.discover(times, noisy, order=2)
+    assert set(np.array(found.terms)[found.system.support[:, 1]]) == {"x", "vx", "x^3"}
+    assert found.model_error[0] == 0  # the slope of a position is its velocity, kicked or not
+    assert found.model_error[1] == pytest.approx(0.1, rel=0.3)
+
+
+def test_evidence_is_that_of_the_gaussian_model():
+    """Against the marginal likelihood of the data by dense algebra, for a linear law."""
+    rng = np.random.default_rng(0)
+    t = np.linspace(0.0, 3.0, 12)
+    segment = Segment.even(t, rng.standard_normal((len(t), 1)), 0.5, 0)
+    exponents = monomial_exponents(1, 1)
+    coefficients = np.array([[0.3], [-0.7]])
+
+    def both(noise, kick):
+        collocation = Collocation.of([segment], exponents, [noise**-2], [kick**-2])
+        grid = collocation.grid
+        state = State(
+            np.zeros((grid.r, 1)), coefficients, coefficients != 0, np.zeros(1), np.zeros(1, bool)
+        )
+        # The curve alone is fitted: the law stays as it is.
+        solved = collocation.linearise(state, np.array([], dtype=int))
+        state = state.moved(solved.curve_step, state.flat())
+        physics = grid.slopes.toarray() - coefficients[1] * grid.nodes.toarray()
+        rows = np.vstack(
+            [grid.samples.toarray() / noise, np.sqrt(grid.node_weights)[:, None] * physics / kick]
+        )
+        right = np.concatenate(
+            [
+                grid.x[:, 0] / noise,
+                np.sqrt(grid.node_weights) * coefficients[0] / kick,
+            ]
+        )
+        control, *_ = np.linalg.lstsq(rows, right, rcond=None)
+        left = ((rows @ control - right) ** 2).sum()
+        dense = left + np.linalg.slogdet(rows.T @ rows)[1]
+        dense += 2 * len(t) * np.log(noise)
+        dense -= np.log(grid.node_weights).sum() - 2 * len(grid.node_weights) * np.log(kick)
+        return evidence(Fit(state, collocation, Status.CONVERGED)), dense
+
+    for noise, kick in ((0.1, 0.3), (0.5, 0.01)):
+        ours, dense = both(noise, kick)
+        assert ours == pytest.approx(dense, rel=1e-6)

@@ -1,0 +1,122 @@
+"""How precise each measurement is, as the errors that a law leaves tell.
+
+Noise may grow with the signal, with its speed (times that are not exact) or be larger for a while,
+and some samples may be plainly wrong. A model of the variance is fitted to the residuals, the
+simplest that explains them (Bayesian information criterion); each measurement then has its own
+weight, and what is no noise at all has none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Bools, Floats
+from .collocation import Fit
+from .errors import inflation
+from .problem import Problem
+
+GROSS = 6.0
+"""Distance from the curve, in standard deviations of the noise there, that no noise reaches."""
+MOST_GROSS = 0.1
+"""Largest share of samples that may be wrong; if more are, the law is."""
+STRETCHES = 8
+"""Pieces of a trajectory that may have a noise of their own."""
+LIKELY = 20.0
+"""Gain of the criterion from which on a noise is not taken to be even."""
+LARGEST_RATIO = 100.0
+"""Precision of the best measurements over the typical one, at most."""
+UPDATES = 60
+"""Steps of the variance components: ten would do for most."""
+MEDIAN = 0.455
+"""Median of the square of a standard normal number."""
+LASTING = 1.5
+"""Inflation of the errors from which on they are no noise of single samples."""
+NOISELESS = 1e-4
+"""Errors as small as this are those of splines, not of measurements."""
+
+
+def with_precision(problem: Problem, fit: Fit) -> Problem:
+    """The problem with the precision that a fit shows each measurement to have.
+
+    The same problem where the noise is even and no sample is wrong.
+
+    Parameters
+    ----------
+    problem : Problem
+    fit : Fit
+        A law that fits as far as its measurements allow.
+    """
+    collocation, known = fit.collocation, fit.collocation.precision
+    residual, _ = collocation.data_residual(fit.state.control_points)
+    residual *= np.sqrt(known)
+    spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(collocation.counts, 1))
+    factors, causes = np.ones_like(residual), _causes(problem, fit)
+    for j in np.flatnonzero(spread > NOISELESS):
+        seen = known[:, j] > 0
+        factors[seen, j] = _factors(residual[seen, j], [cause[seen, j] for cause in causes])
+    if (factors == 1).all():
+        return problem
+    precision = [values.copy() for values in problem.precision]
+    ends = np.cumsum([len(segment.t) for segment in collocation.segments])[:-1]
+    for segment, factor in zip(collocation.segments, np.split(factors, ends), strict=True):
+        rows = np.searchsorted(problem.trajectories[segment.trajectory][0], segment.t)
+        precision[segment.trajectory][rows] *= factor
+    return replace(problem, precision=precision)
+
+
+def _causes(problem: Problem, fit: Fit) -> list[Floats]:
+    """What the variance of the noise may follow, each (n, d): the signal, its speed, the time."""
+    segments = fit.collocation.segments
+    splines = fit.collocation.grid.splines(fit.state.control_points)
+    pairs = list(zip(segments, splines, strict=True))
+    signal = np.concatenate([spline(s.t) for s, spline in pairs]) - problem.home
+    speed = np.concatenate([spline(s.t, 1) for s, spline in pairs])
+    return [signal**2, speed**2]
+
+
+def _factors(residual: Floats, causes: list[Floats]) -> Floats:
+    """Precision of measurements over the typical one, (n,): 0 for what is no noise."""
+    n = len(residual)
+    even = np.ones(n)
+    pieces = np.minimum(np.arange(n) * STRETCHES // n, STRETCHES - 1)
+    stretches = (pieces == np.arange(STRETCHES)[:, None]).astype(float)
+    models = [even[None], *([even, z] for z in causes), stretches]
+    fits = [_variance(residual, np.array(model)) for model in models]
+    cost, variance, gross = min(fits, key=lambda fit: fit[0])
+    plain = n * np.log((residual**2).mean()) + n + np.log(n)
+    if not cost < plain - LIKELY or gross.mean() > MOST_GROSS:
+        return even
+    if inflation([np.where(gross, 0.0, residual / np.sqrt(variance))[:, None]])[0] > LASTING:
+        variance = even  # what lasts is no noise, but a single sample may still be wrong
+    precision = np.minimum(np.median(variance) / variance, LARGEST_RATIO)
+    return np.where(gross & _alone(residual), 0.0, precision)
+
+
+def _alone(residual: Floats) -> Bools:
+    """Which residuals are more than twice those around them, (n,)."""
+    around = np.stack([np.roll(residual, k) for k in (-2, -1, 1, 2)])
+    return np.abs(residual) > 2 * np.abs(np.median(around, axis=0))
+
+
+def _variance(residual: Floats, causes: Floats) -> tuple[float, Floats, Bools]:
+    """A variance that is a sum of causes, (k, n), each times an unknown size of at least 0.
+
+    Its criterion, itself, (n,), and what is no noise. The sizes by an ascent of the likelihood
+    that keeps them positive; what is gross at present does not count.
+    """
+    causes = causes / causes.mean(axis=1, keepdims=True)
+    squares = residual**2
+    variance = causes.sum(axis=0)
+    sizes = np.full(len(causes), np.median(squares / variance) / MEDIAN)
+    for _ in range(UPDATES):
+        variance = sizes @ causes
+        noise = squares <= GROSS**2 * variance
+        up = (causes * (noise * squares / variance**2)).sum(axis=1)
+        down = (causes * (noise / variance)).sum(axis=1)
+        sizes = sizes * up / down
+    variance = np.maximum(sizes @ causes, variance.max() / LARGEST_RATIO**2)
+    gross = squares > GROSS**2 * variance
+    terms = np.log(variance) + np.where(gross, GROSS**2, squares / variance)
+    return float(terms.sum() + len(causes) * np.log(len(residual))), variance, gross
