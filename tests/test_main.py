@@ -272,6 +272,18 @@ def test_a_full_disk_is_one_line_and_the_law_is_told(tracked, capsys, monkeypatc
     assert not list(tracked.glob("*report*"))
 
 
+def test_a_refusal_without_a_picture_is_told_all_the_same(tracked, capsys, monkeypatch):
+    def full(path, *_):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    command = ["discover", "--rig", "rig.toml", "--fps", "25", "--tracks"]
+    assert main([*command, "a.csv", "still.csv", "c.csv"]) == 2
+    (line,) = [one for one in capsys.readouterr().err.splitlines() if one.startswith("error:")]
+    assert "the target's motion must determine" in line
+    assert "the tracks could not be drawn: [Errno 28] No space left on device" in line
+
+
 @pytest.mark.slow
 def test_every_kind_of_film_under_any_name(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -64,7 +64,7 @@ def _discover(options: argparse.Namespace) -> int:
     Tracker, DeepLabCut and this command write them.
 
     examples:
-      python -m vidsindy_lite rig-template --cameras 3 > rig.toml      and fill it in
+      python -m vidsindy_lite rig-template --output rig.toml           and fill it in
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml --lag 0,7,0 --degree 2
       python -m vidsindy_lite discover "a/%04d.png" "b/%04d.png" c/ --rig rig.toml --fps 240
@@ -95,7 +95,10 @@ def _discover(options: argparse.Namespace) -> int:
     try:
         found = _found(options, rig)
     except Refused as refused:
-        write_refusal(refused, videos, rig, options.out, told)
+        try:
+            write_refusal(refused, videos, rig, options.out, told)
+        except (ValueError, OSError) as error:
+            raise ValueError(f"{refused}; the tracks could not be drawn: {error}") from None
         page = Path(options.out) / PAGE
         raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
     # First the law: if the report cannot be written, it is not lost.
@@ -143,7 +146,46 @@ def _rig_template(options: argparse.Namespace) -> int:
     """Print a rig file with a comment on every value, to be filled in with what you measured."""
     from .cameras import rig_template
 
-    print(rig_template(options.cameras, options.model, options.size), end="")
+    return _write(rig_template(options.cameras, options.model, options.size), options.output)
+
+
+def _rig_import(options: argparse.Namespace) -> int:
+    """Print the rig file of what other tools have calibrated: perspective cameras, lenses included.
+
+    Files of Anipose, Pose2Sim, Caliscope (.toml), OpenCV (.yaml, .xml, .json, .npz with K, dist, R
+    or rvec, t), DLT coefficients of DLTdv, Argus and easyWand (.csv), or projection matrices
+    (.csv, .npy); one file of all cameras or one per camera, in the order of the videos.
+
+    examples:
+      python -m vidsindy_lite rig-import calibration.toml --output rig.toml
+      python -m vidsindy_lite rig-import dltCoefs.csv --size 1920x1080 > rig.toml
+    """
+    from .cameras import read_calibration
+
+    rig = read_calibration(options.files, options.size)
+    for warning in rig.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    return _write(rig.text(), options.output)
+
+
+def _rig_export(options: argparse.Namespace) -> int:
+    """Write a rig for other tools: .toml for Anipose and Pose2Sim, .npz, or .csv for DLT.
+
+    examples:
+      python -m vidsindy_lite rig-export report/rig.toml calibration.toml
+    """
+    from .cameras import Rig, write_calibration
+
+    write_calibration(Rig.load(options.rig), options.file)
+    return 0
+
+
+def _write(text: str, output: str | None) -> int:
+    """Text for the terminal, or in UTF-8 for a file."""
+    if output is None:
+        print(text, end="")
+    else:
+        Path(output).write_text(text, encoding="utf-8")
     return 0
 
 
@@ -318,12 +360,22 @@ COMMANDS = {
     "rig-template": _Command(_rig_template, "print a rig file to fill in", {
         "--cameras": _count(3, "how many (default: 3)"),
         "--model": _choice(
-            "orthographic", ("orthographic", "perspective"),
-            "orthographic for far cameras with long lenses (default), perspective for near ones"
+            "perspective", ("perspective", "orthographic"),
+            "perspective (default), or orthographic for far cameras with long lenses"
         ),
         "--size": _text(
             "WxH", "of the videos in pixels (default: 1920x1080)", type=_size, default=(1920, 1080)
         ),
+        "--output": _text("FILE", "write it there, in UTF-8 (default: print it)"),
+    }),
+    "rig-import": _Command(_rig_import, "a rig file from the calibration of another tool", {
+        "files": _text("FILE", "calibrations, in the order of the videos", nargs="+"),
+        "--size": _text("WxH", "of the videos in pixels, if the files do not say", type=_size),
+        "--output": _text("FILE", "write it there, in UTF-8 (default: print it)"),
+    }),
+    "rig-export": _Command(_rig_export, "a rig file as a calibration for other tools", {
+        "rig": _text("RIG", "a rig file of perspective cameras, all calibrated"),
+        "file": _text("FILE", "to write: .toml, .npz or .csv"),
     }),
     "run": _Command(_run, "execute the notebooks, regenerate figures and tables", {
         "notebooks": _text("NOTEBOOK", "number, name or path (default: all)", nargs="*"),

@@ -130,7 +130,7 @@ def observe(
     files = _check_paths(paths, rig)
     shots = _check_shots(files, rig)
     names = [path.name for path in files]
-    clocks = _check_clocks(files, shots)
+    clocks = [frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     given = _check_lags(lags, clock, names)
     videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
@@ -196,9 +196,7 @@ def _observed(
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     with refusing("lags", raw, names):
-        best = learn_lags(
-            raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress
-        )
+        best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress)
         if lags is not None:
             _refuse_wrong(lags, best)
     used = best.frames if lags is None else lags
@@ -274,22 +272,6 @@ def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
     return shots
 
 
-def _check_clocks(files: Sequence[Path], shots: Sequence[VideoInfo]) -> list[Floats]:
-    """When the frames of each file were taken, in frames."""
-    clocks = [frame_clock(path) for path in files]
-    for path, shot, clock in zip(files, shots, clocks, strict=True):
-        if len(clock) != shot.frames:
-            raise ValueError(_cut_off(path, shot.frames, len(clock)))
-    return clocks
-
-
-def _cut_off(path: Path, stated: int, read: int) -> str:
-    return (
-        f"paths: {path.name} must hold the {stated} frames that its header states, got {read} "
-        "that can be read: the file is cut off or damaged, or its header wrong"
-    )
-
-
 def _check_hints(
     hints: Sequence[Hint | None] | None, files: Sequence[Path]
 ) -> Sequence[Hint | None]:
@@ -301,13 +283,15 @@ def _check_hints(
     return hints
 
 
-def _track_one(
-    path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None
-) -> Track:
+def _track_one(path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None) -> Track:
     """Track a video that should have so many frames."""
     found = track(path, detector, hint)
     if len(found.pixels) != frames:
-        raise ValueError(_cut_off(path, frames, len(found.pixels)))
+        raise ValueError(
+            f"paths: {path.name} must hold the {frames} frames that its header states, got "
+            f"{len(found.pixels)} that can be read: the file is cut off or damaged, or its header "
+            "wrong"
+        )
     return found
 
 

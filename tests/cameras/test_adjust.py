@@ -224,3 +224,14 @@ def test_noise_and_outliers_are_told_apart():
     assert found.weights[100] < 0.01
     assert np.sum(found.weights < 1) < 5
     assert found.settled
+
+
+def test_a_measurement_that_is_far_off_is_told():
+    rng = np.random.default_rng(12)
+    rig = room(rng, 4)
+    _, tracks = film(rng, rig)
+    first, *others = by_hand(rng, rig).cameras
+    wrong = replace(first, position=first.position + [0.0, 0.0, 1.5])
+    (warning,) = learn_cameras(tracks, vl.Rig([wrong, *others])).warnings
+    assert "of cameras[0] is" in warning
+    assert "times its error from what was measured" in warning

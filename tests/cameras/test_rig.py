@@ -15,7 +15,7 @@ def test_a_template_is_a_rig_with_one_calibrated_camera(tmp_path, cameras, model
     path.write_text(rig_template(cameras, model, (640, 480)), encoding="utf-8")
     rig = vl.Rig.load(path)
     calibrated = [camera.is_calibrated for camera in rig.cameras]
-    assert calibrated == [True] + [False] * (cameras - 1)
+    assert calibrated == [True] + [model == "perspective"] * (cameras - 1)
     assert {camera.model for camera in rig.cameras} == {model}
     assert {camera.image_size for camera in rig.cameras} == {(640, 480)}
 
@@ -29,6 +29,58 @@ def test_its_origin_is_in_the_middle_and_z_is_up(tmp_path, model):
     np.testing.assert_allclose(origin, (959.5, 539.5), atol=2)  # its numbers are rounded
     assert abs(above[0] - origin[0]) < 1
     assert above[1] < origin[1] - 10
+
+
+def test_what_a_hand_measures(tmp_path):
+    """A field of view of 90 degrees shows at one metre two metres; a roll turns the z axis left."""
+    path = tmp_path / "rig.toml"
+    text = """
+[[camera]]
+model = "perspective"
+position = [3, 1, 1]
+looks_at = [0, 1, 1]
+field_of_view = 90
+roll = {roll}
+image_size = [641, 481]
+normal_error = 2
+"""
+    for roll in (0, 30, -90):
+        other = "position = [1, 4, 1]\nlooks_at = [1, 1, 1]"
+        first = text.format(roll=roll)
+        path.write_text(first + first.replace("position = [3, 1, 1]\nlooks_at = [0, 1, 1]", other))
+        camera = vl.Rig.load(path).cameras[0]
+        middle, above, side = camera.project([[0, 1, 1], [0, 1, 2], [0, 4, 1]])
+        np.testing.assert_allclose(middle, (320, 240), atol=1e-9)
+        lean = np.deg2rad(roll)
+        long = 641 / 2 / 3  # pixels of one metre at three metres
+        np.testing.assert_allclose(
+            above - middle, long * np.array([-np.sin(lean), -np.cos(lean)]), atol=1e-9
+        )
+        np.testing.assert_allclose(np.linalg.norm(side - middle), 3 * long, rtol=1e-12)
+        assert camera.normal_error == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "looks_at = ",
+            "normal = [1, 0, 0]\nlooks_at = ",
+            "looks_at: must be given with a position",
+        ),
+        ("field_of_view = 60", "field_of_view = 180", "field_of_view: must be between 0 and 180"),
+        ("field_of_view = 60", "scale = 1\nfield_of_view = 60", "in place of scale and angle"),
+        ("field_of_view = 60", "", "roll: must be given with a field_of_view"),
+        ("looks_at = ", "# ", "normal: must be"),
+        ("roll = 0", "roll = '0'", "roll: must be a finite number"),
+    ],
+)
+def test_what_a_hand_cannot_have_measured(tmp_path, old, new, message):
+    path = tmp_path / "rig.toml"
+    path.write_text(rig_template(2).replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(ValueError, match=message) as caught:
+        vl.Rig.load(path)
+    assert "camera 0" in str(caught.value)
 
 
 @pytest.mark.parametrize(

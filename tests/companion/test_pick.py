@@ -1,6 +1,7 @@
 """The page on which the target is shown: complete, without network, and right to a pixel."""
 
 import re
+import tomllib
 
 import numpy as np
 import pytest
@@ -86,5 +87,7 @@ def test_a_box_becomes_the_line_to_paste(videos, tmp_path, width, drawn):
     numbers = [float(number) for number in re.findall(r"-?[\d.]+", toml)]
     assert numbers == [float(number) for number in re.findall(r"-?[\d.]+", python)]
     assert re.fullmatch(r"target = \{ frame = 59, box = \[.*\] \}", toml)
+    hint = vl.Hint(**tomllib.loads(toml)["target"])  # as the rig file takes it
+    assert (hint.frame, list(hint.box)) == (59, numbers[1:])
     expected = [40, 50, 20, 20] if drawn == "box" else [46, 56, 8, 8]
     np.testing.assert_allclose(numbers[1:], expected, atol=0.11)

@@ -261,7 +261,7 @@ def test_the_tracks_can_be_read_again(page, case):
     tracks = read_tracks(page.parent / "tracks.csv")
     for ours, theirs in zip(tracks, case[0].tracks, strict=True):
         np.testing.assert_allclose(ours.pixels, theirs, rtol=1e-9)
-        np.testing.assert_allclose(ours.t, case[0].t, rtol=1e-9)
+        np.testing.assert_allclose(ours.t, case[0].t, rtol=1e-9, atol=1e-9)
 
 
 def test_a_narrow_screen_is_enough(page):

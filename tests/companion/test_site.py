@@ -181,6 +181,25 @@ def test_a_folder_of_something_else_is_not_emptied(tmp_path, name):
     assert (tmp_path / name).read_text() == "dear"
 
 
+def test_what_is_left_of_an_interrupted_site_may_be_replaced(tmp_path, monkeypatch):
+    class Interrupted:
+        def __init__(self, pages, settings, output, *_, **__):
+            self.output = output
+
+        def build(self):
+            write_file(self.output / "half.html", b"")
+            raise KeyboardInterrupt
+
+    for folder in ("figures", "notebooks", "vidsindy_lite"):
+        (tmp_path / "root" / folder).mkdir(parents=True)
+    for name in ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md"):
+        (tmp_path / "root" / name).write_text("# One\n")
+    monkeypatch.setattr("vidsindy_lite.companion.site.Sphinx", Interrupted)
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            build_site(tmp_path / "site", tmp_path / "root")
+
+
 @pytest.mark.parametrize("name", ["vidsindy_lite", "notebooks", "figures", "figures/site"])
 def test_what_is_shown_is_not_written_over(tmp_path, name):
     for folder in ("vidsindy_lite", "notebooks", "figures"):

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.dynamics import Discovery, PolynomialSystem
+from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
 from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.library import shift_matrix
 from vidsindy_lite.dynamics.order import ADVICE, SETTLED, accelerated, better, unexplained
+from vidsindy_lite.dynamics.problem import pose
+from vidsindy_lite.dynamics.search import _thinner
 from vidsindy_lite.dynamics.smoothing import smooth
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import SYSTEMS
@@ -139,20 +142,48 @@ def test_one_throw_is_called_undetermined(acceleration):
     assert any("several runs" in warning for warning in found.warnings)
 
 
+def anharmonic_spring(t):
+    """A damped one in space, from its rest position."""
+    stiff = np.array([30.0, 34.0, 40.0])
+    return moving(lambda x, v: -stiff * x - 0.25 * v - 25 * x**3, [1, 0.5, -0.3], [0, 2, 1.5], t)
+
+
+SPRING = {(f"v{i}", term) for i in "xyz" for term in (i, f"v{i}", f"{i}^3")}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.05])
 def test_an_anharmonic_damped_spring_in_space(share):
-    stiff = np.array([30.0, 34.0, 40.0])
     t = np.linspace(0, 12, 1500)
-
-    def spring(x, v):
-        return -stiff * x - 0.25 * v - 25 * x**3
-
-    x = noisy(moving(spring, [1, 0.5, -0.3], [0, 2, 1.5], t), share)
-    found = discover(t, x, order=2)
-    own = {(f"v{i}", term) for i in "xyz" for term in (i, f"v{i}", f"{i}^3")}
-    assert found_terms(found.system).keys() == own
+    found = discover(t, noisy(anharmonic_spring(t), share), order=2)
+    assert found_terms(found.system).keys() == SPRING
     assert found.status == "ok", found.warnings
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_place_where_a_spring_rests_is_found(seed):
+    t, rest = np.linspace(0, 12, 1500), np.array([3.0, -2.0, 5.0])
+    found = discover(t, noisy(anharmonic_spring(t), 0.01, seed) + rest, order=2)
+    assert found_terms(found.native).keys() == SPRING
+    assert (np.abs(found.offset[:3] - rest) < 4 * found.offset_errors[:3]).all()
+
+
+def test_an_axis_leaves_home_where_terms_make_up_for_its_staying():
+    t = np.linspace(0, 20, 100)
+    x = moving(duffing, [1.5], [0.0], t)
+    problem = pose([(t, x)], [np.empty((100, 1, 0))], 3, np.random.default_rng(0), order=2)
+    exponents, zeros = problem.exponents, np.zeros(2)
+    coefficients = np.zeros(exponents.shape)
+    for term, value in {(1, 0): -1.0, (0, 1): -0.1, (3, 0): -0.5}.items():
+        coefficients[(exponents == term).all(axis=1), 1] = value
+    for rest in (0.0, 0.7):
+        law = shift_matrix(exponents, np.array([rest, 0])) @ coefficients
+        state = State(np.zeros((4, 2)), law, law != 0, zeros, zeros.astype(bool))
+        origins = _thinner(problem, state)
+        assert (len(origins) > 0) == (rest > 0)
+        assert all(origin == pytest.approx([rest, 0]) for origin in origins)
+        assert _thinner(problem, replace(state, moving=np.array([True, False]))) == []
 
 
 def test_an_order_that_is_none():

@@ -7,6 +7,7 @@
     models        the two models of camera: orthographic and perspective
     lens          what a lens does to the image: distortion
     rig           the cameras that watch one scene, and their file
+    calibrations  rigs from files of other tools, and back
     unknowns      what is unknown of a rig: as one vector, and linear equations for it
  1. synchronise   tracks -> when each camera started (`Lags`)
     clocks        when the frames of each video were taken
@@ -28,6 +29,7 @@ The other rooms import from here alone.
 from .alignment import Lags, align, list_lags
 from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
 from .clocks import Clock
+from .calibrations import read_calibration, write_calibration
 from .causes import GROSS, explain, smooth
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance

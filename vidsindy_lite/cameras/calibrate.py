@@ -19,7 +19,7 @@ from ..checks import check_instance, check_integer
 from .adjust import Adjustment, adjust
 from .camera import Camera
 from .changes import PARTS, known_to
-from .messages import unconverged_cameras, undecided_outliers, unsettled_points
+from .messages import far_from_measured, unconverged_cameras, undecided_outliers, unsettled_points
 from .models import all_orthographic, independent
 from .rig import Rig
 from .triangulate import (
@@ -32,6 +32,8 @@ from .triangulate import (
     points_of_views,
 )
 from .unknowns import Unknowns, agreement, calibrated, names, solve
+
+_TOO_FAR = 5.0  # standard errors that a measurement may be off
 
 
 def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
@@ -215,7 +217,13 @@ def cameras_of_views(views: Views, unknowns: Unknowns) -> Rig:
 def _closest(views: Views, start: Sequence[Camera], errors: Floats) -> tuple[Adjustment, Rig]:
     """The cameras of the smallest errors near a start, and the rig that they make."""
     found = adjust(views, start, errors)
-    doubts = () if found.settled else (unconverged_cameras(found.steps),)
+    doubts: tuple[str, ...] = () if found.settled else (unconverged_cameras(found.steps),)
+    measured = (errors > 0) & np.isfinite(errors)
+    off = np.where(measured, np.abs(found.change) / np.where(measured, errors, 1.0), 0.0)
+    if off.max() > _TOO_FAR:
+        i, part = np.unravel_index(off.argmax(), off.shape)
+        what = next(name for name, place in PARTS.items() if place.start <= part < place.stop)
+        doubts += (far_from_measured(int(i), what, float(off.max())),)
     return found, Rig(found.cameras, doubts)
 
 

@@ -85,7 +85,8 @@ class Clock:
         if t is None:
             if not told.all():
                 raise ValueError(
-                    f"t: must be given if a file states no frame rate, got {rates.tolist()}"
+                    f"t: must be given, as by --fps, if a file states no frame rate, as images do, "
+                    f"got {rates.tolist()}"
                 )
             return cls(frames[0] / rates[0], rates / rates[0], frames)
         if told.any() and np.ptp(rates[told]) > _SAME_RATE * rates[told].min():

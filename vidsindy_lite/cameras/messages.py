@@ -13,6 +13,14 @@ def unconverged_cameras(steps: int) -> str:
     )
 
 
+def far_from_measured(camera: int, what: str, times: float) -> str:
+    """A measurement contradicts the tracks and the other measurements."""
+    return (
+        f"the {what} of cameras[{camera}] is {times:.0f} times its error from what was measured: "
+        "check it, and how the others were measured"
+    )
+
+
 def undecided_outliers() -> str:
     """Fit and outliers kept changing each other."""
     return (

@@ -12,6 +12,7 @@ import os
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,30 +23,40 @@ from ..checks import (
     check_image_size,
     check_instance,
     check_integer,
+    check_number,
     check_path,
     check_rows,
+    check_vector,
 )
 from .camera import Camera
+from .geometry import rotation_to_z
 from .models import MODELS, OrthographicCamera, all_orthographic, independent
 
 _MOST = 100  # cameras of a template
 _HEAD = """\
 # Rig file: one [[camera]] table per video, in the order of the videos.
-# Choose an origin, axes and a unit of length (here: metres) and replace every number.
+# Choose an origin, axes (z up) and a unit of length (here: metres) and replace every number.
+"""
+_STILL = """\
 # Cameras stand still. What is left out is learned from the videos, but for one camera at least
 # scale and angle must be given.
 """
-_SCALES = {
-    "orthographic": "scale = 0.005    # scene units per pixel: length of an object over its pixels",
-    "perspective": "scale = 0.001    # one over the focal length in pixels",
-}
-_POSITIONS = {
-    "orthographic": "# of the camera, or a landmark in the middle of its image",
-    "perspective": "# of the camera: of its pinhole, near the lens",
-}
+_MEASURED = """\
+# Cameras stand still. Errors are those of a tape and of the eye: one standard deviation each; the
+# videos then tell better. Without its error, a number is taken as exact.
+"""
+_SCALE = "scale = 0.005    # scene units per pixel: length of an object over its pixels"
 _ANGLE = """\
 angle = {angle:.3f}    # radians: for this normal and the z axis upright in the image; add how
                   # far the z axis is turned anticlockwise there"""
+_BY_HAND = """\
+looks_at = [0.000, 0.000, 0.000]    # what stands in the middle of its image (or give normal)
+field_of_view = 60    # degrees across the width of the video (or give scale and angle)
+roll = 0    # degrees by which the z axis leans to the left in its image; 0 for a level camera
+position_error = 0.03    # metres in each direction
+normal_error = 2    # degrees, of where it looks and of its roll
+scale_error = 0.03    # share of the focal length: 3 %"""
+_LOOKS = ("looks_at", "field_of_view", "roll")  # keys that a hand can measure
 
 
 @dataclass(frozen=True)
@@ -181,6 +192,10 @@ class Rig:
         path : path-like
             Overwritten if it exists.
         """
+        check_path("path", path).write_text(self.text(), encoding="utf-8")
+
+    def text(self) -> str:
+        """What `save` writes."""
         lines = [
             "# Cameras of a rig; scale in scene units per pixel (of a perspective camera: at "
             "distance 1), angle in radians."
@@ -189,7 +204,7 @@ class Rig:
             lines += ["", "[[camera]]"]
             # repr of a float is its shortest exact decimal form, and valid TOML.
             lines += [f"{key} = {value!r}" for key, value in _to_table(camera).items()]
-        check_path("path", path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return "\n".join(lines) + "\n"
 
     def uncalibrated(self, keep: int = 0) -> Rig:
         """The same rig with scale and angle forgotten in all cameras but one.
@@ -216,7 +231,7 @@ class Rig:
 
 
 def rig_template(
-    cameras: int = 3, model: str = "orthographic", image_size: tuple[int, int] = (1920, 1080)
+    cameras: int = 3, model: str = "perspective", image_size: tuple[int, int] = (1920, 1080)
 ) -> str:
     """Text of a rig file, to be filled in with what was measured.
 
@@ -225,7 +240,7 @@ def rig_template(
     cameras : int
         Between 2 and 100, evenly around the scene, looking 20 degrees down on its origin from a
         distance of three units.
-    model : {"orthographic", "perspective"}
+    model : {"perspective", "orthographic"}
         Of all cameras.
     image_size : tuple of int
         Width and height of the videos in pixels.
@@ -244,22 +259,23 @@ def rig_template(
         raise ValueError(f"cameras: must be at most {_MOST}, got {cameras}")
     check_choice("model", model, [*MODELS])
     width, height = check_image_size(image_size)
-    parts = [_HEAD]
+    flat = model == OrthographicCamera.model
+    parts = [_HEAD + (_STILL if flat else _MEASURED)]
     for i in range(cameras):
         # Of two cameras, one is a third of a turn from the other: face to face both see the same.
         azimuth = 2 * np.pi * i / max(cameras, 3) + np.deg2rad(20)
         normal, upright = _looking_down(azimuth, np.deg2rad(20))
-        lines = ["[[camera]]"]
-        if model != "orthographic":
-            lines.append(f'model = "{model}"')
-        lines += [
-            f"position = {_vector(3 * normal)}    {_POSITIONS[model]}",
-            f"normal = {_vector(normal)}    # from the scene to the camera; any length",
-            f"image_size = [{width}, {height}]",
-        ]
-        if i == 0:
-            lines += [_SCALES[model], _ANGLE.format(angle=upright)]
-        parts.append("\n".join(lines) + "\n")
+        place, size = f"position = {_vector(3 * normal)}", f"image_size = [{width}, {height}]"
+        if flat:
+            lines = [
+                f"{place}    # of the camera, or a landmark in the middle of its image",
+                f"normal = {_vector(normal)}    # from the scene to the camera; any length",
+                size,
+                *((_SCALE, _ANGLE.format(angle=upright)) if i == 0 else ()),
+            ]
+        else:
+            lines = [f'model = "{model}"', f"{place}    # of its lens", size, _BY_HAND]
+        parts.append("\n".join(["[[camera]]", *lines]) + "\n")
     return "\n".join(parts)
 
 
@@ -268,6 +284,32 @@ def _looking_down(azimuth: float, elevation: float) -> tuple[Floats, float]:
     away = np.array([np.cos(azimuth), np.sin(azimuth), 0])
     normal = np.cos(elevation) * away + [0, 0, np.sin(elevation)]
     return normal, np.arctan2(-np.cos(azimuth), -np.sin(azimuth))
+
+
+def _by_hand(table: dict[str, Any], model: str) -> dict[str, Any]:
+    """A table with normal, scale and angle in place of what a hand measures."""
+    known = {key: value for key, value in table.items() if key not in _LOOKS}
+    if "looks_at" in table:
+        if "normal" in table or "position" not in table:
+            raise ValueError("looks_at: must be given with a position and without a normal")
+        position = check_vector("position", table["position"], 3)
+        known["normal"] = position - check_vector("looks_at", table["looks_at"], 3)
+    if "field_of_view" in table:
+        if model == OrthographicCamera.model or "scale" in table or "angle" in table:
+            raise ValueError(
+                "field_of_view: must be given in place of scale and angle, perspective"
+            )
+        width = check_image_size(table.get("image_size", Camera.image_size))[0]
+        across = check_number("field_of_view", table["field_of_view"])
+        if not 0 < across < 180:
+            raise ValueError(f"field_of_view: must be between 0 and 180 degrees, got {across:g}")
+        x, y = rotation_to_z(known.get("normal", ()))[:2, 2]
+        roll = check_number("roll", table.get("roll", 0.0))
+        known["scale"] = 2 * np.tan(np.deg2rad(across) / 2) / width
+        known["angle"] = float(np.arctan2(x, y) + np.deg2rad(roll))
+    elif "roll" in table:
+        raise ValueError("roll: must be given with a field_of_view")
+    return known
 
 
 def _vector(values: Floats) -> str:
@@ -295,11 +337,12 @@ def _from_table(index: int, table: object) -> Camera:
         model = known.pop("model", OrthographicCamera.model)
         known.pop("target", None)  # for the tracker
         check_choice("model", model, [*MODELS])
-        keys = ["model", "target", *(part.name for part in fields(MODELS[model]))]
+        keys = ["model", "target", *(part.name for part in fields(MODELS[model])), *_LOOKS]
         for key in table:
             if key not in keys:
                 raise ValueError(f"{key}: must be one of {', '.join(keys)}")
-        if "normal" not in table:
+        known = _by_hand(known, model)
+        if "normal" not in known:
             raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
         return MODELS[model](**known)
     except ValueError as error:

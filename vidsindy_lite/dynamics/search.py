@@ -18,7 +18,7 @@ from ..arrays import Bools, Floats
 from .collocation import Collocation, Fit, State
 from .discovery import History
 from .gaps import Gap, gaps, join
-from .library import closure_mask, monomials, shift_matrix
+from .library import closure_mask, divides, monomials, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
 from .problem import Problem, fit_curves
@@ -32,6 +32,8 @@ FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
 NEEDLESS_START = 0.1
 """Chance that a second start, from terms of all degrees, is made though the first left nothing."""
+FAINT = 0.02
+"""What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
 LONGEST_SEARCH = 10
 """Most rounds of a subset search."""
 CONSISTENT = 1.5
@@ -218,7 +220,7 @@ def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
         ]
         limit = min(fit.criterion for fit in refined) + problem.penalties.max()
         kept = list({_key(fit.state): fit for fit in refined if fit.criterion <= limit}.values())
-    settled = [come_home(problem, fit, history) for fit in kept]
+    settled = [leave_home(problem, come_home(problem, fit, history), history) for fit in kept]
     return min(settled, key=lambda fit: fit.criterion)
 
 
@@ -244,6 +246,36 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
         if trial.criterion < fit.criterion:
             return trial
     return fit
+
+
+def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
+    """Move an axis off home where terms make up for its staying there, if the criterion falls."""
+    for origin in _thinner(problem, fit.state):
+        closed, law = _closed(problem, fit, FINAL_WEIGHT)
+        away = fit.state.moving | (origin != fit.state.offset)
+        start = _candidate(problem, closed, law, origin, away)
+        trial = select(problem, start, FINAL_WEIGHT, "offset away", history)
+        if trial.criterion < fit.criterion:
+            return trial
+    return fit
+
+
+def _thinner(problem: Problem, state: State) -> list[Floats]:
+    """Origins away from home at which a law itself, not refitted, has clearly fewer terms."""
+    exponents, found = problem.exponents, []
+    home = problem.form.movable & ~state.moving
+    frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), home)
+    below = divides(exponents, home) & ~np.eye(len(exponents), dtype=bool)
+    for entry in np.argwhere((state.active & (below @ state.active)).T):
+        step = frames.vanish(np.zeros(problem.d), entry[None])
+        if not np.isfinite(step).all():
+            continue
+        matrix = shift_matrix(exponents, -step)
+        left = np.abs(matrix @ state.coefficients)
+        terms = (left > FAINT * (np.abs(matrix) @ np.abs(state.coefficients))).sum()
+        if terms + (step != 0).sum() < state.active.sum():
+            found.append(state.offset + step)
+    return found
 
 
 def bridge(problem: Problem, fit: Fit, history: History) -> Fit:

@@ -27,7 +27,8 @@ _STATES = 4  # states of a candidate that are kept
 class Sightings:
     """The candidates of all frames as rows of a table, in the order of their frames.
 
-    `frame`, `which` of the frame, `centre` (m, 2) steadied, `size`, `colour` (m, 3), `quality`;
+    `frame`, `which` of the frame, `centre` (m, 2) steadied, `size`, `colour` (m, 3), `quality`,
+    `box` (m, 4) in the frame;
     `diagonal` of the image, in the same pixels.
     """
 
@@ -37,6 +38,7 @@ class Sightings:
     size: Floats
     colour: Floats
     quality: Floats
+    box: Floats
     diagonal: float
 
     @classmethod
@@ -53,7 +55,8 @@ class Sightings:
             frame, which, np.concatenate([np.zeros((0, 2)), *places]),
             np.sqrt([c.area for *_, c in rows]),
             np.array([c.colour for *_, c in rows]).reshape(-1, 3),
-            np.array([c.quality for *_, c in rows]), diagonal,
+            np.array([c.quality for *_, c in rows]),
+            np.array([c.box for *_, c in rows]).reshape(-1, 4), diagonal,
         )  # fmt: skip
 
     def only(self, rows: Ints) -> "Sightings":
@@ -65,6 +68,7 @@ class Sightings:
             self.size[rows],
             self.colour[rows],
             self.quality[rows],
+            self.box[rows],
             self.diagonal,
         )
 

@@ -25,11 +25,12 @@ _SHORTEST = 5  # frames of a path
 _AS_PLAIN = 0.5  # rating of another path, relative to the best, above which there is doubt
 _BEYOND = 3  # frames by which a path is carried on at its ends
 _PLAIN = 0.2  # quality of the candidates of a path that is worth anything
+_SCARCE = 0.05  # share of the frames in which a target must be seen
 _SWAYS = 0.5  # pixels of a camera's displacement that are more than doubtful
 _LOOSE = 1.0  # pixels to which a camera's motion should be known
 _COLOUR = 70.0  # grey levels between colours that are not alike
 _TOLD = 100.0  # quality of the candidate that a user points at
-_LARGE = 0.03  # share of the image that a target hardly fills
+_LARGE = 0.01  # share of the image that a target hardly fills
 
 
 class Rated(NamedTuple):
@@ -57,9 +58,9 @@ def rate(seen: Sightings, rows: Ints, value: float) -> float:
     return float(value * extent / (extent + 2) / doubts)
 
 
-def plainest_paths(seen: Sightings, boxes: Floats) -> list[Rated]:
+def plainest_paths(seen: Sightings) -> list[Rated]:
     """Several paths that have nothing in common, the plainest first."""
-    left, found = np.arange(len(seen.frame)), []
+    left, found, boxes = np.arange(len(seen.frame)), [], seen.box
     for _ in range(_PATHS):
         rows, value = best_path(seen.only(left))
         rows = left[rows]
@@ -128,23 +129,44 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     """
     film = _Film.of(path, samples)
     found, lights = _candidates(path, film, hint)
-    n = len(found)
+    seen, paths = _linked(found, film)
+    doubts: tuple[str, ...] = ()
+    if hint is not None and hint.box is not None:
+        paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
+    elif hint is None and paths and _travels(seen, paths[0].rows):
+        doubts = _rivals(seen, paths, film.factor)
+        # What the target looks like is known by now, which tells it from what it meets.
+        seen, paths = _linked(_learned(found, seen, paths[0].rows), film)
+        paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
+    elif hint is None:
+        paths = []
+    if not paths:
+        return nothing(film.motion, len(found))
+    if film.sways > _SWAYS:
+        doubts += ("the camera seems to move, but not clearly enough to be followed: its motion is "
+                   "part of the track",)  # fmt: skip
+    ways = expected(seen, paths[0].rows, film, len(found))
+    return _finished(_views(path, samples, film, ways, lights), film.motion, doubts)
+
+
+def _linked(found: list[list[Candidate]], film: "_Film") -> tuple[Sightings, list[Rated]]:
+    """The candidates as a table, and the paths through them, the plainest first."""
     places = [
         carry(film.maps[i], np.array([c.centre for c in f])) for i, f in enumerate(found) if f
     ]
     seen = Sightings.of(found, places, float(np.hypot(*film.plate.size)))
-    boxes = np.array([c.box for f in found for c in f]).reshape(-1, 4)
-    paths = plainest_paths(seen, boxes)
-    if hint is not None and hint.box is not None:
-        paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
-    if not paths or (hint is None and not _travels(seen, paths[0].rows)):
-        return nothing(film.motion, n)
-    doubts = _rivals(seen, paths, film.factor) if hint is None else ()
-    if film.sways > _SWAYS:
-        doubts += ("the camera seems to move, but not clearly enough to be followed: its motion is "
-                   "part of the track",)  # fmt: skip
-    ways = expected(seen, boxes, paths[0].rows, film, n)
-    return _finished(_views(path, samples, film, ways, lights), film.motion, doubts)
+    return seen, plainest_paths(seen)
+
+
+def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[list[Candidate]]:
+    """Candidates as far as they have the colour of a path, whose best one is sure."""
+    colour = np.median(seen.colour[rows], axis=0)
+    alike = [[replace(c, quality=c.quality * _alike(c.colour, colour)) for c in f] for f in found]
+    worth = [alike[seen.frame[r]][seen.which[r]].quality for r in rows]
+    best = rows[int(np.argmax(worth))]
+    frame = int(seen.frame[best])
+    alike[frame] = [replace(found[frame][seen.which[best]], quality=_TOLD)]
+    return alike
 
 
 class _Film(NamedTuple):
@@ -287,7 +309,7 @@ class Ways(NamedTuple):
     colour: Floats
 
 
-def expected(seen: Sightings, boxes: Floats, rows: Ints, film: _Film, n: int) -> Ways:
+def expected(seen: Sightings, rows: Ints, film: _Film, n: int) -> Ways:
     """Where a path leads in all frames from its first to its last, and a little beyond."""
     at, place = seen.frame[rows], seen.centre[rows]
     frames = np.arange(max(at[0] - _BEYOND, 0), min(at[-1] + _BEYOND, n - 1) + 1)
@@ -297,7 +319,7 @@ def expected(seen: Sightings, boxes: Floats, rows: Ints, film: _Film, n: int) ->
             fit = np.polyfit(at[end] - at[end][0], place[end], min(2, len(at[end]) - 1))
             t = frames[outside] - at[end][0]
             along[outside] = np.column_stack([np.polyval(fit[:, k], t) for k in (0, 1)])
-    extent = np.column_stack([np.interp(frames, at, x) for x in boxes[rows, 2:].T])
+    extent = np.column_stack([np.interp(frames, at, x) for x in seen.box[rows, 2:].T])
     centre, box, colour = np.full((n, 2), np.nan), np.full((n, 4), np.nan), np.zeros((n, 3))
     centre[frames] = carry(np.linalg.inv(film.maps[frames]), along)
     box[frames] = np.column_stack([centre[frames] - extent / 2, extent])
@@ -320,9 +342,11 @@ def _finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str,
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     good = fitting(at, steady, areas, inside)
+    if good.sum() < max(_SHORTEST, _SCARCE * n):
+        return nothing(motion, n)
     pixels[at[good]] = steady[good]
     errors[at[good]] = np.hypot(scatter(at[good], steady[good]), motion.errors[at[good]])
-    if good.any() and np.median(motion.errors[at[good]]) > _LOOSE:
+    if np.median(motion.errors[at[good]]) > _LOOSE:
         error = np.median(motion.errors[at[good]])
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
     return Followed(pixels, errors, motion.maps[:n], doubts)

@@ -29,7 +29,7 @@ from .stills import find_stills, read_still, read_stills
 from .timing import Shown, cut_off, timing
 
 if TYPE_CHECKING:
-    from av import Packet, VideoFrame
+    from av import VideoFrame
     from av.container import InputContainer, OutputContainer
     from av.video.stream import VideoStream
 
@@ -283,16 +283,8 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
         return VideoInfo(len(stills.files), 0.0, read_still(stills.files[0]).shape[1::-1])
     with _opened(path) as (container, stream):
         size = _first(path, container, stream).shape[1::-1]
-    with _opened(path) as (container, stream):
-        stated = stream.frames
-        every = [packet for packet in container.demux(stream) if packet.size]
-        packets = _shown(every)
-        count = (
-            stated - (len(every) - len(packets))  # those before the start that an editor has set
-            if stated
-            else len(packets) + cut_off(packets, container, stream)
-        )
-        return VideoInfo(count, timing(packets, stream)[1], size)
+    clock, rate = _clock(path)
+    return VideoInfo(len(clock), rate, size)
 
 
 def frame_clock(path: str | os.PathLike) -> Floats:
@@ -307,7 +299,8 @@ def frame_clock(path: str | os.PathLike) -> Floats:
     -------
     ndarray, shape (n,)
         0, 1, 2, ... if the frames are evenly spaced to within the ticks of the file's clock, or the
-        file states no times; 0, 1, 3, 4, ... if one was dropped. Divided by the rate, seconds.
+        file states no times, or was cut off; 0, 1, 3, 4, ... if one was dropped. Divided by the
+        rate, seconds.
 
     Raises
     ------
@@ -317,8 +310,21 @@ def frame_clock(path: str | os.PathLike) -> Floats:
     stills = find_stills(check_path("path", path))
     if stills:
         return stills.clock
+    return _clock(path)[0]
+
+
+def _clock(path: str | os.PathLike) -> tuple[Floats, float]:
+    """When each frame was taken, those included that were cut off a file later; and their rate."""
     with _opened(path) as (container, stream):
-        return timing(_packets(container, stream), stream)[0]
+        stated, hidden, packets = stream.frames, 0, []
+        for packet in container.demux(stream):
+            if packet.size and packet.is_discard:  # before the start that an editor has set
+                hidden += 1
+            elif packet.size:  # the last one of a stream is empty
+                packets.append((packet.pts, packet.is_keyframe))
+        clock, rate = timing(packets, stream)
+        count = stated - hidden if stated else len(clock) + cut_off(packets, container, stream)
+    return (clock if len(clock) == count else np.arange(count, dtype=float)), rate
 
 
 def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Image]:
@@ -379,12 +385,7 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
 
 def _packets(container: InputContainer, stream: VideoStream) -> list[Shown]:
     """When each frame is shown, in ticks, and whether decoding can begin there."""
-    return _shown(container.demux(stream))  # one packet a frame
-
-
-def _shown(packets: Iterable[Packet]) -> list[Shown]:
-    """Time, and whether a decoder can begin there, of each packet that is shown."""
-    # The last one of a stream is empty.
+    packets = container.demux(stream)  # one a frame; the last one of a stream is empty
     return [(p.pts, p.is_keyframe) for p in packets if p.size and not p.is_discard]
 
 

@@ -1,0 +1,234 @@
+"""Calibrations of other tools: their projections to a billionth of a pixel, there and back."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import vidsindy_lite as vl
+from vidsindy_lite.__main__ import main
+from vidsindy_lite.cameras import read_calibration, write_calibration
+
+SIZE = (1280, 720)
+POINTS = np.random.default_rng(0).uniform(-0.5, 0.5, (50, 3))
+
+
+def rooms(seed, dist=True):
+    """K, dist, R, t of three cameras as OpenCV has them, about three metres from the origin."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for i in range(3):
+        azimuth = 2 * np.pi * i / 3 + rng.uniform(-0.3, 0.3)
+        away = np.array([np.cos(azimuth), np.sin(azimuth), rng.uniform(-0.4, 0.6)])
+        away /= np.linalg.norm(away)
+        right = np.cross([0, 0, 1.0], away)
+        right /= np.linalg.norm(right)
+        rotation = np.array([right, -np.cross(away, right), -away])
+        rotation = Rotation.from_rotvec(rng.normal(scale=0.1, size=3)).as_matrix() @ rotation
+        f = rng.uniform(900, 1300)
+        parts.append({
+            "K": np.array([[f, 0, 640 + 20 * rng.normal()], [0, f * 1.01, 350.0], [0, 0, 1]]),
+            "dist": rng.normal(scale=[0.1, 0.05, 1e-3, 1e-3, 0.01]) * dist,
+            "R": rotation,
+            "t": np.array([0, 0, 3.0]) + 0.1 * rng.normal(size=3),
+            "size": SIZE,
+        })  # fmt: skip
+    return parts
+
+
+def seen(part):
+    turned = cv2.Rodrigues(part["R"])[0]
+    return cv2.projectPoints(POINTS, turned, part["t"], part["K"], part["dist"])[0][:, 0]
+
+
+def assert_same(rig, parts):
+    assert len(rig.cameras) == len(parts)
+    for camera, part in zip(rig.cameras, parts, strict=True):
+        assert camera.image_size == SIZE
+        np.testing.assert_allclose(camera.project(POINTS), seen(part), rtol=0, atol=1e-9)
+
+
+def toml(parts, head="cam_{}", matrix=False):
+    """As aniposelib's `CameraGroup.dump` and Pose2Sim write it."""
+    text = ""
+    for i, part in enumerate(parts):
+        turned = part["R"] if matrix else Rotation.from_matrix(part["R"]).as_rotvec()
+        text += (
+            f'[{head.format(i)}]\nname = "{i}"\nsize = [ {SIZE[0]}, {SIZE[1]},]\n'
+            f"matrix = {part['K'].tolist()}\ndistortions = {part['dist'].tolist()}\n"
+            f"rotation = {turned.tolist()}\ntranslation = {part['t'].tolist()}\n\n"
+        )
+    return text + "[metadata]\nadjusted = false\nerror = 0.5\n"
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("head", "matrix"), [("cam_{}", False), ("cam_0{}", True), ("cameras.{}", False)]
+)
+def test_anipose_pose2sim_and_caliscope(tmp_path, seed, head, matrix):
+    parts = rooms(seed)
+    (tmp_path / "a.toml").write_text(toml(parts, head, matrix), encoding="utf-8")
+    assert_same(read_calibration([tmp_path / "a.toml"]), parts)
+
+
+@pytest.mark.parametrize("suffix", [".yml", ".yaml", ".json", ".xml"])
+def test_opencv_storage_one_file_a_camera(tmp_path, suffix):
+    parts, paths = rooms(4), []
+    for i, part in enumerate(parts):
+        paths.append(tmp_path / f"{i}{suffix}")
+        storage = cv2.FileStorage(str(paths[-1]), cv2.FILE_STORAGE_WRITE)
+        storage.write("image_width", SIZE[0])
+        storage.write("image_height", SIZE[1])
+        storage.write("camera_matrix", part["K"])
+        storage.write("distortion_coefficients", part["dist"].reshape(-1, 1))
+        storage.write("rvec", cv2.Rodrigues(part["R"])[0])
+        storage.write("tvec", part["t"].reshape(-1, 1))
+        storage.release()
+    assert_same(read_calibration(paths), parts)
+
+
+def test_plain_json_and_arrays(tmp_path):
+    parts = rooms(5)
+    plain = [{key: np.asarray(value).tolist() for key, value in part.items()} for part in parts]
+    (tmp_path / "a.json").write_text(json.dumps({"cameras": plain}), encoding="utf-8")
+    assert_same(read_calibration([tmp_path / "a.json"]), parts)
+    for part in plain:
+        del part["size"]
+    paths = [tmp_path / f"{i}.npz" for i in range(3)]
+    for path, part in zip(paths, parts, strict=True):
+        np.savez(path, mtx=part["K"], dist=part["dist"], R=part["R"], T=part["t"])
+    assert_same(read_calibration(paths, SIZE), parts)
+    with pytest.raises(ValueError, match=r"0\.npz: image_size: must be given"):
+        read_calibration(paths)
+
+
+def projection(part):
+    return part["K"] @ np.column_stack((part["R"], part["t"]))
+
+
+@pytest.mark.parametrize("lower_left", [False, True])
+def test_dlt_coefficients(tmp_path, lower_left):
+    parts, columns = rooms(6, dist=False), []
+    for part in parts:
+        # DLTdv counts pixels from 1; before version 8 from the lower left.
+        turn = [[1, 0, 1], [0, -1, SIZE[1]] if lower_left else [0, 1, 1], [0, 0, 1]]
+        matrix = turn @ projection(part)
+        columns.append((matrix / matrix[2, 3]).ravel()[:11])
+    np.savetxt(tmp_path / "dltCoefs.csv", np.column_stack(columns), delimiter=",", fmt="%.17g")
+    rig = read_calibration([tmp_path / "dltCoefs.csv"], SIZE)
+    assert_same(rig, parts)
+    assert rig.warnings == ()
+
+
+def test_projection_matrices(tmp_path):
+    parts = rooms(7, dist=False)
+    stacked = np.array([s * projection(part) for s, part in zip((1, -2, 0.1), parts, strict=True)])
+    np.save(tmp_path / "p.npy", stacked)
+    np.savetxt(tmp_path / "p.txt", stacked.reshape(-1, 4), fmt="%.17g")
+    for name in ("p.npy", "p.txt"):
+        assert_same(read_calibration([tmp_path / name], SIZE), parts)
+
+
+def test_a_skew_is_told_and_a_large_one_refused(tmp_path):
+    parts = rooms(8, dist=False)
+    for skew, told in ((1.0, True), (100.0, False)):
+        parts[1]["K"][0, 1] = skew
+        np.save(tmp_path / "p.npy", np.array([projection(part) for part in parts]))
+        if told:
+            (warning,) = read_calibration([tmp_path / "p.npy"], SIZE).warnings
+            assert warning.startswith("cameras[1] (p.npy): its pixels are skew, by 0.28 pix")
+        else:
+            with pytest.raises(ValueError, match="a camera with square corners, got a skew of"):
+                read_calibration([tmp_path / "p.npy"], SIZE)
+
+
+@pytest.mark.parametrize("suffix", [".toml", ".npz", ".csv"])
+def test_there_and_back(tmp_path, suffix):
+    parts = rooms(9, dist=suffix != ".csv")
+    (tmp_path / "a.toml").write_text(toml(parts), encoding="utf-8")
+    rig = read_calibration([tmp_path / "a.toml"])
+    write_calibration(rig, tmp_path / f"b{suffix}")
+    again = read_calibration([tmp_path / f"b{suffix}"], SIZE)
+    assert_same(again, parts)
+
+
+def test_the_command_line(tmp_path, capsys):
+    parts = rooms(10)
+    (tmp_path / "a.toml").write_text(toml(parts), encoding="utf-8")
+    assert main(["rig-import", str(tmp_path / "a.toml")]) == 0
+    (tmp_path / "rig.toml").write_text(capsys.readouterr().out, encoding="utf-8")
+    assert_same(vl.Rig.load(tmp_path / "rig.toml"), parts)
+    assert main(["rig-export", str(tmp_path / "rig.toml"), str(tmp_path / "c.toml")]) == 0
+    out = ["--output", str(tmp_path / "again.toml")]
+    assert main(["rig-import", str(tmp_path / "c.toml"), *out]) == 0
+    assert_same(vl.Rig.load(tmp_path / "again.toml"), parts)
+    assert main(["rig-template", "--output", str(tmp_path / "t.toml")]) == 0
+    assert len(vl.Rig.load(tmp_path / "t.toml").cameras) == 3
+
+
+# ---------------------------------------------------------------------------------------- bad input
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("rotation = ", "rotated = ", r"a\.toml: R: must be given \(r, rotation"),
+        ("translation = [", "translation = [1.0, ", "t: must be finite and of shape"),
+        ("[metadata]", "[", r"a\.toml: must be a \.toml file of its kind"),
+        ("matrix = ", "matrices = ", "must hold a camera matrix"),
+        ("matrix = [[", "matrix = [[-", "K: must be"),
+        ('name = "1"', "fisheye = true", "fisheye: must be False, got True"),
+        ('name = "1"', "rotation_count = 1", "rotation_count: must be 0, got 1"),
+        ("distortions = [", "distortions = [1, 1, 1, 1, 1, ", "dist: must be k1, k2, p1, p2, k3"),
+        ("size = [ 1280, 720,]", "size = [ 1280 ]", "size|unpack"),
+    ],
+)
+def test_malformed_tables_are_refused_by_name(tmp_path, old, new, message):
+    text = toml(rooms(11))
+    assert old in text
+    (tmp_path / "a.toml").write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(ValueError, match=message) as caught:
+        read_calibration([tmp_path / "a.toml"])
+    assert str(tmp_path / "a.toml") in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.csv", "1,2,3\n4,5\n", "must hold rows of as many numbers each"),
+        ("a.csv", "1,2,3\n4,5,6\n", "must hold 11 DLT coefficients per camera"),
+        ("a.csv", "nan,2\n" * 11, "must hold finite numbers"),
+        ("a.csv", "0,0\n" * 11, "must be of a camera at a finite place"),
+        ("a.json", "{", "must be a .json file of its kind"),
+        ("a.json", "[1, 2]", "must hold a camera matrix"),
+        ("a.yml", "no yaml: [", "a.yml"),
+        ("a.npz", "no archive", "must be a .npz file of its kind"),
+        ("a.mat", "x", "must end in .toml"),
+    ],
+)
+def test_files_that_are_no_calibration(tmp_path, name, content, message):
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(ValueError, match=message) as caught:
+        read_calibration([tmp_path / name], SIZE)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_such_file(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no such calibration file"):
+        read_calibration([tmp_path / "none.toml"])
+
+
+def test_what_cannot_be_written(tmp_path):
+    rig = vl.Rig.around(POINTS)
+    with pytest.raises(ValueError, match=r"cameras must be perspective, got cameras\[0\]"):
+        write_calibration(rig, tmp_path / "a.toml")
+    (tmp_path / "a.toml").write_text(toml(rooms(1)), encoding="utf-8")
+    rig = read_calibration([tmp_path / "a.toml"])
+    with pytest.raises(ValueError, match="DLT coefficients hold no distortion, got one in cameras"):
+        write_calibration(rig, tmp_path / "a.csv")
+    with pytest.raises(ValueError, match=r"path: must end in \.toml, \.npz or \.csv"):
+        write_calibration(rig, tmp_path / "a.mat")
