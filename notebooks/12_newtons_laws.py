@@ -41,7 +41,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from vidsindy_lite import PerspectiveCamera, PolynomialSystem, Rig, discover, discover_from_tracks
-from vidsindy_lite.companion.artifacts import save_figure, versions
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import plots
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -194,6 +194,25 @@ print(kicked)
 names = np.array(kicked.terms)[kicked.system.support[:, 1]]
 assert set(names) == {"x", "vx", "x^3"}
 assert abs(kicked.model_error[1] / gust - 1) < 0.4
+
+# %% [markdown]
+# ## All laws of this page
+
+# %%
+laws = {
+    "spring, tracks of three cameras": (found, law),
+    "four throws": (fallen, flight),
+    "one throw": (once, flight),
+}
+rows = [
+    {
+        "motion": motion, "true terms": true.support.sum(),
+        "missing": (true.support & ~told.system.support).sum(),
+        "false": (told.system.support & ~true.support).sum(), "status": told.status,
+    }
+    for motion, (told, true) in laws.items()
+]  # fmt: skip
+save_table("newton_laws", rows, caption="Laws of second order from positions alone.")
 
 # %% [markdown]
 # ## What we learned
