@@ -333,7 +333,6 @@ assert worst[tried == late - 1] > 3 * worst.min()
 def complaint(*options):
     done = discover(shown, *options, "--out", "none")
     assert done.returncode == 2
-    assert not (folders[shown] / "none").exists()
     return done.stderr.splitlines()[-1]
 
 
@@ -341,12 +340,14 @@ print(wrong_lag := complaint("--lag", "0,0,0"))
 (folders[shown] / "c.avi").write_bytes(b"not a video")
 print(no_video := complaint())
 assert "(0, 7, 0) do" in wrong_lag
+assert (folders[shown] / "none" / "report.html").exists()
 assert "must be a video file" in no_video
 home.cleanup()
 
 # %% [markdown]
-# What cannot work ends in one error and leaves no report; a law that should not be trusted gets a report
-# that starts with the doubts, and the exit status 1.
+# What cannot work ends in one error and the exit status 2, with a report that shows the tracks and the step
+# that failed; a law that should not be trusted gets a report that starts with the doubts, and the exit
+# status 1.
 #
 # Check in this order: the verdict and its reasons; the tracks; the residuals; whether curve and path stay
 # together; and last whether the law makes sense to you. The README has a table of messages, what causes

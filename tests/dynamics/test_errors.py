@@ -1,10 +1,12 @@
 """Errors that last for several samples count for what they leave uncertain."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from vidsindy_lite.dynamics.errors import inflation
+from vidsindy_lite.dynamics.errors import inflation, prediction_gain
 
 
 def lasting(n, correlation, rng):
@@ -51,3 +53,29 @@ def test_each_coordinate_has_its_own_inflation():
     white, slow = inflation([errors])
     assert white == 1.0
     assert slow == pytest.approx(9, rel=0.15)
+
+
+def fit_with(residual):
+    """A fit that leaves these errors."""
+    n, d = residual.shape
+    data = SimpleNamespace(data_residual=lambda control: (residual, None))
+    state = SimpleNamespace(control_points=None, moving=np.zeros(d, dtype=bool))
+    return SimpleNamespace(collocation=data, state=state)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+def test_what_errors_foretell_is_as_theory_says(correlation):
+    error = lasting(20_000, correlation, np.random.default_rng(6))
+    gain = prediction_gain(fit_with(error[:, None]))[0]
+    assert gain == pytest.approx(20_000 * np.log(1 - correlation**2), rel=0.05, abs=20)
+
+
+def test_few_errors_foretell_little():
+    for n in (1, 5, 11, 25):
+        gain = prediction_gain(fit_with(np.random.default_rng(n).standard_normal((n, 2))))
+        assert gain.shape == (2,)
+        assert (np.abs(gain) < 20).all()
+
+
+def test_errors_of_what_was_not_seen_foretell_nothing():
+    assert prediction_gain(fit_with(np.zeros((100, 1))))[0] == 0

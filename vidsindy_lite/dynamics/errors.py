@@ -87,9 +87,8 @@ def prediction_gain(fit: Fit) -> Floats:
     """
     residual, _ = fit.collocation.data_residual(fit.state.control_points)
     n = len(residual)
-    covariances = np.stack(
-        [(residual[k:] * residual[: n - k]).sum(axis=0) for k in range(ORDER + 1)]
-    )
+    lags = range(min(ORDER, n // 10) + 1)
+    covariances = np.stack([(residual[k:] * residual[: n - k]).sum(axis=0) for k in lags])
     return np.array([_levinson(covariance, n) for covariance in covariances.T])
 
 
@@ -97,7 +96,7 @@ def _levinson(covariance: Floats, n: int) -> float:
     if not covariance[0] > 0:
         return 0.0  # of what was never observed
     best, variance, weights = 0.0, covariance[0], np.zeros(0)
-    for order in range(1, min(ORDER, n // 10) + 1):
+    for order in range(1, len(covariance)):
         reflection = (covariance[order] - weights @ covariance[order - 1 : 0 : -1]) / variance
         weights = np.append(weights - reflection * weights[::-1], reflection)
         variance *= 1 - reflection**2
