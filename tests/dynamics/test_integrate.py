@@ -102,3 +102,15 @@ def test_a_chaotic_path_is_the_same_with_every_kernel_of_linear_algebra(kernel):
     here = digest()
     assert len(here.strip()) == len(hashlib.sha256().hexdigest())
     assert digest(OPENBLAS_CORETYPE=kernel, OMP_NUM_THREADS="2") == here
+
+
+def test_a_motion_too_stiff_to_follow_ends(monkeypatch):
+    t = np.linspace(0.0, 20.0, 50)
+
+    def rate(x):
+        return -1e6 * (x - 1)
+
+    monkeypatch.setitem(integrate.__globals__, "MOST_STEPS", 200)
+    path = integrate(rate, t, np.array([0.0]))
+    assert np.isfinite(path[0]).all()
+    assert np.isnan(path[-1]).all()

@@ -21,6 +21,8 @@ WEIGHTS, THIRD, FIFTH = (row[:STAGES, None] for row in (DOP853.B, DOP853.E3, DOP
 """Coefficients of the step, and of its errors against steps of order 3 and 5."""
 MUCH_BETTER = 2.0**-9
 """Error over tolerance below which a step of order 8 may be twice as long."""
+MOST_STEPS = 50_000
+"""Steps of a whole motion; one that needs more is stiff, or as good as lost."""
 SHORTEST_STEP = 1e-13
 """Least step over the length of the whole motion."""
 
@@ -88,7 +90,7 @@ def integrate(
     Returns
     -------
     ndarray, shape (n, d)
-        Rows after a blow-up are NaN.
+        Rows after a blow-up are NaN, or after so many steps that the motion is too stiff to follow.
 
     References
     ----------
@@ -97,8 +99,12 @@ def integrate(
     path = np.full((len(t), len(x0)), np.nan)
     path[0] = x = x0
     step, span = float(np.diff(t[:2]).sum()), float(t[-1] - t[0])
+    steps = MOST_STEPS + len(t)
     for row, (now, end) in enumerate(zip(t[:-1].tolist(), t[1:].tolist(), strict=True), start=1):
         while now < end:
+            steps -= 1
+            if not steps:
+                return path
             last = step >= end - now
             taken = end - now if last else step
             with np.errstate(over="ignore", invalid="ignore"):  # of steps that are too long

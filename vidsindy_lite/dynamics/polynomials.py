@@ -211,7 +211,7 @@ class PolynomialSystem:
         Returns
         -------
         ndarray, shape (n, d)
-            The trajectory; rows after a blow-up are NaN.
+            The trajectory; rows after a blow-up are NaN, or where it is too stiff to follow.
 
         Raises
         ------

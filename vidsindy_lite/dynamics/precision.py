@@ -29,6 +29,8 @@ LARGEST_RATIO = 100.0
 """Precision of the best measurements over the typical one, at most."""
 UPDATES = 60
 """Steps of the variance components: ten would do for most."""
+LEAST = 1e-300
+"""Keeps a quotient finite where nothing is left."""
 MEDIAN = 0.455
 """Median of the square of a standard normal number."""
 LASTING = 1.5
@@ -115,7 +117,7 @@ def _variance(residual: Floats, causes: Floats) -> tuple[float, Floats, Bools]:
         noise = squares <= GROSS**2 * variance
         up = (causes * (noise * squares / variance**2)).sum(axis=1)
         down = (causes * (noise / variance)).sum(axis=1)
-        sizes = sizes * up / down
+        sizes = sizes * up / np.maximum(down, LEAST)
     variance = np.maximum(sizes @ causes, variance.max() / LARGEST_RATIO**2)
     gross = squares > GROSS**2 * variance
     terms = np.log(variance) + np.where(gross, GROSS**2, squares / variance)
