@@ -222,6 +222,12 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 # * A first-order law of the same data is wrong, and says so.
 # * Throws in several directions settle gravity and drag; one throw does not, and is not believed.
 # * Kicks of the motion are no errors of the measurement: they are found, counted, and stay out of the law.
+#
+# **What the paper says and what we found.**
+#
+# * All systems of the paper are of first order, and so is the law of its Eq. (7); of a ball that flies or swings
+#   it says nothing. The same objective serves: the velocities join the control points, and half of the law is
+#   known before.
 
 # %% [markdown]
 # ## Exercises

@@ -2,7 +2,7 @@
 
 What they have in common is OpenCV's camera: a point X of the scene is seen at the pixel of
 K (R X + t), bent by the lens, x to the right, y down and z forward. Its centre is -R' t, our normal
-is minus the third row of R, our scale 1 / fx. Understood are
+is minus the third row of R, our scale 1 / fx. Understood are::
 
     .toml              Anipose, Pose2Sim, Caliscope: a table per camera with matrix, distortions,
                        rotation (of Rodrigues, or a matrix), translation and size
