@@ -152,7 +152,7 @@ SPRING = {(f"v{i}", term) for i in "xyz" for term in (i, f"v{i}", f"{i}^3")}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [0.0, 0.01, 0.05])
+@pytest.mark.parametrize("share", [0.0, 0.01, pytest.param(0.05, marks=pytest.mark.thorough)])
 def test_an_anharmonic_damped_spring_in_space(share):
     t = np.linspace(0, 12, 1500)
     found = discover(t, noisy(anharmonic_spring(t), share), order=2)

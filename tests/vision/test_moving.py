@@ -48,6 +48,7 @@ def test_phone_footage(tmp_path, phone):
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_twenty_films(tmp_path):
     medians, wrong = [], []
     for seed in range(20):
