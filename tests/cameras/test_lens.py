@@ -126,7 +126,8 @@ def test_bad_input_is_named(change, message):
 def test_an_orthographic_camera_has_no_distortion(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text("[[camera]]\nnormal = [0, 0, 1]\ndistortion = [0.1]\n", encoding="utf-8")
-    with pytest.raises(ValueError, match="camera 0: distortion: must be one of model, "):
+    message = "camera 0: distortion: must be one of model, target, position"
+    with pytest.raises(ValueError, match=message):
         Rig.load(path)
 
 
