@@ -31,6 +31,6 @@ def draw_path(found: Discovery) -> Figure:
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     panels[0, 0].set(ylabel="terms", ylim=(0, None))
     drawn = [axes.get_legend_handles_labels() for axes in panels[0]]
-    shown = {label: h for handles, labels in drawn for h, label in zip(handles, labels, strict=True)}
+    shown = {label: one for pair in drawn for one, label in zip(*pair, strict=True)}
     figure.legend(shown.values(), shown, loc="outside upper center", ncols=2)
     return figure
