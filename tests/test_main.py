@@ -160,6 +160,13 @@ def test_lags_that_are_no_numbers(here, capsys):
     assert message in capsys.readouterr().err
 
 
+def test_a_library_that_is_none(here, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["discover", *VIDEOS, "--rig", "rig.toml", "--library", "tan(1)"])
+    message = "argument --library: must be a sum of polynomial(degree) and fourier(harmonics), got"
+    assert message in capsys.readouterr().err
+
+
 def test_a_size_that_is_none(capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["rig-template", "--size", "640"])

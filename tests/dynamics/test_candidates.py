@@ -144,7 +144,7 @@ def test_a_library_that_does_not_suit_is_refused_in_one_line(library, words):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Library.parse("polynomial(3) + tan(1)"), r"library: must be a sum of .*'tan\(1\)'"),
+        (lambda: Library.parse("polynomial(3) + tan(1)"), r"a sum of .*'tan\(1\)'"),
         (lambda: Library.parse(""), "library: must be a sum of"),
         (lambda: Library.fourier(0), "harmonics: must be an integer of at least 1, got 0"),
         (lambda: Library.polynomial(-1), "degree: must be an integer of at least 0, got -1"),

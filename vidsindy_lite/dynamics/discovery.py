@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -21,6 +22,9 @@ from .polynomials import PolynomialSystem
 from .problem import Problem, Units
 from .selection import inverse
 from .splines import DEGREE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -224,6 +228,18 @@ class Discovery:
         t = np.asarray(t, dtype=float)
         status = f"diverges after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
         return Simulation(t, x, status)
+
+    def plot_path(self) -> Figure:
+        """Draw `path`: the terms of each equation over the error that is tolerated.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            One panel an equation. The law is drawn broad: it should be the widest plateau by far.
+        """
+        from .drawing import draw_path  # which imports matplotlib
+
+        return draw_path(self)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write everything to a text file (JSON), with all digits; `load` reads it."""
