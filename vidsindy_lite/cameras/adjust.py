@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from ..arrays import Bools, Floats
 from .alignment import Footage
@@ -40,6 +41,7 @@ _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
 _RIPPLES = 1.05  # noise is less between frames than at them, so that a better lag may cost more
 _LOST = 0.05  # share of what is seen that a step in time may lead out of the video
 _PROBE = 1e-6  # of a unit: slopes are taken over twice that
+_BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
 _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 _DAMPING = (0.0, 1e-4, 1e-2, 1.0, 1e2)  # tried in turn, until a step leads downhill
 _LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
@@ -126,7 +128,7 @@ def adjust(
     noise = _noise(state.misses)
     settled, steps = False, 0
     while not settled and steps < (_STEPS if most is None else most):
-        weights = _weights(state.misses, noise)
+        weights = problem.weights(state, noise)
         moved, step = _downhill(problem, state, weights, noise)
         if moved is None:  # rounding is all that is left
             settled = True
@@ -226,6 +228,14 @@ class _Problem:
         """Track minus image of one camera, (n, 2)."""
         return self.shown(footage, i, camera)[self.found] - camera.image(points)
 
+    def weights(self, state: _State, noise: float) -> Floats:
+        """Of each frame, (n,): one, unless it is missed by far, ..."""
+        worst = np.nanmax(np.abs(state.misses), axis=1, initial=0.0)
+        weights = np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2
+        if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
+            weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
+        return weights
+
     def slopes(self, state: _State) -> tuple[Floats, Floats]:
         """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
         count = len(self.start)
@@ -261,7 +271,7 @@ class _Problem:
         frames, (count, width) = len(self.found), reduced.slopes.shape[1:]
         misses, weights = np.full((frames, count), np.nan), np.zeros(frames)
         slopes, path = np.zeros((frames, count, width)), np.zeros((frames, 3, width))
-        misses[self.found], weights[self.found] = state.misses, _weights(state.misses, noise)
+        misses[self.found], weights[self.found] = state.misses, self.weights(state, noise)
         slopes[self.found], path[self.found] = reduced.slopes, reduced.follow
         return Adjustment(
             state.cameras, state.footage, self.errors, self.full(state.change), misses, weights,
@@ -357,9 +367,3 @@ def _noise(misses: Floats) -> float:
     # Of 2 m numbers of a frame its point takes three.
     grown = np.where(seen, np.abs(misses) * np.sqrt(count / np.maximum(count - 3, 1)), 0.0)
     return max(1.4826 * float(np.median(grown[seen])), _FINEST)
-
-
-def _weights(misses: Floats, noise: float) -> Floats:
-    """Of each frame: one, unless it is missed by far."""
-    worst = np.nanmax(np.abs(misses), axis=1, initial=0.0)
-    return np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2
