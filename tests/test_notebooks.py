@@ -2,6 +2,7 @@
 
 import ast
 import json
+import os
 import re
 
 import jupytext
@@ -218,8 +219,16 @@ def test_figures_are_complete_and_of_this_code():
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory):
-    """Where all quick runs go, one after the other, so that one may read another's tables."""
-    return tmp_path_factory.mktemp("quick")
+    """Where all quick runs go, one after the other, so that one may read another's tables.
+
+    Every track and trajectory is disturbed by a relative 1e-9, see `test_disturbed`, and the tables
+    are compared with those of a run that nothing disturbs: no sentence may hold by a hair.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VIDSINDY_DISTURB", "1e-9:1")
+        patch.setenv("VIDSINDY_CACHE", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("PYTHONPATH", str(ROOT / "tests" / "disturbed"), prepend=os.pathsep)
+        yield tmp_path_factory.mktemp("quick")
 
 
 @pytest.mark.notebooks

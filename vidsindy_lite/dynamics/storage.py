@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BSpline
 
-from ..checks import check_path
+from ..checks import check_output, check_path
 from .discovery import Discovery, Step
 from .persistence import Plateau
 from .polynomials import PolynomialSystem
@@ -23,8 +23,9 @@ TYPES: dict[str, Any] = {
 
 def write(found: Discovery, path: str | os.PathLike) -> None:
     """Write a discovery to a file."""
+    file = check_output("path", path)
     text = json.dumps({"format": FORMAT, "discovery": _encoded(found)}, indent=1)
-    check_path("path", path).write_text(text + "\n", encoding="utf-8")
+    file.write_text(text + "\n", encoding="utf-8")
 
 
 def read(path: str | os.PathLike) -> Discovery:
@@ -38,8 +39,8 @@ def read(path: str | os.PathLike) -> Discovery:
         If the file holds none.
     """
     file = check_path("path", path)
-    if not file.exists():
-        raise FileNotFoundError(f"path: must be a file that `save` has written, got no file {file}")
+    if not file.is_file():
+        raise FileNotFoundError(f"path: must be a file that `save` has written, got no file '{file}'")
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         found = _decoded(content["discovery"]) if content["format"] == FORMAT else None
