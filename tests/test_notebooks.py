@@ -142,6 +142,8 @@ def story_problems(path):
     exercises = len(re.findall(r"^\*\*\d\.\*\*", prose, re.MULTILINE))
     if not 2 <= exercises == solutions <= 3:
         problems.append(f"{exercises} exercises with {solutions} hidden solutions, not 2 or 3 each")
+    if re.search(r"^## Exercises.*```", prose, re.MULTILINE | re.DOTALL):
+        problems.append("a solution is no cell, so that nobody runs it")
     if not re.search(r"^\s*assert ", code, re.MULTILINE):
         problems.append("no claim is asserted")
     if not code.rstrip().endswith("print(versions())"):
@@ -393,6 +395,7 @@ def test_story_gate_accepts_a_whole_story(tmp_path):
         ("assert True", "True"),
         ("print(versions())", "versions"),
         ("## Exercises", "## Run time and versions\n# ## Exercises"),
+        ("## Exercises", "## Exercises\n# ```python\n# 1 + 1\n# ```"),
     ],
 )
 def test_story_gate_fails(tmp_path, old, new):
