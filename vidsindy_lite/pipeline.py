@@ -17,7 +17,6 @@ from .observation import Observation, observe, observe_tracks
 from .refusal import refusing
 from .vision import Hint, TrackFile, read_tracks
 
-
 _OTHER_CLOCK = 1e-3  # share by which given and stated frame rates may differ without a word
 
 
@@ -173,8 +172,11 @@ def _times(
 
 def _contradicted(read: Sequence[TrackFile], fps: float | None) -> list[str]:
     """Which files state other frames in a unit of time than the given ones."""
-    stated = [(track.name, 1 / np.median(np.diff(track.t)))
-              for track in read if fps is not None and track.t is not None and len(track.t) > 1]
+    stated = [
+        (track.name, 1 / np.median(np.diff(track.t)))
+        for track in read
+        if fps is not None and track.t is not None and len(track.t) > 1
+    ]
     return [
         f"fps: {fps:g} frames in a unit of time are taken as given, though {name} states {rate:.4g}"
         for name, rate in stated
