@@ -534,7 +534,7 @@ for s in np.geomspace(0.001, 1, 13):
 # %%
 persistent = discover(t, bent)
 assert score(persistent.native, native).exact
-fig = plots.plot_plateaus(persistent)
+fig = persistent.plot_path()
 caption = "Terms of each equation over the tolerated error: space is bent by 0.1 %, without noise."
 numbers = [[(p.low, p.high, int(p.terms.sum())) for p in path] for path in persistent.path]
 save_figure("solver_path", fig, caption=caption, numbers=dict(zip("xyz", numbers, strict=True)))

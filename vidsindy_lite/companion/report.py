@@ -30,7 +30,7 @@ from ..checks import check_path
 from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
 from ..refusal import Refused
-from ..study.plots import plot_frames, plot_path, plot_plateaus, plot_residuals, plot_rig
+from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..vision import VideoInfo, read_frame, video_info
 from .pages import page
 from .play import law_over_videos
@@ -318,7 +318,7 @@ def _figures(
             yield "rig", _encoded(plot_rig(found.rig, found.x))
         missed = residuals(found.tracks, found.rig)
         yield "residuals", _encoded(plot_residuals(found.t, missed, DISAGREEMENT))
-        yield "plateaus", _encoded(plot_plateaus(found.discovery))
+        yield "plateaus", _encoded(found.discovery.plot_path())
 
 
 def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:

@@ -19,7 +19,7 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from ..arrays import Bools, Floats, Ints
-from .library import monomials, shift_generators
+from .library import Function, along_state, extended, monomials, shift_generators
 from .selection import RIDGE, equilibrated
 from .splines import WIDTH, Grid, Segment, normal_band, rows_from
 
@@ -151,7 +151,7 @@ class Collocation:
     ----------
     grid : Grid
         Data, knots and nodes; `Collocation.of` makes it from segments.
-    exponents : ndarray of int, shape (l, d)
+    exponents : ndarray of int, shape (l, d + k)
         The library.
     data_weights : ndarray, shape (d,)
         1 / variance of the measurement noise.
@@ -164,6 +164,8 @@ class Collocation:
         times an unknown number of mean 0 and variance 1.
     known : ndarray, shape (l, d)
         Coefficients of the law that are given; those of a `State` come on top.
+    functions : tuple of Function, length k
+        Of the state, in the units of the fit.
     """
 
     grid: Grid
@@ -173,6 +175,7 @@ class Collocation:
     physics_weights: Floats
     systematic: Floats
     known: Floats
+    functions: tuple[Function, ...] = ()
 
     @classmethod
     def of(
@@ -184,6 +187,7 @@ class Collocation:
         systematic: Floats | None = None,
         precision: Floats | None = None,
         known: Floats | None = None,
+        functions: tuple[Function, ...] = (),
     ) -> Collocation:
         """The problem of these segments, by default without systematic errors or known terms.
 
@@ -194,8 +198,8 @@ class Collocation:
         data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
         relative = np.ones(grid.x.shape) if precision is None else precision
         seen = np.where(np.isnan(grid.x), 0.0, relative)
-        given = np.zeros(exponents.shape) if known is None else known
-        return cls(grid, exponents, data, seen, physics, shared, given)
+        given = np.zeros((len(exponents), grid.x.shape[1])) if known is None else known
+        return cls(grid, exponents, data, seen, physics, shared, given, functions)
 
     def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
         """The same with other weights."""
@@ -204,7 +208,7 @@ class Collocation:
     @property
     def d(self) -> int:
         """Dimension of the state."""
-        return self.exponents.shape[1]
+        return self.grid.x.shape[1]
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -270,7 +274,8 @@ class Collocation:
         x, slope = self.node_states(state.control_points)
         law = state.coefficients + self.known
         rows = law.any(axis=1)
-        return slope - monomials(x - state.offset, self.exponents[rows]) @ law[rows]
+        z = extended(x - state.offset, self.functions)
+        return slope - monomials(z, self.exponents[rows]) @ law[rows]
 
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
@@ -340,11 +345,12 @@ class Collocation:
         d, l = self.d, len(self.exponents)
         law = state.coefficients + self.known
         x, slope = self.node_states(state.control_points)
-        terms = monomials(x - state.offset, self.exponents)
+        terms = monomials(extended(x - state.offset, self.functions), self.exponents)
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
         residual = root * (slope - terms @ law)
         # (nodes, equation, coordinate): how the law changes with the state.
         rates = (terms @ (self._generators @ law)).transpose(1, 2, 0)
+        rates = along_state(rates, x - state.offset, self.functions)
         jacobian = root[:, :, None] * rates
         # Minus the terms in their own equation, and the rates of the law for the offset.
         offset_columns = columns[columns >= d * l] - d * l

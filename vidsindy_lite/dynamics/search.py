@@ -18,7 +18,7 @@ from ..arrays import Bools, Floats
 from .collocation import Collocation, Fit, State
 from .discovery import History
 from .gaps import Gap, gaps, join
-from .library import closure_mask, divides, monomials, shift_matrix
+from .library import closure_mask, divides, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
 from .problem import Problem, fit_curves
@@ -42,7 +42,7 @@ LONGEST_CLIMB = 4
 """Most searches at larger errors."""
 
 
-def search(problem: Problem, degree: int, rng: np.random.Generator, history: History) -> Fit:
+def search(problem: Problem, rng: np.random.Generator, history: History) -> Fit:
     """The terms that make the motion: the cheapest law at a tolerated error.
 
     If the law leaves larger errors than were tolerated, or errors that last, the search is made
@@ -51,7 +51,7 @@ def search(problem: Problem, degree: int, rng: np.random.Generator, history: His
     tolerated = problem.noise if problem.kicked else np.maximum(problem.noise, TOLERATED)
     for _ in range(LONGEST_CLIMB):
         tolerant = replace(problem, noise=tolerated)
-        found = candidates(tolerant, degree, rng, history)
+        found = candidates(tolerant, rng, history)
         fit = bridge(tolerant, cheapest(tolerant, found, history), history)
         left = problem.errors(fit)
         if (left <= CONSISTENT * tolerated).all() or (tolerated >= LARGEST).all():
@@ -60,13 +60,11 @@ def search(problem: Problem, degree: int, rng: np.random.Generator, history: His
     return fit
 
 
-def candidates(
-    problem: Problem, degree: int, rng: np.random.Generator, history: History
-) -> list[Fit]:
+def candidates(problem: Problem, rng: np.random.Generator, history: History) -> list[Fit]:
     """Supports worth refining, from all terms up to degree 2, and if need be from all terms."""
     collocation = problem.collocation(problem.segments())
     control = fit_curves(collocation, problem.curves)
-    found = []
+    found, degree = [], problem.form.degree
     for start in sorted({min(2, degree), degree}):
         fit = unpruned(problem, collocation, control, start, history)
         found += _in_sparse_frames(problem, fit, rng, history)
@@ -81,8 +79,8 @@ def unpruned(
     """Fit all terms up to a degree while the physics weight rises."""
     d, rows = problem.d, problem.exponents.sum(axis=1) <= degree
     x, slope = collocation.node_states(control)
-    coefficients = np.zeros(problem.exponents.shape)
-    terms = monomials(x, problem.exponents[rows])
+    coefficients = np.zeros(problem.known.shape)
+    terms = problem.terms(x)[:, rows]
     coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=problem.noise.min())[0]
     active = rows[:, None] & problem.form.candidates
     coefficients[~active] = 0.0
@@ -147,7 +145,7 @@ def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]
     # A law exact in another frame has no firm minimum here: some steps are near enough.
     closed = collocation.solve(state, tolerance=0.1, max_steps=8)
     state, columns = closed.state, np.flatnonzero(closed.state.free())
-    information = np.diag(np.where(state.free()[: exponents.size], 0.0, 1e30))
+    information = np.diag(np.where(state.free()[:-d], 0.0, 1e30))
     information[np.ix_(columns, columns)] = collocation.linearise(state, columns).information
     return closed, ShiftedLaw(exponents, state.coefficients, information, problem.form.movable)
 
@@ -165,7 +163,7 @@ def _candidate(
         problem.prices[columns],
         np.ones(len(columns), dtype=bool),
     )
-    flat = np.zeros(problem.exponents.size)
+    flat = np.zeros(closed.state.coefficients.size)
     flat[columns] = solution
     coefficients = flat.reshape(problem.d, -1).T
     state = State(

@@ -7,10 +7,8 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 
 from ...arrays import Bools, Floats
-from ...dynamics import Discovery
 
 Pair = tuple[Floats, Floats]
 
@@ -236,36 +234,6 @@ def plot_origin_map(
     axes.grid(False)
     dark = {"frameon": True, "facecolor": "0.25", "edgecolor": "none", "labelcolor": "white"}
     axes.legend(loc="lower right", **dark)
-    return figure
-
-
-# ------------------------------------------------------------------------------------ path of laws
-
-
-def plot_plateaus(found: Discovery) -> Figure:
-    """Number of terms of each equation over the error that is tolerated.
-
-    Parameters
-    ----------
-    found : Discovery
-        Its path; the plateaus of the law itself are drawn broad.
-    """
-    sides = found.system.sides()
-    figure, panels = plt.subplots(
-        1, len(sides), figsize=(2.9 * len(sides), 2.8), sharex=True, sharey=True, squeeze=False
-    )
-    for axes, (j, side) in zip(panels[0], sides.items(), strict=True):
-        plateaus = found.path[j]
-        edges = [plateaus[0].low, *(plateau.high for plateau in plateaus)]
-        counts = [int(plateau.terms.sum()) for plateau in plateaus]
-        axes.stairs(counts, edges, color="0.4", baseline=None, label="all laws")
-        for own in (p for p in plateaus if (p.terms == found.native.support[:, j]).all()):
-            axes.hlines(own.terms.sum(), own.low, own.high, color="C1", lw=5, label="the law")
-        axes.set(xscale="log", xlabel="tolerated error / spread", title=side)
-        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    panels[0, 0].set(ylabel="terms", ylim=(0, None))
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles[:2], labels[:2], loc="outside upper center", ncols=2)
     return figure
 
 
