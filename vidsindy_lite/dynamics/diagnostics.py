@@ -75,11 +75,9 @@ def diagnose(
         By how much the criterion rises if a term of this law is taken out or put back, equation
         by equation.
     """
-    runs, seen = problem.measured, problem.form.movable
-    units = problem.units
     return (
-        *outliers(runs),
-        *shapes(runs, (problem.noise * units.scale)[seen], problem.form.names[: seen.sum()]),
+        *outliers(problem.measured),
+        *_shape(problem, fit),
         *_misfit(problem, fit),
         *_unfinished(fit),
         *_unmet(problem, fit),
@@ -87,7 +85,6 @@ def diagnose(
         *_selection(problem, fit, path),
         *_sampling(problem),
         *_standstill(law),
-        *cancelling(problem.law(fit.state), fit.collocation.node_states(fit.state.control_points)[0] - fit.state.offset),
         *_narrow(law, margins),
     )
 
@@ -128,6 +125,16 @@ def _leaps(values: Floats, row: int) -> bool:
     beside = np.concatenate((before, after[: REACH - GUARD]))
     middle = np.median(beside)
     return bool(abs(values[row] - middle) > OUTLIER * np.median(np.abs(beside - middle)))
+
+
+def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
+    """What follows from where the motion takes place."""
+    measured = problem.measured[0][1].shape[1]
+    noise = (problem.noise * problem.units.scale)[:measured]
+    terms = fit.state.active.sum(axis=0)[-measured:]
+    yield from shapes(problem.measured, noise, problem.form.names[:measured], terms)
+    x, _ = fit.collocation.node_states(fit.state.control_points)
+    yield from cancelling(problem.law(fit.state), x - fit.state.offset)
 
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:

@@ -183,7 +183,7 @@ def _fitted(x: Floats) -> tuple[Floats, Floats]:
 
     fit = least_squares(distance, start, jac=slope, method="lm", xtol=1e-14, ftol=1e-14)
     information = fit.jac.T @ fit.jac
-    if not np.linalg.cond(information) < 1e16:
+    if not np.linalg.cond(information) < 1e12:
         raise ValueError("x: must not be flat: what has no curvature has no centre")
     variance = (fit.fun**2).sum() / (len(u) - len(start)) * inflation([fit.fun[:, None]])[0]
     fit.x[:-1] = fit.x[:-1] * size + middle

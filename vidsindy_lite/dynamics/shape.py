@@ -12,13 +12,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from .library import monomials
 from .polynomials import PolynomialSystem
 from .rounds import Round, on_circle, on_sphere
 from .trajectories import Trajectory
+
+Complexes = NDArray[np.complex128]
 
 CLOSE = 0.005
 """Distance from a shape, over the size of the shape, that is none: scales and cameras are off by
@@ -37,6 +40,8 @@ PIECES = 50
 """Averages of the angle that tell the way along an arc."""
 NEARLY = 0.3
 """Distance of two laps, in standard deviations of the motion, at which it is looked at closer."""
+SPARE = 1
+"""Numbers of an orbit beyond the coefficients of a law that it takes to test it."""
 HARMONICS = 25
 """Of a closed orbit, at most."""
 ENOUGH = 3000
@@ -49,7 +54,9 @@ CANCELLED = 300.0
 """Terms of an equation, their sizes added, over their sum: from here on they cancel."""
 
 
-def shapes(runs: Sequence[Trajectory], noise: Floats, names: Sequence[str]) -> Iterator[str]:
+def shapes(
+    runs: Sequence[Trajectory], noise: Floats, names: Sequence[str], terms: Ints
+) -> Iterator[str]:
     """What there is to say of where a motion takes place, with what to do about it.
 
     Parameters
@@ -60,6 +67,8 @@ def shapes(runs: Sequence[Trajectory], noise: Floats, names: Sequence[str]) -> I
         Estimated standard deviation of the errors of each coordinate.
     names : sequence of str
         Of the coordinates.
+    terms : ndarray of int, shape (d,)
+        How many coefficients of each coordinate's equation the data have to settle.
     """
     x = np.concatenate([values for _, values in runs])
     away = x - x.mean(axis=0)
@@ -70,13 +79,17 @@ def shapes(runs: Sequence[Trajectory], noise: Floats, names: Sequence[str]) -> I
     if not moves.any():
         return
     names = [name for name, moving in zip(names, moves, strict=True) if moving]
-    yield from _flat_or_round(x[:, moves], noise[moves], names)
-    if len(runs) == 1:
-        yield from _closed(runs[0][0], x[:, moves], noise[moves])
+    x, noise, terms = x[:, moves], noise[moves], terms[moves]
+    orbit = list(_closed(runs[0][0], x, noise, terms)) if len(runs) == 1 else []
+    yield from _flat_or_round(x, noise, names, plain=bool(orbit) and x.shape[1] == 2)
+    yield from orbit
 
 
-def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[str]:
-    """What there is to say of a line, a plane, a circle or a sphere."""
+def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str], plain: bool) -> Iterator[str]:
+    """What there is to say of a line, a plane, a circle or a sphere.
+
+    A circle that is a closed orbit of two coordinates is ``plain``: these may be place and speed.
+    """
     d, scale = x.shape[1], x.std(axis=0)
     standard = (x - x.mean(axis=0)) / scale
     _, directions = np.linalg.eigh(standard.T @ standard)  # the narrowest first
@@ -86,7 +99,7 @@ def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[s
     ]
     flat = across.index(False) if False in across else d - 1
     if (d - flat == 2 and d <= 3) or (d == 3 and not flat):
-        told = _round(x, noise, planar=d - flat == 2)
+        told = _round(x, noise, planar=d - flat == 2, whole=not plain)
         if told:
             yield told
             return
@@ -111,8 +124,11 @@ def _relation(normal: Floats, x: Floats, names: Sequence[str]) -> str:
     return f"{sides.removeprefix('+ 1 ')} = {0 if nil else constant:.4g}"
 
 
-def _round(x: Floats, noise: Floats, planar: bool) -> str:
-    """What there is to say of a motion on a circle or a sphere; nothing if it is on none."""
+def _round(x: Floats, noise: Floats, planar: bool, whole: bool) -> str:
+    """What there is to say of a motion on a circle or a sphere; nothing if it is on none.
+
+    A whole circle counts only if it may.
+    """
     try:
         where = on_circle(x) if planar else on_sphere(x)
     except ValueError:  # nothing round is closer than what is flat
@@ -124,7 +140,7 @@ def _round(x: Floats, noise: Floats, planar: bool) -> str:
     size = widths[-2 if planar else 0]
     if not _on((reach - where.radius)[:, None], float(np.sqrt((outward @ noise**2).mean())), size):
         return ""
-    return _told(where, planar) if not planar or _bound(where.angle) else ""
+    return _told(where, planar) if not planar or _bound(where.angle, whole) else ""
 
 
 def _told(where: Round, planar: bool) -> str:
@@ -139,26 +155,29 @@ def _told(where: Round, planar: bool) -> str:
     )
 
 
-def _bound(angle: Floats) -> bool:
-    """Whether a motion along an arc turns back on it, or goes round."""
+def _bound(angle: Floats, whole: bool) -> bool:
+    """Whether a motion along an arc turns back on it, or goes round, if that counts."""
     pieces = [piece.mean() for piece in np.array_split(angle, min(PIECES, len(angle)))]
     length = float(np.ptp(pieces))
-    return bool(np.abs(np.diff(pieces)).sum() > SWEPT * length or length > np.pi)
+    return bool(np.abs(np.diff(pieces)).sum() > SWEPT * length or whole and length > np.pi)
 
 
-def _closed(t: Floats, x: Floats, noise: Floats) -> Iterator[str]:
-    """Is the motion one lap after the other on the same orbit?"""
+def _closed(t: Floats, x: Floats, noise: Floats, terms: Ints) -> Iterator[str]:
+    """Is the motion one lap after the other on the same orbit, and that too plain for a law?"""
     scale = x.std(axis=0)
     standard, errors = (x - x.mean(axis=0)) / scale, float(np.sqrt(((noise / scale) ** 2).mean()))
     thin = slice(None, None, -(-len(t) // ENOUGH))
     for period in _periods(t, standard, errors):
-        orbit = _Orbit(t[thin] - t[0], standard[thin])
-        exact, residual = orbit.fitted(period)
-        if _on(residual, errors, 1.0):
-            yield (
-                f"the motion repeats one closed orbit (period {exact:.4g}): what a law says off "
-                "this orbit is not seen, and many fit it; add runs from other starts"
-            )
+        orbit = _Orbit.near(t[thin] - t[0], standard[thin], period)
+        if _on(orbit.residual, errors, 1.0):
+            scant = np.flatnonzero(orbit.numbers() <= terms + SPARE)
+            if len(scant):
+                told, wanted = orbit.numbers()[scant[0]], terms[scant[0]]
+                yield (
+                    f"the motion repeats one closed orbit (period {orbit.period:.4g}) of which the "
+                    f"data tell {told} numbers, where a law has {wanted} coefficients: what it "
+                    "says off this orbit is not tested; add runs from other starts"
+                )
             return
 
 
@@ -182,38 +201,68 @@ def _periods(t: Floats, x: Floats, noise: float) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class _Orbit:
-    """A closed orbit as a Fourier series in the time, through samples (n, d)."""
+    """A closed orbit through samples, as a Fourier series in the time.
 
-    t: Floats
-    x: Floats
+    Parameters
+    ----------
+    period : float
+    waves : ndarray of complex, shape (k, d)
+        Amplitudes of the harmonics.
+    residual : ndarray, shape (n, d)
+        What the series leaves of the samples, made up for the freedom that it used.
+    """
 
-    def fitted(self, period: float) -> tuple[float, Floats]:
-        """The period near one that fits best, and what it leaves, (n, d)."""
-        laps = self.t[-1] / period
-        most = int(np.clip(len(self.t) / laps / 6, 1, HARMONICS))
+    period: float
+    waves: Complexes
+    residual: Floats
+
+    @classmethod
+    def near(cls, t: Floats, x: Floats, period: float) -> _Orbit:
+        """The orbit with the period near one that fits best."""
+        laps = t[-1] / period
+        most = int(np.clip(len(t) / laps / 6, 1, HARMONICS))
         for harmonics in sorted({min(2, most), min(6, most), most}):
-            log = minimize_scalar(
-                lambda log, period=period, harmonics=harmonics: float(
-                    (self.left(period * np.exp(log), harmonics) ** 2).sum()
-                ),
-                bounds=(-0.5 / laps / harmonics, 0.5 / laps / harmonics), method="bounded",
-                options={"xatol": 1e-4 / laps / harmonics},
-            ).x  # fmt: skip
-            period *= float(np.exp(log))
-        unused = 1 - (2 * most + 1) / len(self.t)
-        return period, self.left(period, most) / np.sqrt(max(unused, 0.1))
+            reach = 0.5 / laps / harmonics
 
-    def left(self, period: float, harmonics: int) -> Floats:
-        """What a series of so many harmonics leaves of the samples."""
-        first = np.exp(2j * np.pi / period * self.t)
-        waves = np.cumprod(np.repeat(first[:, None], harmonics, axis=1), axis=1)
-        terms = np.hstack([np.ones((len(self.t), 1)), waves.real, waves.imag])
-        gram = terms.T @ terms + 1e-9 * len(self.t) * np.eye(terms.shape[1])
-        return self.x - terms @ np.linalg.solve(gram, terms.T @ self.x)
+            def left(log: float, around: float = period, harmonics: int = harmonics) -> float:
+                return float((_series(t, x, around * np.exp(log), harmonics)[1] ** 2).sum())
+
+            found = minimize_scalar(
+                left, bounds=(-reach, reach), method="bounded", options={"xatol": 1e-4 * reach}
+            )
+            period *= float(np.exp(found.x))
+        waves, residual = _series(t, x, period, most)
+        unused = max(1 - (2 * most + 1) / len(t), 0.1)
+        return cls(period, waves, residual / np.sqrt(unused))
+
+    def numbers(self) -> Ints:
+        """How many numbers of each coordinate stand out from the noise, (d,).
+
+        Counted from a time at which the largest first harmonic is at its height.
+        """
+        strongest = self.waves[0, np.abs(self.waves[0]).argmax()]
+        turns = (strongest.conj() / np.abs(strongest)) ** np.arange(1, len(self.waves) + 1)
+        parts = self.waves * turns[:, None]
+        error = np.sqrt(2 * (self.residual**2).mean(axis=0) / len(self.residual))
+        return np.asarray(
+            sum((np.abs(part) > SURE * error).sum(axis=0) for part in (parts.real, parts.imag))
+        )
+
+
+def _series(t: Floats, x: Floats, period: float, harmonics: int) -> tuple[Complexes, Floats]:
+    """Amplitudes of harmonics, (k, d), that fit samples best, and what they leave, (n, d)."""
+    first = np.exp(2j * np.pi / period * t)
+    powers = np.cumprod(np.repeat(first[:, None], harmonics, axis=1), axis=1)
+    terms = np.hstack([np.ones((len(t), 1)), powers.real, powers.imag])
+    gram = terms.T @ terms + 1e-9 * len(t) * np.eye(terms.shape[1])
+    found = np.linalg.solve(gram, terms.T @ x)
+    return found[1 : 1 + harmonics] - 1j * found[1 + harmonics :], x - terms @ found
 
 
 def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
     """The equations of a law whose terms cancel along a motion, seen from its middle."""
+    if law.functions:
+        return  # such a law has no other frame
     middle = x.mean(axis=0)
     central, away = law.shift(-middle), x - middle
     sums = central(away)
