@@ -170,7 +170,7 @@ def test_a_law_evaluates_differentiates_and_prints():
     product = PolynomialSystem.from_terms({"v": {"u cos(u)": 1}, "u": {"1": 1}}, library=library)
     np.testing.assert_allclose(product(x)[:, 0], u * np.cos(u))
     with pytest.raises(ValueError, match=r"term: must be a product of the variables .* got 'tan"):
-        PolynomialSystem.from_terms({"v": {"tan(v)": 1.0}}, library=library)
+        PolynomialSystem.from_terms({"v": {"tan(v)": 1}, "u": {"1": 1}}, library=library)
 
 
 def test_a_sum_is_a_union():
