@@ -44,7 +44,7 @@ def pyramid(small: Image) -> list[Floats32]:
 
 
 def align(before: list[Floats32], after: list[Floats32], guess: Floats) -> Aligned | None:
-    """The map of one view to another from a guess of it; None where the views have little in common.
+    """The map of one view to another, from a guess; None where they have little in common.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def explains(before: list[Floats32], after: list[Floats32], here: Floats) -> boo
     return more_alike(*parts)
 
 
-def parts_unlike(change: Floats32, known: Bools) -> Floats32:
+def parts_unlike(change: Floats32, known: Bools) -> Floats:
     """Grey levels by which two images differ in each of their parts, those of a target bounded.
 
     Of single pixels, which show what is sharp, and of means of 4 x 4, which show what is faint.
@@ -87,13 +87,13 @@ def parts_unlike(change: Floats32, known: Bools) -> Floats32:
     shown = cv2.resize(known.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     coarse = cv2.resize(off, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
     parts = [
-        cv2.resize(np.minimum(np.abs(x), _BOUND), size, interpolation=cv2.INTER_AREA)
+        cv2.resize(np.minimum(np.abs(np.asarray(x)), _BOUND), size, interpolation=cv2.INTER_AREA)
         for x in (off, coarse)
     ]
     return np.array(parts) / np.maximum(shown, 0.1)
 
 
-def more_alike(moved: Floats32, still: Floats32) -> bool:
+def more_alike(moved: Floats, still: Floats) -> bool:
     """Do most parts differ less if the camera is taken to move than if it is not?"""
     ratios = np.median(moved / np.maximum(still, 1e-3), axis=(1, 2))
     return bool(ratios.min() < _BETTER)
@@ -107,7 +107,7 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
     u, v = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
     gv, gu = np.gradient(key)
     slopes = np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, key, np.ones_like(key)], axis=-1)
-    power = cv2.resize(gu**2 + gv**2, (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA)
+    power = cv2.resize(np.asarray(gu**2 + gv**2), (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA)
     fair = np.minimum(1, _FAIR * np.median(power) / np.maximum(power, 1e-9))
     share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
     sure = np.array([_STEP, _STEP, _TURN, _TURN, 1, 100]) * [scale, scale, 1, 1, 1, 1]
@@ -141,7 +141,9 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
     return Aligned(here, error, float(known.mean()))
 
 
-def _error(slopes: Floats32, miss: Floats32, normal: Floats, at: tuple[Floats32, Floats32]) -> float:
+def _error(
+    slopes: Floats32, miss: Floats32, normal: Floats, at: tuple[Floats32, Floats32]
+) -> float:
     """Standard error of the places of a map, if errors within a block may be the same."""
     height, width = (side // _BLOCKS for side in miss.shape)
     if not height or not width:

@@ -138,7 +138,7 @@ def _camera(
     return (motion, True) if more_alike(moved, still) else (rest, False)
 
 
-def _unlike(samples: Image, maps: Floats) -> Floats32:
+def _unlike(samples: Image, maps: Floats) -> Floats:
     """Grey levels by which samples differ from their plate, in each part of the image."""
     plate = Plate(samples, maps, np.ones(len(samples), bool))
     found = []
@@ -174,8 +174,8 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
         doubts += ("the camera seems to move, but not clearly enough to be followed: its motion is "
                    "part of the track",)  # fmt: skip
     ways = expected(seen, paths[0].rows, film, len(found))
-    found = _finished(_views(path, samples, film, ways, lights), film.motion, doubts)
-    return found if film.sure else _doubted(found)
+    followed = _finished(_views(path, samples, film, ways, lights), film.motion, doubts)
+    return followed if film.sure else _doubted(followed)
 
 
 def _doubted(found: Followed) -> Followed:

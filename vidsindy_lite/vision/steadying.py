@@ -159,7 +159,7 @@ class Steadying:
         self.last = np.eye(3)  # from the key frame to the newest
 
     def _locate(self, relief: _Relief) -> Aligned | None:
-        """Where the key frame lies in another: by their corners, or by all pixels if these are few."""
+        """Where the key frame lies in another: by corners, or by all pixels if these are few."""
         assert self.key is not None
         guess = carry(self.last, self.points) if len(self.points) else self.points
         ends, found = _follow(self.key.fine, relief.fine, self.points, guess)
