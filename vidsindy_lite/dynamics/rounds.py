@@ -148,7 +148,7 @@ def _positions(x: ArrayLike, dimensions: tuple[int, ...]) -> tuple[Floats, Bools
     if x.ndim != 2 or x.shape[1] not in dimensions:
         wanted = " or ".join(f"(n, {d})" for d in dimensions)
         raise ValueError(f"x: must have shape {wanted}, got {x.shape}")
-    seen = np.isfinite(x).all(axis=1)
+    seen = np.asarray(np.isfinite(x).all(axis=1))
     if seen.sum() < x.shape[1] + 3:
         raise ValueError(f"x: must hold at least {x.shape[1] + 3} positions, got {seen.sum()}")
     return x, seen

@@ -74,7 +74,7 @@ def shapes(
     away = x - x.mean(axis=0)
     part = [_distance(away[:, [j]], size)[1] / size for j, size in enumerate(noise)]
     moves = np.array(part) > FAINT
-    for j in np.flatnonzero(~moves):
+    for j in np.flatnonzero(~moves).tolist():
         yield f"{names[j]} moves by no more than a part of its noise: leave it out"
     if not moves.any():
         return
