@@ -358,6 +358,10 @@ def _covariance(units: Units, fit: Fit) -> Floats:
     covariance[np.ix_(columns, columns)] = inverse(information)
     factors = units.factors(fit.collocation.exponents)
     unit = np.concatenate([factors.T.ravel(), units.scale])
+    for entry, first in fit.state.followers():
+        covariance[entry] = covariance[first]
+    for entry, first in fit.state.followers():
+        covariance[:, entry] = covariance[:, first]
     return covariance * (unit[:, None] * unit)
 
 

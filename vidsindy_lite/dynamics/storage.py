@@ -54,7 +54,7 @@ def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
         raise ValueError(f"path: must be a file that `save` has written, got {file}")
     system, native = found.system, found.native
     written = cast("tuple[str, ...]", system.functions)  # of which a file holds the names
-    functions = restored(system.names, written, library)
+    functions = restored(system.names, system.d // system.order, written, library)
     return replace(
         found,
         system=replace(system, functions=functions),
