@@ -147,7 +147,7 @@ def test_a_file_that_holds_no_discovery_is_refused(tmp_path, text):
 
 def test_a_missing_file_is_told_with_the_argument(tmp_path):
     for path in (tmp_path / "law.json", tmp_path):
-        with pytest.raises(FileNotFoundError, match="path: must be .*, got none at"):
+        with pytest.raises(FileNotFoundError, match="path: must be .*, none at"):
             Discovery.load(path)
 
 

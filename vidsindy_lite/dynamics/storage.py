@@ -44,7 +44,7 @@ def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
     """
     file = check_path("path", path)
     if not file.is_file():
-        raise FileNotFoundError(f"path: must be a file that `save` has written, got none at '{file}'")
+        raise FileNotFoundError(f"path: must be a file that `save` has written, none at '{file}'")
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         found = _decoded(content["discovery"]) if content["format"] == FORMAT else None

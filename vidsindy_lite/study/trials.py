@@ -164,11 +164,7 @@ def run_trial(trial: Trial) -> TrialResult:
     TrialResult
     """
     filmed = film_result(trial.film)
-    if trial.source == "tracks":
-        x, systematic = _reconstructed(filmed, trial.corrupt_each(filmed.tracks))
-    else:
-        path, systematic = source_path(filmed, trial.source)
-        x = trial.corrupt(path)
+    x, systematic = _corrupted_path(filmed, trial)
     began = time.perf_counter()
     found = find_law(trial.method, filmed.t, x, systematic, trial.trial)
     seconds = time.perf_counter() - began
@@ -194,6 +190,14 @@ def source_path(filmed: FilmResult, source: str) -> tuple[Floats, Floats | None]
     if source == "whole pixels":
         return _reconstructed(filmed, [np.round(track) for track in filmed.tracks])
     return filmed.x, filmed.systematic
+
+
+def _corrupted_path(filmed: FilmResult, trial: Trial) -> tuple[Floats, Floats | None]:
+    """The path that a trial is about, and its systematic errors, if any."""
+    if trial.source == "tracks":
+        return _reconstructed(filmed, trial.corrupt_each(filmed.tracks))
+    path, systematic = source_path(filmed, trial.source)
+    return trial.corrupt(path), systematic
 
 
 def _reconstructed(filmed: FilmResult, tracks: list[Floats]) -> tuple[Floats, Floats]:
