@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..checks import check_instance, check_integer
@@ -46,7 +47,7 @@ class Library:
 
     degree: int | None = None
     harmonics: int = 0
-    functions: tuple[tuple[str, Callable[..., Floats]], ...] = ()
+    functions: tuple[tuple[str, Callable[..., ArrayLike]], ...] = ()
 
     @classmethod
     def polynomial(cls, degree: int) -> Library:
@@ -62,7 +63,7 @@ class Library:
         return cls(harmonics=check_integer("harmonics", harmonics, 1))
 
     @classmethod
-    def terms(cls, functions: Mapping[str, Callable[..., Floats]]) -> Library:
+    def terms(cls, functions: Mapping[str, Callable[..., ArrayLike]]) -> Library:
         """Functions of one's own as terms.
 
         Parameters
@@ -70,7 +71,9 @@ class Library:
         functions : mapping of str to callable
             Names and functions. The arguments of a function are named like the variables that it
             needs (``x, y``; of a law of second order also ``vx, vy``); it takes and returns arrays
-            of shape (n,). Derivatives are taken by differences of fourth order.
+            of shape (n,). Derivatives are taken by differences of fourth order. If it returns as
+            many arrays as there are measured coordinates, these are the directions of a vector,
+            and the term has the same coefficient in all of them.
 
         Raises
         ------
@@ -145,7 +148,8 @@ class Library:
             for multiple in range(1, self.harmonics + 1)
             for kind in ("sin", "cos")
         ]
-        functions += [own(names, name, rule) for name, rule in self.functions]
+        for name, rule in self.functions:
+            functions += own(names, measured, name, rule)
         powers = np.empty((0, d), dtype=int)
         if self.degree is not None:
             powers = monomial_exponents(d, self.degree)
@@ -186,7 +190,7 @@ def harmonic(names: tuple[str, ...], axis: int, multiple: int, kind: str) -> Fun
 
 
 def restored(
-    names: tuple[str, ...], written: Sequence[str], library: Library | None
+    names: tuple[str, ...], measured: int, written: Sequence[str], library: Library | None
 ) -> tuple[Function, ...]:
     """The functions of a law by their names; one's own from a library that holds them.
 
@@ -195,12 +199,13 @@ def restored(
     ValueError
         If a function is none of the library's.
     """
-    rules = dict(library.functions) if library else {}
+    _, held = (library or Library()).resolve(names, measured)
+    known = {function.name: function for function in held}
     functions = []
     for name in written:
         match = re.fullmatch(r"(sin|cos)\((?:(\d+) )?(\w+)\)", name)
-        if name in rules:
-            functions.append(own(names, name, rules[name]))
+        if name in known:
+            functions.append(known[name])
         elif match and match[3] in names:
             functions.append(harmonic(names, names.index(match[3]), int(match[2] or 1), match[1]))
         else:
@@ -211,8 +216,42 @@ def restored(
     return tuple(functions)
 
 
-def own(names: tuple[str, ...], name: str, rule: Callable[..., Floats]) -> Function:
-    """A function of one's own, whose arguments are named like variables."""
+def own(
+    names: tuple[str, ...], measured: int, name: str, rule: Callable[..., ArrayLike]
+) -> list[Function]:
+    """A function of one's own, whose arguments are named like variables; or its components."""
+    axes = _axes(names, name, rule)
+
+    def evaluate(x: Floats) -> Floats:
+        with np.errstate(all="ignore"):  # what is not finite is refused where it matters
+            return np.asarray(rule(*(x[:, axis] for axis in axes)), dtype=float)
+
+    shape = evaluate(np.ones((2, len(names)))).shape
+    if shape not in ((2,), (measured, 2)):
+        raise ValueError(
+            f"library: {name!r} must return an array of the shape of its arguments, (n,), or "
+            f"{measured} of these, got shape {shape} for n = 2"
+        )
+
+    def component(direction: int | None) -> Function:
+        def value(x: Floats) -> Floats:
+            values = evaluate(x)
+            return values if direction is None else values[direction]
+
+        of = "" if direction is None else names[direction]
+        return Function(
+            name=f"{name}_{of}" if of else name,
+            latex=rf"\mathrm{{{name}}}" + (f"_{{{of}}}" if of else ""),
+            value=value,
+            gradient=lambda x: _differences(value, x, axes),
+            direction=direction,
+        )
+
+    return [component(j) for j in (range(measured) if len(shape) == 2 else [None])]
+
+
+def _axes(names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]) -> list[int]:
+    """Which variables the arguments of a function are."""
     try:
         arguments = list(inspect.signature(rule).parameters)
     except (TypeError, ValueError):  # of some functions in C
@@ -223,26 +262,16 @@ def own(names: tuple[str, ...], name: str, rule: Callable[..., Floats]) -> Funct
             f"library: the arguments of {name!r} must be named like variables "
             f"({', '.join(names)}), got {', '.join(unknown) or 'none'}"
         )
-    axes = [names.index(argument) for argument in arguments]
+    return [names.index(argument) for argument in arguments]
 
-    def value(x: Floats) -> Floats:
-        with np.errstate(all="ignore"):  # what is not finite is refused where it matters
-            result = np.asarray(rule(*(x[:, axis] for axis in axes)), dtype=float)
-        if result.shape != x.shape[:1]:
-            raise ValueError(
-                f"library: {name!r} must return an array of the shape of its arguments, "
-                f"{x.shape[:1]}, got {result.shape}"
-            )
-        return result
 
-    def gradient(x: Floats) -> Floats:
-        result = np.zeros_like(x)
-        for axis in axes:
-            step = np.zeros(x.shape[1])
-            step[axis] = STEP * (np.abs(x[:, axis]).mean() or 1.0)
-            near = value(x + step) - value(x - step)
-            far = value(x + 2 * step) - value(x - 2 * step)
-            result[:, axis] = (8 * near - far) / (12 * step[axis])
-        return result
-
-    return Function(name=name, latex=rf"\mathrm{{{name}}}", value=value, gradient=gradient)
+def _differences(value: Callable[[Floats], Floats], x: Floats, axes: Sequence[int]) -> Floats:
+    """Derivatives of a function along axes by differences of fourth order, (n, d)."""
+    result = np.zeros_like(x)
+    for axis in axes:
+        step = np.zeros(x.shape[1])
+        step[axis] = STEP * (np.abs(x[:, axis]).mean() or 1.0)
+        near = value(x + step) - value(x - step)
+        far = value(x + 2 * step) - value(x - 2 * step)
+        result[:, axis] = (8 * near - far) / (12 * step[axis])
+    return result

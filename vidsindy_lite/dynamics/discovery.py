@@ -242,7 +242,13 @@ class Discovery:
         return draw_path(self)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write everything to a text file (JSON), with all digits; `load` reads it."""
+        """Write everything to a text file (JSON), with all digits; `load` reads it.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be there: it is a folder, or its folder does not exist.
+        """
         from .storage import write  # which needs this class
 
         write(self, path)
@@ -352,6 +358,10 @@ def _covariance(units: Units, fit: Fit) -> Floats:
     covariance[np.ix_(columns, columns)] = inverse(information)
     factors = units.factors(fit.collocation.exponents)
     unit = np.concatenate([factors.T.ravel(), units.scale])
+    for entry, first in fit.state.followers():
+        covariance[entry] = covariance[first]
+    for entry, first in fit.state.followers():
+        covariance[:, entry] = covariance[:, first]
     return covariance * (unit[:, None] * unit)
 
 

@@ -34,6 +34,9 @@ class Form:
         Coefficients that are given, in the units of the data; zero where a term is a candidate.
     movable : ndarray of bool, shape (d,)
         Coordinates whose origin is unknown. What is known does not change when it moves.
+    shared : ndarray of int, shape (l d,)
+        Of each place in the coefficients, equation by equation, whose value it has: its own, but
+        for the directions of a vector, which all have that of the first.
     """
 
     names: tuple[str, ...]
@@ -42,6 +45,7 @@ class Form:
     candidates: Bools
     known: Floats
     movable: Bools
+    shared: Ints
 
     @classmethod
     def of(cls, measured: int, library: Library, order: int) -> Form:
@@ -59,9 +63,17 @@ class Form:
             known[row[tuple(velocity)], position] = 1.0
         candidates = np.zeros(known.shape, dtype=bool)
         candidates[[row[tuple(powers)] for powers in wanted.tolist()], d - measured :] = True
+        shared, first = np.arange(candidates.size).reshape(d, -1), 0
+        for k, powers in enumerate(np.eye(wanted.shape[1], dtype=int)[d:].tolist()):
+            direction = functions[k].direction
+            if direction is not None:
+                equation, here = d - measured + direction, row[tuple(powers)]
+                candidates[here, np.arange(d) != equation] = False
+                first = shared[equation, here] if direction == 0 else first
+                shared[equation, here] = first
         # A function of the state does not move with the origin, so that none is sought.
         movable = (np.arange(d) < measured) & (not functions)
-        return cls(names, exponents, functions, candidates, known, movable)
+        return cls(names, exponents, functions, candidates, known, movable, shared.ravel())
 
     def law(self, coefficients: Floats) -> PolynomialSystem:
         """The law with these coefficients, (l, d), in the units of the data."""
@@ -75,4 +87,5 @@ class Form:
     @property
     def searched(self) -> Ints:
         """The candidates' places in the coefficients, equation by equation."""
-        return np.flatnonzero(self.candidates.T)
+        own = self.shared == np.arange(len(self.shared))
+        return np.flatnonzero(self.candidates.T.ravel() & own)

@@ -8,7 +8,7 @@ they are when the origin is shifted.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations_with_replacement
 
@@ -42,20 +42,23 @@ class Function:
         From points (n, d) to values (n,).
     gradient : callable
         From points (n, d) to derivatives (n, d).
+    direction : int, optional
+        Of a component of a vector, which one it is: the first has the others after it, each stands
+        in the equation of its direction alone, and all have one coefficient.
     """
 
     name: str
     latex: str
     value: Callable[[Floats], Floats]
     gradient: Callable[[Floats], Floats]
+    direction: int | None = None
 
     def standardised(self, centre: Floats, scale: Floats, size: float) -> Function:
         """The same function over ``size``, of points less ``centre``, over ``scale``."""
-        return Function(
-            self.name,
-            self.latex,
-            lambda x: self.value(centre + scale * x) / size,
-            lambda x: self.gradient(centre + scale * x) * scale / size,
+        return replace(
+            self,
+            value=lambda x: self.value(centre + scale * x) / size,
+            gradient=lambda x: self.gradient(centre + scale * x) * scale / size,
         )
 
 

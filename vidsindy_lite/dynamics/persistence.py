@@ -142,6 +142,7 @@ def follow(problem: Problem, fit: Fit) -> Path:
         )
         active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
         active.flat[problem.form.searched] = support[:terms_end]
+        active = fit.state.whole(active.T).T
         for j, terms in enumerate(active):
             if paths[j] and (paths[j][-1].terms == terms).all():
                 low_here = paths[j].pop().low

@@ -118,9 +118,10 @@ class PolynomialSystem:
                 "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
                 f"'y': {{'x': 1}}}}, got {equations!r:.60}"
             )
-        names = tuple(equations)
-        degree = None if degree is None else check_integer("degree", degree)
-        _, functions = (library or Library()).resolve(names, len(names))
+        names, m = tuple(equations), len(equations) // 2
+        accelerations = m and names[m:] == velocity_names(names[:m])
+        held, measured = library or Library(), m if accelerations else len(names)
+        _, functions = held.resolve(names, measured)
         known = (*names, *(function.name for function in functions))
         parsed = [
             (_parse_term(term, known), column, check_number(f"coefficient of {term}", value))
@@ -128,15 +129,14 @@ class PolynomialSystem:
             for term, value in terms.items()
         ]
         highest = max((sum(powers) for powers, _, _ in parsed), default=0)
-        if degree is not None and highest > degree:
+        degree = highest if degree is None else check_integer("degree", degree)
+        if highest > degree:
             raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
-        monomials_of = Library.polynomial(highest if degree is None else degree)
-        exponents, _ = ((library or Library()) + monomials_of).resolve(names, len(names))
-        index = {tuple(e): row for row, e in enumerate(exponents)}
+        wanted, _ = (held + Library.polynomial(degree)).resolve(names, measured)
+        exponents = closure(np.array([*wanted.tolist(), *(powers for powers, _, _ in parsed)]))
+        index = {tuple(e): row for row, e in enumerate(exponents.tolist())}
         coefficients = np.zeros((len(exponents), len(names)))
         for powers, column, value in parsed:
-            if powers not in index:
-                raise ValueError(f"term: must be one of the library {library}, got powers {powers}")
             coefficients[index[powers], column] += value
         return cls(names, exponents, coefficients, functions=functions)
 

@@ -213,7 +213,7 @@ class Problem:
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
-        terms = self.penalties @ state.active.sum(axis=1)
+        terms = self.prices @ state.free()[: len(self.prices)]
         return collocation.objective(state) + terms + self.axis_penalty * state.moving.sum()
 
     def law(self, state: State) -> PolynomialSystem:
@@ -322,6 +322,11 @@ def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
                 f"library: {function.name} must be finite on the data, got none at ({where})"
             )
     sizes = np.sqrt((values**2).mean(axis=0))
+    for k, function in enumerate(problem.form.functions):
+        if function.direction == 0:  # of a vector, in the units of the equations
+            scale = problem.units.scale[-len(problem.measured[0][1].T) :]
+            common = np.sqrt(((sizes[k : k + len(scale)] / scale) ** 2).mean())
+            sizes[k : k + len(scale)] = common * scale
     sized = replace(problem, units=replace(problem.units, sizes=np.where(sizes > 0, sizes, 1.0)))
     # Each coordinate in an order of its own: what depends on each other there does so everywhere.
     apart = rng.permuted(problem.units.standard(x), axis=0)

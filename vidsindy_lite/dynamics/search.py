@@ -84,7 +84,8 @@ def unpruned(
     coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=problem.noise.min())[0]
     active = rows[:, None] & problem.form.candidates
     coefficients[~active] = 0.0
-    state = State(control, coefficients, active, np.zeros(d), np.zeros(d, dtype=bool))
+    still, shared = np.zeros(d, dtype=bool), problem.form.shared
+    state = State(control, coefficients, active, np.zeros(d), still, shared)
     for weight in FIRST_WEIGHTS:
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         state = fit.state
@@ -95,7 +96,7 @@ def unpruned(
 def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
     """Would the terms of higher degree together explain more of the data than chance does?"""
     searched = problem.form.searched
-    left_out = len(searched) - int(fit.state.active.sum())
+    left_out = len(searched) - int(fit.state.free()[searched].sum())
     if not left_out:
         return False
     _, gain = fit.collocation.linearise(fit.state, searched).newton()
@@ -134,12 +135,12 @@ def _variants(origin: Floats, home: Floats) -> list[tuple[Floats, Bools]]:
 def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]:
     """The law in the centred frame, all terms of its shift closure fitted."""
     d, exponents = problem.d, problem.exponents
-    state = State(
-        fit.state.control_points,
-        shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
-        closure_mask(exponents, fit.state.active, problem.form.movable),
-        np.zeros(d),
-        np.zeros(d, dtype=bool),
+    state = replace(
+        fit.state,
+        coefficients=shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
+        active=closure_mask(exponents, fit.state.active, problem.form.movable),
+        offset=np.zeros(d),
+        moving=np.zeros(d, dtype=bool),
     )
     collocation = problem.weighted(fit.collocation, weight)
     # A law exact in another frame has no firm minimum here: some steps are near enough.
@@ -163,12 +164,10 @@ def _candidate(
         problem.prices[columns],
         np.ones(len(columns), dtype=bool),
     )
-    flat = np.zeros(closed.state.coefficients.size)
+    flat = np.append(np.zeros(closed.state.coefficients.size), origin)
     flat[columns] = solution
-    coefficients = flat.reshape(problem.d, -1).T
-    state = State(
-        closed.state.control_points, coefficients, coefficients != 0, origin.copy(), moving
-    )
+    state = closed.state.moved(closed.state.control_points, flat)
+    state = replace(state, active=state.coefficients != 0, moving=moving)
     objective = closed.collocation.objective(closed.state)
     cost = objective + value + problem.axis_penalty * moving.sum()
     return replace(closed, state=state, criterion=cost)

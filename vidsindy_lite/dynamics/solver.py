@@ -206,7 +206,7 @@ def _refitted(
     changed = _changed(path.fit, goal)
     if not changed:
         return None
-    active = np.stack([plateau.terms for plateau in goal], axis=1)
+    active = path.fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
     if active.sum() > RICHEST * path.fit.state.active.sum():
         return None
     state, collocation = path.restricted(active), path.fit.collocation
