@@ -356,8 +356,6 @@ def _by_hand(table: dict[str, Any], model: str) -> dict[str, Any]:
         if "normal" in known:
             x, y = rotation_to_z(known["normal"])[:2, 2]
             known["angle"] = float(np.arctan2(x, y) + np.deg2rad(roll))
-        elif "position" in known:
-            raise ValueError("field_of_view: must be given with looks_at or a normal, or alone")
     elif "roll" in table:
         raise ValueError("roll: must be given with a field_of_view")
     return known
