@@ -165,6 +165,11 @@ class PolynomialSystem:
         between = "" if all(len(name) == 1 for name in names) else " "
         return tuple(_term_text(e, names + slopes, "{}^{}", between) for e in self.exponents)
 
+    @property
+    def is_polynomial(self) -> bool:
+        """Whether terms are products of the variables alone: only then can the origin be moved."""
+        return self.exponents.shape[1] == self.d
+
     @cached_property
     def implicit(self) -> Bools:
         """Which terms hold a slope, bool, shape (l,); none, unless the law is a fraction."""
@@ -238,7 +243,7 @@ class PolynomialSystem:
             If the law is no polynomial, and the shift is not zero.
         """
         shift = check_vector("offset", offset, self.d)
-        if self.exponents.shape[1] > self.d and shift.any():
+        if not self.is_polynomial and shift.any():
             raise ValueError(
                 f"offset: must be zero for a law that is no polynomial, got {offset!r:.60}"
             )
