@@ -242,7 +242,13 @@ class Discovery:
         return draw_path(self)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write everything to a text file (JSON), with all digits; `load` reads it."""
+        """Write everything to a text file (JSON), with all digits; `load` reads it.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be there: it is a folder, or its folder does not exist.
+        """
         from .storage import write  # which needs this class
 
         write(self, path)
