@@ -44,6 +44,7 @@ from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     CONTESTANTS,
     ERRORS,
+    FLOWS,
     LORENZ_GRID,
     MOTIONS,
     ODEBENCH,
