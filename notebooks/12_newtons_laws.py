@@ -227,7 +227,7 @@ assert swung.status == "ok"
 assert abs(swung.coefficients[row, 1] + 9.81) < 5 * swung.standard_errors[row, 1]
 
 # %% [markdown]
-# Polynomials alone imitate the sine by its series along this swing, and take what is left for kicks. Let go at
+# Polynomials alone imitate the sine by its series along this swing, with a doubt, or with kicks that nobody gave. Let go at
 # 2.8 rad, the law with the sine is still that of the pendulum; the series sends it off to infinity.
 
 # %%

@@ -163,7 +163,7 @@ def test_lags_that_are_no_numbers(here, capsys):
 def test_a_library_that_is_none(here, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["discover", *VIDEOS, "--rig", "rig.toml", "--library", "tan(1)"])
-    message = "argument --library: must be a sum of polynomial(degree) and fourier(harmonics), got"
+    message = "argument --library: must be a sum of polynomial(degree), fourier(harmonics) and"
     assert message in capsys.readouterr().err
 
 

@@ -61,7 +61,8 @@ def test_terms_that_cannot_be_told_apart_are_searched_from_the_first_fit(monkeyp
         return search.replace(fit, status=status)
 
     monkeypatch.setattr(Collocation, "solve", solved)
-    _, weight = search.unpruned(problem, collocation, control, 2, History())
+    every = np.ones(len(problem.exponents), dtype=bool)
+    _, weight = search.unpruned(problem, collocation, control, every, "", History())
     expected = search.FIRST_WEIGHTS[-1 if fails_at is None else 0]
     assert weight == expected
     assert len(calls) == (4 if fails_at is None else fails_at + 1)

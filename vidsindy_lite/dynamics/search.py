@@ -96,12 +96,20 @@ def _of_all_data(problem: Problem, fit: Fit, history: History) -> Fit:
 
 
 def candidates(problem: Problem, rng: np.random.Generator, history: History) -> list[Fit]:
-    """Supports worth refining, from all terms up to degree 2, and if need be from all terms."""
+    """Supports worth refining, from all terms up to degree 2, and if need be from all terms.
+
+    Terms of denominators come last: a factor above and below the line changes nothing.
+    """
     collocation = problem.collocation(problem.segments())
     control = fit_curves(collocation, problem.curves)
     found, degree = [], problem.form.degree
-    for start in sorted({min(2, degree), degree}):
-        fit, weight = unpruned(problem, collocation, control, start, history)
+    degrees, implicit = problem.exponents.sum(axis=1), problem.form.implicit
+    starts = {f"degree {k}": ~implicit & (degrees <= k) for k in (min(2, degree), degree)}
+    if implicit.any():
+        starts["all"] = degrees <= degree
+    for name, rows in starts.items():
+        stage = f"unpruned, {name}"
+        fit, weight = unpruned(problem, collocation, control, rows, stage, history)
         here = _in_sparse_frames(problem, fit, weight, rng, history)
         if weight < FIRST_WEIGHTS[-1]:
             best = sorted(here, key=lambda candidate: candidate.criterion)[: REFINED - 1]
@@ -113,14 +121,20 @@ def candidates(problem: Problem, rng: np.random.Generator, history: History) -> 
 
 
 def unpruned(
-    problem: Problem, collocation: Collocation, control: Floats, degree: int, history: History
+    problem: Problem,
+    collocation: Collocation,
+    control: Floats,
+    rows: Bools,
+    stage: str,
+    history: History,
 ) -> tuple[Fit, float]:
-    """Fit all terms up to a degree while the physics weight rises, and the last weight.
+    """Fit all terms of some rows of the library, (l,), while the physics weight rises.
 
-    Many terms that the data hardly tell apart cannot be fitted at a large weight: such a fit does
-    not converge, and even those before it lean on the terms. Then the first fit is the start.
+    The last weight comes back, too. Many terms that the data hardly tell apart cannot be fitted at
+    a large one: such a fit does not converge, and even those before it lean on the terms. Then the
+    first fit is the start.
     """
-    d, rows = problem.d, problem.exponents.sum(axis=1) <= degree
+    d = problem.d
     x, slope = collocation.node_states(control)
     coefficients = np.zeros(problem.known.shape)
     terms = problem.terms(x)[:, rows]
@@ -133,7 +147,7 @@ def unpruned(
     for weight in FIRST_WEIGHTS:
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         state = fit.state
-        history.add(f"unpruned, degree {degree}", problem, fit, weight)
+        history.add(stage, problem, fit, weight)
         fits.append((fit, weight))
         if fit.status is not Status.CONVERGED:
             return fits[0]
@@ -154,7 +168,7 @@ def _climbed(problem: Problem, found: list[Fit], weight: float, history: History
 
 
 def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
-    """Would the terms of higher degree together explain more of the data than chance does?"""
+    """Would the other terms together explain more of the data than chance does?"""
     searched = problem.form.searched
     left_out = len(searched) - int(fit.state.free()[searched].sum())
     if not left_out:
