@@ -25,16 +25,19 @@ from .cameras import (
     learn_cameras,
     learn_lags,
     list_lags,
+    posed,
     reconstruct,
     smooth,
     systematic_errors,
     trailing_errors,
 )
 from .checks import check_path, check_tracks, check_vector
+from .dynamics import smooth as smooth_curves
 from .refusal import Refused, refusing
 from .vision import Hint, Track, VideoInfo, check_detector, frame_clock, track, video_info
 
 _OTHER_LAG = 0.02  # frames by which it may differ without a word
+_SMOOTHED = 8  # frames of a stretch, from which its curve can be told from noise
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
@@ -97,7 +100,9 @@ def observe(
         One video per camera of the rig: a file, a folder of images, or a pattern of their names,
         see `read_video`.
     rig : Rig
-        Positions and normals of all cameras, scale and angle of at least one.
+        Positions and normals of all cameras, scale and angle of at least one. Or of three or more
+        perspective cameras nothing but the scale, which may be rough; then the videos must start
+        within a frame or two of each other, or their lags be given.
     t : array_like, shape (n,), optional
         Time of each frame of the first video, increasing; all videos then have the same frame rate.
         By default as the file states, in seconds from its first frame.
@@ -195,6 +200,10 @@ def _observed(
     progress: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    if not rig.is_measured:
+        with refusing("cameras", raw, names):
+            begun = np.zeros(len(raw)) if lags is None else lags
+            rig = posed(align(raw, begun, clock.rates, clock.uneven), rig, lags is not None)
     with refusing("lags", raw, names):
         best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress)
         if lags is not None:
@@ -207,14 +216,13 @@ def _observed(
     told = best
     if lags is not None:
         told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
-    shared = systematic_errors(raw, rig, learned, told), trailing_errors(tracks, learned)
     return Observation(
         tracks=tracks,
         rig=learned,
         lags=told,
         t=clock.times,
         x=reconstruct(tracks, learned),
-        systematic=np.concatenate(shared),
+        systematic=_shared_errors(raw, tracks, rig, learned, told, clock.times),
         warnings=(
             *_rig_warnings(tracks, rig, learned, names, used, best),
             *learned.warnings,
@@ -222,6 +230,35 @@ def _observed(
             *told.warnings,
         ),
     )
+
+
+def _smoothed(t: Floats, values: Floats) -> Floats:
+    """What (n, k) values that change with the motion would be without the noise of its frames."""
+    clean, rng = values.copy(), np.random.default_rng(0)
+    seen = np.flatnonzero(np.isfinite(values).all(axis=1))
+    for stretch in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1):
+        if len(stretch) >= _SMOOTHED:
+            curve = smooth_curves([(t[stretch], values[stretch])], rng).splines[0]
+            clean[stretch] = curve(t[stretch])
+    return clean
+
+
+def _shared_errors(
+    raw: Sequence[Floats], tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: Lags, t: Floats
+) -> Floats:
+    """Errors of the path that all frames share, (k, n, 3), as those of the motion alone.
+
+    A mode that holds the noise of each frame would explain that very noise: in a fit, its size
+    would grow beyond all measure, and bend the path with it.
+    """
+    trails = trailing_errors(tracks, learned, [_smoothed(t, track) for track in tracks])
+    learning = systematic_errors(raw, rig, learned, lags)
+    if not len(learning):
+        return trails
+    flat = np.moveaxis(learning, 1, 0).reshape(len(t), -1)
+    flat[~np.isfinite(reconstruct(tracks, learned)).all(axis=1)] = np.nan
+    steady = np.nan_to_num(_smoothed(t, flat)).reshape(len(t), len(learning), -1)
+    return np.concatenate((np.moveaxis(steady, 0, 1), trails))
 
 
 def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]) -> Floats | None:

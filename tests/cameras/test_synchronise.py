@@ -3,6 +3,7 @@
 import warnings
 from dataclasses import replace
 
+import helpers
 import numpy as np
 import pytest
 from helpers import trajectory
@@ -445,7 +446,7 @@ def test_lags_fit_equally_well_up_to_a_ratio(motion, monkeypatch):
         )
         monkeypatch.setattr(synchrony, "_drifted", lambda found: found)
         monkeypatch.setattr(
-            synchrony, "_told", lambda _, f, __: vl.Lags(f.lags, np.ones(3), np.zeros(3), f.score)
+            synchrony, "_told", lambda _, f, __: Lags(f.lags, np.ones(3), np.zeros(3), f.score)
         )
         found = learn_lags(filmed(motion, (60,) * 3, (0, 9, 0)), motion[1])
         assert len(found.warnings) == (told is not None)
@@ -537,7 +538,7 @@ def test_a_camera_that_never_sees_the_target(motion, blind):
 
 
 def test_the_frame_of_an_instant():
-    lags = vl.Lags(np.array([0, 10.3, -4]), np.array([1, 1.2, 0.5]), np.zeros(3), 0.0)
+    lags = Lags(np.array([0, 10.3, -4]), np.array([1, 1.2, 0.5]), np.zeros(3), 0.0)
     assert [lags.frame_at(i, 100) for i in range(3)] == [100, 108, 52]
 
 
@@ -613,3 +614,25 @@ def test_the_nearest_frame_of_an_uneven_video():
 def test_clocks_that_are_none(clocks, message):
     with pytest.raises(ValueError, match=message):
         align([np.ones((3, 2))] * 2, (0, 0), clocks=clocks)
+
+
+# -------------------------------------------------------------------------------- rolling shutters
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_lags_and_rolling_shutters_are_told_apart(known):
+    """Both move a track in time, the one by where the target is."""
+    rng = np.random.default_rng(8)
+    rig, lags, frames = helpers.room(rng, 4, readout=0.4), (0, 6.3, -4.6, 0.5), np.arange(400)
+    tracks = []
+    for camera, lag in zip(rig.cameras, lags, strict=True):
+        seen = camera.project(helpers.walk(2 * (frames + lag)))
+        for _ in range(15):
+            late = camera.readout * (seen[:, 1] - 359.5) / 720
+            seen = camera.project(helpers.walk(2 * (frames + lag + late)))
+        tracks.append(seen + 0.2 * rng.normal(size=seen.shape))
+    if not known:
+        rig = vl.Rig(replace(c, readout=0.0, readout_error=0.5) for c in rig.cameras)
+    found = learn_lags(tracks, rig)
+    assert found.agree
+    np.testing.assert_allclose(found.frames, lags, atol=0.05 if known else 0.1)
