@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import Floats
+from .beyond import beyond_the_library
 from .collocation import CLEANEST, Fit, Linearisation, Status
 from .errors import residual_noise
 from .persistence import Path
@@ -180,10 +181,12 @@ def _another_in_the_data(problem: Problem, fit: Fit, law: PolynomialSystem) -> I
 
 def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), fit.state, path)
-    if max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest:
-        return  # weaker errors than those tolerated say nothing about the law
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
+    tolerant = max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
+    yield from beyond_the_library(problem, fit, noisy=not tolerant)
+    if tolerant:
+        return  # weaker errors than those tolerated say nothing about the law
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = fit.collocation.linearise(fit.state, problem.form.searched)
     yield from _left_over(model, fit.state)
