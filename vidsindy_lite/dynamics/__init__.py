@@ -22,7 +22,7 @@ from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao
 from .discovery import Discovery
 from .integrate import runge_kutta_4
-from .library import monomial_exponents, monomial_gradients, monomials, variable_names
+from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
 from .order import check_order
 from .origin import ShiftedLaw
 from .persistence import Plateau
