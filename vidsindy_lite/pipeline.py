@@ -200,5 +200,6 @@ def _with_law(
             seen.t, seen.x, library=library, order=order, seed=seed, progress=progress,
             systematic=seen.systematic,
         )  # fmt: skip
-    parts = vars(seen) | {"warnings": (*seen.warnings, *found.warnings)}
-    return VideoDiscovery(**parts, discovery=found)
+    # Who keeps the law alone keeps the doubts about what it was found in.
+    law = replace(found, warnings=(*seen.warnings, *found.warnings))
+    return VideoDiscovery(**vars(seen) | {"warnings": law.warnings}, discovery=law)

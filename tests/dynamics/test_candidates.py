@@ -1,5 +1,7 @@
 """Libraries as values: what they hold, what they find, and what they refuse."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -266,7 +268,13 @@ def test_a_law_is_saved_and_its_own_functions_are_given_again(tmp_path):
     [
         (Library(), "library: must hold a term"),
         ("polynomial(3)", "library: must be of type Library"),
-        (Library.terms({"a": lambda q: q}), r"arguments of 'a' must be named .*\(x, y\), got q"),
+        (Library.terms({"a": lambda q: q}), r"arguments of 'a' must be named .*\(x, y\), .* got q"),
+        (Library.terms({"x": lambda x: x**2}), "a term must have a name of its own, got 'x' twice"),
+        (
+            Library.terms({"s": lambda x: math.sin(x)}),
+            "'s' must take and return arrays .* TypeError",
+        ),
+        (Library.terms({"q": lambda x: 1 / 0}), "'q' must take and return arrays .* ZeroDivision"),
         (Library.terms({"a": lambda: 1.0}), r"arguments of 'a' .* got none"),
         (Library.terms({"a": lambda x: 1.0}), r"'a' must return an array of the shape"),
         (

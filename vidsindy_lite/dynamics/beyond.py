@@ -76,11 +76,11 @@ class Beyond:
 
 
 def beyond(problem: Problem, fit: Fit) -> Beyond:
-    """The score test of the terms beyond a polynomial library, at the last fit."""
+    """The score test of the polynomial terms beyond a library, at the last fit."""
     size, form = len(problem.exponents), problem.form
     equations = np.flatnonzero(form.candidates.any(axis=0))
     budget = BUDGET / fit.collocation.grid.x.size / len(equations)
-    exponents = _widened(problem.exponents, form.degree, budget)
+    exponents = _widened(problem.exponents, len(form.names), budget)
     l, new = len(exponents), len(exponents) - size
 
     def padded(array: NDArray[Any]) -> NDArray[Any]:
@@ -116,15 +116,19 @@ def beyond(problem: Problem, fit: Fit) -> Beyond:
     )
 
 
-def _widened(exponents: Ints, degree: int, budget: float) -> Ints:
-    """A library with the monomials of the next degrees; of few variables each, if they are many."""
-    d = exponents.shape[1]
-    higher = monomial_exponents(d, degree + HIGHER)
-    higher = higher[higher.sum(axis=1) > degree]
+def _widened(exponents: Ints, d: int, budget: float) -> Ints:
+    """A library with the monomials of the next degrees; of few variables each, if they are many.
+
+    Its first ``d`` columns are the variables, of which functions may be further ones.
+    """
+    plain = exponents[(exponents[:, d:] == 0).all(axis=1), :d]
+    higher = monomial_exponents(d, int(plain.sum(axis=1).max(initial=0)) + HIGHER)
+    higher = higher[~(higher[:, None] == plain).all(axis=2).any(axis=1)]
     for variables in (d, 2, 1):
         kept = higher[(higher > 0).sum(axis=1) <= variables]
         if len(kept) <= budget:
-            return np.concatenate([exponents, kept])
+            unused = ((0, 0), (0, exponents.shape[1] - d))
+            return np.concatenate([exponents, np.pad(kept, unused)])
     return exponents
 
 
@@ -144,8 +148,8 @@ def beyond_the_library(problem: Problem, fit: Fit, noisy: bool) -> Iterator[str]
     Errors that last may follow the state, too; they are no reason to doubt, unless a single term
     explains nearly all of them. What is ``noisy`` has errors of single samples.
     """
-    if not problem.law(fit.state).is_polynomial:
-        return  # whose library was chosen
+    if problem.law(fit.state).implicit.any():
+        return  # a fraction, of which the terms are not those of its slope
     found = beyond(problem, fit)
     if found.decisive or (noisy and found.significant):
         yield (

@@ -162,6 +162,9 @@ class Library:
         ]
         for name, rule in self.functions:
             functions += own(names, measured, name, rule)
+        taken = [*names, *(function.name for function in functions)]
+        if clash := next((name for name in taken if taken.count(name) > 1), None):
+            raise ValueError(f"library: a term must have a name of its own, got {clash!r} twice")
         powers = np.empty((0, d), dtype=int)
         if self.degree is not None:
             powers = monomial_exponents(d, self.degree)
@@ -245,7 +248,13 @@ def own(
         with np.errstate(all="ignore"):  # what is not finite is refused where it matters
             return np.asarray(rule(*(x[:, axis] for axis in axes)), dtype=float)
 
-    shape = evaluate(np.ones((2, len(names)))).shape
+    try:
+        shape = evaluate(np.ones((2, len(names)))).shape
+    except Exception as error:  # whatever a function of one's own may raise
+        raise ValueError(
+            f"library: {name!r} must take and return arrays of shape (n,), as numpy's functions "
+            f"do, got {type(error).__name__}: {error}"
+        ) from error
     if shape not in ((2,), (measured, 2)):
         raise ValueError(
             f"library: {name!r} must return an array of the shape of its arguments, (n,), or "
@@ -279,7 +288,7 @@ def _axes(names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]) -> 
     if not arguments or unknown:
         raise ValueError(
             f"library: the arguments of {name!r} must be named like variables "
-            f"({', '.join(names)}), got {', '.join(unknown) or 'none'}"
+            f"({', '.join(names)}), as in lambda x: np.sin(x), got {', '.join(unknown) or 'none'}"
         )
     return [names.index(argument) for argument in arguments]
 
