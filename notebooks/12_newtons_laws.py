@@ -24,7 +24,8 @@
 # * a ball on a spring, from the tracks of three perspective cameras to its law and its forecasts;
 # * what a first-order law says of the same data, and that it is not believed;
 # * gravity and drag from four throws, and why one throw is not enough;
-# * a motion that is kicked at random, and how strong the kicks are.
+# * a motion that is kicked at random, and how strong the kicks are;
+# * a pendulum at a large amplitude, whose law is no polynomial.
 #
 # **What you need**: the objective of [notebook 04](04_spline_ado.ipynb), the cameras of
 # [notebook 08](08_lab_experiment.ipynb).
@@ -40,7 +41,14 @@ seed: int = 0  # of all errors and kicks
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import PerspectiveCamera, PolynomialSystem, Rig, discover, discover_from_tracks
+from vidsindy_lite import (
+    Library,
+    PerspectiveCamera,
+    PolynomialSystem,
+    Rig,
+    discover,
+    discover_from_tracks,
+)
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import plots
 
@@ -196,6 +204,43 @@ assert set(names) == {"x", "vx", "x^3"}
 assert abs(kicked.model_error[1] / gust - 1) < 0.4
 
 # %% [markdown]
+# ## A pendulum at a large amplitude
+#
+# A pendulum that is let go at 1.5 rad, with a length of 1 m and friction: $\ddot\theta=-\frac gL\sin\theta-c\,\dot\theta$.
+# The candidate terms are a value that can be added up: the polynomials and the sines and cosines of the
+# coordinates. Sines have an origin of their own, so that none is searched.
+
+# %%
+sines = Library.polynomial(1) + Library.fourier(1)
+swinging = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -0.1}}
+pendulum = PolynomialSystem.from_terms(swinging, library=sines)
+u = np.arange(1200) / 60
+theta = pendulum.simulate(u, np.array([1.5, 0.0]))[:, :1]
+theta = theta + 0.01 * theta.std() * rng.standard_normal(theta.shape)
+
+# %%
+swung = discover(u, theta, order=2, library=sines)
+print(swung)
+row = swung.terms.index("sin(x)")
+assert (swung.system.support == pendulum.support).all()
+assert swung.status == "ok"
+assert abs(swung.coefficients[row, 1] + 9.81) < 5 * swung.standard_errors[row, 1]
+
+# %% [markdown]
+# Polynomials alone imitate the sine by its series along this swing, and take what is left for kicks. Let go at
+# 2.8 rad, the law with the sine is still that of the pendulum; the series sends it off to infinity.
+
+# %%
+series = discover(u, theta, order=2)
+print(series)
+start, ahead = np.array([2.8, 0.0]), u[u < 5]
+miss = np.abs(swung.system.simulate(ahead, start) - pendulum.simulate(ahead, start))[:, 0].max()
+outcome = series.simulate(start, ahead).status
+print(f"with the sine {miss:.1g} rad from the truth in five seconds; the series {outcome}")
+assert miss < 0.1
+assert "diverges" in outcome
+
+# %% [markdown]
 # ## All laws of this page
 
 # %%
@@ -203,6 +248,7 @@ laws = {
     "spring, tracks of three cameras": (found, law),
     "four throws": (fallen, flight),
     "one throw": (once, flight),
+    "pendulum, with its sine": (swung, pendulum),
 }
 rows = [
     {
@@ -222,6 +268,7 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 # * A first-order law of the same data is wrong, and says so.
 # * Throws in several directions settle gravity and drag; one throw does not, and is not believed.
 # * Kicks of the motion are no errors of the measurement: they are found, counted, and stay out of the law.
+# * A law that is no polynomial is found when its terms are among the candidates, and then holds at other amplitudes, too.
 #
 # **What the paper says and what we found.**
 #
@@ -263,6 +310,24 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 # ```
 #
 # Order 2: the law of order 1 misses the data.
+# </details>
+#
+# **4.** (Explore.) Let the pendulum hang in a wind that pushes with $0.5\cos\theta$. Is the push found beside the
+# sine, and what does a start at 0.1 rad say of it?
+#
+# <details><summary>Solution</summary>
+#
+# ```python
+# pushed = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -0.1, "cos(x)": 0.5}}
+# windy_law = PolynomialSystem.from_terms(pushed, library=sines)
+# for angle in (1.5, 0.1):
+#     clean = windy_law.simulate(u, np.array([angle, 0.0]))[:, :1]
+#     noisy = clean + 0.01 * clean.std() * rng.standard_normal(clean.shape)
+#     print(discover(u, noisy, order=2, library=sines))
+# ```
+#
+# At 1.5 rad it is. At 0.1 rad the pendulum is a spring about another point: a line is as good as a sine, and a
+# constant as a cosine. The first is said in a warning.
 # </details>
 
 # %% [markdown]

@@ -122,6 +122,10 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
         (["--rig", "none.toml", "--detector", "none.onnx"], "detector: no such file, got"),
         (["--rig", "rig.toml", "--fps", "0"], "fps: must be positive, got 0"),
         (["--rig", "rig.toml", "--degree", "0"], "degree: must be an integer of at least 1"),
+        (
+            ["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"],
+            "degree: must not be given with a library, got 2 and fourier(1)",
+        ),
         (["--rig", "rig.toml", "--seed", "-1"], "seed: must be an integer of at least 0"),
         (["--rig", "rig.toml", "--out", "."], "out: must be a new folder"),
         (["--rig", "rig.toml", "--out", "\udcff"], r"must be made of characters, got '\udcff'"),
@@ -153,6 +157,13 @@ def test_lags_that_are_no_numbers(here, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["discover", *VIDEOS, "--rig", "rig.toml", "--lag", "0,soon,0"])
     message = "argument --lag: must be numbers with commas between them, got '0,soon,0'"
+    assert message in capsys.readouterr().err
+
+
+def test_a_library_that_is_none(here, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["discover", *VIDEOS, "--rig", "rig.toml", "--library", "tan(1)"])
+    message = "argument --library: must be a sum of polynomial(degree) and fourier(harmonics), got"
     assert message in capsys.readouterr().err
 
 

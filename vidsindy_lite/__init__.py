@@ -25,7 +25,7 @@ from .cameras import (
     residuals,
     rig_template,
 )
-from .dynamics import Discovery, PolynomialSystem, SplineSINDy, discover
+from .dynamics import Discovery, Library, PolynomialSystem, SplineSINDy, discover
 from .observation import Observation, observe, observe_tracks
 from .pipeline import VideoDiscovery, discover_from_tracks, discover_from_videos
 from .vision import (
@@ -69,6 +69,7 @@ __all__ = [
     "residuals",
     "discover",
     "Discovery",
+    "Library",
     "PolynomialSystem",
     "SplineSINDy",
 ]

@@ -79,6 +79,7 @@ def _discover(options: argparse.Namespace) -> int:
     """
     from .cameras import Rig, list_lags
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
+    from .dynamics import check_library
     from .refusal import Refused
     from .vision import check_detector
 
@@ -87,7 +88,8 @@ def _discover(options: argparse.Namespace) -> int:
     check_detector(options.detector)
     check_folder_is_free(options.out)
     rig, videos = Rig.load(options.rig), options.videos or None
-    told = {"rig file": options.rig, "degree": options.degree, "seed": options.seed}
+    library = check_library(options.degree, options.library)
+    told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
     told |= {"order": options.order}
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
@@ -115,7 +117,7 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     from .pipeline import discover_from_tracks, discover_from_videos
     from .vision import frame_clock, load_hints
 
-    shared = {name: getattr(options, name) for name in ("degree", "seed")}
+    shared = {name: getattr(options, name) for name in ("degree", "library", "seed")}
     shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
     shared |= {"lags": options.lag, "progress": True}
     if options.tracks:
@@ -291,6 +293,15 @@ def _numbers(text: str) -> list[float]:
         ) from None
 
 
+def _library(text: str) -> Any:
+    from .dynamics import Library
+
+    try:
+        return Library.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error).removeprefix("library: ")) from None
+
+
 def _size(text: str) -> tuple[int, int]:
     try:
         width, height = text.split("x")
@@ -341,7 +352,11 @@ COMMANDS = {
             "RATE", "frames of each video in one unit of time of the equations (default: as the "
             "files say, which makes it a second of video)", type=float
         ),
-        "--degree": _count(3, "highest degree of the polynomials (default: 3)"),
+        "--degree": _count(None, "highest degree of the polynomials (default: 3)"),
+        "--library": _text(
+            "TERMS", "in place of --degree: polynomial(N), fourier(N) with the sines and cosines "
+            "of the coordinates, or a sum such as 'polynomial(1) + fourier(1)'", type=_library
+        ),
         "--order": _choice(
             "1", ("1", "2", "auto"),
             "1 for x' = f(x) (default), 2 for laws of motion, x'' = f(x, x'), auto for the one to "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -204,9 +204,9 @@ def _observed(
     with refusing("cameras", raw, names):
         learned = learn_cameras(tracks, rig)
     missed = disagreement(tracks, learned)
-    told = (
-        best if lags is None else Lags(lags, best.rates, 0 * lags, max(missed), clocks=best.clocks)
-    )
+    told = best
+    if lags is not None:
+        told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
     shared = systematic_errors(raw, rig, learned, told), trailing_errors(tracks, learned)
     return Observation(
         tracks=tracks,

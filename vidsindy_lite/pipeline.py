@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .arrays import Floats
 from .cameras import Rig
 from .checks import check_integer, check_positive, check_rows
-from .dynamics import Discovery, check_order, discover
+from .dynamics import Discovery, Library, check_library, check_order, discover
 from .observation import Observation, observe, observe_tracks
 from .refusal import refusing
 from .vision import Hint, TrackFile, read_tracks
@@ -43,7 +43,8 @@ def discover_from_videos(
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
     hints: Sequence[Hint | None] | None = None,
-    degree: int = 3,
+    degree: int | None = None,
+    library: Library | None = None,
     order: int | str = 1,
     seed: int = 0,
     progress: bool = False,
@@ -56,7 +57,7 @@ def discover_from_videos(
     ----------
     paths, rig, t, lags, detector, hints, progress
         See `observe`. The unit of time is that of the equations.
-    degree, order, seed
+    degree, library, order, seed
         See `discover`.
 
     Returns
@@ -68,12 +69,12 @@ def discover_from_videos(
     FileNotFoundError, ValueError
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
-    check_integer("degree", degree, 1)
+    terms = check_library(degree, library)
     check_order(order)
     check_integer("seed", seed)
     seen = observe(paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress)
     names = [Path(path).name for path in paths]
-    return _with_law(seen, names, degree=degree, order=order, seed=seed, progress=progress)
+    return _with_law(seen, names, library=terms, order=order, seed=seed, progress=progress)
 
 
 def discover_from_tracks(
@@ -83,7 +84,8 @@ def discover_from_tracks(
     *,
     fps: float | None = None,
     lags: Sequence[float] | None = None,
-    degree: int = 3,
+    degree: int | None = None,
+    library: Library | None = None,
     order: int | str = 1,
     seed: int = 0,
     progress: bool = False,
@@ -103,7 +105,7 @@ def discover_from_tracks(
     fps : float, optional
         Frames of every camera in one unit of time, in place of ``t``. Without either, files have
         to state the times of their rows.
-    degree, order, seed, progress
+    degree, library, order, seed, progress
         See `discover_from_videos`.
 
     Returns
@@ -116,7 +118,7 @@ def discover_from_tracks(
         If a file is missing or holds no track, if times are given twice or not at all, or as
         `observe_tracks` and `discover` do.
     """
-    check_integer("degree", degree, 1)
+    terms = check_library(degree, library)
     check_order(order)
     check_integer("seed", seed)
     read = _read(tracks)
@@ -124,7 +126,7 @@ def discover_from_tracks(
     seen = observe_tracks(pixels, rig, _times(read, t, fps), lags=lags, names=names)
     doubts = tuple(warning for track in read for warning in track.warnings)
     seen = replace(seen, warnings=(*seen.warnings, *doubts))
-    return _with_law(seen, names, degree=degree, order=order, seed=seed, progress=progress)
+    return _with_law(seen, names, library=terms, order=order, seed=seed, progress=progress)
 
 
 def _read(tracks: Sequence[ArrayLike | str | os.PathLike]) -> list[TrackFile]:
@@ -170,7 +172,7 @@ def _with_law(
     seen: Observation,
     names: Sequence[str],
     *,
-    degree: int,
+    library: Library,
     order: int | str,
     seed: int,
     progress: bool,
@@ -178,7 +180,7 @@ def _with_law(
     """An observation with the law that it obeys."""
     with refusing("law", seen.tracks, names):
         found = discover(
-            seen.t, seen.x, degree=degree, order=order, seed=seed, progress=progress,
+            seen.t, seen.x, library=library, order=order, seed=seed, progress=progress,
             systematic=seen.systematic,
         )  # fmt: skip
     parts = vars(seen) | {"warnings": (*seen.warnings, *found.warnings)}

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
 from vidsindy_lite.cameras.adjust import adjust
+from vidsindy_lite.cameras.alignment import Footage
 from vidsindy_lite.cameras.changes import PARTS, SIZE, changed, known_to
 from vidsindy_lite.cameras.shutter import steadied
-from vidsindy_lite.cameras.triangulate import Views
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -219,7 +219,7 @@ def test_noise_and_outliers_are_told_apart():
     _, tracks = film(rng, rig, n=1000)
     tracks[2][100] += 80
     errors = np.array([known_to(c) for c in by_hand(rng, rig).cameras])
-    found = adjust(Views.of(tracks), rig.cameras, errors)
+    found = adjust(Footage.of(tracks), rig.cameras, errors)
     assert abs(found.noise - 0.5) < 0.03
     assert found.weights[100] < 0.01
     assert np.sum(found.weights < 1) < 5

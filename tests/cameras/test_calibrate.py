@@ -15,7 +15,6 @@ from vidsindy_lite.cameras import (
     learn_cameras,
     learn_cameras_eq4,
     learn_cameras_lbfgs,
-    learn_normal,
     reconstruct,
     residuals,
 )
@@ -527,8 +526,9 @@ def test_a_wrong_normal_is_learned_back(index):
     tracks = [camera.project(x) for camera in truth.cameras]
     turn = rodrigues([1, 2, 3], np.deg2rad(8))
     cameras = list(truth.cameras)
-    cameras[index] = replace(cameras[index], normal=turn @ cameras[index].normal)
-    learned = learn_normal(tracks, Rig(cameras).uncalibrated(), index)
+    wrong = turn @ cameras[index].normal
+    cameras[index] = replace(cameras[index], normal=wrong, normal_error=8.0)
+    learned = learn_cameras(tracks, Rig(cameras).uncalibrated())
     np.testing.assert_allclose(
         learned.cameras[index].normal, truth.cameras[index].normal, atol=1e-6
     )
@@ -540,12 +540,13 @@ def test_a_few_gross_outliers_do_not_bend_a_normal(known):
     x, truth, tracks, rng = scene(5)
     tracks = [track + 0.1 * rng.normal(size=track.shape) for track in tracks]
     cameras = list(truth.cameras)
-    cameras[1] = replace(cameras[1], normal=rodrigues([1, 2, 3], 0.05) @ cameras[1].normal)
+    wrong = rodrigues([1, 2, 3], 0.05) @ cameras[1].normal
+    cameras[1] = replace(cameras[1], normal=wrong, normal_error=3.0)
     start = Rig(cameras) if known else Rig(cameras).uncalibrated()
-    clean = learn_normal(tracks, start, 1)
+    clean = learn_cameras(tracks, start)
     for i, frame in enumerate(rng.choice(500, 9, replace=False)):
         tracks[i % 3][frame] += [(300, -200), (-30, 40)][i % 2]
-    found = learn_normal(tracks, start, 1)
+    found = learn_cameras(tracks, start)
     for ours, theirs in zip(found.cameras, clean.cameras, strict=True):
         np.testing.assert_allclose(ours.normal, theirs.normal, atol=3e-4)
     assert np.abs(calibration_errors(found, clean)).max() < 3e-4
@@ -687,9 +688,10 @@ class TestPosition:
         _, rig, tracks, _ = scene(8, cameras=4)
         start = self.without(rig.uncalibrated(), 3)
         true = start.cameras[1].normal
-        wrong = replace(start.cameras[1], normal=rodrigues([0, 0, 1], 0.1) @ true)
+        wrong = rodrigues([0, 0, 1], 0.1) @ true
+        second = replace(start.cameras[1], normal=wrong, normal_error=6.0)
         first, _, third, fourth = start.cameras
-        found = learn_normal(tracks, Rig([first, wrong, third, fourth]), 1)
+        found = learn_cameras(tracks, Rig([first, second, third, fourth]))
         np.testing.assert_allclose(found.cameras[1].normal, true, atol=1e-4)
 
     def test_file(self, small, tmp_path):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
 from vidsindy_lite.dynamics.persistence import Plateau, follow
@@ -13,6 +14,8 @@ from vidsindy_lite.dynamics.problem import Units, pose
 from vidsindy_lite.dynamics.splines import DEGREE, Segment
 from vidsindy_lite.dynamics.trajectories import check_trajectories
 from vidsindy_lite.study import SYSTEMS, corruption
+
+CUBIC = Library.polynomial(3)
 
 NOISE = 0.03
 
@@ -31,7 +34,7 @@ def fitted(duffing, dropped=None):
     """The problem in units in which it is standard already, and a fit with the support given."""
     law, t, x = duffing
     problem = replace(
-        pose([(t, x)], [np.empty((*x.shape, 0))], degree=3, rng=np.random.default_rng(0)),
+        pose([(t, x)], [np.empty((*x.shape, 0))], CUBIC, rng=np.random.default_rng(0)),
         trajectories=[(t, x)],
         units=Units(np.zeros(2), np.ones(2), 1.0),
         noise=np.full(2, NOISE),

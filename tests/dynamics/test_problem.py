@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Fit, State, Status
 from vidsindy_lite.dynamics.errors import residual_noise
 from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
@@ -17,7 +18,8 @@ def posed(noise=0.0, seen=slice(None)):
     x = np.stack([3 + 2 * np.sin(t), 0.1 * np.cos(t)], axis=1)
     x += noise * np.array([2, 0.1]) * np.random.default_rng(0).normal(size=x.shape)
     t, x = t[seen], x[seen]
-    return pose([(t, x)], [np.ones((len(t), 2, 1))], degree=2, rng=np.random.default_rng(0))
+    library = Library.polynomial(2)
+    return pose([(t, x)], [np.ones((len(t), 2, 1))], library, rng=np.random.default_rng(0))
 
 
 def fit_of(problem, moving=(True, False)):

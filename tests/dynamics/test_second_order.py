@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
+from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.library import shift_matrix
 from vidsindy_lite.dynamics.order import ADVICE, SETTLED, accelerated, better, unexplained
@@ -172,7 +173,8 @@ def test_the_place_where_a_spring_rests_is_found(seed):
 def test_an_axis_leaves_home_where_terms_make_up_for_its_staying():
     t = np.linspace(0, 20, 100)
     x = moving(duffing, [1.5], [0.0], t)
-    problem = pose([(t, x)], [np.empty((100, 1, 0))], 3, np.random.default_rng(0), order=2)
+    library, rng = Library.polynomial(3), np.random.default_rng(0)
+    problem = pose([(t, x)], [np.empty((100, 1, 0))], library, rng, order=2)
     exponents, zeros = problem.exponents, np.zeros(2)
     coefficients = np.zeros(exponents.shape)
     for term, value in {(1, 0): -1.0, (0, 1): -0.1, (3, 0): -0.5}.items():
@@ -194,11 +196,11 @@ def test_an_order_that_is_none():
 
 
 def test_what_is_known_is_no_candidate():
-    form = Form.of(2, 2, order=2)
+    form = Form.of(2, Library.polynomial(2), order=2)
     assert form.names == ("x", "y", "vx", "vy")
     assert not form.candidates[form.known != 0].any()
     assert form.candidates.sum() == len(form.searched) == 2 * len(form.exponents)
-    first = Form.of(3, 2, order=1)
+    first = Form.of(3, Library.polynomial(2), order=1)
     assert first.candidates.all()
     assert not first.known.any()
     assert first.movable.all()

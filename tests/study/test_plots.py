@@ -4,8 +4,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas
 import pytest
+from helpers import room, walk
 from mpl_toolkits.mplot3d import proj3d
 
+from vidsindy_lite import Rig
 from vidsindy_lite.study import lab, plots
 
 
@@ -37,6 +39,27 @@ def test_the_scene_in_the_lab_fills_its_half_and_nothing_is_cut_off():
         assert box.y0 >= 0
         assert box.x1 <= figure.bbox.width
         assert box.y1 <= figure.bbox.height
+
+
+@pytest.mark.parametrize("kind", ["orthographic", "perspective"])
+def test_lines_of_sight_lead_from_the_path_to_the_cameras(kind):
+    x = walk(np.arange(80))
+    x[:7] = np.nan
+    rig = room(np.random.default_rng(0)) if kind == "perspective" else Rig.around(x)
+    (axes,) = plots.plot_rig(rig, x).axes
+    assert axes.get_xlabel() == "x (scene units)"
+    for i, camera in enumerate(rig.cameras):
+        sights = [line.get_data_3d() for line in axes.lines if line.get_color() == f"C{i}"
+                  and line.get_linestyle() == ":"]  # fmt: skip
+        assert len(sights) == 5
+        for sight in np.swapaxes(sights, 1, 2):
+            start, end = sight
+            assert np.abs(x[7:] - start).sum(axis=1).min() < 1e-12
+            assert start.tolist() not in ([np.nan] * 3, end.tolist())
+            np.testing.assert_allclose(camera.project(sight[:1] + 0.3 * (end - start)),
+                                       camera.project(sight[:1]), atol=1e-6)  # fmt: skip
+            if kind == "perspective":
+                np.testing.assert_allclose(end, camera.position)
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,14 @@ import pytest
 from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
-    _background_motion,
     _largest_component,
     _median,
+    _others,
     _reduce,
     _shape,
+    _unrest,
     camera_motion,
+    light,
     sample_frames,
     track_blobs,
     view_distances,
@@ -55,21 +57,44 @@ def test_a_displaced_view_is_measured(texture, shift):
     change = -(shift[0] * slope[0] + shift[1] * slope[1])
     changes = [(change + rng.normal(0, 0.1, change.shape)).astype(np.float32)] * 3
     found = camera_motion(texture, changes, 1e3)
-    assert found == pytest.approx(4 * np.hypot(*shift), rel=0.05)  # in pixels of the video
+    np.testing.assert_allclose(found, 4 * np.hypot(*shift), rtol=0.05)  # in pixels of the video
     still = [rng.normal(0, 1, texture.shape).astype(np.float32) for _ in range(5)]
-    assert camera_motion(texture, still, 1e3) == 0
+    np.testing.assert_array_equal(camera_motion(texture, still, 1e3), 0)
 
 
-def test_what_differs_far_from_the_target_is_motion_of_the_background():
+def test_what_differs_far_from_the_target_is_told():
     change = np.zeros((60, 80, 3), np.float32)
     change[10:20, 10:20] = 50  # the target, 100 coarse pixels
     change[10:20, 24:26] = 50  # close by
-    assert _background_motion([change], 8.0) == 0
-    change[40:45, 60:70] = 50  # far away
-    assert _background_motion([change], 8.0) == pytest.approx(0.5)
-    assert _background_motion([change], 100.0) == 0
-    change[:, 30:] = 50  # too large for a target: all of it counts
-    assert _background_motion([change], 8.0) > 1
+    assert _others([change], 8.0) == 0
+    more = change.copy()
+    more[50:52, 60:62] = 50  # far away, however small
+    assert _others([more], 8.0) == 1
+    assert _others([change, more], 8.0) == 0.5
+    assert _others([more], 100.0) == 0
+    change[:, 30:] = 50  # too large for a target
+    assert _others([change], 8.0) == 1
+
+
+def test_one_push_or_one_change_of_light_is_unrest(texture):
+    ground = 100 + texture / 20
+    slope = np.gradient(ground, axis=(1, 0))
+    rng = np.random.default_rng(2)
+    changes = [rng.normal(0, 0.1, ground.shape).astype(np.float32) for _ in range(21)]
+    assert _unrest(ground, changes, 8.0) == ()
+    pushed = [*changes[:20], changes[20] - (0.2 * slope[0]).astype(np.float32)]
+    assert ["camera moves" in doubt for doubt in _unrest(ground, pushed, 8.0)] == [True]
+    dimmed = [*changes[:20], changes[20] - 0.05 * ground]
+    assert any("light changes, by up to 5 %" in doubt for doubt in _unrest(ground, dimmed, 8.0))
+
+
+def test_light_is_measured_where_most_of_the_image_agrees():
+    then = np.full((60, 80, 3), 100, np.float32)
+    now = 0.9 * then
+    now[10:20, 10:20] = 255
+    np.testing.assert_allclose(light(now, then, np.ones((60, 80), bool)), 0.9, rtol=1e-6)
+    dark = np.full((60, 80, 3), 5, np.float32)
+    np.testing.assert_array_equal(light(2 * dark, dark, np.ones((60, 80), bool)), 1)
 
 
 def test_the_largest_component_by_area_or_by_weight():
@@ -118,8 +143,7 @@ def test_the_model_of_a_film(variance):
     assert off.mean() <= (0 if variance == 0 else 6)
     assert model.noise == pytest.approx(255 * np.sqrt(variance), rel=0.15)
     assert model.area == pytest.approx(np.pi * 8**2, rel=0.2)
-    assert model.background_motion < 0.3
-    assert model.camera_motion == 0
+    assert model.unrest == ()
     blobs = list(track_blobs(model, frames))
     error = np.array([b.centroid for b in blobs]) - truth
     assert np.sqrt(np.mean(error**2)) < (0.01 if variance == 0 else 0.1)
@@ -179,7 +203,8 @@ def test_what_is_learned_of_a_square(plain):
     np.testing.assert_array_equal(plain.background, squares())
     assert plain.area == 16**2
     np.testing.assert_array_equal(plain.contrast[0, 0], np.subtract(TARGET, GROUND))
-    assert plain.noise == plain.camera_motion == plain.background_motion == 0
+    assert plain.noise == 0
+    assert plain.unrest == ()
 
 
 def test_search_finds_the_middle_of_a_square_and_looks_a_little_beyond_it(plain):

@@ -9,7 +9,7 @@ from footage import Phone, camera_maps, write_phone
 
 import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision.candidates import Candidate, Plate, light, reduce
+from vidsindy_lite.vision.candidates import Candidate, Plate, reduce
 from vidsindy_lite.vision.hints import load_hints
 from vidsindy_lite.vision.linking import Sightings, best_path
 from vidsindy_lite.vision.refining import fitting, scatter
@@ -146,15 +146,6 @@ def test_scatter_is_the_noise_of_a_smooth_motion():
     noisy = places + rng.normal(0, 0.2, places.shape)
     assert scatter(frames, places) < 0.01
     assert scatter(frames, noisy) == pytest.approx(0.2, rel=0.15)
-
-
-def test_light_is_measured_where_most_of_the_image_agrees():
-    then = np.full((60, 80, 3), 100, np.float32)
-    now = 0.9 * then
-    now[10:20, 10:20] = 255
-    np.testing.assert_allclose(light(now, then, np.ones((60, 80), bool)), 0.9, rtol=1e-6)
-    dark = np.full((60, 80, 3), 5, np.float32)
-    np.testing.assert_array_equal(light(2 * dark, dark, np.ones((60, 80), bool)), 1)
 
 
 def test_the_plate_of_a_moving_camera():

@@ -13,11 +13,10 @@
     clocks        when the frames of each video were taken
     alignment     tracks at the same instants, whatever the lags, rates and clocks of the videos
     pairs         lags that are promising, from two views at a time
-    joint         cameras, lags and points together, from tracks and a start
  2. calibrate     tracks -> the same `Rig`, with nothing unknown
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
-    adjust        bundle adjustment: cameras and path together (`changes`: of what), `shutter`
+    adjust        bundle adjustment: cameras, clocks, path together (`changes`: of what), `shutter`
     causes        why views do not agree, by trying one thing at a time
     covariance    of errors that depend on their neighbours
     messages      all warnings
@@ -27,7 +26,7 @@ The other rooms import from here alone.
 """
 
 from .alignment import Lags, align, list_lags
-from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_normal
+from .calibrate import calibration_errors, check_learnable, learn_cameras
 from .clocks import Clock
 from .calibrations import read_calibration, write_calibration
 from .causes import GROSS, explain, smooth

@@ -1,6 +1,6 @@
-"""Bundle adjustment: cameras and path together, from what was seen and what was measured.
+"""Bundle adjustment: cameras, clocks and path together, from what was seen and what was measured.
 
-Wanted are the changes p of the cameras (`changes`) and the points x of the path that make
+Wanted are the changes p of cameras and clocks (`changes`) and the points x of the path that make
 
 ::
 
@@ -21,10 +21,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from ..arrays import Bools, Floats
+from .alignment import Footage
 from .camera import Camera
-from .changes import PARTS, at_once, changed, units
+from .changes import PARTS, changed, units
+from .shutter import steadied
 from .triangulate import Views, points_of_views
 
 _OUTLIER = 6.0  # sigma
@@ -32,22 +35,31 @@ _FINEST = 1e-6  # pixels; noise below that is rounding
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
 _STEPS = 60
 _SETTLED = 1e-11  # pixels, or ...
-_ENOUGH = 1e-7  # ... of sigma, by which a last step moves the images
+_ENOUGH = 1e-7  # ... of sigma, by which a last step moves the images, or ...
+_IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
+_LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
+_RIPPLES = 1.05  # noise is less between frames than at them, so that a better lag may cost more
+_LOST = 0.05  # share of what is seen that a step in time may lead out of the video
 _PROBE = 1e-6  # of a unit: slopes are taken over twice that
+_BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
+_FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 _DAMPING = (0.0, 1e-4, 1e-2, 1.0, 1e2)  # tried in turn, until a step leads downhill
+_LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
 
 
 @dataclass(frozen=True)
 class Adjustment:
-    """Cameras of the smallest errors, and what is known of them near by.
+    """Cameras and clocks of the smallest errors, and what is known of them near by.
 
     Parameters
     ----------
     cameras : tuple of Camera
+    footage : Footage
+        With its lags and rates.
     errors : ndarray, shape (m, SIZE)
         As they were given.
     change : ndarray, shape (m, SIZE)
-        Of each camera, from the start.
+        Of each camera and its clock, from the start.
     misses : ndarray, shape (n, 2 m)
         Residuals, pixels; NaN where nothing is seen or no point is found.
     weights : ndarray, shape (n,)
@@ -63,6 +75,7 @@ class Adjustment:
     """
 
     cameras: tuple[Camera, ...]
+    footage: Footage
     errors: Floats
     change: Floats
     misses: Floats
@@ -78,75 +91,110 @@ class Adjustment:
         """Information of the measurements on the free changes, (p,)."""
         return self.errors[self.errors > 0] ** -2.0
 
+    @property
+    def weighed(self) -> tuple[Floats, Floats]:
+        """Residuals and slopes times the roots of the weights, zero where nothing is seen."""
+        root = np.sqrt(self.weights)[:, None]
+        return root * np.nan_to_num(self.misses), root[..., None] * self.slopes
 
-def adjust(views: Views, start: Sequence[Camera], errors: Floats) -> Adjustment:
-    """The cameras of the smallest errors near a start, see the module.
+
+def adjust(
+    footage: Footage,
+    start: Sequence[Camera],
+    errors: Floats,
+    *,
+    begin: Floats | None = None,
+    used: Bools | None = None,
+    most: int | None = None,
+) -> Adjustment:
+    """The cameras and clocks of the smallest errors near a start, see the module.
 
     Parameters
     ----------
-    views : Views
+    footage : Footage
     start : sequence of Camera
         Calibrated and placed.
     errors : ndarray, shape (m, SIZE)
         Standard errors of the start: zero what is exactly known, infinite what is not at all.
+    begin : ndarray, shape (m, SIZE), optional
+        Changes from which the search begins; by default none.
+    used : ndarray of bool, shape (n,), optional
+        Which instants count; by default all.
+    most : int, optional
+        Steps.
     """
-    problem = _Problem.of(views, start, errors)
-    change = np.zeros((errors > 0).sum())
-    state = problem.at(change, problem.begin)
+    change = np.zeros(errors.shape) if begin is None else begin
+    problem, state = _Problem.of(footage, start, errors, change, used)
     noise = _noise(state.misses)
     settled, steps = False, 0
-    while not settled and steps < _STEPS:
-        weights = _weights(state.misses, noise)
+    while not settled and steps < (_STEPS if most is None else most):
+        weights = problem.weights(state, noise)
         moved, step = _downhill(problem, state, weights, noise)
         if moved is None:  # rounding is all that is left
             settled = True
         else:
             state, before = moved, noise
             noise = _noise(state.misses)
-            settled = step <= max(_SETTLED, _ENOUGH * noise) and noise >= before * (1 - 1e-3)
+            enough = _IN_TIME if problem.timed else _ENOUGH
+            settled = step <= max(_SETTLED, enough * noise) and noise >= before * (1 - 1e-3)
         steps += 1
     return problem.result(state, noise, settled, steps)
 
 
-def linearised(views: Views, cameras: Sequence[Camera], errors: Floats) -> Adjustment:
-    """What is known near cameras that were adjusted before."""
-    problem = _Problem.of(views, cameras, errors)
-    state = problem.at(np.zeros((errors > 0).sum()), problem.begin)
-    return problem.result(state, _noise(state.misses), settled=True, steps=0)
+def linearised(footage: Footage, cameras: Sequence[Camera], errors: Floats) -> Adjustment:
+    """What is known near cameras and clocks that were adjusted before."""
+    return adjust(footage, cameras, errors, most=0)
 
 
 @dataclass(frozen=True)
 class _State:
-    """Changes, (p,), points, (n, 3), the cameras, and by how much they miss the tracks."""
+    """Changes, (p,), points, (n, 3), cameras, clocks, and by how much they miss the tracks."""
 
     change: Floats
     points: Floats
     cameras: tuple[Camera, ...]
+    footage: Footage
     misses: Floats
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """The tracks, the start, what is free of it, and the frames in which a point can be found."""
+    """What was filmed, the start, what is free of it, and the frames in which a point is found."""
 
-    tracks: tuple[Floats, ...]
+    footage: Footage
     start: tuple[Camera, ...]
     errors: Floats
     found: Bools  # which frames
-    begin: Floats
     unit: Floats  # of each free change, and ...
     reach: float  # ... of points
 
     @classmethod
-    def of(cls, views: Views, start: Sequence[Camera], errors: Floats) -> _Problem:
-        """Start, and units from the size of the path."""
-        points = points_of_views(views, start)
-        found = np.asarray(np.isfinite(points).all(axis=1))
-        begin = points[found]
-        reach = float(np.sqrt(np.mean(np.var(begin, axis=0)))) if len(begin) else 1.0
+    def of(
+        cls,
+        footage: Footage,
+        start: Sequence[Camera],
+        errors: Floats,
+        change: Floats,
+        used: Bools | None,
+    ) -> tuple[_Problem, _State]:
+        """Units from the size of the path, and the first state."""
+        every = np.ones(len(footage.instants), bool)
+        blank = cls(footage, tuple(start), errors, every, np.ones(0), 1.0)
+        cameras, moved = blank.changed(change)
+        seen = [blank.shown(moved, i, camera) for i, camera in enumerate(cameras)]
+        points = points_of_views(Views.of(seen), cameras)
+        found = np.asarray(np.isfinite(points).all(axis=1)) & (every if used is None else used)
+        points = points[found]
+        reach = float(np.sqrt(np.mean(np.var(points, axis=0)))) if len(points) else 1.0
         reach = reach or 1.0
         sizes = np.array([units(reach, float(camera.image_size[0])) for camera in start])
-        return cls(views.tracks, tuple(start), errors, found, begin, sizes[errors > 0], reach)
+        problem = replace(blank, found=found, unit=sizes[errors > 0], reach=reach)
+        return problem, problem.at(change[errors > 0], points)
+
+    @property
+    def timed(self) -> bool:
+        """Whether a clock is unknown."""
+        return bool(self.errors[:, [_LAG, _DRIFT]].any())
 
     def full(self, change: Floats) -> Floats:
         """Changes of all components, (m, SIZE), from those of the free ones."""
@@ -154,19 +202,39 @@ class _Problem:
         every[self.errors > 0] = change
         return every
 
+    def changed(self, change: Floats) -> tuple[tuple[Camera, ...], Footage]:
+        """Cameras and clocks after changes (m, SIZE)."""
+        pairs = zip(self.start, change, strict=True)
+        moved = self.footage
+        if change[:, [_LAG, _DRIFT]].any():
+            moved = moved.later(change[:, _LAG], change[:, _DRIFT])
+        return tuple(changed(camera, part) for camera, part in pairs), moved
+
+    def shown(self, footage: Footage, i: int, camera: Camera) -> Floats:
+        """The track of one camera in all frames, its rows read at once."""
+        return steadied(footage.aligned[i], camera.readout, camera.image_size[1])
+
     def at(self, change: Floats, points: Floats) -> _State:
         """What the cameras miss after a change."""
-        pairs = zip(self.start, self.full(change), strict=True)
-        cameras = tuple(changed(camera, part) for camera, part in pairs)
-        return _State(change, points, cameras, np.hstack([
-            self._missed(i, camera, points, self.full(change)[i])
-            for i, camera in enumerate(cameras)
-        ]))  # fmt: skip
+        cameras, footage = self.changed(self.full(change))
+        missed = np.stack(
+            [self._missed(footage, i, c, points) for i, c in enumerate(cameras)], axis=1
+        )
+        seen = np.isfinite(missed).all(axis=-1)
+        missed[~seen | (seen.sum(axis=1) < 2)[:, None]] = np.nan  # one view has no say
+        return _State(change, points, cameras, footage, missed.reshape(len(points), -1))
 
-    def _missed(self, i: int, camera: Camera, points: Floats, change: Floats) -> Floats:
+    def _missed(self, footage: Footage, i: int, camera: Camera, points: Floats) -> Floats:
         """Track minus image of one camera, (n, 2)."""
-        track = at_once(self.tracks[i], change, camera.image_size[1])
-        return track[self.found] - camera.image(points)
+        return self.shown(footage, i, camera)[self.found] - camera.image(points)
+
+    def weights(self, state: _State, noise: float) -> Floats:
+        """Of each frame, (n,): one, unless it is missed by far, ..."""
+        worst = np.nanmax(np.abs(state.misses), axis=1, initial=0.0)
+        weights = np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2
+        if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
+            weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
+        return weights
 
     def slopes(self, state: _State) -> tuple[Floats, Floats]:
         """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
@@ -175,14 +243,18 @@ class _Problem:
         in_change = np.zeros((len(state.points), 2 * count, len(free)))
         every = self.full(state.change)
         for k, (i, part) in enumerate(free):
-            ends = []
+            columns = slice(2 * i, 2 * i + 2)
+            if part in (_LAG, _DRIFT):
+                in_lag, in_drift = state.footage.slopes(i)
+                in_change[:, columns, k] = (in_lag if part == _LAG else in_drift)[self.found]
+                continue
+            ends, step = [], _PROBE * self.unit[k]
             for sign in (1, -1):
                 moved = every[i].copy()
-                moved[part] += sign * _PROBE * self.unit[k]
+                moved[part] += sign * step
                 camera = changed(self.start[i], moved)
-                ends.append(self._missed(i, camera, state.points, moved))
-            slope = (ends[0] - ends[1]) / (2 * _PROBE * self.unit[k])
-            in_change[:, 2 * i : 2 * i + 2, k] = slope
+                ends.append(self._missed(state.footage, i, camera, state.points))
+            in_change[:, columns, k] = (ends[0] - ends[1]) / (2 * step)
         probe = _PROBE * self.reach
         in_points = np.stack([
             np.hstack([c.image(state.points - e) - c.image(state.points + e)
@@ -190,30 +262,54 @@ class _Problem:
             for e in probe * np.eye(3)
         ], axis=-1)  # fmt: skip
         seen = np.isfinite(state.misses)[..., None]
+        in_change, in_points = np.nan_to_num(in_change), np.nan_to_num(in_points)
         return np.where(seen, in_change, 0.0), np.where(seen, in_points, 0.0)
 
     def result(self, state: _State, noise: float, settled: bool, steps: int) -> Adjustment:
         """All of it, in all frames."""
-        in_change, in_points = self.slopes(state)
-        q, r = np.linalg.qr(in_points)
-        along = q.swapaxes(1, 2) @ in_change
-        frames, (count, width) = len(self.found), in_change.shape[1:]
+        reduced = _Reduced.of(*self.slopes(state), state.misses)
+        frames, (count, width) = len(self.found), reduced.slopes.shape[1:]
         misses, weights = np.full((frames, count), np.nan), np.zeros(frames)
         slopes, path = np.zeros((frames, count, width)), np.zeros((frames, 3, width))
-        misses[self.found], weights[self.found] = state.misses, _weights(state.misses, noise)
-        slopes[self.found], path[self.found] = in_change - q @ along, -np.linalg.solve(r, along)
-        change = self.full(state.change)
+        misses[self.found], weights[self.found] = state.misses, self.weights(state, noise)
+        slopes[self.found], path[self.found] = reduced.slopes, reduced.follow
         return Adjustment(
-            self._read(state, change), self.errors, change, misses, weights, noise, slopes, path,
-            settled, steps,
+            state.cameras, state.footage, self.errors, self.full(state.change), misses, weights,
+            noise, slopes, path, settled, steps,
         )  # fmt: skip
 
-    def _read(self, state: _State, change: Floats) -> tuple[Camera, ...]:
-        """The cameras of a state, with the readout of each in place."""
-        late = change[:, PARTS["readout"]][:, 0]
-        return tuple(
-            replace(c, readout=float(np.clip(c.readout + add, -1, 1))) if add else c
-            for c, add in zip(state.cameras, late, strict=True)
+
+@dataclass(frozen=True)
+class _Reduced:
+    """Slopes, (n, 2 m, p), and misses, (n, 2 m), with the points taken out.
+
+    The points move by `own`, (n, 3), to where they are missed least, and with the changes by
+    `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
+    misses they take up.
+    """
+
+    slopes: Floats
+    misses: Floats
+    own: Floats
+    follow: Floats
+    along: Floats
+
+    @classmethod
+    def of(cls, in_change: Floats, in_points: Floats, misses: Floats) -> _Reduced:
+        """By QR, frame by frame."""
+        q, r = np.linalg.qr(in_points)
+        pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
+        told = pivots.min(axis=1, initial=np.inf) > _FLAT * pivots.max(axis=1, initial=0)
+        q, r = np.where(told[:, None, None], q, 0.0), np.where(told[:, None, None], r, np.eye(3))
+        across = q.swapaxes(1, 2)
+        missed = np.nan_to_num(misses)[..., None]
+        of_change, of_misses = across @ in_change, across @ missed
+        return cls(
+            in_change - q @ of_change,
+            (missed - q @ of_misses)[..., 0],
+            -np.linalg.solve(r, of_misses)[..., 0],
+            -np.linalg.solve(r, of_change),
+            of_misses[..., 0],
         )
 
 
@@ -221,41 +317,43 @@ def _downhill(
     problem: _Problem, state: _State, weights: Floats, noise: float
 ) -> tuple[_State | None, float]:
     """The state after a step that lessens the errors, and how far it moved images, pixels."""
-    in_change, in_points = problem.slopes(state)
-    q, r = np.linalg.qr(in_points)
-    missed = np.nan_to_num(state.misses)[..., None]
-    own = -np.linalg.solve(r, q.swapaxes(1, 2) @ missed)[..., 0]
-    along = q.swapaxes(1, 2) @ in_change
-    slopes = in_change - q @ along
-    left = missed - q @ (q.swapaxes(1, 2) @ missed)
+    reduced = _Reduced.of(*problem.slopes(state), state.misses)
     root = np.sqrt(weights)[:, None] / max(noise, _PRIOR_NOISE)
-    design = (root[..., None] * slopes).reshape(-1, len(state.change))
+    design = (root[..., None] * reduced.slopes).reshape(-1, len(state.change))
     prior = 1 / problem.errors[problem.errors > 0]
     rows = np.vstack((design, np.diag(prior)))
-    target = -np.append((root * left[..., 0]).ravel(), prior * state.change)
+    target = -np.append((root * reduced.misses).ravel(), prior * state.change)
     size = np.sqrt(np.sum(rows**2, axis=0))
     size[size == 0] = 1.0
     factor, triangle = np.linalg.qr(rows / size)
     aim = factor.T @ target
-    seen = np.isfinite(state.misses)
-    here = _cost(state, seen, weights, noise, prior)
+    lags = np.argwhere(problem.errors > 0)[:, 1] == _LAG
+    here = _cost(problem, state, state, weights, noise)
     for damping in _DAMPING:
         damped = np.vstack((triangle, np.sqrt(damping) * np.eye(len(size))))
         full = np.append(aim, np.zeros(len(size)))
         step = np.linalg.lstsq(damped, full, rcond=1e-13)[0] / size
-        points = state.points + own - np.linalg.solve(r, along @ step[:, None])[..., 0]
+        step /= max(np.abs(step[lags]).max(initial=0) / _LONGEST, 1.0)
+        points = state.points + reduced.own + reduced.follow @ step
         moved = problem.at(state.change + step, points)
-        shift = float(np.sqrt(np.mean((slopes @ step) ** 2))) if slopes.size else 0.0
-        if _cost(moved, seen, weights, noise, prior) <= here * (1 + 1e-12) + 1e-18:
-            return moved, max(shift, float(np.abs(q.swapaxes(1, 2) @ missed).max(initial=0)))
+        shift = float(np.sqrt(np.mean((reduced.slopes @ step) ** 2))) if len(step) else 0.0
+        slack = _RIPPLES if problem.timed else 1 + 1e-12
+        if _cost(problem, moved, state, weights, noise) <= here * slack + 1e-18:
+            late = noise * float(np.abs(step[lags]).max(initial=0))
+            return moved, max(shift, late, float(np.abs(reduced.along).max(initial=0)))
     return None, 0.0
 
 
-def _cost(state: _State, seen: Bools, weights: Floats, noise: float, prior: Floats) -> float:
-    """What is to be smallest; infinite if a point that was seen would not be."""
-    if not np.isfinite(state.misses[seen]).all():
+def _cost(
+    problem: _Problem, state: _State, before: _State, weights: Floats, noise: float
+) -> float:
+    """What is to be smallest; infinite if points that were seen before would not be."""
+    seen = np.isfinite(before.misses)
+    lost = ~np.isfinite(state.misses[seen])
+    if lost.any() and lost.mean() > (_LOST if problem.timed else 0.0):
         return np.inf
-    squares = np.nansum(state.misses**2, axis=1)
+    squares = np.nansum(np.where(seen, state.misses, 0.0) ** 2, axis=1)
+    prior = 1 / problem.errors[problem.errors > 0]
     sigma = max(noise, _PRIOR_NOISE)
     return float(np.sum(weights * squares) / sigma**2 + np.sum((prior * state.change) ** 2))
 
@@ -269,9 +367,3 @@ def _noise(misses: Floats) -> float:
     # Of 2 m numbers of a frame its point takes three.
     grown = np.where(seen, np.abs(misses) * np.sqrt(count / np.maximum(count - 3, 1)), 0.0)
     return max(1.4826 * float(np.median(grown[seen])), _FINEST)
-
-
-def _weights(misses: Floats, noise: float) -> Floats:
-    """Of each frame: one, unless it is missed by far."""
-    worst = np.nanmax(np.abs(misses), axis=1, initial=0.0)
-    return np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2

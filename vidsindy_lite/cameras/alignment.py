@@ -9,7 +9,7 @@ camera would have given them: that is the video's `clock`, 0, 1, 2, ... for an e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,6 +45,8 @@ class Lags:
         Why the lags should not be trusted, with advice.
     clocks : tuple of ndarray, shape (n_i,)
         When each frame was taken, see `align`; empty if all videos are even.
+    rate_errors : ndarray, shape (m,)
+        Standard errors of the rates that were learned; zero of the others.
     """
 
     frames: Floats
@@ -53,6 +55,11 @@ class Lags:
     residual: float
     warnings: tuple[str, ...] = ()
     clocks: tuple[Floats, ...] = field(default=(), repr=False)
+    rate_errors: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if not len(self.rate_errors):
+            object.__setattr__(self, "rate_errors", np.zeros(len(self.frames)))
 
     @property
     def agree(self) -> bool:
@@ -104,11 +111,7 @@ def align(
     shifts = check_lags("lags", lags, len(tracks))
     speeds = check_rates(rates, len(tracks))
     ticks = check_clocks(clocks, tracks)
-    curves = map(Curve, tracks, ticks)
-    return tuple(
-        curve.at((ticks[0] - lag) * rate)
-        for curve, lag, rate in zip(curves, shifts, speeds, strict=True)
-    )
+    return Footage(tuple(map(Curve, tracks, ticks)), ticks[0], shifts, speeds).aligned
 
 
 def list_lags(lags: Sequence[float] | Floats) -> str:
@@ -174,6 +177,60 @@ class Curve:
         back, on = (np.clip(frames + step, seen[0], seen[-1]) for step in (-1, 1))
         width = np.maximum(on - back, 1)[..., None]
         return (self._spline(on) - self._spline(back)) / width
+
+
+@dataclass(frozen=True, eq=False)
+class Footage:
+    """What several videos show at the same instants, shape (n,), of the first one's clock.
+
+    Lags and rates, (m,), are those of `align`.
+    """
+
+    curves: tuple[Curve, ...]
+    instants: Floats
+    lags: Floats
+    rates: Floats
+
+    @classmethod
+    def of(cls, tracks: Sequence[Floats]) -> Footage:
+        """Tracks that are at the same instants already."""
+        even = np.arange(len(tracks[0]), dtype=float)
+        still = np.zeros(len(tracks))
+        return cls(tuple(Curve(track, even) for track in tracks), even, still, still + 1)
+
+    @cached_property
+    def span(self) -> float:
+        """Frames from the first instant to the last."""
+        return max(float(np.ptp(self.instants)), 1.0)
+
+    @cached_property
+    def middle(self) -> float:
+        """Half way between them."""
+        return float(self.instants[0] + self.instants[-1]) / 2
+
+    @cached_property
+    def aligned(self) -> tuple[Floats, ...]:
+        """The tracks at the instants, (n, 2)."""
+        frames = map(self.frames, range(len(self.curves)))
+        return tuple(curve.at(at) for curve, at in zip(self.curves, frames, strict=True))
+
+    def frames(self, i: int) -> Floats:
+        """What video i shows at the instants: which of its frames."""
+        return (self.instants - self.lags[i]) * self.rates[i]
+
+    def later(self, lags: Floats, drifts: Floats) -> Footage:
+        """If videos start later by `lags` in the middle, and by `drifts` more at the end, frames.
+
+        The drift is counted from the first instant to the last.
+        """
+        slower = 1 - drifts / self.span
+        behind = self.lags + lags - drifts * self.middle / self.span
+        return replace(self, lags=behind / slower, rates=self.rates * slower)
+
+    def slopes(self, i: int) -> tuple[Floats, Floats]:
+        """Of the tracks of video i in its lag and in its drift, (n, 2) each."""
+        lag = -self.rates[i] * self.curves[i].slope(self.frames(i))
+        return lag, lag * ((self.instants - self.middle) / self.span)[:, None]
 
 
 def check_lags(name: str, lags: ArrayLike, count: int) -> Floats:

@@ -14,9 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Floats
-from ..checks import check_instance, check_integer
-from .adjust import Adjustment, adjust
+from ..arrays import Bools, Floats
+from ..checks import check_instance
+from .adjust import adjust
+from .alignment import Footage
 from .camera import Camera
 from .changes import PARTS, known_to
 from .messages import far_from_measured, unconverged_cameras, undecided_outliers, unsettled_points
@@ -25,6 +26,7 @@ from .rig import Rig
 from .triangulate import (
     Views,
     check_calibrated,
+    check_seen,
     check_views,
     epipolar_design,
     epipolar_lines,
@@ -85,53 +87,25 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     Paper: Eq. (4); by itself it is `learn_cameras_eq4`.
     """
     unknowns = check_learnable(rig)
-    return cameras_of_views(check_views(tracks, rig), unknowns)
-
-
-def learn_normal(tracks: Sequence[Floats], rig: Rig, index: int) -> Rig:
-    """Learn the cameras with the normal of one of them unknown as well.
-
-    For a rig that does not agree with its tracks: if the normal of this camera alone was measured
-    badly, the residuals of the new rig are no larger than the errors of the tracks. Outliers are
-    left out as by `learn_cameras`.
-
-    Parameters
-    ----------
-    tracks, rig
-        See `learn_cameras`.
-    index : int
-        Of the camera.
-
-    Returns
-    -------
-    Rig
-        Its warnings say if a search did not converge.
-
-    Raises
-    ------
-    ValueError
-        See `learn_cameras`.
-    """
-    unknowns = check_learnable(rig)
-    if not check_integer("index", index) < len(rig.cameras):
-        raise ValueError(f"index: must be below {len(rig.cameras)}, the cameras, got {index}")
-    views = check_views(tracks, rig)
-    learned = cameras_of_views(views, unknowns)
-    for _ in range(2):  # where a normal is wrong, small outliers hide behind what it misses
-        learned = _tilted(views, unknowns, learned, index)
-    return learned
-
-
-def _tilted(views: Views, unknowns: Unknowns, learned: Rig, index: int) -> Rig:
-    """The closest cameras if the normal of one is unknown, too, from those that are learned.
-
-    Left out are the frames in which these, if they are orthographic, contradict each other.
-    """
-    if learned.is_orthographic:
-        views = views.only(agreement(views, Unknowns.of(learned))[0].frames)
-    errors = np.array([known_to(camera) for camera in unknowns.cameras])
-    errors[index, PARTS["normal"]] = np.inf
-    return _closest(views, learned.cameras, errors)[1]
+    views, footage = check_views(tracks, rig), Footage.of(check_seen(tracks, rig))
+    errors = np.array([known_to(camera) for camera in rig.cameras])
+    if not errors.any():
+        return Rig(rig.cameras)
+    if not unknowns.any:
+        return _closest(footage, rig.cameras, errors)
+    if all_orthographic(rig.cameras):
+        equations, decided = agreement(views, unknowns)
+        start = unknowns.vector(*solve(equations.design, equations.target, unknowns))
+        agreeing = np.isin(np.arange(views.frames), equations.frames)
+        used = None if unknowns.measured else agreeing
+        learned = _closest(footage, unknowns.filled(start), errors, used)
+        doubts = () if decided else (undecided_outliers(),)
+    else:
+        learned = _closest(footage, _spread(views, unknowns), errors)
+        _, settled = intersect(learned.cameras, views.tracks)
+        left = int((~settled).sum())
+        doubts = (unsettled_points(left, views.frames),) if left else ()
+    return replace(learned, warnings=learned.warnings + doubts)
 
 
 def check_learnable(rig: Rig) -> Unknowns:
@@ -195,28 +169,11 @@ def calibration_errors(rig: Rig, truth: Rig) -> Floats:
     return np.array([(s / r - 1, np.angle(np.exp(1j * (a - b)))) for (s, a), (r, b) in known])
 
 
-def cameras_of_views(views: Views, unknowns: Unknowns) -> Rig:
-    """`learn_cameras` of views and unknowns that were checked."""
-    errors = np.array([known_to(camera) for camera in unknowns.cameras])
-    if not errors.any():
-        return Rig(unknowns.cameras)
-    if all_orthographic(unknowns.cameras):
-        equations, decided = agreement(views, unknowns)
-        start = unknowns.vector(*solve(equations.design, equations.target, unknowns))
-        used = views if unknowns.measured else views.only(equations.frames)
-        _, learned = _closest(used, unknowns.filled(start), errors)
-        doubts = () if decided else (undecided_outliers(),)
-    else:
-        _, learned = _closest(views, _spread(views, unknowns), errors)
-        _, settled = intersect(learned.cameras, views.tracks)
-        left = int((~settled).sum())
-        doubts = (unsettled_points(left, views.frames),) if left else ()
-    return replace(learned, warnings=learned.warnings + doubts)
-
-
-def _closest(views: Views, start: Sequence[Camera], errors: Floats) -> tuple[Adjustment, Rig]:
-    """The cameras of the smallest errors near a start, and the rig that they make."""
-    found = adjust(views, start, errors)
+def _closest(
+    footage: Footage, start: Sequence[Camera], errors: Floats, used: Bools | None = None
+) -> Rig:
+    """The cameras of the smallest errors near a start."""
+    found = adjust(footage, start, errors, used=used)
     doubts: tuple[str, ...] = () if found.settled else (unconverged_cameras(found.steps),)
     measured = (errors > 0) & np.isfinite(errors)
     off = np.where(measured, np.abs(found.change) / np.where(measured, errors, 1.0), 0.0)
@@ -224,7 +181,7 @@ def _closest(views: Views, start: Sequence[Camera], errors: Floats) -> tuple[Adj
         i, part = np.unravel_index(off.argmax(), off.shape)
         what = next(name for name, place in PARTS.items() if place.start <= part < place.stop)
         doubts += (far_from_measured(int(i), what, float(off.max())),)
-    return found, Rig(found.cameras, doubts)
+    return Rig(found.cameras, doubts)
 
 
 def _spread(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:

@@ -21,6 +21,7 @@ from scipy.stats import f as fisher
 
 from ..arrays import Bools, Floats
 from .adjust import Adjustment, adjust, linearised
+from .alignment import Footage
 from .camera import Camera
 from .changes import PARTS, SIZE, NearCamera, known_to
 from .covariance import bandwidth, long_run_covariance
@@ -109,7 +110,8 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation |
     far = smooth(tracks, learned) and _apart(residuals(tracks, learned)) > GROSS
     start = [_near(camera, points[seen].mean(axis=0)) for camera in learned.cameras]
     causes = [c for c in _causes(start) if (c.mask(len(start)) & (errors == 0)).any()]
-    near = linearised(views, start, np.where(errors > 0, errors, np.inf))
+    footage = Footage.of(tracks)
+    near = linearised(footage, start, np.where(errors > 0, errors, np.inf))
     sizes = [_sizes(near, errors, cause) for cause in causes]
     # Where views are far apart, and no noise makes it, no test is needed.
     rank = [explained if far else evidence for evidence, explained in sizes]
@@ -117,7 +119,7 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation |
     best: tuple[float, Explanation] | None = None
     for cause in tried:
         freed = cause.mask(len(start))
-        found = adjust(views, start, np.where(freed, np.inf, errors))
+        found = adjust(footage, start, np.where(freed, np.inf, errors))
         used = np.isfinite(found.misses)
         left = float(np.sum((np.sqrt(found.weights)[:, None] * found.misses)[used] ** 2))
         count = used.sum()
@@ -179,9 +181,7 @@ _FIELDS = {name for name in OrthographicCamera.__dataclass_fields__ if name != "
 
 def _sizes(near: Adjustment, errors: Floats, cause: Cause) -> tuple[float, float]:
     """T over what chance may make it, zero if it would not matter; pixels that it explains."""
-    root = np.sqrt(near.weights)[:, None]
-    missed = root * np.nan_to_num(near.misses)
-    slopes = root[..., None] * near.slopes
+    missed, slopes = near.weighed
     free, wanted = errors[near.errors > 0] > 0, cause.mask(len(errors))[near.errors > 0]
     own = slopes[..., wanted & ~free]
     flat, target = own.reshape(-1, own.shape[-1]), missed.ravel()

@@ -18,7 +18,6 @@ import numpy as np
 from ..arrays import Floats
 from .camera import Camera
 from .models import OrthographicCamera, PerspectiveCamera
-from .shutter import steadied
 
 PARTS = {
     "normal": slice(0, 2),
@@ -80,7 +79,7 @@ def units(width: float, image: float) -> Floats:
 
 
 def changed(camera: Camera, change: Floats) -> Camera:
-    """A calibrated camera after a change. What changes the instants, `at_once` does to a track."""
+    """A calibrated camera after a change; lag and drift are none of its own."""
     part = {name: change[place] for name, place in PARTS.items()}
     values: dict[str, Any] = {}
     if part["normal"].any():
@@ -93,6 +92,8 @@ def changed(camera: Camera, change: Floats) -> Camera:
     if part["distortion"].any() and isinstance(camera, PerspectiveCamera):
         before = np.zeros(5) if camera.distortion is None else camera.distortion
         values["distortion"] = before + np.append(part["distortion"], 0.0)
+    if part["readout"].any():
+        values["readout"] = float(np.clip(camera.readout + part["readout"][0], -1, 1))
     if part["nearness"].any() and isinstance(camera, NearCamera):
         values["nearness"] = camera.nearness + part["nearness"][0]
     moved = replace(camera, **values) if values else camera
@@ -101,10 +102,3 @@ def changed(camera: Camera, change: Floats) -> Camera:
         grown = np.clip(part["scale"][0], -_LARGEST, _LARGEST)
         moved = moved.calibrated(scale * np.exp(grown + 1j * (angle + part["angle"][0])))
     return moved
-
-
-def at_once(track: Floats, change: Floats, height: int) -> Floats:
-    """A track whose rows are seen at the instants that they belong to after a change."""
-    part = {name: float(change[place][0]) for name, place in PARTS.items()}
-    middle = np.linspace(-0.5, 0.5, len(track))
-    return steadied(track, part["readout"], height, part["lag"] + part["drift"] * middle)

@@ -37,11 +37,11 @@ def unsettled_points(count: int, frames: int) -> str:
     )
 
 
-def unsettled_lags(step: float) -> str:
+def unsettled_lags(steps: int) -> str:
     """The search for fractions of a frame ran out of steps."""
     return (
-        f"the search for the lags of the videos did not converge: its last step was {step:.2g} "
-        "frames; give the lags if you know them"
+        f"the search for the lags of the videos did not converge in {steps} steps: give the lags "
+        "if you know them"
     )
 
 

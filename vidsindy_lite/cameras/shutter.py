@@ -12,16 +12,12 @@ from ..arrays import Floats
 _LARGEST = 0.49  # frames; so instants never overtake each other, whatever an outlier says
 
 
-def steadied(track: Floats, readout: float, height: int, late: float | Floats = 0.0) -> Floats:
-    """What a camera that reads all rows at once would have seen: the track at whole frames.
-
-    `late` is by how many frames each one was taken later still, at most half a frame.
-    """
+def steadied(track: Floats, readout: float, height: int) -> Floats:
+    """What a camera that reads all rows at once would have seen: the track at whole frames."""
     seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    if (readout == 0 and not np.any(late)) or len(seen) < 4:
+    if readout == 0 or len(seen) < 4:
         return track
     behind = readout * (track[seen, 1] - (height - 1) / 2) / height
-    behind = behind + np.broadcast_to(late, len(track))[seen]
     instants = seen + np.clip(behind, -_LARGEST, _LARGEST)
     still = track.copy()
     still[seen] = make_interp_spline(instants, track[seen], k=3)(seen)

@@ -8,11 +8,12 @@ are found in three steps:
    linear in what is unknown of the other camera, and is solved at all whole lags at once. It is
    solved a second time with a shift of the other image, which takes up most of what a badly
    measured normal or position does;
-2. all cameras together (`joint`), in some of the frames, from the most promising whole lags;
+2. all cameras together (`adjust`), in some of the frames, from the most promising whole lags;
 3. from the best of these, in all frames.
 
-If cameras that may turn and zoom a little explain the tracks far better than those of the rig, the
-lags are taken from these: a wrong normal is no reason for a wrong lag.
+What was measured with an error may change with the lags. If cameras that may turn and zoom a little
+although they are called exact explain the tracks far better, the lags are taken from these: a wrong
+normal is no reason for a wrong lag.
 
 A motion that repeats itself fits at several lags, one that hardly moves at all of them: then the
 result says so.
@@ -27,15 +28,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
-from ..arrays import Floats
-from .alignment import Curve, Lags, check_clocks, check_lags, check_rates, list_lags
+from ..arrays import Bools, Floats
+from .adjust import Adjustment, adjust
+from .alignment import Curve, Footage, Lags, check_clocks, check_lags, check_rates, list_lags
 from .calibrate import check_learnable
-from .joint import WAYS, Fit, Scene, fit, roughly_fit
+from .camera import Camera
+from .changes import PARTS, known_to
+from .covariance import long_run_covariance
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
 from .pairs import promising_lags, rough_cameras
 from .rig import Rig
-from .triangulate import Views, check_seen, residuals
-from .uncertainty import long_run_covariance
+from .shutter import steadied
+from .triangulate import Views, check_seen, residuals, residuals_of_views
 from .unknowns import Unknowns
 
 DISAGREEMENT = 1.0
@@ -49,17 +53,18 @@ FINE = 0.05
 """... and residual in pixels below which all do: real tracks are no better than that."""
 
 _INSTANTS = 300  # at which all cameras are compared in the second step
-_ROUNDS = 8  # of the second step
+_ROUGH_STEPS = 8  # of the second step
 _TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
 _BETTER_PART = 0.7  # of all frames, in which no view is an outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
 _SHOWN = 3  # of the lags that fit equally well
-_SETTLED = 1e-2  # frames, of the last step in a lag
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 _BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
 _CLEAR = 5.0  # standard errors by which a clock must drift, ...
-_DRIFT = 0.05  # ... and frames over the whole video
+_ENOUGH = 0.05  # ... and frames over the whole video
+_USED = 0.5  # weight of an instant that holds no outlier
+_TIMES = _LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
 
 
 def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
@@ -125,7 +130,11 @@ def learn_lags(
     first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
     given = check_rates(rates, len(tracks))
     with tqdm(desc="synchronise", unit="fit", delay=2, disable=not progress) as bar:
-        curves = tuple(map(Curve, tracks, check_clocks(clocks, tracks)))
+        still = [
+            steadied(track, camera.readout, camera.image_size[1])
+            for track, camera in zip(tracks, rig.cameras, strict=True)
+        ]
+        curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
         found = _learned(_Videos(curves, unknowns, given, bar), first)
     return found if clocks is None else replace(found, clocks=tuple(c.clock for c in curves))
 
@@ -144,65 +153,92 @@ class _Videos:
         """Frames from one to the next of those in which all cameras are compared."""
         return max(1, len(self.curves[0].clock) // _INSTANTS)
 
-    def scene(self, lags: Floats, step: int = 1, loose: bool = False) -> Scene | None:
-        """Every so many instants, with the cameras that the closed form finds at these lags.
+    def footage(self, lags: Floats, step: int = 1) -> Footage:
+        """Every so many instants."""
+        return Footage(self.curves, self.curves[0].clock[::step], lags, self.rates)
 
-        None if it finds none.
-        """
-        count, unknowns = len(self.curves), self.unknowns
-        instants = self.curves[0].clock[::step]
-        at = [
-            c.at((instants - k) * r) for c, k, r in zip(self.curves, lags, self.rates, strict=True)
-        ]
-        if not all(np.isfinite(track).any() for track in at):
+    def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
+        """Those that the closed form finds; None if it finds none."""
+        tracks = footage.aligned
+        if not all(np.isfinite(track).any() for track in tracks):
             return None
-        cameras = rough_cameras(Views.of(at), unknowns)
-        if cameras is None:
-            return None
-        spreads = np.zeros((count, WAYS))
-        spreads[:, :4] = _LOOSE * loose
-        spreads[unknowns.uncalibrated, 2:4] = np.inf
-        spreads[unknowns.unplaced, 4:] = np.inf
-        still = np.zeros(count, bool)
-        return Scene(self.curves, instants, self.rates, cameras, spreads, unknowns.width, still)
+        return rough_cameras(Views.of(tracks), self.unknowns)
+
+    def errors(self, loose: bool = False) -> Floats:
+        """What is known of cameras, and of all lags but the first one's nothing."""
+        errors = np.array([known_to(camera) for camera in self.unknowns.cameras])
+        errors[:, PARTS["readout"]] = 0.0  # was undone
+        errors[1:, PARTS["lag"]] = np.inf
+        if loose:
+            ways = np.zeros(errors.shape, bool)
+            for what in ("normal", "angle", "scale"):
+                ways[:, PARTS[what]] = True
+            errors[ways & (errors == 0)] = _LOOSE
+        return errors
 
     def fitted(self, lags: Floats, step: int = 1, loose: bool = False) -> _Fitted | None:
         """The best lags near given ones; None if nothing fits."""
         self.bar.update()
-        scene = self.scene(lags, step, loose)
-        if scene is None:
+        footage = self.footage(lags, step)
+        cameras = self.cameras(footage)
+        if cameras is None:
             return None
-        start = scene.start(lags)
-        found = fit(scene, start) if step == 1 else roughly_fit(scene, start, _ROUNDS)
-        return None if found is None else _Fitted(scene, found)
+        errors = self.errors(loose)
+        return _Fitted.of(footage, cameras, errors, most=None if step == 1 else _ROUGH_STEPS)
 
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """What was fitted, and how."""
+    """What was fitted, and to what."""
 
-    scene: Scene
-    fit: Fit
+    footage: Footage
+    cameras: tuple[Camera, ...]
+    fit: Adjustment
+
+    @classmethod
+    def of(
+        cls,
+        footage: Footage,
+        cameras: tuple[Camera, ...],
+        errors: Floats,
+        *,
+        begin: Floats | None = None,
+        most: int | None = None,
+    ) -> _Fitted | None:
+        """None if the views have too little in common."""
+        fit = adjust(footage, cameras, errors, begin=begin, most=most)
+        told = np.isfinite(fit.misses).any(axis=1).sum()
+        return cls(footage, cameras, fit) if 3 * told > np.isinf(errors[:, _TIMES]).sum() else None
 
     @property
     def lags(self) -> Floats:
         """In frames."""
-        return self.fit.estimate.lags
+        return self.fit.footage.lags
+
+    @property
+    def used(self) -> Bools:
+        """Instants that hold no outlier."""
+        return self.fit.weights > _USED
+
+    @property
+    def missed(self) -> Floats:
+        """Residuals, (m, n, 2)."""
+        return np.stack(np.split(self.fit.misses, len(self.cameras), axis=1))
 
     @property
     def residual(self) -> float:
         """The worst camera's, pixels."""
-        return max(_trimmed(part) for part in np.moveaxis(self.fit.missed, 1, 0))
+        return max(map(_trimmed, self.missed))
 
     @property
     def score(self) -> float:
         """The same, if errors are normal but for some outliers: from the better part of them."""
-        return max(_trimmed(part, _BETTER_PART) for part in np.moveaxis(self.fit.missed, 1, 0))
+        return max(_trimmed(part, _BETTER_PART) for part in self.missed)
 
     @property
     def persists(self) -> bool:
         """Whether residuals are like those of the next frame, as tracking errors are not."""
-        missed = self.fit.missed[self.fit.used].reshape(self.fit.used.sum(), -1)
+        missed = self.fit.misses[self.used]
         now, then = missed[:-1], missed[1:]
         both = np.isfinite(now) & np.isfinite(then)
         return bool(np.sum((now * then)[both]) > _PERSISTENT * np.sum((now**2)[both]))
@@ -316,60 +352,67 @@ def _different(found: list[_Fitted]) -> list[_Fitted]:
 
 def _drifted(found: _Fitted) -> _Fitted:
     """The same with the drifts of clocks that are clear and large enough to matter, if any are."""
-    scene, count = found.scene, len(found.lags)
-    tried = replace(scene, drifting=np.arange(count) > 0)
-    free = fit(tried, found.fit.estimate)
+    errors, change = found.fit.errors.copy(), found.fit.change
+    errors[1:, _DRIFT] = np.inf
+    free = _Fitted.of(found.footage, found.cameras, errors, begin=change)
     if free is None:
         return found
-    span = np.ptp(scene.instants)
-    drift, errors = free.estimate.drifts * span, np.zeros(count)
-    covariance = _covariance(tried, free)
-    errors[1:] = np.sqrt(np.diag(covariance))[count - 1 :] * 1.0
-    clear = np.abs(drift) > np.maximum(_CLEAR * errors, _DRIFT)
+    drift, off = free.fit.change[:, _DRIFT], np.zeros(len(errors))
+    off[1:] = np.sqrt(np.diag(_covariance(free)))[len(off) - 1 :]
+    clear = np.abs(drift) > np.maximum(_CLEAR * off, _ENOUGH)
     if not clear.any():
         return found
-    kept = replace(scene, drifting=clear)
-    start = replace(free.estimate, drifts=np.where(clear, free.estimate.drifts, 0))
-    again = fit(kept, start)
-    return found if again is None else _Fitted(kept, again)
+    errors[~clear, _DRIFT] = 0.0
+    begin = np.where(errors > 0, free.fit.change, 0.0)
+    return _Fitted.of(found.footage, found.cameras, errors, begin=begin) or found
 
 
-def _covariance(scene: Scene, found: Fit) -> Floats:
+def _covariance(found: _Fitted) -> Floats:
     """Of lags and drifts, if that of cameras is known as well as the tracks tell it.
 
     Residuals may depend on those of the frames beside: the larger of both variances counts.
     """
-    slopes, missed = found.slopes[found.used], np.nan_to_num(found.missed[found.used])
-    square = np.einsum("nik,nil->kl", slopes, slopes)
-    spreads = scene.spreads[scene.spreads > 0]
-    square[np.diag_indices(len(spreads))] += found.noise / spreads**2
+    fit = found.fit
+    missed, slopes = fit.weighed
+    square = np.einsum("nik,nil->kl", slopes, slopes) + fit.noise**2 * np.diag(fit.prior)
     bread = np.linalg.pinv(square, hermitian=True)
-    scores = np.einsum("nik,ni->nk", slopes, missed.reshape(len(missed), -1)) @ bread
-    white, robust = found.noise * bread, long_run_covariance(scores) * len(scores)
+    scores = np.einsum("nik,ni->nk", slopes, missed) @ bread
+    white, robust = fit.noise**2 * bread, long_run_covariance(scores) * len(scores)
     more = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(white), 1e-300), 1))
-    return (white * np.outer(more, more))[len(spreads) :, len(spreads) :]
+    covariance = white * np.outer(more, more)
+    parts = np.argwhere(fit.errors > 0)[:, 1]
+    order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
+    return covariance[np.ix_(order, order)]
 
 
 def _told(videos: _Videos, found: _Fitted, first: Floats) -> Lags:
     """What a fit tells of the lags, or that it tells nothing."""
-    lags, rates = found.lags.copy(), videos.rates * (1 + found.fit.estimate.drifts)
+    fit, lags = found.fit, found.lags.copy()
     count = len(lags) - 1
-    covariance = _covariance(found.scene, found.fit)[:count, :count]
     share = _shares(found)
     if not share.all():
         return _untold(videos, first, found.score <= DISAGREEMENT)
-    information = np.linalg.pinv(covariance, hermitian=True) * np.sqrt(np.outer(share, share))
+    covariance, rate_errors = _covariance(found), np.zeros(len(lags))
+    drifting = fit.errors[:, _DRIFT] > 0
+    rate_errors[drifting] = np.sqrt(np.diag(covariance)[count:]) / fit.footage.span
+    # Lags are those of the first instant, those of the fit of the middle.
+    moved = np.hstack((np.eye(count), -np.eye(count)[:, drifting[1:]] * fit.footage.middle
+                       / fit.footage.span))  # fmt: skip
+    information = np.linalg.pinv(moved @ covariance @ moved.T, hermitian=True)
+    information *= np.sqrt(np.outer(share, share))
     errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information, hermitian=True)))))
     # Schwarz's criterion: a fraction is one more unknown per video.
     rounded = np.rint(lags) + 0.0  # and not -0
     beside = (rounded - lags)[1:]
-    if beside @ information @ beside < count * np.log(found.fit.used.sum()):
+    if beside @ information @ beside < count * np.log(found.used.sum()):
         lags = rounded
     blurred = np.flatnonzero(errors > BLURRED)
     warnings = [blurred_lag(int(i) + 1, lags[i]) for i in blurred]
-    if found.fit.last > _SETTLED:
-        warnings.append(unsettled_lags(found.fit.last))
-    return Lags(lags, rates, errors, found.residual, tuple(warnings))
+    if not fit.settled:
+        warnings.append(unsettled_lags(fit.steps))
+    return Lags(
+        lags, fit.footage.rates, errors, found.residual, tuple(warnings), rate_errors=rate_errors
+    )
 
 
 def _shares(found: _Fitted) -> Floats:
@@ -378,14 +421,17 @@ def _shares(found: _Fitted) -> Floats:
     Interpolated noise has a slope, too: with a variance of half of the noise's, as it is taken
     between two frames that are two apart.
     """
-    scene, fit = found.scene, found.fit
-    ways = int((scene.spreads > 0).sum())
-    slopes = fit.slopes[fit.used].reshape(-1, fit.slopes.shape[-1])
-    lags = slopes[:, ways : ways + len(found.lags) - 1]
-    others = slopes[:, :ways]
-    lags = lags - others @ np.linalg.lstsq(others, lags)[0] if ways else lags
-    freedom = np.maximum(fit.freedom[fit.used].sum(axis=0)[1:], 1e-9)
-    chance = 0.5 * fit.noise * scene.rates[1:] ** 2 * (freedom + 2 * np.sqrt(2 * freedom))
+    fit, used = found.fit, found.used
+    slopes = fit.slopes[used].reshape(-1, fit.slopes.shape[-1])
+    parts = np.argwhere(fit.errors > 0)[:, 1]
+    lags, others = slopes[:, parts == _LAG], slopes[:, ~np.isin(parts, _TIMES)]
+    lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
+    # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
+    seen = np.isfinite(found.missed[:, used, 0])
+    views = np.maximum(seen.sum(axis=0), 2)
+    freedom = np.maximum((seen * (2 - 3 / views)).sum(axis=1)[1:], 1e-9)
+    speeds = fit.footage.rates[1:]
+    chance = 0.5 * fit.noise**2 * speeds**2 * (freedom + 2 * np.sqrt(2 * freedom))
     total = np.sum(lags**2, axis=0)
     return np.clip((total - chance) / np.maximum(total, 1e-300), 0, 1)
 
@@ -393,10 +439,11 @@ def _shares(found: _Fitted) -> Floats:
 def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     """Lags of which the tracks tell nothing, as all agree or none; the first one is the clock."""
     errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
-    residual, scene = np.inf, videos.scene(lags)
-    if scene is not None:
-        missed = scene.missed(scene.start(lags))
-        residual = max(_trimmed(part) for part in np.moveaxis(missed, 1, 0))
+    residual, footage = np.inf, videos.footage(lags)
+    cameras = videos.cameras(footage)
+    if cameras is not None:
+        missed = residuals_of_views(Views.of(footage.aligned), cameras)
+        residual = max(map(_trimmed, missed))
     warnings = [blurred_lag(i + 1, lags[i]) for i in range(1, len(lags))]
     if not agree:
         warnings = [no_lags(list_lags(lags), residual)]

@@ -28,22 +28,17 @@ import numpy as np
 
 from ..arrays import Floats
 from .adjust import linearised
-from .alignment import Lags, align
-from .changes import known_to
+from .alignment import Curve, Footage, Lags, check_clocks
+from .changes import PARTS, known_to
 from .covariance import long_run_covariance
-from .joint import OUTLIER
 from .rig import Rig
 from .triangulate import (
-    Views,
     check_calibrated,
     check_views,
     points_of_views,
     residuals_of_views,
     views_of,
 )
-
-PROBE = 0.05
-"""Frames; slopes in a lag are taken over twice that."""
 
 _SMALLEST = 1e-4  # of the largest mode
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
@@ -59,7 +54,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     rig, learned : Rig
         Before and after `learn_cameras`.
     lags : Lags
-        Lags with a standard error of zero or infinity are taken as they are.
+        Lags and rates with a standard error of zero or infinity are taken as they are.
 
     Returns
     -------
@@ -70,35 +65,18 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
         unit of length, which are as uncertain as the measurements leave them.
     """
     errors = np.array([known_to(camera) for camera in rig.cameras])
-    moving = np.flatnonzero((lags.errors > 0) & np.isfinite(lags.errors))
-    clocks = lags.clocks or None
-
-    def views(shift: Floats) -> Views:
-        return views_of(
-            align(tracks, lags.frames + shift, lags.rates, clocks), learned.cameras
-        )
-
-    def both(shift: Floats) -> Floats:
-        """Residuals and path, side by side, at other lags."""
-        seen, cameras = views(shift), learned.cameras
-        return np.hstack((*residuals_of_views(seen, cameras), points_of_views(seen, cameras)))
-
-    still = views(0 * lags.frames)
-    near = linearised(still, learned.cameras, errors)
-    shifts = PROBE * np.eye(len(lags.frames))[moving]
-    late = [(both(shift) - both(-shift)) / (2 * PROBE) for shift in shifts]
-    slopes = np.concatenate((near.slopes, near.path_slopes), axis=1)
-    slopes = np.concatenate((slopes, *(part[..., None] for part in late)), axis=-1)
-    missed, slope = near.misses, slopes[:, :-3]
-    used = np.isfinite(missed) & np.isfinite(slope).all(axis=-1)
-    limit = OUTLIER * np.median(np.abs(missed[used])) if used.any() else 0.0
-    used &= ~(np.abs(missed) > limit).any(axis=1, keepdims=True)
-    prior = np.append(near.prior, np.zeros(len(moving)))
-    factor = _sandwich(
-        np.where(used, missed, 0), np.where(used[..., None], slope, 0), prior, near.noise
-    )
-    modes = np.einsum("ik,nji->knj", factor, np.nan_to_num(slopes[:, -3:]))
-    return _of_shape(modes, points_of_views(still, learned.cameras)) if prior.any() else modes
+    moving = (lags.errors > 0) & np.isfinite(lags.errors)
+    errors[moving, PARTS["lag"]] = errors[lags.rate_errors > 0, PARTS["drift"]] = np.inf
+    clocks = check_clocks(lags.clocks or None, tracks)
+    curves = tuple(map(Curve, tracks, clocks))
+    footage = Footage(curves, clocks[0], lags.frames, lags.rates)
+    near = linearised(footage, learned.cameras, errors)
+    factor = _sandwich(*near.weighed, near.prior, near.noise)
+    modes = np.einsum("ik,nji->knj", factor, near.path_slopes)
+    if not near.prior.any():
+        return modes
+    still = views_of(footage.aligned, learned.cameras)
+    return _of_shape(modes, points_of_views(still, learned.cameras))
 
 
 def _of_shape(modes: Floats, x: Floats) -> Floats:

@@ -295,7 +295,7 @@ def _page(
     progress: bool = False,
 ) -> str:
     """The report as one HTML page."""
-    total = 3 + (paths is not None) + found.rig.is_orthographic
+    total = 4 + (paths is not None)
     figures = tqdm(_figures(found, paths), desc="report", total=total, disable=not progress)
     about = {"limit": DISAGREEMENT, "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
@@ -314,8 +314,7 @@ def _figures(
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
             yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
-        if found.rig.is_orthographic:
-            yield "rig", _encoded(plot_rig(found.rig, found.x))
+        yield "rig", _encoded(plot_rig(found.rig, found.x))
         missed = residuals(found.tracks, found.rig)
         yield "residuals", _encoded(plot_residuals(found.t, missed, DISAGREEMENT))
         yield "plateaus", _encoded(found.discovery.plot_path())

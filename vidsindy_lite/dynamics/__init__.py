@@ -8,12 +8,14 @@ process_noise (is the motion kicked?), and persistence: which law stays the same
 is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings
 storage: the result as a file; drawing: its path of laws as a picture
-law: polynomials, on a library of monomials; integrate solves it
+law: polynomials, on a library of monomials, also of functions of the state; candidates are the
+libraries that a user asks for; integrate solves a law
 sindy: the same for code that is written for pysindy
 order: first or second, where that is left open
 beside the way: cramer_rao, the least errors that any estimate could have
 """
 
+from .candidates import Library, check_library
 from .collocation import Collocation, State, Status
 from .cramer_rao import cramer_rao
 from .discovery import Discovery

@@ -19,7 +19,7 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from ..arrays import Bools, Floats, Ints
-from .library import monomials, shift_generators
+from .library import Function, along_state, extended, monomials, shift_generators
 from .selection import RIDGE, equilibrated
 from .splines import WIDTH, Grid, Segment, normal_band, rows_from
 
@@ -48,6 +48,8 @@ class State:
         ``Delta``, the origin of the law.
     moving : ndarray of bool, shape (d,)
         Coordinates of the offset that are free.
+    shared : ndarray of int, shape (l d,), optional
+        Of each coefficient, equation by equation, whose value it has; its own by default.
     """
 
     control_points: Floats
@@ -55,25 +57,44 @@ class State:
     active: Bools
     offset: Floats
     moving: Bools
+    shared: Ints | None = None
 
     def flat(self) -> Floats:
         """Coefficients, equation by equation, then the offset."""
         return np.concatenate([self.coefficients.T.ravel(), self.offset])
 
     def free(self) -> Bools:
-        """Which entries of `flat` are unknowns."""
-        return np.concatenate([self.active.T.ravel(), self.moving])
+        """Which entries of `flat` are unknowns: of those that share a value, the first."""
+        free = np.concatenate([self.active.T.ravel(), self.moving])
+        free[[entry for entry, _ in self.followers()]] = False
+        return free
+
+    def followers(self) -> list[tuple[int, int]]:
+        """Entries of `flat` that have the value of another, and which."""
+        if self.shared is None:
+            return []
+        entries = np.flatnonzero(self.shared != np.arange(len(self.shared)))
+        return [(int(entry), int(self.shared[entry])) for entry in entries]
+
+    def whole(self, active: Bools) -> Bools:
+        """Terms, (l, d), with all that share a value with one of them."""
+        if self.shared is None:
+            return active
+        count = np.bincount(self.shared, active.T.ravel(), len(self.shared))
+        return np.asarray(count[self.shared] > 0).reshape(active.T.shape).T
 
     def moved(self, control_points: Floats, flat: Floats) -> State:
         """The same terms with another curve and other entries of `flat`."""
         l, d = self.coefficients.shape
-        coefficients, offset = flat[: l * d].reshape(d, l).T, flat[l * d :]
+        values, offset = flat[: l * d], flat[l * d :]
+        coefficients = (values if self.shared is None else values[self.shared]).reshape(d, l).T
         return replace(
             self, control_points=control_points, coefficients=coefficients, offset=offset
         )
 
     def of_terms(self, active: Bools) -> State:
-        """The same with these terms and no others."""
+        """The same with these terms, those that share a value with them, and no others."""
+        active = self.whole(active)
         return replace(self, active=active, coefficients=np.where(active, self.coefficients, 0.0))
 
 
@@ -151,7 +172,7 @@ class Collocation:
     ----------
     grid : Grid
         Data, knots and nodes; `Collocation.of` makes it from segments.
-    exponents : ndarray of int, shape (l, d)
+    exponents : ndarray of int, shape (l, d + k)
         The library.
     data_weights : ndarray, shape (d,)
         1 / variance of the measurement noise.
@@ -164,6 +185,8 @@ class Collocation:
         times an unknown number of mean 0 and variance 1.
     known : ndarray, shape (l, d)
         Coefficients of the law that are given; those of a `State` come on top.
+    functions : tuple of Function, length k
+        Of the state, in the units of the fit.
     """
 
     grid: Grid
@@ -173,6 +196,7 @@ class Collocation:
     physics_weights: Floats
     systematic: Floats
     known: Floats
+    functions: tuple[Function, ...] = ()
 
     @classmethod
     def of(
@@ -184,6 +208,7 @@ class Collocation:
         systematic: Floats | None = None,
         precision: Floats | None = None,
         known: Floats | None = None,
+        functions: tuple[Function, ...] = (),
     ) -> Collocation:
         """The problem of these segments, by default without systematic errors or known terms.
 
@@ -194,8 +219,8 @@ class Collocation:
         data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
         relative = np.ones(grid.x.shape) if precision is None else precision
         seen = np.where(np.isnan(grid.x), 0.0, relative)
-        given = np.zeros(exponents.shape) if known is None else known
-        return cls(grid, exponents, data, seen, physics, shared, given)
+        given = np.zeros((len(exponents), grid.x.shape[1])) if known is None else known
+        return cls(grid, exponents, data, seen, physics, shared, given, functions)
 
     def weighted(self, data_weights: Floats, physics_weights: Floats) -> Collocation:
         """The same with other weights."""
@@ -204,7 +229,7 @@ class Collocation:
     @property
     def d(self) -> int:
         """Dimension of the state."""
-        return self.exponents.shape[1]
+        return self.grid.x.shape[1]
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -270,7 +295,8 @@ class Collocation:
         x, slope = self.node_states(state.control_points)
         law = state.coefficients + self.known
         rows = law.any(axis=1)
-        return slope - monomials(x - state.offset, self.exponents[rows]) @ law[rows]
+        z = extended(x - state.offset, self.functions)
+        return slope - monomials(z, self.exponents[rows]) @ law[rows]
 
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
@@ -340,11 +366,12 @@ class Collocation:
         d, l = self.d, len(self.exponents)
         law = state.coefficients + self.known
         x, slope = self.node_states(state.control_points)
-        terms = monomials(x - state.offset, self.exponents)
+        terms = monomials(extended(x - state.offset, self.functions), self.exponents)
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
         residual = root * (slope - terms @ law)
         # (nodes, equation, coordinate): how the law changes with the state.
         rates = (terms @ (self._generators @ law)).transpose(1, 2, 0)
+        rates = along_state(rates, x - state.offset, self.functions)
         jacobian = root[:, :, None] * rates
         # Minus the terms in their own equation, and the rates of the law for the offset.
         offset_columns = columns[columns >= d * l] - d * l
@@ -355,6 +382,10 @@ class Collocation:
         for j in range(d):
             here = np.flatnonzero(term_columns // l == j)
             unknowns[:, j, 1 + here] = -root[:, j, None] * terms[:, term_columns[here] % l]
+        for entry, first in state.followers():
+            j, k = divmod(entry, l)
+            place = np.flatnonzero(term_columns == first)
+            unknowns[:, j, 1 + place] = -root[:, j, None] * terms[:, [k]]
         unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
         return self._physics_rows(root, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
 

@@ -199,7 +199,7 @@ def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]
 def _left_over(model: Linearisation, state: State) -> Iterator[str]:
     """Would all candidates together explain more than chance (Rao's score test)?"""
     gain = float(model.gradient @ model.newton()[0])
-    unused = len(model.columns) - int(state.active.sum())
+    unused = len(model.columns) - int(state.free()[model.columns].sum())
     if unused and not chi2.sf(gain, unused) > CHANCE:
         yield (
             f"the terms left out explain more than chance (chi-square {gain:.0f} for {unused}): a "

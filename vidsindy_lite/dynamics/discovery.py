@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 
 from ..arrays import Floats, Ints
 from ..checks import check_array
+from .candidates import Library
 from .collocation import Fit
 from .diagnostics import diagnose
 from .errors import residual_noise
@@ -247,19 +248,27 @@ class Discovery:
         write(self, path)
 
     @staticmethod
-    def load(path: str | os.PathLike) -> Discovery:
+    def load(path: str | os.PathLike, library: Library | None = None) -> Discovery:
         """Read a discovery that `save` has written.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        library : Library, optional
+            That holds the functions of one's own in the law, if there are any: a file holds their
+            names alone.
 
         Raises
         ------
         FileNotFoundError
             If there is no such file.
         ValueError
-            If the file holds none.
+            If the file holds none, or the library not all functions of the law.
         """
         from .storage import read  # which needs this class
 
-        return read(path)
+        return read(path, library)
 
     def statement(self) -> str:
         """The law as text, and what was found out beside it: all but the warnings."""
@@ -292,8 +301,7 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
         Passed on.
     """
     units, state, collocation = problem.units, fit.state, fit.collocation
-    exponents, (l, d) = problem.exponents, state.coefficients.shape
-    form = problem.form
+    form, exponents, (l, d) = problem.form, problem.exponents, state.coefficients.shape
     covariance = _covariance(units, fit)
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
@@ -305,11 +313,11 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     margins /= np.repeat(tolerated**2, l)
     if not state.moving.any():
         margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
-    law = PolynomialSystem(form.names, exponents, moved + form.known)
+    law = form.law(moved + form.known)
     seen = collocation.counts > 0
     return Discovery(
         system=law,
-        native=PolynomialSystem(form.names, exponents, coefficients + form.known),
+        native=form.law(coefficients + form.known),
         offset=offset,
         covariance=moved_covariance,
         native_covariance=covariance[: l * d, : l * d],
@@ -344,6 +352,10 @@ def _covariance(units: Units, fit: Fit) -> Floats:
     covariance[np.ix_(columns, columns)] = inverse(information)
     factors = units.factors(fit.collocation.exponents)
     unit = np.concatenate([factors.T.ravel(), units.scale])
+    for entry, first in fit.state.followers():
+        covariance[entry] = covariance[first]
+    for entry, first in fit.state.followers():
+        covariance[:, entry] = covariance[:, first]
     return covariance * (unit[:, None] * unit)
 
 
@@ -351,12 +363,12 @@ def _shifted(
     exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats
 ) -> tuple[Floats, Floats]:
     """Law in the data's frame, with the covariance of coefficients and offset carried along."""
-    l, d = exponents.shape
+    l, d = coefficients.shape
     matrix = shift_matrix(exponents, offset)
     moved = matrix @ coefficients
     jacobian = np.zeros((l * d, l * d + d))
     jacobian[:, : l * d] = np.kron(np.eye(d), matrix)
-    for i, generator in enumerate(shift_generators(exponents)):
+    for i, generator in enumerate(shift_generators(exponents)[:d]):
         jacobian[:, l * d + i] = -(generator @ moved).T.ravel()
     return moved, jacobian @ covariance @ jacobian.T
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .library import monomial_exponents, variable_names
-from .polynomials import velocity_names
+from .candidates import Library
+from .library import Function, closure, variable_names
+from .polynomials import PolynomialSystem, velocity_names
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,40 +24,68 @@ class Form:
     ----------
     names : tuple of str
         Of the d state variables: first those that were measured.
-    exponents : ndarray of int, shape (l, d)
-        The library.
+    exponents : ndarray of int, shape (l, d + k)
+        The library: with every term all that divides it.
+    functions : tuple of Function, length k
+        Of the state, in the units of the data.
     candidates : ndarray of bool, shape (l, d)
         Terms that are searched.
     known : ndarray, shape (l, d)
         Coefficients that are given, in the units of the data; zero where a term is a candidate.
     movable : ndarray of bool, shape (d,)
         Coordinates whose origin is unknown. What is known does not change when it moves.
+    shared : ndarray of int, shape (l d,)
+        Of each place in the coefficients, equation by equation, whose value it has: its own, but
+        for the directions of a vector, which all have that of the first.
     """
 
     names: tuple[str, ...]
     exponents: Ints
+    functions: tuple[Function, ...]
     candidates: Bools
     known: Floats
     movable: Bools
+    shared: Ints
 
     @classmethod
-    def of(cls, measured: int, degree: int, order: int) -> Form:
-        """A law in all terms up to a degree, for so many measured coordinates."""
+    def of(cls, measured: int, library: Library, order: int) -> Form:
+        """A law in all terms of a library, for so many measured coordinates."""
         names = variable_names(measured)
         if order == 2:
             names += velocity_names(names)
         d = len(names)
-        exponents = monomial_exponents(d, degree)
-        movable = np.arange(d) < measured
-        known = np.zeros(exponents.shape)
-        # Terms 1 .. d of the library are the variables themselves, in their order.
-        for position, velocity in enumerate(range(measured, d)):
-            known[1 + velocity, position] = 1.0
-        candidates = np.zeros(exponents.shape, dtype=bool)
-        candidates[:, d - measured :] = True
-        return cls(names, exponents, candidates, known, movable)
+        wanted, functions = library.resolve(names, measured)
+        velocities = np.eye(wanted.shape[1], dtype=int)[measured:d]
+        exponents = closure(np.concatenate([wanted, velocities]))
+        row = {tuple(powers): k for k, powers in enumerate(exponents.tolist())}
+        known = np.zeros((len(exponents), d))
+        for position, velocity in enumerate(velocities.tolist()):
+            known[row[tuple(velocity)], position] = 1.0
+        candidates = np.zeros(known.shape, dtype=bool)
+        candidates[[row[tuple(powers)] for powers in wanted.tolist()], d - measured :] = True
+        shared, first = np.arange(candidates.size).reshape(d, -1), 0
+        for k, powers in enumerate(np.eye(wanted.shape[1], dtype=int)[d:].tolist()):
+            direction = functions[k].direction
+            if direction is not None:
+                equation, here = d - measured + direction, row[tuple(powers)]
+                candidates[here, np.arange(d) != equation] = False
+                first = shared[equation, here] if direction == 0 else first
+                shared[equation, here] = first
+        # A function of the state does not move with the origin, so that none is sought.
+        movable = (np.arange(d) < measured) & (not functions)
+        return cls(names, exponents, functions, candidates, known, movable, shared.ravel())
+
+    def law(self, coefficients: Floats) -> PolynomialSystem:
+        """The law with these coefficients, (l, d), in the units of the data."""
+        return PolynomialSystem(self.names, self.exponents, coefficients, functions=self.functions)
+
+    @property
+    def degree(self) -> int:
+        """The highest degree among the candidates; a function counts as a variable."""
+        return int(self.exponents[self.candidates.any(axis=1)].sum(axis=1).max())
 
     @property
     def searched(self) -> Ints:
         """The candidates' places in the coefficients, equation by equation."""
-        return np.flatnonzero(self.candidates.T)
+        own = self.shared == np.arange(len(self.shared))
+        return np.flatnonzero(self.candidates.T.ravel() & own)

@@ -14,7 +14,6 @@ from scipy.interpolate import BSpline, CubicHermiteSpline
 
 from ..arrays import Floats
 from .integrate import runge_kutta_4
-from .library import monomials
 from .polynomials import PolynomialSystem
 from .splines import Segment
 from .trajectories import Trajectory
@@ -78,7 +77,7 @@ class Joined:
         share = np.linspace(0, 1, steps + 1)
 
         def rate(x: Floats) -> Floats:
-            return pace * (monomials(x, self.law.exponents) @ self.law.coefficients)
+            return pace * self.law(x)
 
         with np.errstate(over="ignore", invalid="ignore"):
             paths = runge_kutta_4(rate, share, x0, substeps=1)

@@ -1,10 +1,14 @@
 """The library: monomials of the state, and what a shift of the origin does to them (paper: Eq. 10).
 
-A library that holds all divisors of its monomials is closed under a shift of the origin.
+A library that holds all divisors of its monomials is closed under a shift of the origin. Its
+monomials may have functions of the state as further variables, after the coordinates; these stay as
+they are when the origin is shifted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations_with_replacement
 
@@ -18,6 +22,61 @@ from ..checks import check_integer
 def variable_names(d: int) -> tuple[str, ...]:
     """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
     return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
+
+
+def name_latex(name: str) -> str:
+    """A variable as LaTeX: digits at its end become an index."""
+    letters = name.rstrip("0123456789")
+    return name if letters == name else f"{letters}_{{{name[len(letters) :]}}}"
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """A function of the state, as a further variable of monomials.
+
+    Parameters
+    ----------
+    name, latex : str
+        How it is printed.
+    value : callable
+        From points (n, d) to values (n,).
+    gradient : callable
+        From points (n, d) to derivatives (n, d).
+    direction : int, optional
+        Of a component of a vector, which one it is: the first has the others after it, each stands
+        in the equation of its direction alone, and all have one coefficient.
+    """
+
+    name: str
+    latex: str
+    value: Callable[[Floats], Floats]
+    gradient: Callable[[Floats], Floats]
+    direction: int | None = None
+
+    def standardised(self, centre: Floats, scale: Floats, size: float) -> Function:
+        """The same function over ``size``, of points less ``centre``, over ``scale``."""
+        return replace(
+            self,
+            value=lambda x: self.value(centre + scale * x) / size,
+            gradient=lambda x: self.gradient(centre + scale * x) * scale / size,
+        )
+
+
+def extended(x: Floats, functions: Sequence[Function]) -> Floats:
+    """Points (n, d), and the values of k functions at them, side by side: (n, d + k)."""
+    return np.column_stack([x, *(f.value(x) for f in functions)]) if functions else x
+
+
+def along_state(rates: Floats, x: Floats, functions: Sequence[Function]) -> Floats:
+    """Derivatives in coordinates and functions, (n, m, d + k), as those in coordinates alone.
+
+    The chain rule: (n, m, d).
+    """
+    d = x.shape[1]
+    total = rates[:, :, :d]
+    for k, function in enumerate(functions):
+        total = total + rates[:, :, d + k, None] * function.gradient(x)[:, None, :]
+    return total
 
 
 def monomial_exponents(d: int, degree: int) -> Ints:
@@ -82,10 +141,12 @@ def monomial_gradients(x: Floats, exponents: Ints) -> Floats:
 def shift_matrix(exponents: Ints, offset: Floats) -> Floats:
     """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l).
 
-    The library has to be closed: with every monomial it holds all its divisors.
+    The library has to be closed: with every monomial it holds all its divisors. An offset (d,)
+    leaves the functions as they are.
     """
+    still = np.zeros(exponents.shape[1] - len(offset))
     factors, lowered = _binomials(exponents.tobytes(), *exponents.shape)
-    return (factors * (-np.asarray(offset, dtype=float)) ** lowered).prod(axis=-1)
+    return (factors * (-np.append(offset, still)) ** lowered).prod(axis=-1)
 
 
 @lru_cache(maxsize=64)
@@ -108,6 +169,8 @@ def divides(exponents: Ints, axes: Bools | None = None) -> Bools:
 
     If axes are given, bool (d,), along these only: along the others both have the same power.
     """
+    if axes is not None:
+        axes = np.append(axes, np.zeros(exponents.shape[1] - len(axes), dtype=bool))
     row, column = exponents[:, None, :], exponents[None, :, :]
     lower = row < column if axes is None else axes & (row < column)
     return np.all((row == column) | lower, axis=-1)

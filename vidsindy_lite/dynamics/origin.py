@@ -26,7 +26,7 @@ class ShiftedLaw:
 
     Parameters
     ----------
-    exponents : ndarray of int, shape (l, d)
+    exponents : ndarray of int, shape (l, d + k)
         A library that holds all divisors of its monomials.
     coefficients : ndarray, shape (l, d)
         Estimate in the present frame.
@@ -44,12 +44,12 @@ class ShiftedLaw:
     @property
     def d(self) -> int:
         """Dimension of the state."""
-        return self.exponents.shape[1]
+        return self.coefficients.shape[1]
 
     @cached_property
     def _covariances(self) -> Floats:
         """Covariance of the coefficients of each equation, (d, l, l)."""
-        l, d = self.exponents.shape
+        l, d = self.coefficients.shape
         blocks = inverse(self.information).reshape(d, l, d, l)
         return np.stack([blocks[j, :, j, :] for j in range(d)])
 

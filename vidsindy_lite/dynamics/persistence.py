@@ -140,8 +140,9 @@ def follow(problem: Problem, fit: Fit) -> Path:
         support, _, _ = subset_search(
             share * model.information, share * model.gradient, present, prices, support
         )
-        active = np.zeros(problem.exponents.T.shape, dtype=bool)
+        active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
         active.flat[problem.form.searched] = support[:terms_end]
+        active = fit.state.whole(active.T).T
         for j, terms in enumerate(active):
             if paths[j] and (paths[j][-1].terms == terms).all():
                 low_here = paths[j].pop().low

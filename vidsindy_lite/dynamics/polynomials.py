@@ -2,22 +2,33 @@
 
 The law is ``dx/dt = phi(x) Lambda`` (paper: Eq. 7), with a row ``phi`` of monomials and a sparse
 matrix ``Lambda`` of coefficients. A polynomial library is closed under a shift of the origin, so
-the law in any other frame follows exactly (paper: Eq. 10) and is never typed by hand.
+the law in any other frame follows exactly (paper: Eq. 10) and is never typed by hand. A law may
+be a polynomial in functions of the state, too: then its frame is that of the data.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..checks import check_array, check_integer, check_number, check_times, check_vector
+from .candidates import Library
 from .integrate import integrate
-from .library import closure, monomial_exponents, monomial_gradients, monomials, shift_matrix
+from .library import (
+    Function,
+    along_state,
+    closure,
+    extended,
+    monomial_gradients,
+    monomials,
+    name_latex,
+    shift_matrix,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +39,12 @@ class PolynomialSystem:
     ----------
     names : sequence of str, length d
         Names of the state variables: a letter, then letters, digits and underscores.
-    exponents : array_like of int, shape (l, d)
-        The monomials of the library, one row each.
+    exponents : array_like of int, shape (l, d + k)
+        The monomials of the library, one row each, in the variables and in k functions of them.
     coefficients : array_like, shape (l, d)
         ``Lambda``; column j is the right-hand side of variable j.
+    functions : tuple of Function
+        Those of the k functions that a `Library` brings; none for a polynomial law.
 
     Raises
     ------
@@ -43,6 +56,7 @@ class PolynomialSystem:
     names: tuple[str, ...]
     exponents: Ints
     coefficients: Floats
+    functions: tuple[Function, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         names = tuple(self.names) if isinstance(self.names, Iterable) else ()
@@ -53,20 +67,18 @@ class PolynomialSystem:
             )
         powers = check_array("exponents", self.exponents)
         coefficients = check_array("coefficients", self.coefficients).copy()
-        if powers.ndim != 2 or powers.shape[1] != len(names):
-            raise ValueError(
-                f"exponents: must have shape (l, {len(names)}), got shape {powers.shape}"
-            )
+        width = len(names) + len(self.functions)
+        if powers.ndim != 2 or powers.shape[1] != width:
+            raise ValueError(f"exponents: must have shape (l, {width}), got shape {powers.shape}")
         whole = np.isfinite(powers) & (powers >= 0) & (powers == np.rint(powers))
         if not whole.all():
             raise ValueError(f"exponents: must be non-negative integers, got {powers[~whole][0]:g}")
         exponents = powers.astype(int)
         if len(np.unique(exponents, axis=0)) != len(exponents):
             raise ValueError("exponents: every monomial may appear once, got a repeated row")
-        if coefficients.shape != exponents.shape:
-            raise ValueError(
-                f"coefficients: must have shape {exponents.shape}, got {coefficients.shape}"
-            )
+        shape = (len(exponents), len(names))
+        if coefficients.shape != shape:
+            raise ValueError(f"coefficients: must have shape {shape}, got {coefficients.shape}")
         if not np.isfinite(coefficients).all():
             raise ValueError("coefficients: must be finite, got NaN or infinity")
         for array in (exponents, coefficients):
@@ -77,7 +89,10 @@ class PolynomialSystem:
 
     @classmethod
     def from_terms(
-        cls, equations: Mapping[str, Mapping[str, float]], degree: int | None = None
+        cls,
+        equations: Mapping[str, Mapping[str, float]],
+        degree: int | None = None,
+        library: Library | None = None,
     ) -> PolynomialSystem:
         """Build a system from named terms.
 
@@ -88,6 +103,8 @@ class PolynomialSystem:
             is a product of variables, ``"1"``, ``"xz"``, ``"x^2 y"`` or ``"x*y**2"``.
         degree : int, optional
             Degree of the full library; by default the highest degree among the terms.
+        library : Library, optional
+            Whose functions terms may name, as in ``"sin(x)"``.
 
         Raises
         ------
@@ -101,9 +118,13 @@ class PolynomialSystem:
                 "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
                 f"'y': {{'x': 1}}}}, got {equations!r:.60}"
             )
-        names = tuple(equations)
+        names, m = tuple(equations), len(equations) // 2
+        accelerations = m and names[m:] == velocity_names(names[:m])
+        held, measured = library or Library(), m if accelerations else len(names)
+        _, functions = held.resolve(names, measured)
+        known = (*names, *(function.name for function in functions))
         parsed = [
-            (_parse_term(term, names), column, check_number(f"coefficient of {term}", value))
+            (_parse_term(term, known), column, check_number(f"coefficient of {term}", value))
             for column, terms in enumerate(given)
             for term, value in terms.items()
         ]
@@ -111,12 +132,13 @@ class PolynomialSystem:
         degree = highest if degree is None else check_integer("degree", degree)
         if highest > degree:
             raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
-        exponents = monomial_exponents(len(names), degree)
-        index = {tuple(e): row for row, e in enumerate(exponents)}
-        coefficients = np.zeros(exponents.shape)
+        wanted, _ = (held + Library.polynomial(degree)).resolve(names, measured)
+        exponents = closure(np.array([*wanted.tolist(), *(powers for powers, _, _ in parsed)]))
+        index = {tuple(e): row for row, e in enumerate(exponents.tolist())}
+        coefficients = np.zeros((len(exponents), len(names)))
         for powers, column, value in parsed:
             coefficients[index[powers], column] += value
-        return cls(names, exponents, coefficients)
+        return cls(names, exponents, coefficients, functions=functions)
 
     @property
     def d(self) -> int:
@@ -126,8 +148,9 @@ class PolynomialSystem:
     @cached_property
     def terms(self) -> tuple[str, ...]:
         """Names of the monomials, e.g. ``("1", "x", "x^2", "xy")``."""
-        between = "" if all(len(name) == 1 for name in self.names) else " "
-        return tuple(_term_text(e, self.names, "{}^{}", between) for e in self.exponents)
+        names = (*self.names, *(function.name for function in self.functions))
+        between = "" if all(len(name) == 1 for name in names) else " "
+        return tuple(_term_text(e, names, "{}^{}", between) for e in self.exponents)
 
     @cached_property
     def order(self) -> int:
@@ -138,7 +161,7 @@ class PolynomialSystem:
         m = self.d // 2
         if self.names[m:] != velocity_names(self.names[:m]):
             return 1
-        tied = (self.exponents @ np.arange(self.d))[:, None] == np.arange(m, 2 * m)
+        tied = (self.exponents[:, : self.d] @ np.arange(self.d))[:, None] == np.arange(m, 2 * m)
         tied &= self.exponents.sum(axis=1)[:, None] == 1
         return 2 if (self.coefficients[:, :m] == tied).all() and tied.any(axis=0).all() else 1
 
@@ -149,7 +172,7 @@ class PolynomialSystem:
 
     def library(self, x: Floats) -> Floats:
         """Candidate terms ``phi(x)``: (n, d) points to (n, l) values."""
-        return monomials(self._points(x), self.exponents)
+        return monomials(extended(self._points(x), self.functions), self.exponents)
 
     def __call__(self, x: Floats) -> Floats:
         """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
@@ -171,8 +194,9 @@ class PolynomialSystem:
         """
         x = check_array("x", x)
         points = self._points(np.atleast_2d(x))
-        jacobian = np.einsum(
-            "nli,lj->nji", monomial_gradients(points, self.exponents), self.coefficients
+        rates = monomial_gradients(extended(points, self.functions), self.exponents)
+        jacobian = along_state(
+            np.einsum("nli,lj->nji", rates, self.coefficients), points, self.functions
         )
         return jacobian.reshape(*x.shape, self.d)
 
@@ -185,12 +209,22 @@ class PolynomialSystem:
         ----------
         offset : array_like, shape (d,)
             Shift of the trajectory, in state units.
+
+        Raises
+        ------
+        ValueError
+            If the law has functions of the state, and the shift is not zero.
         """
+        shift = check_vector("offset", offset, self.d)
+        if self.functions and shift.any():
+            raise ValueError(
+                f"offset: must be zero for a law with {self.functions[0].name}, got {offset!r:.60}"
+            )
         exponents = closure(self.exponents)
         rows = {tuple(e): row for row, e in enumerate(exponents)}
-        closed = np.zeros(exponents.shape)
+        closed = np.zeros((len(exponents), self.d))
         closed[[rows[tuple(e)] for e in self.exponents]] = self.coefficients
-        matrix = shift_matrix(exponents, check_vector("offset", offset, self.d))
+        matrix = shift_matrix(exponents, shift)
         shifted = matrix @ closed
         # What cancels in exact arithmetic must not survive as a term of 1e-16.
         shifted[np.abs(shifted) <= 1e-13 * (np.abs(matrix) @ np.abs(closed))] = 0.0
@@ -223,7 +257,8 @@ class PolynomialSystem:
         exponents, coefficients = self.exponents[active], self.coefficients[active]
 
         def rate(x: Floats) -> Floats:  # sums and products one by one: no digit is left to a BLAS
-            return (monomials(x[None], exponents).T * coefficients).sum(axis=0)
+            z = extended(x[None], self.functions)
+            return (monomials(z, exponents).T * coefficients).sum(axis=0)
 
         return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
 
@@ -246,12 +281,13 @@ class PolynomialSystem:
 
     def latex(self, digits: int = 4) -> str:
         """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
-        names = tuple(map(_name_latex, self.names))
+        names = tuple(map(name_latex, self.names))
         left = {j: rf"\dot{{{name}}}" for j, name in enumerate(names)}
         if self.order == 2:
             m = self.d // 2
             names = names[:m] + tuple(left[j] for j in range(m))
             left = {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
+        names += tuple(function.latex for function in self.functions)
         terms = [_term_text(e, names, "{}^{{{}}}", " ") for e in self.exponents]
         rows = (
             f"{side} &= " + _sum_text(self.coefficients[:, j], terms, digits, r"\,")
@@ -301,11 +337,6 @@ def _term_text(exponents: Ints, names: tuple[str, ...], power: str, between: str
         if e
     ]
     return between.join(factors) or "1"
-
-
-def _name_latex(name: str) -> str:
-    letters = name.rstrip("0123456789")
-    return name if letters == name else f"{letters}_{{{name[len(letters) :]}}}"
 
 
 def _sum_text(coefficients: Floats, terms: Sequence[str], digits: int, times: str = " ") -> str:

@@ -7,17 +7,19 @@ root-mean-square speed is 1.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
+from .candidates import Library
 from .collocation import CLEANEST, Collocation, Fit, State
 from .errors import effective_noise, spread_to_unseen
 from .form import Form
-from .library import monomials
+from .library import Function, extended, monomials
 from .polynomials import PolynomialSystem
 from .smoothing import smooth
 from .splines import DEGREE, Segment, clamped_knots
@@ -31,6 +33,10 @@ GAP = 0.4
 """A pause longer than this fraction of the time scale of the motion is a gap."""
 SHORTEST_STRETCH = 4
 """Stretches of fewer samples tell less than their initial conditions cost."""
+LEAST = 1e-300
+"""Keeps a quotient finite where a term is zero everywhere."""
+DEPENDENT, INVOLVED = 1e-10, 1e-3
+"""Least singular value over the largest at which terms depend on each other, and least share."""
 NOISY, WIDE, NARROW = 0.02, 1 / 5, 1 / 16
 """Knot spacing in time scales: wide where the noise is above this, narrow elsewhere."""
 
@@ -45,11 +51,14 @@ class Units:
         Mean and standard deviation of the data.
     time : float
         Length of a standard time unit.
+    sizes : ndarray, shape (k,)
+        Root mean squares of the functions of the state in the library.
     """
 
     centre: Floats
     scale: Floats
     time: float
+    sizes: Floats = field(default_factory=lambda: np.empty(0))
 
     def standard(self, point: Floats) -> Floats:
         """A point of the data's frame in standard units."""
@@ -61,7 +70,8 @@ class Units:
 
     def factors(self, exponents: Ints) -> Floats:
         """What turns standard coefficients into those of the data's units, shape (l, d)."""
-        return self.scale / np.prod(self.scale**exponents, axis=1)[:, None] / self.time
+        scales = np.append(self.scale, self.sizes)
+        return self.scale / np.prod(scales**exponents, axis=1)[:, None] / self.time
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,12 +123,25 @@ class Problem:
     @property
     def d(self) -> int:
         """Dimension of the state."""
-        return self.exponents.shape[1]
+        return len(self.form.names)
 
     @property
     def exponents(self) -> Ints:
-        """The library, shape (l, d)."""
+        """The library, shape (l, d + k)."""
         return self.form.exponents
+
+    @cached_property
+    def functions(self) -> tuple[Function, ...]:
+        """Those of the library, of standard points."""
+        centre, scale, sizes = self.units.centre, self.units.scale, self.units.sizes
+        return tuple(
+            function.standardised(centre, scale, size)
+            for function, size in zip(self.form.functions, sizes.tolist(), strict=True)
+        )
+
+    def terms(self, x: Floats) -> Floats:
+        """All candidate terms at standard points, (n, l)."""
+        return monomials(extended(x, self.functions), self.exponents)
 
     @property
     def known(self) -> Floats:
@@ -132,7 +155,7 @@ class Problem:
 
     def columns(self, state: State) -> Ints:
         """Entries of `State.flat` that may differ from zero: candidates and moving axes."""
-        size = self.exponents.size
+        size = self.form.candidates.size
         return np.concatenate([self.form.searched, size + np.flatnonzero(state.moving)])
 
     @property
@@ -162,8 +185,9 @@ class Problem:
         )
         weights = (self.noise if noise is None else noise) ** -2
         return Collocation.of(
-            segments, self.exponents, weights, np.ones(self.d), shared, precision, self.known
-        )
+            segments, self.exponents, weights, np.ones(self.d), shared, precision, self.known,
+            self.functions,
+        )  # fmt: skip
 
     def _at(self, segment: Segment, values: Sequence[Floats]) -> Floats:
         """What is given for all samples of each trajectory, at those of a segment."""
@@ -189,18 +213,20 @@ class Problem:
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
-        terms = self.penalties @ state.active.sum(axis=1)
+        terms = self.prices @ state.free()[: len(self.prices)]
         return collocation.objective(state) + terms + self.axis_penalty * state.moving.sum()
 
     def law(self, state: State) -> PolynomialSystem:
         """The law of a state in its own frame."""
-        return PolynomialSystem(self.form.names, self.exponents, state.coefficients + self.known)
+        coefficients = state.coefficients + self.known
+        names, functions = self.form.names, self.functions
+        return PolynomialSystem(names, self.exponents, coefficients, functions=functions)
 
 
 def pose(
     measured: list[Trajectory],
     systematic: list[Floats],
-    degree: int,
+    library: Library,
     rng: np.random.Generator,
     order: int = 1,
 ) -> Problem:
@@ -209,20 +235,23 @@ def pose(
     Raises
     ------
     ValueError
-        If a coordinate does not move, or there are fewer samples than unknowns.
+        If a coordinate does not move, or there are fewer samples than unknowns; if a function of
+        the library is not finite on the data, or its terms depend on each other.
     """
     x = np.concatenate([values for _, values in measured])
-    form = Form.of(x.shape[1], degree, order)
+    form = Form.of(x.shape[1], library, order)
     unknowns = len(form.exponents) + 1
     if len(x) < unknowns:
         raise ValueError(
             f"x: must hold at least as many samples as unknowns per equation "
-            f"({unknowns} for degree {degree} and d = {x.shape[1]}), got {len(x)} samples"
+            f"({unknowns} for {library} and d = {x.shape[1]}), got {len(x)} samples"
         )
     centre, scale = x.mean(axis=0), x.std(axis=0)
     if not (scale > 1e-12 * np.abs(centre)).all():
         still = int(np.argmin(scale))
         raise ValueError(f"x: every coordinate must move, got a constant column {still}")
+    if form.functions:  # they are what they are in the frame of the data
+        centre = np.zeros_like(centre)
     step = typical_step(measured)
     trajectories = [(t / step, (values - centre) / scale) for t, values in measured]
     stretches, curves, noise = _smoothed(trajectories, rng)
@@ -244,6 +273,8 @@ def pose(
     )
     if order == 2:
         problem = _with_velocities(problem, curves)
+    if form.functions:
+        problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))
 
 
@@ -275,8 +306,44 @@ def _with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
             scale=np.append(units.scale, rms * units.scale / units.time),
             time=units.time,
         ),
-        noise=spread_to_unseen(problem.noise, problem.form.movable),
+        noise=spread_to_unseen(problem.noise, np.arange(2 * m) < m),
     )
+
+
+def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
+    """The same with the functions of the library in units of their own, and checked."""
+    pieces = zip(problem.curves, problem.stretches, strict=True)
+    x = problem.units.point(np.concatenate([curve(t) for curve, (_, (t, _)) in pieces]))
+    values = extended(x, problem.form.functions)[:, problem.d :]
+    for function, column in zip(problem.form.functions, values.T, strict=True):
+        if not np.isfinite(column).all():
+            where = ", ".join(f"{v:g}" for v in x[np.argmin(np.isfinite(column))])
+            raise ValueError(
+                f"library: {function.name} must be finite on the data, got none at ({where})"
+            )
+    sizes = np.sqrt((values**2).mean(axis=0))
+    for k, function in enumerate(problem.form.functions):
+        if function.direction == 0:  # of a vector, in the units of the equations
+            scale = problem.units.scale[-len(problem.measured[0][1].T) :]
+            common = np.sqrt(((sizes[k : k + len(scale)] / scale) ** 2).mean())
+            sizes[k : k + len(scale)] = common * scale
+    sized = replace(problem, units=replace(problem.units, sizes=np.where(sizes > 0, sizes, 1.0)))
+    # Each coordinate in an order of its own: what depends on each other there does so everywhere.
+    apart = rng.permuted(problem.units.standard(x), axis=0)
+    _check_independent(problem.form, sized.terms(apart))
+    return sized
+
+
+def _check_independent(form: Form, terms: Floats) -> None:
+    """Refuse candidates that depend on each other at any points, given as terms (n, l)."""
+    searched = form.candidates.any(axis=1)
+    columns = terms[np.isfinite(terms).all(axis=1)][:, searched]
+    columns /= np.maximum(np.linalg.norm(columns, axis=0), LEAST)
+    _, sizes, shares = np.linalg.svd(columns, full_matrices=False)
+    if len(columns) >= len(sizes) and sizes[-1] < DEPENDENT * sizes[0]:
+        names = np.array(form.law(form.known).terms)[searched]
+        tied = ", ".join(names[np.abs(shares[-1]) > INVOLVED])
+        raise ValueError(f"library: its terms must not depend on each other, got {tied}")
 
 
 def _smoothed(
@@ -313,7 +380,7 @@ def _rms_speed(splines: Sequence[BSpline]) -> float:
 def _slack(problem: Problem) -> Floats:
     collocation = problem.collocation(problem.segments())
     x, slope = collocation.node_states(fit_curves(collocation, problem.curves))
-    terms = monomials(x, problem.exponents)
+    terms = problem.terms(x)
     misfit = slope - terms @ np.linalg.lstsq(terms, slope, rcond=None)[0]
     slack = np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
     searched = problem.form.candidates.any(axis=0)

@@ -18,7 +18,7 @@ from ..arrays import Bools, Floats
 from .collocation import Collocation, Fit, State
 from .discovery import History
 from .gaps import Gap, gaps, join
-from .library import closure_mask, divides, monomials, shift_matrix
+from .library import closure_mask, divides, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
 from .problem import Problem, fit_curves
@@ -42,7 +42,7 @@ LONGEST_CLIMB = 4
 """Most searches at larger errors."""
 
 
-def search(problem: Problem, degree: int, rng: np.random.Generator, history: History) -> Fit:
+def search(problem: Problem, rng: np.random.Generator, history: History) -> Fit:
     """The terms that make the motion: the cheapest law at a tolerated error.
 
     If the law leaves larger errors than were tolerated, or errors that last, the search is made
@@ -51,7 +51,7 @@ def search(problem: Problem, degree: int, rng: np.random.Generator, history: His
     tolerated = problem.noise if problem.kicked else np.maximum(problem.noise, TOLERATED)
     for _ in range(LONGEST_CLIMB):
         tolerant = replace(problem, noise=tolerated)
-        found = candidates(tolerant, degree, rng, history)
+        found = candidates(tolerant, rng, history)
         fit = bridge(tolerant, cheapest(tolerant, found, history), history)
         left = problem.errors(fit)
         if (left <= CONSISTENT * tolerated).all() or (tolerated >= LARGEST).all():
@@ -60,13 +60,11 @@ def search(problem: Problem, degree: int, rng: np.random.Generator, history: His
     return fit
 
 
-def candidates(
-    problem: Problem, degree: int, rng: np.random.Generator, history: History
-) -> list[Fit]:
+def candidates(problem: Problem, rng: np.random.Generator, history: History) -> list[Fit]:
     """Supports worth refining, from all terms up to degree 2, and if need be from all terms."""
     collocation = problem.collocation(problem.segments())
     control = fit_curves(collocation, problem.curves)
-    found = []
+    found, degree = [], problem.form.degree
     for start in sorted({min(2, degree), degree}):
         fit = unpruned(problem, collocation, control, start, history)
         found += _in_sparse_frames(problem, fit, rng, history)
@@ -81,12 +79,13 @@ def unpruned(
     """Fit all terms up to a degree while the physics weight rises."""
     d, rows = problem.d, problem.exponents.sum(axis=1) <= degree
     x, slope = collocation.node_states(control)
-    coefficients = np.zeros(problem.exponents.shape)
-    terms = monomials(x, problem.exponents[rows])
+    coefficients = np.zeros(problem.known.shape)
+    terms = problem.terms(x)[:, rows]
     coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=problem.noise.min())[0]
     active = rows[:, None] & problem.form.candidates
     coefficients[~active] = 0.0
-    state = State(control, coefficients, active, np.zeros(d), np.zeros(d, dtype=bool))
+    still, shared = np.zeros(d, dtype=bool), problem.form.shared
+    state = State(control, coefficients, active, np.zeros(d), still, shared)
     for weight in FIRST_WEIGHTS:
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         state = fit.state
@@ -97,7 +96,7 @@ def unpruned(
 def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
     """Would the terms of higher degree together explain more of the data than chance does?"""
     searched = problem.form.searched
-    left_out = len(searched) - int(fit.state.active.sum())
+    left_out = len(searched) - int(fit.state.free()[searched].sum())
     if not left_out:
         return False
     _, gain = fit.collocation.linearise(fit.state, searched).newton()
@@ -136,18 +135,18 @@ def _variants(origin: Floats, home: Floats) -> list[tuple[Floats, Bools]]:
 def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]:
     """The law in the centred frame, all terms of its shift closure fitted."""
     d, exponents = problem.d, problem.exponents
-    state = State(
-        fit.state.control_points,
-        shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
-        closure_mask(exponents, fit.state.active, problem.form.movable),
-        np.zeros(d),
-        np.zeros(d, dtype=bool),
+    state = replace(
+        fit.state,
+        coefficients=shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
+        active=closure_mask(exponents, fit.state.active, problem.form.movable),
+        offset=np.zeros(d),
+        moving=np.zeros(d, dtype=bool),
     )
     collocation = problem.weighted(fit.collocation, weight)
     # A law exact in another frame has no firm minimum here: some steps are near enough.
     closed = collocation.solve(state, tolerance=0.1, max_steps=8)
     state, columns = closed.state, np.flatnonzero(closed.state.free())
-    information = np.diag(np.where(state.free()[: exponents.size], 0.0, 1e30))
+    information = np.diag(np.where(state.free()[:-d], 0.0, 1e30))
     information[np.ix_(columns, columns)] = collocation.linearise(state, columns).information
     return closed, ShiftedLaw(exponents, state.coefficients, information, problem.form.movable)
 
@@ -165,12 +164,10 @@ def _candidate(
         problem.prices[columns],
         np.ones(len(columns), dtype=bool),
     )
-    flat = np.zeros(problem.exponents.size)
+    flat = np.append(np.zeros(closed.state.coefficients.size), origin)
     flat[columns] = solution
-    coefficients = flat.reshape(problem.d, -1).T
-    state = State(
-        closed.state.control_points, coefficients, coefficients != 0, origin.copy(), moving
-    )
+    state = closed.state.moved(closed.state.control_points, flat)
+    state = replace(state, active=state.coefficients != 0, moving=moving)
     objective = closed.collocation.objective(closed.state)
     cost = objective + value + problem.axis_penalty * moving.sum()
     return replace(closed, state=state, criterion=cost)

@@ -20,6 +20,7 @@ from tqdm import tqdm
 
 from ..arrays import Floats
 from ..checks import check_integer
+from .candidates import Library, check_library
 from .collocation import Fit
 from .discovery import Discovery, History, conclude
 from .order import SETTLED, UNLIKELY, accelerated, advised, better, check_order
@@ -48,13 +49,14 @@ LONGEST_DESCENT = 3
 def discover(
     t: Floats | Sequence[tuple[Floats, Floats]],
     x: Floats | None = None,
-    degree: int = 3,
+    degree: int | None = None,
     seed: int = 0,
     progress: bool = False,
     systematic: Floats | Sequence[Floats] | None = None,
     order: int | str = 1,
+    library: Library | None = None,
 ) -> Discovery:
-    """Discover the polynomial law of a measured trajectory (paper: Eqs. 7-10).
+    """Discover the law of a measured trajectory (paper: Eqs. 7-10).
 
     Parameters
     ----------
@@ -62,8 +64,9 @@ def discover(
         Increasing times, even or uneven; or several trajectories of one system.
     x : array_like, shape (n, d), optional
         States with d of at least 1; a row with a NaN is missing. Omitted when ``t`` is a list.
-    degree : int
-        Highest degree of the candidate terms.
+    degree : int, optional
+        Highest degree of the candidate terms: short for ``library=Library.polynomial(degree)``; 3
+        by default.
     seed : int
         For the random probes of the noise estimate and the starts of the offset search.
     progress : bool
@@ -76,6 +79,9 @@ def discover(
         1 for ``x' = f(x)``; 2 for ``x'' = f(x, x')``, where ``x`` are positions alone: velocities
         become states ``vx, ...`` of the law, after the positions. ``"auto"`` looks for the second
         where the first is doubtful, and says in `Discovery.note` which was taken and why.
+    library : Library, optional
+        The candidate terms, in place of ``degree``. With terms that are no polynomials the law
+        is sought in the frame of the data only, as no shift of its origin is exact.
 
     Returns
     -------
@@ -86,33 +92,34 @@ def discover(
     ------
     ValueError
         If the input has the wrong shape, times that do not increase, infinite values, a
-        coordinate that does not move, or fewer samples than unknowns.
+        coordinate that does not move, or fewer samples than unknowns; if ``degree`` and
+        ``library`` are given, or a library does not suit the data.
 
     Examples
     --------
     >>> t, x = study.SYSTEMS["Lorenz"].trajectory(1500)
     >>> print(vl.discover(t, x).equations())
     """
-    degree, seed = check_integer("degree", degree, 1), check_integer("seed", seed)
+    library, seed = check_library(degree, library), check_integer("seed", seed)
     check_order(order)
     trajectories = check_trajectories(t, x)
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
     if order == 2:
-        return _solved(trajectories, shared, degree, 2, seed, progress)[0]
-    found, problem = _solved(trajectories, shared, degree, 1, seed, progress)
+        return _solved(trajectories, shared, library, 2, seed, progress)[0]
+    found, problem = _solved(trajectories, shared, library, 1, seed, progress)
     if order == 1:
         return advised(found, problem.curves)
     if not found.warnings or not accelerated(problem.curves):
         return replace(found, note=UNLIKELY if found.warnings else SETTLED)
-    second, _ = _solved(trajectories, shared, degree, 2, seed, progress)
+    second, _ = _solved(trajectories, shared, library, 2, seed, progress)
     return better(found, second)
 
 
 def _solved(
     trajectories: list[Trajectory],
     shared: list[Floats],
-    degree: int,
+    library: Library,
     order: int,
     seed: int,
     progress: bool,
@@ -122,20 +129,20 @@ def _solved(
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     history = History()
-    problem = foreseen(pose(trajectories, shared, degree, probes, order))
+    problem = foreseen(pose(trajectories, shared, library, probes, order))
     with tqdm(total=3, disable=not progress, desc="discover", leave=False) as bar:
-        fit = polish(problem, search(problem, degree, starts, history), history)
+        fit = polish(problem, search(problem, starts, history), history)
         bar.update()
         for _ in range(MOST_WEIGHINGS):
             weighed = with_precision(problem, fit)
             if weighed is problem:
                 break
             problem = weighed
-            fit = polish(problem, search(problem, degree, starts, history), history)
+            fit = polish(problem, search(problem, starts, history), history)
         if (problem.errors(fit) > CONSISTENT * problem.noise).any():
             problem = with_process_noise(problem, fit, probes)
         if problem.kicked:
-            fit = search(problem, degree, starts, history)
+            fit = search(problem, starts, history)
             problem = rebalanced(problem, fit, probes)
             fit = polish(problem, fit, history)
         bar.update()
@@ -199,7 +206,7 @@ def _refitted(
     changed = _changed(path.fit, goal)
     if not changed:
         return None
-    active = np.stack([plateau.terms for plateau in goal], axis=1)
+    active = path.fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
     if active.sum() > RICHEST * path.fit.state.active.sum():
         return None
     state, collocation = path.restricted(active), path.fit.collocation

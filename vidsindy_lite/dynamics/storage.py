@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import fields, is_dataclass
-from typing import Any
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from scipy.interpolate import BSpline
 
 from ..checks import check_path
+from .candidates import Library, restored
 from .discovery import Discovery, Step
+from .library import Function
 from .persistence import Plateau
 from .polynomials import PolynomialSystem
 
@@ -27,15 +29,17 @@ def write(found: Discovery, path: str | os.PathLike) -> None:
     check_path("path", path).write_text(text + "\n", encoding="utf-8")
 
 
-def read(path: str | os.PathLike) -> Discovery:
+def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
     """Read a discovery from a file that `write` has made.
+
+    Functions of one's own are those of the library: a file holds their names.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        If the file holds none.
+        If the file holds none, or the library not all functions of the law.
     """
     file = check_path("path", path)
     if not file.exists():
@@ -47,7 +51,14 @@ def read(path: str | os.PathLike) -> Discovery:
         raise ValueError(f"path: must be a file that `save` has written, got {file}") from error
     if not isinstance(found, Discovery):
         raise ValueError(f"path: must be a file that `save` has written, got {file}")
-    return found
+    system, native = found.system, found.native
+    written = cast("tuple[str, ...]", system.functions)  # of which a file holds the names
+    functions = restored(system.names, system.d // system.order, written, library)
+    return replace(
+        found,
+        system=replace(system, functions=functions),
+        native=replace(native, functions=functions),
+    )
 
 
 def _encoded(value: Any) -> Any:
@@ -55,6 +66,8 @@ def _encoded(value: Any) -> Any:
         return {"type": "array", "dtype": value.dtype.kind, "values": value.tolist()}
     if isinstance(value, BSpline):
         return {"type": "spline", "t": _encoded(value.t), "c": _encoded(value.c), "k": value.k}
+    if isinstance(value, Function):
+        return value.name
     if is_dataclass(value):
         parts = {field.name: _encoded(getattr(value, field.name)) for field in fields(value)}
         return {"type": type(value).__name__, **parts}

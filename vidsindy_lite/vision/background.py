@@ -35,8 +35,11 @@ SAMPLES = 21
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
 _BORDER = 3  # coarse pixels around a place that show how its surroundings continue
-_OFTEN = 0.1  # share of the samples that must differ from the background to cast doubt on it
+_OFTEN = 0.1  # share of the samples that must differ to cast doubt on a place of the background
 _NEAR = 16  # coarse pixels, within which several things that differ may be one target
+_SOMETHING = 4  # coarse pixels in one place that are more than noise
+_SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
+_FLICKERS = 0.02  # change of the light above which it is not steady
 _TOO_LARGE = 0.25  # share of the image that no target fills
 _ROUNDING = 0.05  # grey levels squared; variance of coarse differences without any noise
 _QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
@@ -104,36 +107,40 @@ def _remove_ghosts(background: Image, samples: Image, floor: float) -> None:
         view[inside] = min(looks, key=lambda look: np.abs(look - expected).sum())
 
 
-def _background_motion(changes: list[Floats32], floor: float) -> float:
-    """How much differs from the background far from the largest thing that does, in its areas.
+def _others(changes: list[Floats32], floor: float) -> float:
+    """Share of the samples in which something differs from the background beside the target.
 
-    Of a target before a background at rest nothing does: 0. Something that fills much of the image
-    is no target. The median over the samples, given their differences from the background.
+    Far from the largest thing that differs, at least so many pixels in one place, or a thing that
+    is too large for a target; given the samples' differences from the background.
     """
-    shares = []
+    found = []
     for change in changes:
         differs = np.linalg.norm(change, axis=-1) > floor
-        found = _largest_component(differs)
-        if found is None:
+        largest = _largest_component(differs)
+        if largest is None:
             continue
-        left, top, width, height, area = found[1]
-        if area < _TOO_LARGE * differs.size:
-            v, u = np.ogrid[: differs.shape[0], : differs.shape[1]]
-            differs &= np.hypot(u - left - width / 2, v - top - height / 2) > _NEAR
-        shares.append(differs.sum() / area)
-    return float(np.median(shares)) if shares else 0.0
+        left, top, width, height, area = largest[1]
+        near = np.s_[
+            max(top - _NEAR, 0) : top + height + _NEAR, max(left - _NEAR, 0) : left + width + _NEAR
+        ]
+        differs[near] = False
+        other = _largest_component(differs)
+        found.append(
+            area > _TOO_LARGE * differs.size
+            or (other is not None and other[1][cv2.CC_STAT_AREA] >= _SOMETHING)
+        )
+    return float(np.mean(found)) if found else 0.0
 
 
-def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -> float:
-    """Pixels by which the whole background is displaced, where that is certain, else 0.
+def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -> Floats:
+    """Pixels by which the whole background is displaced in each sample, 0 where that is not sure.
 
     To first order a displacement changes the image by minus that times its slope: least squares,
-    with a prior of one coarse pixel where there is little to see. Nine samples in ten are displaced
-    by at most so much: a camera that was pushed once is displaced ever after.
+    with a prior of one coarse pixel where there is little to see.
     """
     slope = np.array(np.gradient(background, axis=(1, 0)))
-    displaced: list[float] = []
-    for change in changes:
+    displaced = np.zeros(len(changes))
+    for k, change in enumerate(changes):
         calm = np.linalg.norm(change, axis=-1) <= floor
         if not calm.any():
             continue
@@ -143,11 +150,48 @@ def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -
         displacement = np.linalg.solve(information, g @ d / variance)
         error = np.sqrt(np.trace(np.linalg.inv(information)))
         distance = float(np.linalg.norm(displacement))
-        displaced.append(_COARSE * distance if distance > 5 * error else 0.0)
-    return float(np.quantile(displaced, 0.9)) if displaced else 0.0
+        displaced[k] = _COARSE * distance if distance > 5 * error else 0.0
+    return displaced
+
+
+def light(frame: Floats32, background: Floats32, known: Bools) -> Floats32:
+    """By what factor each colour of a frame is brighter than the background, (3,).
+
+    The median over pixels that are neither dark nor saturated nor, probably, the target's.
+    """
+    step = max(1, int(np.sqrt(known.size / 4000)))
+    a, b = frame[::step, ::step], background[::step, ::step]
+    use = known[::step, ::step] & (b.min(axis=-1) > 40) & (b.max(axis=-1) < 240)
+    if use.mean() < 0.1:
+        return np.ones(3, np.float32)
+    ratio = np.median(a[use] / b[use], axis=0)
+    ratio[np.abs(ratio - 1) < 0.01] = 1  # what rounding and compression do
+    return np.clip(ratio, 0.4, 2.5).astype(np.float32)
 
 
 # --------------------------------------------------------------------------------------- the model
+
+
+def _unrest(background: Floats32, changes: list[Floats32], floor: float) -> tuple[str, ...]:
+    """Why a background model is not the right one: what is not at rest in the samples."""
+    doubts = []
+    displaced = camera_motion(background, changes, floor)
+    if displaced.size and displaced.max() > _SHAKY:
+        doubts.append(
+            f"the camera moves, by up to {displaced.max():.1f} px in the sampled frames; "
+            "its motion is part of the track"
+        )
+    everywhere = np.ones(background.shape[:2], bool)
+    lights = [np.abs(light(background + change, background, everywhere) - 1) for change in changes]
+    if max(map(np.max, lights)) > _FLICKERS:
+        doubts.append(f"the light changes, by up to {100 * np.max(lights):.0f} %")
+    others = _others(changes, floor)
+    if others > _OFTEN:
+        doubts.append(
+            "the background is not at rest, or other things move: beside the largest thing that "
+            f"differs from it there is another in {100 * others:.0f} % of the sampled frames"
+        )
+    return tuple(doubts)
 
 
 @dataclass(frozen=True)
@@ -183,8 +227,7 @@ class BackgroundModel:
         self.size = np.array(self.background.shape[1::-1])
         self.coarse_background = _reduce(self.background)
         changes = [_reduce(sample) - self.coarse_background for sample in samples]
-        self.background_motion = _background_motion(changes, self.coarse_floor)
-        self.camera_motion = camera_motion(self.coarse_background, changes, self.coarse_floor)
+        self.unrest = _unrest(self.coarse_background, changes, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         self.blur = 1.2 if self.noise > _QUIET else 0.0
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import _median
+from .background import _median, light
 
 LONGEST = 480  # pixels of the longer side of a reduced frame
 _LARGEST = 2.5  # frames that the plate may hold, side by side
@@ -145,21 +145,6 @@ def _masked_median(
         result[top : top + strip[1]] = _median(layers)
         count[top : top + strip[1]] = here
     return result, count
-
-
-def light(frame: Floats32, background: Floats32, known: Bools) -> Floats32:
-    """By what factor each colour of a frame is brighter than the background, (3,).
-
-    The median over pixels that are neither dark nor saturated nor, probably, the target's.
-    """
-    step = max(1, int(np.sqrt(known.size / 4000)))
-    a, b = frame[::step, ::step], background[::step, ::step]
-    use = known[::step, ::step] & (b.min(axis=-1) > 40) & (b.max(axis=-1) < 240)
-    if use.mean() < 0.1:
-        return np.ones(3, np.float32)
-    ratio = np.median(a[use] / b[use], axis=0)
-    ratio[np.abs(ratio - 1) < 0.01] = 1  # what rounding and compression do
-    return np.clip(ratio, 0.4, 2.5).astype(np.float32)
 
 
 class Difference:

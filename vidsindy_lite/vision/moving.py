@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .background import SAMPLES, camera_motion
-from .candidates import Candidate, Difference, Plate, enlarged, light, reduce, reduction
+from .background import SAMPLES, camera_motion, light
+from .candidates import Candidate, Difference, Plate, enlarged, reduce, reduction
 from .hints import Hint
 from .linking import Sightings, best_path
 from .refining import Lens, View, fitting, scatter
@@ -28,6 +28,8 @@ _PLAIN = 0.2  # quality of the candidates of a path that is worth anything
 _SCARCE = 0.05  # share of the frames in which a target must be seen
 _SWAYS = 0.5  # pixels of a camera's displacement that are more than doubtful
 _LOOSE = 1.0  # pixels to which a camera's motion should be known
+_EXPLAINS = 0.95  # share of what differs that a camera's motion must leave at most
+_BOUND = 30.0  # grey levels
 _COLOUR = 70.0  # grey levels between colours that are not alike
 _TOLD = 100.0  # quality of the candidate that a user points at
 _LARGE = 0.01  # share of the image that a target hardly fills
@@ -109,17 +111,41 @@ def _sways(samples: Image, plate: Plate, noise: float) -> float:
     for sample in samples:
         now = sample.astype(np.float32)
         changes.append((now / light(now, then, known) - then)[::2, ::2])
-    return 0.5 * camera_motion(then[::2, ::2], changes, max(6 * noise, 8.0))
+    displaced = camera_motion(then[::2, ::2], changes, max(6 * noise, 8.0))
+    return float(0.5 * np.quantile(displaced, 0.9))
 
 
-def _camera(path: str | os.PathLike, small: Image, frames: int, factor: int) -> CameraMotion:
-    """The camera's motion, read from all frames unless some of them show it at rest."""
+def _camera(path: str | os.PathLike, small: Image, sampled: Ints, factor: int) -> CameraMotion:
+    """The camera's motion: read from all frames, unless the sampled ones tell that it is at rest.
+
+    It must explain better than a camera at rest how the samples differ: maps that are not needed
+    only add their errors.
+    """
+    rest = at_rest(video_info(path).frames)
     if stands_still(small):
-        return at_rest(frames)
+        return rest
     steadying = Steadying(factor)
     for frame in read_video(path):
         steadying.add(reduce(frame, factor))
-    return steadying.motion()
+    motion = steadying.motion()
+    sampled = np.minimum(sampled, len(motion.maps) - 1)
+    larger = enlarged(factor)
+    maps = np.linalg.inv(larger) @ motion.maps[sampled] @ larger
+    known = np.isfinite(motion.errors[sampled])
+    still = _unlike(small[known], rest.maps[sampled][known])
+    return motion if _unlike(small[known], maps[known]) < _EXPLAINS * still else rest
+
+
+def _unlike(samples: Image, maps: Floats) -> float:
+    """Grey levels by which samples differ from their plate, those of the target bounded."""
+    plate = Plate(samples, maps, np.ones(len(samples), bool))
+    found = []
+    for sample, here in zip(samples, maps, strict=True):
+        then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1])
+        a, b = sample.astype(np.float32), then.astype(np.float32)
+        change = np.abs(a - b * light(a, b, known))[known]
+        found.append(np.minimum(change, _BOUND).mean() if change.size else _BOUND)
+    return float(np.mean(found))
 
 
 def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) -> Followed:
@@ -184,11 +210,11 @@ class _Film(NamedTuple):
     def of(cls, path: str | os.PathLike, samples: Image) -> "_Film":
         """From its sampled frames, and from all of them if its camera moves."""
         frames = video_info(path).frames
+        sampled = np.unique(np.linspace(0, frames - 1, SAMPLES).round().astype(int))[: len(samples)]
         factor = reduction((samples.shape[2], samples.shape[1]))
         small = np.array([reduce(sample, factor) for sample in samples])
-        motion = _camera(path, small, frames, factor)
-        sampled = np.unique(np.linspace(0, frames - 1, SAMPLES).round().astype(int))
-        sampled = np.minimum(sampled[: len(samples)], len(motion.maps) - 1)
+        motion = _camera(path, small, sampled, factor)
+        sampled = np.minimum(sampled, len(motion.maps) - 1)
         larger = enlarged(factor)
         maps = np.linalg.inv(larger) @ motion.maps @ larger
         plate = Plate(small, maps[sampled], np.isfinite(motion.errors[sampled]))

@@ -30,8 +30,7 @@ from .video import read_video
 
 DETECTORS = ("auto", "background", "learned")
 
-_RESTLESS = 0.3  # motion above which a background is not at rest; before one at rest it is 0.03
-_SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
+_KEPT = 0.67  # share of the frames below which many of them are lost
 _SOFT = 1.0  # of a sharp outline it is 0.6, see `Blob`
 _FEW = 0.95  # share of views that are whole, below which a blurred outline cannot be trusted
 _ROUGH = 1.0  # pixels that a track may scatter about a smooth motion
@@ -116,28 +115,32 @@ def track(
         check_instance("target", target, Hint)
         if detector != "auto":
             raise ValueError(f"target: may be given for detector='auto', got {detector!r:.60}")
+    found = _track(path, detector, target)
+    doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in found.warnings + _lost(found))
+    return replace(found, warnings=doubts)
+
+
+def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | None) -> Track:
+    """The track, its doubts without the name of the file."""
     if detector not in ("auto", "background"):
         return _link_detections(path, detector)
-    samples, name = sample_frames(path), Path(path).name
+    samples = sample_frames(path)
     model = BackgroundModel(samples)
-    shaky, restless = model.camera_motion > _SHAKY, model.background_motion > _RESTLESS
-    if detector == "auto" and (shaky or restless):
+    if detector == "auto" and model.unrest:
         return _follow(path, samples, target)
     found, blurred = _track_blobs(path, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return _follow(path, samples, target)
-    doubts = []
-    if shaky:
-        doubts.append(
-            f"{name}: the camera moves, typically by {model.camera_motion:.1f} px or more; "
-            "its motion is part of the track"
-        )
-    if restless:
-        doubts.append(
-            f"{name}: the background is not at rest; far from the largest thing that moves, "
-            f"{model.background_motion:.1f} times its area changes in a typical frame"
-        )
-    return replace(found, warnings=tuple(doubts))
+    return replace(found, warnings=model.unrest)
+
+
+def _lost(found: Track) -> tuple[str, ...]:
+    """Is the target lost in many of the frames from its first to its last?"""
+    at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
+    if not len(at) or len(at) >= _KEPT * (between := at[-1] - at[0] + 1):
+        return ()
+    lost = between - len(at)
+    return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
 
 
 def _follow(path: str | os.PathLike, samples: Image, hint: Hint | None) -> Track:
@@ -145,9 +148,8 @@ def _follow(path: str | os.PathLike, samples: Image, hint: Hint | None) -> Track
     found = follow(path, samples, hint)
     seen = np.isfinite(found.pixels[:, 0])
     confidence = np.where(seen, np.exp(-found.errors / 3), 0.0)
-    doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in found.doubts)
     moves = not np.array_equal(found.maps, np.broadcast_to(np.eye(3), found.maps.shape))
-    return Track(found.pixels, confidence, "motion", doubts, found.maps if moves else None)
+    return Track(found.pixels, confidence, "motion", found.doubts, found.maps if moves else None)
 
 
 def _plausible(found: Track, hint: Hint | None) -> bool:

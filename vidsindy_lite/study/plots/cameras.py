@@ -9,8 +9,11 @@ from matplotlib.ticker import LogLocator
 from mpl_toolkits.mplot3d import Axes3D
 
 from ...arrays import Floats
-from ...cameras import Camera, Rig
+from ...cameras import Camera, PerspectiveCamera, Rig
 from .common import SPACE, finish_space
+
+_SIGHTS = 5  # instants at which lines of sight are drawn
+_DEPTH = 0.15  # of a pinhole's distance from the path: where its image is drawn
 
 
 def plot_view_plane(camera: Camera, x: Floats) -> Figure:
@@ -81,21 +84,32 @@ def plot_independence(d: Floats, turned: Mapping[str, Floats]) -> Figure:
 
 
 def plot_rig(rig: Rig, x: Floats) -> Figure:
-    """The cameras of a rig around a trajectory, each with its image in its view plane.
+    """The cameras of a rig around a trajectory, their images of it, and some lines of sight.
+
+    An orthographic camera is its view plane; a perspective one its pinhole and the pyramid of what
+    it sees, cut off where its image is drawn.
 
     Parameters
     ----------
     rig : Rig
         Calibrated.
     x : ndarray, shape (n, 3)
-        Trajectory, scene units.
+        Trajectory, scene units; NaN rows are left out.
     """
     figure, axes = plt.subplots(figsize=(7.5, 5.5), subplot_kw=SPACE)
     axes.plot(*x.T, color="k", lw=0.8)
+    shown = np.flatnonzero(np.isfinite(x).all(axis=1))
+    points = x[shown[np.linspace(0, len(shown) - 1, _SIGHTS).astype(int)]]
+    axes.scatter(*points.T, color="k", s=8)
     for i, camera in enumerate(rig.cameras):
-        seen = _on_plane(camera, camera.project(x))
+        # A pinhole's image is drawn close to it.
+        away = _DEPTH * float(np.linalg.norm(points.mean(axis=0) - np.asarray(camera.position)))
+        seen = _on_plane(camera, camera.project(x), away)
         axes.plot(*seen.T, color=f"C{i}", lw=0.8, label=f"camera {i + 1}")
-        _draw_plane(axes, camera, f"C{i}")
+        _draw_plane(axes, camera, f"C{i}", away)
+        ends = _on_plane(camera, camera.project(points))  # or the pinhole
+        for point, end in zip(points, ends, strict=True):
+            axes.plot(*np.transpose([point, end]), color=f"C{i}", lw=0.5, ls=":")
     finish_space(axes, azimuth=-40, elevation=22)
     figure.legend(loc="outside upper center", ncols=len(rig.cameras))
     return figure
@@ -235,18 +249,24 @@ def plot_lags(lags: Floats, missed: Floats, limit: float) -> Figure:
     return figure
 
 
-def _on_plane(camera: Camera, pixels: Floats) -> Floats:
-    """The points of the view plane that are the pixels' places in space."""
-    in_plane = camera.plane_coordinates(pixels) - camera.offset
-    return np.asarray(camera.position) + in_plane @ camera.rows
+def _on_plane(camera: Camera, pixels: Floats, away: float = 0.0) -> Floats:
+    """The pixels' places in space: on the view plane, of a pinhole on one so far before it."""
+    in_plane = (camera.plane_coordinates(pixels) - camera.offset) @ camera.rows
+    place = np.asarray(camera.position)
+    if isinstance(camera, PerspectiveCamera):
+        return place + away * (in_plane - camera.normal)
+    return place + in_plane
 
 
-def _draw_plane(axes: Axes3D, camera: Camera, color: str) -> None:
+def _draw_plane(axes: Axes3D, camera: Camera, color: str, away: float = 0.0) -> None:
     width, height = camera.image_size
     corners = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]]) - 0.5
-    edge = _on_plane(camera, corners)
+    edge = _on_plane(camera, corners, away)
     axes.plot(*edge.T, color=color, lw=1)
     axes.plot_trisurf(*edge[:4].T, triangles=[[0, 1, 2], [0, 2, 3]], color=color, alpha=0.12)
+    if isinstance(camera, PerspectiveCamera):
+        for corner in edge[:4]:
+            axes.plot(*np.transpose([camera.position, corner]), color=color, lw=1)
 
 
 # -------------------------------------------------------------------------- the lab, in millimetres

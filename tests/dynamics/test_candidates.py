@@ -1,0 +1,260 @@
+"""Libraries as values: what they hold, what they find, and what they refuse."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import vidsindy_lite as vl
+from vidsindy_lite import Library, PolynomialSystem
+from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.library import closure, monomial_exponents
+
+PENDULUM = Library.polynomial(1) + Library.fourier(1)
+
+
+def drag(v, u):
+    return np.hypot(v, u) * v
+
+
+def swing(friction=0.1, amplitude=1.5, noise=0.01, seed=0, n=1500):
+    """A pendulum of 1 m, its law, times and noisy angles."""
+    terms = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -friction}}
+    law = PolynomialSystem.from_terms(terms, library=PENDULUM)
+    t = np.linspace(0, 20, n)
+    x = law.simulate(t, [amplitude, 0.0])[:, :1]
+    return law, t, x + noise * x.std() * np.random.default_rng(seed).normal(size=x.shape)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+@pytest.mark.parametrize("library", [PENDULUM, Library.polynomial(3) + Library.fourier(1)])
+def test_a_pendulum_at_a_large_amplitude_is_found_from_its_angle_alone(friction, library):
+    law, t, x = swing(friction)
+    found = vl.discover(t, x, order=2, library=library)
+    if library == PENDULUM:
+        assert (found.system.support == law.support).all()
+    wanted = {"sin(x)": -9.81} | ({"vx": -friction} if friction else {})
+    rows = np.flatnonzero(found.system.support[:, 1])
+    assert {found.terms[k] for k in rows} == set(wanted)
+    for k in rows:
+        error = found.coefficients[k, 1] - wanted[found.terms[k]]
+        assert abs(error) < 5 * found.standard_errors[k, 1]
+    assert found.status == "ok"
+
+
+def test_a_law_of_first_order_may_have_functions_too():
+    law = PolynomialSystem.from_terms(
+        {"x": {"sin(y)": 1.0, "x": -0.3}, "y": {"cos(x)": 2.0, "1": 0.5}}, library=Library.fourier()
+    )
+    t = np.linspace(0, 30, 1500)
+    x = law.simulate(t, [1.0, 0.0])
+    x += 0.01 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
+    found = vl.discover(t, x, library=Library.polynomial(1) + Library.fourier(1))
+    assert found.system.text().splitlines() != law.text().splitlines()
+    wanted = {(law.terms[k], j) for k, j in np.argwhere(law.support)}
+    assert {(found.terms[k], j) for k, j in np.argwhere(found.system.support)} == wanted
+
+
+def speed(vx, vy, vz):
+    return np.sqrt(vx**2 + vy**2 + vz**2)
+
+
+DRAG = Library.terms({"|v|v": lambda vx, vy, vz: speed(vx, vy, vz) * np.array([vx, vy, vz])})
+SEPARATE = Library.terms(
+    {
+        "|v|vx": lambda vx, vy, vz: speed(vx, vy, vz) * vx,
+        "|v|vy": lambda vx, vy, vz: speed(vx, vy, vz) * vy,
+        "|v|vz": lambda vx, vy, vz: speed(vx, vy, vz) * vz,
+    }
+)
+THROWS = ((8, 3, 9), (-6, 7, 6), (5, -8, 10), (-9, -4, 5))
+
+
+def thrown(starts, noise=0.01):
+    """Throws with gravity and quadratic drag: times and noisy positions, 1,500 samples in all."""
+    equations = {q: {f"v{q}": 1.0} for q in "xyz"}
+    equations |= {f"v{q}": {f"|v|v{q}": -0.05} for q in "xyz"}
+    equations["vz"]["1"] = -9.81
+    law, rng = PolynomialSystem.from_terms(equations, library=SEPARATE), np.random.default_rng(0)
+    t = np.linspace(0, 2, 1500 // len(starts))
+    paths = [law.simulate(t, [0, 0, 1.5, *start])[:, :3] for start in starts]
+    return [(t, x + noise * x.std(axis=0) * rng.normal(size=x.shape)) for x in paths]
+
+
+def test_four_throws_tell_quadratic_drag():
+    found = vl.discover(thrown(THROWS), order=2, library=Library.polynomial(1) + SEPARATE)
+    wanted = {("|v|vx", 3), ("|v|vy", 4), ("|v|vz", 5), ("1", 5)}
+    support = found.system.support & (np.arange(6) > 2)
+    assert {(found.terms[k], j) for k, j in np.argwhere(support)} == wanted
+    assert found.status == "ok"
+
+
+@pytest.mark.parametrize("start", THROWS)
+def test_one_throw_tells_quadratic_drag_that_is_the_same_in_all_directions(start):
+    vector = Library.terms({"v": lambda vx, vy, vz: np.array([vx, vy, vz])})
+    found = vl.discover(thrown([start]), order=2, library=Library.polynomial(0) + vector + DRAG)
+    support = found.system.support & (np.arange(6) > 2)
+    wanted = {("|v|v_x", 3), ("|v|v_y", 4), ("|v|v_z", 5), ("1", 5)}
+    assert {(found.terms[k], j) for k, j in np.argwhere(support)} == wanted
+    rows = [found.terms.index(f"|v|v_{q}") for q in "xyz"]
+    drags, errors = (part[rows, [3, 4, 5]] for part in (found.coefficients, found.standard_errors))
+    np.testing.assert_allclose([drags, errors], [drags[:1], errors[:1]] * np.ones(3), rtol=1e-9)
+    assert abs(drags[0] + 0.05) < 5 * errors[0] < 0.001
+
+
+def test_directions_of_a_vector_share_their_coefficient_and_no_other_does():
+    library = Library.polynomial(0) + DRAG
+    form = Form.of(3, library, order=2)
+    l, entries = len(form.exponents), np.arange(6 * len(form.exponents))
+    followers = np.flatnonzero(form.shared != entries)
+    assert [int(entry) // l for entry in followers] == [4, 5]
+    assert {int(entry) // l for entry in form.shared[followers]} == {3}
+    assert len(form.searched) == 3 + 1
+    assert (Form.of(3, Library.polynomial(3), order=2).shared == np.arange(6 * 84)).all()
+
+
+def test_the_law_of_gravitation_is_found_from_positions():
+    pull = Library.terms({"r/r^3": lambda x, y: np.array([x, y]) / np.hypot(x, y) ** 3})
+    t = np.linspace(0, 20, 1500)
+    law = PolynomialSystem.from_terms(
+        {"x": {"vx": 1}, "y": {"vy": 1}, "vx": {"x/r^3": -1}, "vy": {"y/r^3": -1}},
+        library=Library.terms(
+            {
+                "x/r^3": lambda x, y: x / np.hypot(x, y) ** 3,
+                "y/r^3": lambda x, y: y / np.hypot(x, y) ** 3,
+            }
+        ),
+    )
+    x = law.simulate(t, [1, 0, 0, 1.2])[:, :2]
+    x += 0.01 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
+    found = vl.discover(t, x, order=2, library=Library.polynomial(1) + pull)
+    assert found.native.text(2) == "x'' = -r/r^3_x\ny'' = -r/r^3_y"
+
+
+@given(st.integers(1, 4), st.integers(0, 4))
+def test_the_polynomial_library_is_the_special_case(d, degree):
+    names = tuple(f"x{i}" for i in range(d))
+    exponents, functions = Library.polynomial(degree).resolve(names, d)
+    assert functions == ()
+    np.testing.assert_array_equal(exponents, monomial_exponents(d, degree))
+    np.testing.assert_array_equal(closure(exponents), exponents)
+
+
+def test_a_degree_is_short_for_a_polynomial_library():
+    t = np.linspace(0, 10, 300)
+    x = np.column_stack([np.cos(t), -np.sin(t)])
+    short, long = (
+        vl.discover(t, x, **how) for how in ({"degree": 2}, {"library": Library.polynomial(2)})
+    )
+    assert short.equations() == long.equations()
+
+
+def test_a_law_evaluates_differentiates_and_prints():
+    library = Library.fourier(2) + Library.terms({"|v|v": drag})
+    terms = {"v": {"|v|v": -0.2, "sin(2 v)": 1.0}, "u": {"cos(u)": 2.0}}
+    law = PolynomialSystem.from_terms(terms, library=library)
+    assert law.text() == "dv/dt = sin(2 v) - 0.2 |v|v\ndu/dt = 2 cos(u)"
+    assert r"\sin(2 v)" in law.latex()
+    assert r"\mathrm{|v|v}" in law.latex()
+    x = np.random.default_rng(0).normal(size=(50, 2))
+    v, u = x.T
+    wanted = np.column_stack([np.sin(2 * v) - 0.2 * np.hypot(v, u) * v, 2 * np.cos(u)])
+    np.testing.assert_allclose(law(x), wanted, rtol=1e-12)
+    step = 1e-6
+    for i, axis in enumerate(np.eye(2)):
+        slope = (law(x + step * axis) - law(x - step * axis)) / (2 * step)
+        np.testing.assert_allclose(law.gradient(x)[:, :, i], slope, atol=1e-6)
+    assert law.shift([0.0, 0.0])(x) == pytest.approx(law(x))
+    with pytest.raises(ValueError, match=r"offset: must be zero for a law with sin\(v\)"):
+        law.shift([1.0, 0.0])
+    product = PolynomialSystem.from_terms({"v": {"u cos(u)": 1}, "u": {"1": 1}}, library=library)
+    np.testing.assert_allclose(product(x)[:, 0], u * np.cos(u))
+    with pytest.raises(ValueError, match=r"term: must be a product of the variables .* got 'tan"):
+        PolynomialSystem.from_terms({"v": {"tan(v)": 1}, "u": {"1": 1}}, library=library)
+
+
+def test_a_sum_is_a_union():
+    both = Library.polynomial(3) + Library.fourier(1)
+    assert both + both == both
+    assert Library.polynomial(1) + Library.polynomial(3) == Library.polynomial(3)
+    assert str(both + Library.terms({"a": drag})) == "polynomial(3) + fourier(1) + terms(a)"
+    assert Library.parse("fourier(1)+ polynomial( 3 )") == both
+
+
+def test_a_law_is_saved_and_its_own_functions_are_given_again(tmp_path):
+    _, t, x = swing(n=400)
+    library = Library.polynomial(1) + Library.terms({"restoring": lambda x: np.sin(x)})
+    for name, held in (("sines", PENDULUM), ("own", library)):
+        found = vl.discover(t, x, order=2, library=held)
+        found.save(tmp_path / name)
+        again = vl.Discovery.load(tmp_path / name, library=None if name == "sines" else held)
+        assert again.equations() == found.equations()
+        np.testing.assert_array_equal(again.predict([0.3, 1.0]), found.predict([0.3, 1.0]))
+    runs, library = thrown(THROWS[:2]), Library.polynomial(0) + DRAG
+    found = vl.discover(runs, order=2, library=library)
+    found.save(tmp_path / "vector")
+    again = vl.Discovery.load(tmp_path / "vector", library=library)
+    np.testing.assert_array_equal(again.predict(np.ones(6)), found.predict(np.ones(6)))
+    with pytest.raises(ValueError, match=r"library: must hold the function 'restoring'"):
+        vl.Discovery.load(tmp_path / "own")
+
+
+@pytest.mark.parametrize(
+    ("library", "words"),
+    [
+        (Library(), "library: must hold a term"),
+        ("polynomial(3)", "library: must be of type Library"),
+        (Library.terms({"a": lambda q: q}), r"arguments of 'a' must be named .*\(x, y\), got q"),
+        (Library.terms({"a": lambda: 1.0}), r"arguments of 'a' .* got none"),
+        (Library.terms({"a": lambda x: 1.0}), r"'a' must return an array of the shape"),
+        (
+            Library.terms({"a": lambda x: [x, x, x]}),
+            r"'a' must return .* or 2 of these, got shape .3, 2.",
+        ),
+        (Library.terms({"a": lambda x: np.log(-2 - x)}), "library: a must be finite on the data"),
+        (
+            Library.polynomial(1)
+            + Library.terms({"s": lambda x: np.sin(x) ** 2, "c": lambda x: np.cos(x) ** 2}),
+            "library: its terms must not depend on each other, got 1, s, c",
+        ),
+        (
+            Library.polynomial(2) + Library.terms({"square": lambda x: x**2}),
+            "library: its terms must not depend on each other, got square, x.2",
+        ),
+    ],
+)
+def test_a_library_that_does_not_suit_is_refused_in_one_line(library, words):
+    t = np.linspace(0, 10, 300)
+    x = np.column_stack([np.cos(t), -np.sin(t)])
+    with pytest.raises(ValueError, match=words) as refused:
+        vl.discover(t, x, library=library)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Library.parse("polynomial(3) + tan(1)"), r"a sum of .*'tan\(1\)'"),
+        (lambda: Library.parse(""), "library: must be a sum of"),
+        (lambda: Library.fourier(0), "harmonics: must be an integer of at least 1, got 0"),
+        (lambda: Library.polynomial(-1), "degree: must be an integer of at least 0, got -1"),
+        (lambda: Library.terms({}), "functions: must map names to functions"),
+        (lambda: Library.terms({"a": 1}), "functions: must map a name to a function, got 'a'"),
+        (
+            lambda: Library.terms({"a": np.sin}) + Library.terms({"a": np.cos}),
+            "library: a name may stand for one function, got 'a' twice",
+        ),
+        (
+            lambda: vl.discover(np.arange(9.0), np.eye(9), degree=2, library=PENDULUM),
+            "degree: must not be given with a library, got 2 and polynomial.1. . fourier.1.",
+        ),
+    ],
+)
+def test_what_is_no_library_is_refused(make, words):
+    with pytest.raises(ValueError, match=words):
+        make()
+
+
+def test_a_library_is_a_sum_of_libraries_only():
+    with pytest.raises(TypeError):
+        Library.polynomial(1) + 3

@@ -1,0 +1,277 @@
+"""Libraries as values: which candidate terms a law may have, before any data are seen.
+
+A library is a sum of families: polynomials, harmonics of the coordinates, functions of one's own.
+For given variables it becomes what `library` works with: functions of the state, and the exponents
+of products of coordinates and functions.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats, Ints
+from ..checks import check_instance, check_integer
+from .library import Function, monomial_exponents, name_latex
+
+FAMILIES = "polynomial(degree) and fourier(harmonics)"
+"""What can be written as text."""
+STEP = 1e-3
+"""Step of a difference, relative to the size of the coordinate."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """Candidate terms of a law, as a value: made by `polynomial`, `fourier`, `terms`, and added.
+
+    Parameters
+    ----------
+    degree : int, optional
+        Highest total degree of the monomials; none by default, not even the constant.
+    harmonics : int
+        Of each measured coordinate q: sin(q), cos(q), ..., sin(n q), cos(n q).
+    functions : tuple of (str, callable)
+        Terms of one's own, with their names.
+
+    Examples
+    --------
+    >>> vl.Library.polynomial(3)  # what `discover` takes by default
+    >>> vl.Library.polynomial(1) + vl.Library.fourier(1)  # a pendulum
+    >>> vl.Library.polynomial(1) + vl.Library.terms({"x/r^3": lambda x, y: x / np.hypot(x, y)**3})
+    """
+
+    degree: int | None = None
+    harmonics: int = 0
+    functions: tuple[tuple[str, Callable[..., ArrayLike]], ...] = ()
+
+    @classmethod
+    def polynomial(cls, degree: int) -> Library:
+        """All monomials of the state up to a total degree, the constant among them."""
+        return cls(degree=check_integer("degree", degree))
+
+    @classmethod
+    def fourier(cls, harmonics: int = 1) -> Library:
+        """Sine and cosine of each measured coordinate, in radians, and of its multiples.
+
+        The coordinates are taken as they are: no origin is searched for a law with such terms.
+        """
+        return cls(harmonics=check_integer("harmonics", harmonics, 1))
+
+    @classmethod
+    def terms(cls, functions: Mapping[str, Callable[..., ArrayLike]]) -> Library:
+        """Functions of one's own as terms.
+
+        Parameters
+        ----------
+        functions : mapping of str to callable
+            Names and functions. The arguments of a function are named like the variables that it
+            needs (``x, y``; of a law of second order also ``vx, vy``); it takes and returns arrays
+            of shape (n,). Derivatives are taken by differences of fourth order. If it returns as
+            many arrays as there are measured coordinates, these are the directions of a vector,
+            and the term has the same coefficient in all of them.
+
+        Raises
+        ------
+        ValueError
+            If it is no such mapping.
+        """
+        if not isinstance(functions, Mapping) or not functions:
+            raise ValueError(
+                f"functions: must map names to functions of the variables, got {functions!r:.60}"
+            )
+        for name, rule in functions.items():
+            if not isinstance(name, str) or not name.strip() or not callable(rule):
+                raise ValueError(f"functions: must map a name to a function, got {name!r:.60}")
+        return cls(functions=tuple(functions.items()))
+
+    @classmethod
+    def parse(cls, text: str) -> Library:
+        """A library from text such as ``polynomial(3) + fourier(1)``.
+
+        Raises
+        ------
+        ValueError
+            If it names an unknown family.
+        """
+        total = cls()
+        for part in text.split("+"):
+            match = re.fullmatch(r"\s*(polynomial|fourier)\s*\(\s*(\d+)\s*\)\s*", part)
+            if match is None:
+                raise ValueError(f"library: must be a sum of {FAMILIES}, got {part.strip()!r}")
+            family = cls.polynomial if match[1] == "polynomial" else cls.fourier
+            total += family(int(match[2]))
+        return total
+
+    def __add__(self, other: Library) -> Library:
+        if not isinstance(other, Library):
+            return NotImplemented
+        functions = dict(self.functions)
+        for name, rule in other.functions:
+            if functions.setdefault(name, rule) is not rule:
+                raise ValueError(f"library: a name may stand for one function, got {name!r} twice")
+        degrees = [part.degree for part in (self, other) if part.degree is not None]
+        return Library(
+            max(degrees, default=None),
+            max(self.harmonics, other.harmonics),
+            tuple(functions.items()),
+        )
+
+    def __str__(self) -> str:
+        parts = [] if self.degree is None else [f"polynomial({self.degree})"]
+        parts += [f"fourier({self.harmonics})"] if self.harmonics else []
+        parts += [f"terms({', '.join(name for name, _ in self.functions)})"] * bool(self.functions)
+        return " + ".join(parts)
+
+    def resolve(self, names: tuple[str, ...], measured: int) -> tuple[Ints, tuple[Function, ...]]:
+        """The terms of a law in named variables, of which the first ``measured`` were measured.
+
+        Returns
+        -------
+        exponents : ndarray of int, shape (l, d + k)
+            Of the d variables and k functions in each term.
+        functions : tuple of Function, length k
+
+        Raises
+        ------
+        ValueError
+            If a function has an argument that is no variable.
+        """
+        d = len(names)
+        functions = [
+            harmonic(names, axis, multiple, kind)
+            for axis in range(measured)
+            for multiple in range(1, self.harmonics + 1)
+            for kind in ("sin", "cos")
+        ]
+        for name, rule in self.functions:
+            functions += own(names, measured, name, rule)
+        powers = np.empty((0, d), dtype=int)
+        if self.degree is not None:
+            powers = monomial_exponents(d, self.degree)
+        exponents = np.zeros((len(powers) + len(functions), d + len(functions)), dtype=int)
+        exponents[: len(powers), :d] = powers
+        exponents[len(powers) :, d:] = np.eye(len(functions), dtype=int)
+        return exponents, tuple(functions)
+
+
+def check_library(degree: int | None, library: Library | None) -> Library:
+    """The library that is given, or that of a degree, 3 if neither is."""
+    if library is None:
+        return Library.polynomial(3 if degree is None else check_integer("degree", degree, 1))
+    check_instance("library", library, Library)
+    if degree is not None:
+        raise ValueError(f"degree: must not be given with a library, got {degree} and {library}")
+    if library == Library():
+        raise ValueError("library: must hold a term, got none")
+    return library
+
+
+def harmonic(names: tuple[str, ...], axis: int, multiple: int, kind: str) -> Function:
+    """Sine or cosine of a multiple of a coordinate."""
+    of, slope, sign = (np.sin, np.cos, 1) if kind == "sin" else (np.cos, np.sin, -1)
+
+    def gradient(x: Floats) -> Floats:
+        result = np.zeros_like(x)
+        result[:, axis] = sign * multiple * slope(multiple * x[:, axis])
+        return result
+
+    times = "" if multiple == 1 else f"{multiple} "
+    return Function(
+        name=f"{kind}({times}{names[axis]})",
+        latex=rf"\{kind}({times}{name_latex(names[axis])})",
+        value=lambda x: of(multiple * x[:, axis]),
+        gradient=gradient,
+    )
+
+
+def restored(
+    names: tuple[str, ...], measured: int, written: Sequence[str], library: Library | None
+) -> tuple[Function, ...]:
+    """The functions of a law by their names; one's own from a library that holds them.
+
+    Raises
+    ------
+    ValueError
+        If a function is none of the library's.
+    """
+    _, held = (library or Library()).resolve(names, measured)
+    known = {function.name: function for function in held}
+    functions = []
+    for name in written:
+        match = re.fullmatch(r"(sin|cos)\((?:(\d+) )?(\w+)\)", name)
+        if name in known:
+            functions.append(known[name])
+        elif match and match[3] in names:
+            functions.append(harmonic(names, names.index(match[3]), int(match[2] or 1), match[1]))
+        else:
+            raise ValueError(
+                f"library: must hold the function {name!r} of the law, as a file holds its name "
+                f"alone; got {library or 'none'}"
+            )
+    return tuple(functions)
+
+
+def own(
+    names: tuple[str, ...], measured: int, name: str, rule: Callable[..., ArrayLike]
+) -> list[Function]:
+    """A function of one's own, whose arguments are named like variables; or its components."""
+    axes = _axes(names, name, rule)
+
+    def evaluate(x: Floats) -> Floats:
+        with np.errstate(all="ignore"):  # what is not finite is refused where it matters
+            return np.asarray(rule(*(x[:, axis] for axis in axes)), dtype=float)
+
+    shape = evaluate(np.ones((2, len(names)))).shape
+    if shape not in ((2,), (measured, 2)):
+        raise ValueError(
+            f"library: {name!r} must return an array of the shape of its arguments, (n,), or "
+            f"{measured} of these, got shape {shape} for n = 2"
+        )
+
+    def component(direction: int | None) -> Function:
+        def value(x: Floats) -> Floats:
+            values = evaluate(x)
+            return values if direction is None else values[direction]
+
+        of = "" if direction is None else names[direction]
+        return Function(
+            name=f"{name}_{of}" if of else name,
+            latex=rf"\mathrm{{{name}}}" + (f"_{{{of}}}" if of else ""),
+            value=value,
+            gradient=lambda x: _differences(value, x, axes),
+            direction=direction,
+        )
+
+    return [component(j) for j in (range(measured) if len(shape) == 2 else [None])]
+
+
+def _axes(names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]) -> list[int]:
+    """Which variables the arguments of a function are."""
+    try:
+        arguments = list(inspect.signature(rule).parameters)
+    except (TypeError, ValueError):  # of some functions in C
+        arguments = []
+    unknown = [argument for argument in arguments if argument not in names]
+    if not arguments or unknown:
+        raise ValueError(
+            f"library: the arguments of {name!r} must be named like variables "
+            f"({', '.join(names)}), got {', '.join(unknown) or 'none'}"
+        )
+    return [names.index(argument) for argument in arguments]
+
+
+def _differences(value: Callable[[Floats], Floats], x: Floats, axes: Sequence[int]) -> Floats:
+    """Derivatives of a function along axes by differences of fourth order, (n, d)."""
+    result = np.zeros_like(x)
+    for axis in axes:
+        step = np.zeros(x.shape[1])
+        step[axis] = STEP * (np.abs(x[:, axis]).mean() or 1.0)
+        near = value(x + step) - value(x - step)
+        far = value(x + 2 * step) - value(x - 2 * step)
+        result[:, axis] = (8 * near - far) / (12 * step[axis])
+    return result
