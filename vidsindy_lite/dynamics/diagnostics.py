@@ -6,6 +6,7 @@ A warning is a necessary sign of trouble, not a sufficient one: a law without on
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -13,10 +14,11 @@ from scipy.stats import chi2
 from ..arrays import Floats
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .errors import residual_noise
+from .library import shift_matrix
 from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
-from .selection import closest_rival
+from .selection import closest_rival, subset_search
 from .trajectories import Trajectory, typical_step
 
 MISFIT = 1.5
@@ -173,6 +175,7 @@ def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
     model = fit.collocation.linearise(fit.state, problem.form.searched)
     yield from _left_over(model, fit.state)
     yield from _near_tie(problem, fit.state, model)
+    yield from _nearer_home(problem, fit)
 
 
 def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]:
@@ -229,6 +232,31 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[
         f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
         "do not settle it: use a longer or cleaner trajectory"
     )
+
+
+def _nearer_home(problem: Problem, fit: Fit) -> Iterator[str]:
+    """Would a law with one axis less away from home fit almost as well?"""
+    state, size = fit.state, problem.exponents.size
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
+    own = problem.penalties @ state.active.sum(axis=1) + problem.axis_penalty
+    for axis in np.flatnonzero(state.moving).tolist():
+        home = np.arange(problem.d) == axis
+        origin = np.where(home, problem.home, state.offset)
+        moved = shift_matrix(problem.exponents, state.offset - origin) @ state.coefficients
+        there = replace(state, coefficients=moved, offset=origin, moving=state.moving & ~home)
+        columns = problem.columns(there)
+        model = fit.collocation.linearise(there, columns)
+        present = there.flat()[columns]
+        support = (present != 0) | (columns >= size)
+        _, _, value = subset_search(
+            model.information, model.gradient, present, prices[columns], support
+        )
+        if value - own < NEAR_TIE:
+            yield (
+                f"the data hardly tell where the law's origin is in {problem.form.names[axis]}: "
+                f"other terms around the origin of the data fit almost as well (criterion "
+                f"{value - own:+.1f}); use a longer or cleaner trajectory"
+            )
 
 
 def _standstill(law: PolynomialSystem) -> Iterator[str]:
