@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
+from .aligning import more_alike, parts_unlike
 from .background import SAMPLES, camera_motion, light
 from .candidates import Candidate, Difference, Plate, enlarged, reduce, reduction
 from .hints import Hint
@@ -27,9 +28,8 @@ _BEYOND = 3  # frames by which a path is carried on at its ends
 _PLAIN = 0.2  # quality of the candidates of a path that is worth anything
 _SCARCE = 0.05  # share of the frames in which a target must be seen
 _SWAYS = 0.5  # pixels of a camera's displacement that are more than doubtful
+_TREMBLES = 0.3  # pixels by which a track scatters that are more than noise
 _LOOSE = 1.0  # pixels to which a camera's motion should be known
-_EXPLAINS = 0.95  # share of what differs that a camera's motion must leave at most
-_BOUND = 30.0  # grey levels
 _COLOUR = 70.0  # grey levels between colours that are not alike
 _TOLD = 100.0  # quality of the candidate that a user points at
 _LARGE = 0.01  # share of the image that a target hardly fills
@@ -115,15 +115,17 @@ def _sways(samples: Image, plate: Plate, noise: float) -> float:
     return float(0.5 * np.quantile(displaced, 0.9))
 
 
-def _camera(path: str | os.PathLike, small: Image, sampled: Ints, factor: int) -> CameraMotion:
-    """The camera's motion: read from all frames, unless the sampled ones tell that it is at rest.
+def _camera(
+    path: str | os.PathLike, small: Image, sampled: Ints, factor: int
+) -> tuple[CameraMotion, bool]:
+    """The camera's motion, and whether that is sure.
 
-    It must explain better than a camera at rest how the samples differ: maps that are not needed
-    only add their errors.
+    It is read from all frames, unless the sampled ones tell that the camera is at rest, and must
+    explain better than that how the samples differ: maps that are not needed only add their errors.
     """
     rest = at_rest(video_info(path).frames)
     if stands_still(small):
-        return rest
+        return rest, True
     steadying = Steadying(factor)
     for frame in read_video(path):
         steadying.add(reduce(frame, factor))
@@ -132,20 +134,20 @@ def _camera(path: str | os.PathLike, small: Image, sampled: Ints, factor: int) -
     larger = enlarged(factor)
     maps = np.linalg.inv(larger) @ motion.maps[sampled] @ larger
     known = np.isfinite(motion.errors[sampled])
-    still = _unlike(small[known], rest.maps[sampled][known])
-    return motion if _unlike(small[known], maps[known]) < _EXPLAINS * still else rest
+    moved, still = (_unlike(small[known], m[known]) for m in (maps, rest.maps[sampled]))
+    return (motion, True) if more_alike(moved, still) else (rest, False)
 
 
-def _unlike(samples: Image, maps: Floats) -> float:
-    """Grey levels by which samples differ from their plate, those of the target bounded."""
+def _unlike(samples: Image, maps: Floats) -> Floats:
+    """Grey levels by which samples differ from their plate, in each part of the image."""
     plate = Plate(samples, maps, np.ones(len(samples), bool))
     found = []
     for sample, here in zip(samples, maps, strict=True):
         then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1])
         a, b = sample.astype(np.float32), then.astype(np.float32)
-        change = np.abs(a - b * light(a, b, known))[known]
-        found.append(np.minimum(change, _BOUND).mean() if change.size else _BOUND)
-    return float(np.mean(found))
+        change = ((a - b * light(a, b, known)) * known[..., None]).mean(axis=2)
+        found.append(parts_unlike(change, known))
+    return np.mean(found, axis=0)
 
 
 def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) -> Followed:
@@ -172,7 +174,20 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
         doubts += ("the camera seems to move, but not clearly enough to be followed: its motion is "
                    "part of the track",)  # fmt: skip
     ways = expected(seen, paths[0].rows, film, len(found))
-    return _finished(_views(path, samples, film, ways, lights), film.motion, doubts)
+    followed = _finished(_views(path, samples, film, ways, lights), film.motion, doubts)
+    return followed if film.sure else _doubted(followed)
+
+
+def _doubted(found: Followed) -> Followed:
+    """A track whose camera may tremble before too plain a background: does the target, too?"""
+    seen = np.isfinite(found.pixels[:, 0])
+    if not seen.any() or np.median(found.errors[seen]) < _TREMBLES:
+        return found
+    doubt = (
+        f"the track is rough, by {np.median(found.errors[seen]):.1f} px, and the background too "
+        "plain to tell whether the camera trembles: if so, that is part of the track"
+    )
+    return found._replace(doubts=(*found.doubts, doubt))
 
 
 def _linked(found: list[list[Candidate]], film: "_Film") -> tuple[Sightings, list[Rated]]:
@@ -196,7 +211,11 @@ def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[
 
 
 class _Film(NamedTuple):
-    """What is known of a film before its target: `maps` and `plate` are of reduced frames."""
+    """What is known of a film before its target: `maps` and `plate` are of reduced frames.
+
+    `sways` is by how many pixels a camera taken to be at rest may be displaced, and `sure` whether
+    it is known to be at rest, or to move as `motion` says.
+    """
 
     factor: int
     motion: CameraMotion
@@ -205,6 +224,7 @@ class _Film(NamedTuple):
     noise: float
     sampled: Ints
     sways: float
+    sure: bool
 
     @classmethod
     def of(cls, path: str | os.PathLike, samples: Image) -> "_Film":
@@ -213,14 +233,14 @@ class _Film(NamedTuple):
         sampled = np.unique(np.linspace(0, frames - 1, SAMPLES).round().astype(int))[: len(samples)]
         factor = reduction((samples.shape[2], samples.shape[1]))
         small = np.array([reduce(sample, factor) for sample in samples])
-        motion = _camera(path, small, sampled, factor)
+        motion, sure = _camera(path, small, sampled, factor)
         sampled = np.minimum(sampled, len(motion.maps) - 1)
         larger = enlarged(factor)
         maps = np.linalg.inv(larger) @ motion.maps @ larger
         plate = Plate(small, maps[sampled], np.isfinite(motion.errors[sampled]))
         noise = _noise(small, maps[sampled], plate)
         sways = 0.0 if motion.moves else _sways(small, plate, noise)
-        return cls(factor, motion, maps, plate, noise, sampled, factor * sways)
+        return cls(factor, motion, maps, plate, noise, sampled, factor * sways, sure)
 
 
 def _candidates(

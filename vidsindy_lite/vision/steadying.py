@@ -2,8 +2,8 @@
 
 Corners of a key frame are followed into the frames after it (Lucas-Kanade); the homography that
 most of them obey, counted by the parts of the image that they cover, is the camera's motion, since
-the target is in few of these parts however much texture it has. A new key frame is taken when
-little is left of the last one.
+the target is in few of these parts however much texture it has. Where there are few corners, all
+pixels tell the motion (`aligning`). A new key frame is taken when little is left of the last one.
 
 A camera is at rest unless its frames say otherwise: a map that is not needed only adds its errors.
 """
@@ -16,20 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image
+from .aligning import Aligned, align, explains, pyramid
 
 _PARTS = 12  # parts into which each side of the image is cut; one corner is followed in each
-_WIDTHS = 21, 81  # reduced pixels: what is smoother than this is light
+_WIDTH = 21  # reduced pixels: what is smoother than this is light
 _CONTRAST, _DARK = 250.0, 20.0  # of the relief; grey levels below which all is dark
 _FLAT = 2.0  # smallest eigenvalue of the gradient's covariance in a corner, grey levels squared
 _EXACT = 1.0  # reduced pixels by which a corner may miss its place
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
-_SOME = 20  # corners, below which all pixels tell more
-_MANY = 60  # corners for a homography
+_MANY = 60  # corners for a homography; with fewer, all pixels tell more
 _TELLING = 10  # corners that must share a motion, if it is to be the camera's
-_ALIKE = 0.9  # correlation of two reliefs that lie on each other
-_STEPS = 15  # by which two reliefs are laid on each other at most
-_LEFT = 0.5  # share of a key frame's corners below which there must be a new one
+_LEFT = 0.5  # share of a key frame that is left, below which there must be a new one
 
 
 class CameraMotion(NamedTuple):
@@ -60,24 +58,18 @@ def carry(maps: NDArray, points: Floats) -> Floats:
 
 
 class _Relief(NamedTuple):
-    """What stands out from its surroundings, whatever the light: grey levels around 128.
-
-    `fine` is for corners, `broad` also shows what is smooth, e.g. clouds.
-    """
+    """A reduced frame: what stands out from its surroundings, whatever the light; grey levels."""
 
     fine: Image
-    broad: Image
+    levels: list[Floats32]
 
     @classmethod
     def of(cls, small: Image) -> "_Relief":
         grey = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 1))
-        return cls(*(_stand_out(grey, width) for width in _WIDTHS))
-
-
-def _stand_out(grey: Floats32, width: int) -> Image:
-    mean = cv2.blur(cv2.blur(grey, (width, width)), (width, width))
-    return np.clip(128 + _CONTRAST * (grey - mean) / (mean + _DARK), 0, 255).astype(np.uint8)
+        mean = cv2.blur(cv2.blur(grey, (_WIDTH, _WIDTH)), (_WIDTH, _WIDTH))
+        fine = np.clip(128 + _CONTRAST * (grey - mean) / (mean + _DARK), 0, 255).astype(np.uint8)
+        return cls(fine, pyramid(small))
 
 
 def _corners(grey: Image) -> Floats:
@@ -126,33 +118,18 @@ def _moved(before: _Relief, after: _Relief) -> bool:
     a, b = points[found], ends[found]
     similar, _ = _similar(a, b, 2 * _STILL)
     if similar is None:
-        return _direct(before.broad, after.broad, np.eye(3)) is not None
+        return _drifted(before, after)
     still = np.linalg.norm(b - a, axis=1) < _STILL
     share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
     if share.sum() < _TELLING:
-        return _direct(before.broad, after.broad, np.eye(3)) is not None
+        return _drifted(before, after)
     return bool(still.sum() < 0.7 * share.sum())
 
 
-def _direct(before: Image, after: Image, guess: Floats) -> Floats | None:
-    """The affine map of one relief to another by all of their pixels, where corners are few.
-
-    It must explain most of what differs between the two (enhanced correlation; Evangelidis 2008).
-    """
-    a, b = (
-        cv2.resize(x, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA).astype(np.float32)
-        for x in (before, after)
-    )
-    halve = np.array([[0.5, 0, -0.25], [0, 0.5, -0.25], [0, 0, 1]])
-    start = (halve @ guess @ np.linalg.inv(halve))[:2].astype(np.float32)
-    stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, _STEPS, 1e-4)
-    try:
-        alike, found = cv2.findTransformECC(a, b, start, cv2.MOTION_AFFINE, stop)
-    except cv2.error:
-        return None
-    if alike < _ALIKE or 1 - alike > 0.5 * (1 - float(np.corrcoef(a.ravel(), b.ravel())[0, 1])):
-        return None
-    return np.linalg.inv(halve) @ np.vstack([found, [0, 0, 1]]) @ halve
+def _drifted(before: _Relief, after: _Relief) -> bool:
+    """Do all pixels tell of a motion, where there are no corners to do so?"""
+    found = align(before.levels, after.levels, np.eye(3))
+    return found is not None and explains(before.levels, after.levels, found.map)
 
 
 def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
@@ -181,25 +158,21 @@ class Steadying:
         self.key, self.points, self.base, self.drift = relief, _corners(relief.fine), base, error
         self.last = np.eye(3)  # from the key frame to the newest
 
-    def _locate(self, relief: _Relief) -> tuple[Floats, Floats, float] | None:
-        """Map from the key frame, the corners that obey it, their scatter about it."""
+    def _locate(self, relief: _Relief) -> Aligned | None:
+        """Where the key frame lies in another: by corners, or by all pixels if these are few."""
         assert self.key is not None
         guess = carry(self.last, self.points) if len(self.points) else self.points
         ends, found = _follow(self.key.fine, relief.fine, self.points, guess)
         a, b = self.points[found], ends[found]
         best, good = _similar(a, b, 2 * _EXACT)
-        if good.sum() < _SOME:
-            direct = _direct(self.key.broad, relief.broad, self.last)
-            if direct is not None:
-                return direct, self.points, _STILL
-        if best is None or good.sum() < _FEWEST:
-            return None
-        if good.sum() >= _MANY:
-            full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
-            if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
-                best, good = np.asarray(full, float), obey[:, 0] > 0
+        if best is None or good.sum() < _MANY:
+            return align(self.key.levels, relief.levels, self.last)
+        full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
+        if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
+            best, good = np.asarray(full, float), obey[:, 0] > 0
         miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
-        return best, a[good], float(np.sqrt(np.mean(miss**2)))
+        error = float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))
+        return Aligned(best, error, len(miss) / len(self.points))
 
     def add(self, small: Image) -> None:
         """The next frame."""
@@ -212,12 +185,11 @@ class Steadying:
             self.errors.append(0.0 if len(self.maps) == 1 else np.inf)
             self._start(relief, self.maps[-1], np.inf if len(self.maps) > 1 else 0.0)
             return
-        self.last, obeying, scatter = located
-        error = float(np.hypot(self.drift, scatter * np.sqrt(4 / max(len(obeying), 4))))
+        self.last = located.map
         self.maps.append(self.base @ np.linalg.inv(self.last))
-        self.errors.append(error)
-        if len(obeying) < _LEFT * len(self.points):
-            self._start(relief, self.maps[-1], error)
+        self.errors.append(float(np.hypot(self.drift, located.error)))
+        if located.shared < _LEFT:
+            self._start(relief, self.maps[-1], self.errors[-1])
 
     def motion(self) -> CameraMotion:
         """The motion so far, in pixels of the frames."""

@@ -1,0 +1,79 @@
+"""Two views of one scene, laid on each other by all of their pixels, where the motion is known."""
+
+import cv2
+import numpy as np
+import pytest
+from footage import Phone, write_phone
+
+from vidsindy_lite import track
+from vidsindy_lite.vision.aligning import align, explains, more_alike, parts_unlike, pyramid
+
+SIZE = 320, 240
+
+
+def sight(seed, here=None, noise=2.0, contrast=20, light=1.0):
+    """A cloudy scene of few corners, seen through a map of its pixels to those of the view."""
+    rng = np.random.default_rng(seed)
+    cloud = cv2.GaussianBlur(rng.normal(size=(300, 380)).astype(np.float32), (0, 0), 12)
+    scene = 130 + contrast * cloud / cloud.std()
+    move = np.array([[1, 0, -30], [0, 1, -30], [0, 0, 1.0]])
+    here = np.eye(3) if here is None else here
+    rng = np.random.default_rng([seed, int(1e6 * abs(here).sum())])
+    view = light * cv2.warpAffine(scene, (here @ move)[:2], SIZE, flags=cv2.INTER_CUBIC)
+    view = view[..., None] + rng.normal(0, noise, (*SIZE[::-1], 3))
+    return np.clip(view, 0, 255).astype(np.uint8)
+
+
+def similar(u, v, turn=0.0, scale=1.0):
+    c, s = scale * np.cos(turn), scale * np.sin(turn)
+    return np.array([[c, -s, u], [s, c, v], [0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("move", "light"),
+    [
+        (similar(0, 0), 1.0),
+        (similar(0.7, -0.4), 1.0),
+        (similar(-6, 9, 0.01), 1.1),
+        (similar(14, -3, -0.02, 1.01), 0.8),
+    ],
+)
+def test_shift_turn_and_scale_of_clouds(move, light):
+    before, after = pyramid(sight(0)), pyramid(sight(0, move, light=light))
+    found = align(before, after, np.eye(3))
+    points = np.array([[40, 40, 1], [280, 40, 1], [160, 120, 1], [280, 200, 1.0]])
+    miss = np.linalg.norm((points @ (found.map - move).T)[:, :2], axis=1)
+    assert miss.max() < 0.4
+    assert miss.mean() <= 8 * found.error < 2
+    assert found.shared > 0.8
+    assert move[0, 2] == 0 or explains(before, after, found.map)
+
+
+def test_what_moves_on_its_own_is_left_aside():
+    move = similar(3, 2)
+    views = [sight(1), sight(1, move)]
+    for view, left in zip(views, (60, 110), strict=True):
+        view[60:180, left : left + 60] = (20, 20, 160)  # a large thing that goes elsewhere
+    found = align(*map(pyramid, views), np.eye(3))
+    assert np.linalg.norm(found.map[:2, 2] - move[:2, 2]) < 0.5
+
+
+def test_a_plain_wall_tells_no_motion(tmp_path):
+    phone = Phone("plain", 30, person=True, image_size=(320, 240), frames=40)
+    write_phone(tmp_path / "clip.mp4", phone, 3)
+    found = track(tmp_path / "clip.mp4")
+    assert found.maps is None
+
+
+def test_parts_are_compared_where_they_are_shown():
+    change = np.zeros((48, 96), np.float32)
+    change[:, 48:] = 100
+    known = np.ones((48, 96), bool)
+    known[:, 48:72] = False
+    parts = parts_unlike(change, known)
+    assert parts.shape == (2, 12, 12)
+    np.testing.assert_allclose(parts[:, :, :6], 0)
+    np.testing.assert_allclose(parts[:, :, 9:], 30)
+    still = np.ones((2, 12, 12))
+    assert more_alike(0.9 * still, still)
+    assert not more_alike(0.99 * still, still)
