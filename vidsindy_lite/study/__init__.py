@@ -10,6 +10,7 @@
 * `films`, `realistic`, `lab`: what is filmed: benchmarks, a scene with trees, a ball on a table.
 * `trials`, `baselines`, `paper_ado`: who finds the law: `discover`, the methods of the paper's
   tables, the paper's own optimiser.
+* `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
 * `metrics`, `tables`: how good a law is, and many of them side by side.
 * `published`, `audit`: the paper's numbers, and whether they agree with each other.
 * `sweeps`: many tasks in parallel, each computed once.

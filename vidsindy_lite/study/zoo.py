@@ -4,6 +4,8 @@ A law of one to four states has few terms, of random signs and sizes, mostly of 
 drawn until one keeps its motion bounded and does not come to rest (of one state: moves at all).
 """
 
+from functools import cache
+
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
@@ -24,6 +26,7 @@ EXAMINED, PER_PERIOD = 1000, 60
 """Samples, and samples of a period, that have to stay bounded in an exact integration, too."""
 
 
+@cache
 def specimen(number: int) -> Benchmark:
     """The law of a number, with a start and the period of its motion.
 
@@ -56,7 +59,7 @@ def _drawn(rng: np.random.Generator, exponents: Ints) -> Floats:
     # The few largest of log(u) / p are a draw without replacement (Efraimidis and Spirakis 2006).
     order = np.log(rng.random((HERD, l, d))) / likely[:, None]
     rank = np.argsort(np.argsort(-order, axis=1), axis=1)
-    sizes = np.exp(rng.uniform(*np.log(SIZES), size=(HERD, l, d)))
+    sizes = SIZES[0] * (SIZES[1] / SIZES[0]) ** rng.random((HERD, l, d))
     return np.where(rank < count, rng.choice([-1.0, 1.0], size=sizes.shape) * sizes, 0.0)
 
 
