@@ -14,7 +14,6 @@ into figures and pages is `vidsindy_lite.companion`.
 
 from .cameras import (
     Camera,
-    Lags,
     OrthographicCamera,
     PerspectiveCamera,
     Rig,
@@ -25,13 +24,20 @@ from .cameras import (
     residuals,
     rig_template,
 )
-from .dynamics import Discovery, Library, PolynomialSystem, SplineSINDy, discover
+from .dynamics import (
+    Discovery,
+    Library,
+    PolynomialSystem,
+    SplineSINDy,
+    discover,
+    on_circle,
+    on_sphere,
+)
 from .observation import Observation, observe, observe_tracks
 from .pipeline import VideoDiscovery, discover_from_tracks, discover_from_videos
 from .vision import (
     Hint,
     Scene,
-    Track,
     read_frame,
     read_video,
     render_video,
@@ -49,7 +55,6 @@ __all__ = [
     "observe_tracks",
     "Observation",
     "track",
-    "Track",
     "Hint",
     "read_video",
     "read_frame",
@@ -58,7 +63,6 @@ __all__ = [
     "Scene",
     "align",
     "learn_lags",
-    "Lags",
     "Camera",
     "OrthographicCamera",
     "PerspectiveCamera",
@@ -68,6 +72,8 @@ __all__ = [
     "reconstruct",
     "residuals",
     "discover",
+    "on_circle",
+    "on_sphere",
     "Discovery",
     "Library",
     "PolynomialSystem",

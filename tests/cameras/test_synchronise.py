@@ -445,7 +445,7 @@ def test_lags_fit_equally_well_up_to_a_ratio(motion, monkeypatch):
         )
         monkeypatch.setattr(synchrony, "_drifted", lambda found: found)
         monkeypatch.setattr(
-            synchrony, "_told", lambda _, f, __: vl.Lags(f.lags, np.ones(3), np.zeros(3), f.score)
+            synchrony, "_told", lambda _, f, __: Lags(f.lags, np.ones(3), np.zeros(3), f.score)
         )
         found = learn_lags(filmed(motion, (60,) * 3, (0, 9, 0)), motion[1])
         assert len(found.warnings) == (told is not None)
@@ -537,7 +537,7 @@ def test_a_camera_that_never_sees_the_target(motion, blind):
 
 
 def test_the_frame_of_an_instant():
-    lags = vl.Lags(np.array([0, 10.3, -4]), np.array([1, 1.2, 0.5]), np.zeros(3), 0.0)
+    lags = Lags(np.array([0, 10.3, -4]), np.array([1, 1.2, 0.5]), np.zeros(3), 0.0)
     assert [lags.frame_at(i, 100) for i in range(3)] == [100, 108, 52]
 
 

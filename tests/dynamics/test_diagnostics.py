@@ -24,7 +24,9 @@ NOISE = 0.03
 @pytest.fixture(scope="module")
 def duffing():
     """A hardening spring, measured with noise, and the control points of a first curve."""
-    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5}}, degree=3)
+    law = PolynomialSystem.from_terms(
+        {"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5, "y": -0.05}}, degree=3
+    )
     t = np.linspace(0, 30, 600)
     x = law.simulate(t, (1.5, 0))
     x += NOISE * np.random.default_rng(0).normal(size=x.shape)

@@ -115,5 +115,6 @@ def test_small_numbers_and_warnings_are_printed(capsys):
     model.print(lhs=["a", "b"])
     lines = capsys.readouterr().out.splitlines()
     assert lines[:2] == ["a = 1.000 x1", "b = -1.000 x0 + -0.0001 x1"]
-    assert lines[2].startswith("warning: dy/dt is settled by")
+    assert lines[2].startswith("warning: the motion repeats one closed orbit")
+    assert any(line.startswith("warning: dy/dt is settled by") for line in lines)
     assert repr(model) == "SplineSINDy(degree=2, seed=0)"

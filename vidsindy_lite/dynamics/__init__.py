@@ -6,7 +6,8 @@ solver: `discover`; its stages (search, then polish and settle) use collocation 
 selection of terms, origin, gaps, errors that last, precision (whom to trust how far),
 process_noise (is the motion kicked?), and persistence: which law stays the same while more error
 is tolerated
-discovery: the result, with error bars from the last fit; diagnostics: all its warnings
+discovery: the result, with error bars from the last fit; diagnostics: all its warnings, those of
+the motion's shape among them; rounds: circles and spheres, whose angles are coordinates
 storage: the result as a file; drawing: its path of laws as a picture
 law: polynomials, on a library of monomials, also of functions of the state; candidates are the
 libraries that a user asks for; integrate solves a law
@@ -26,6 +27,7 @@ from .origin import ShiftedLaw
 from .persistence import Plateau
 from .polynomials import PolynomialSystem
 from .problem import Units, term_penalties
+from .rounds import Round, on_circle, on_sphere
 from .selection import closest_rival, subset_search
 from .sindy import SplineSINDy
 from .smoothing import smooth

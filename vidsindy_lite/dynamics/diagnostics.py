@@ -19,6 +19,7 @@ from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
 from .selection import closest_rival, subset_search
+from .shape import cancelling, shapes
 from .trajectories import Trajectory, typical_step
 
 MISFIT = 1.5
@@ -80,12 +81,13 @@ def diagnose(
     """
     return (
         *outliers(problem.measured),
+        *_shape(problem, fit),
         *_misfit(problem, fit),
         *_unfinished(fit),
         *_unmet(problem, fit),
         *_another_in_the_data(problem, fit, law),
         *_selection(problem, fit, path, law),
-        *_sampling(problem.trajectories),
+        *_sampling(problem),
         *_standstill(law),
         *_narrow(law, margins),
     )
@@ -127,6 +129,18 @@ def _leaps(values: Floats, row: int) -> bool:
     beside = np.concatenate((before, after[: REACH - GUARD]))
     middle = np.median(beside)
     return bool(abs(values[row] - middle) > OUTLIER * np.median(np.abs(beside - middle)))
+
+
+def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
+    """What follows from where the motion takes place."""
+    measured = problem.measured[0][1].shape[1]
+    noise = (problem.noise * problem.units.scale)[:measured]
+    terms = fit.state.active.sum(axis=0)[-measured:]
+    if problem.form.functions:
+        terms = np.zeros_like(terms)  # who names a sine knows more than one orbit tells
+    yield from shapes(problem.measured, noise, problem.form.names[:measured], terms)
+    x, _ = fit.collocation.node_states(fit.state.control_points)
+    yield from cancelling(problem.law(fit.state), x - fit.state.offset)
 
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
@@ -291,13 +305,16 @@ def _place(law: PolynomialSystem, entry: int) -> str:
     return f"{law.terms[term]} in d{law.names[equation]}/dt"
 
 
-def _sampling(trajectories: Sequence[Trajectory]) -> Iterator[str]:
-    turns = sum(t[-1] - t[0] for t, _ in trajectories) / (2 * np.pi)
-    if turns < TURNS and trajectories[0][1].shape[1] > 1:  # on a line nothing turns
+def _sampling(problem: Problem) -> Iterator[str]:
+    runs, form = problem.trajectories, problem.form
+    turns = sum(t[-1] - t[0] for t, _ in runs) / (2 * np.pi)
+    # On a line nothing turns; and a body need not turn, if it is seen from several starts.
+    bound = len(form.names) > 1 if form.movable.all() else len(runs) == 1
+    if turns < TURNS and bound:
         yield (
             f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "
             "indistinguishable on it; record longer, or several runs from other starts"
         )
-    step = typical_step(trajectories)
+    step = typical_step(runs)
     if step > COARSE:
         yield f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster"

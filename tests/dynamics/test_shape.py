@@ -1,0 +1,132 @@
+"""Motions whose place tells too little about their law are named, and no others."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from vidsindy_lite.dynamics import PolynomialSystem, discover
+from vidsindy_lite.dynamics.shape import cancelling, shapes
+from vidsindy_lite.study import SYSTEMS
+
+TIMES = np.linspace(0, 12, 600)
+
+
+def solved(rate, start, t=TIMES):
+    return solve_ivp(rate, (0, t[-1]), start, t_eval=t, rtol=1e-9, atol=1e-10).y.T
+
+
+def pendulum(amplitude, damping=0.0):
+    """Angle and its rate."""
+    return solved(lambda _, s: [s[1], -9.81 * np.sin(s[0]) - damping * s[1]], [amplitude, 0])
+
+
+def bob(angle):
+    return 1.1 * np.stack([0.6 * np.sin(angle), 0.8 * np.sin(angle), -np.cos(angle)], 1) + [1, 2, 3]
+
+
+def spherical():
+    def rate(_, s):
+        pull = s[3:] @ s[3:] - 9.81 * s[2]
+        return np.append(s[3:], -pull * s[:3] + [0, 0, -9.81])
+
+    return solved(rate, [0.6, 0, -0.8, 0, 1.2, 0])[:, :3]
+
+
+def waves(*parts):
+    """One column for each pair of an amplitude and a frequency."""
+    return np.stack([a * np.cos(w * TIMES + w) for a, w in parts], axis=1)
+
+
+NAMED = {
+    "bob": (bob(pendulum(1.0)[:, 0]), "on a circle"),
+    "bob that comes to rest": (bob(pendulum(1.5, 0.1)[:, 0]), "on a circle"),
+    "bob in its plane": (bob(pendulum(1.5, 0.1)[:, 0])[:, [0, 2]] / [0.6, 1], "on a circle"),
+    "bob that swings aside": (spherical(), "on a sphere"),
+    "pendulum": (pendulum(1.0), "closed orbit"),
+    "pendulum, angle": (pendulum(1.0)[:, :1], "closed orbit"),
+    "ellipse": (np.stack([np.cos(2 * TIMES), 0.6 * np.sin(2 * TIMES)], 1), "closed orbit"),
+    "oscillator": (np.stack([np.cos(TIMES), -np.sin(TIMES)], 1), "closed orbit"),
+    "line": (waves((1, 2), (0.6, 2)), "on a line"),
+    "plane": (waves((1, 2), (0.6, 3.1)) @ [[1, 0, 0.5], [0, 1, -0.2]] + [0, 0, 4], "in a plane"),
+    "sum": (waves((1, 2), (1, 3.1), (1, 1.3)) @ [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], "3 of"),
+    "at rest": (
+        np.append(waves((1, 2), (1, 3.1)), np.full((600, 1), 2.0), 1),
+        "z moves by no",
+    ),
+}
+
+
+def told(x, share=0.01, seed=0, t=TIMES, terms=2):
+    """What is said of positions with errors of a share of the widest coordinate."""
+    noise = np.full(x.shape[1], share * x.std(axis=0).max())
+    noisy = x + noise * np.random.default_rng(seed).standard_normal(x.shape)
+    return " | ".join(shapes([(t, noisy)], noise, "xyzw"[: x.shape[1]], np.full(x.shape[1], terms)))
+
+
+@pytest.mark.parametrize("share", [0.002, 0.01])
+@pytest.mark.parametrize("name", NAMED)
+def test_a_shape_is_named(name, share):
+    x, words = NAMED[name]
+    assert words in told(x, share)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.05, 0.2])
+@pytest.mark.parametrize("length", [400, 1500])
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_flows_are_on_no_shape(name, length, share):
+    t, x = SYSTEMS[name].trajectory(length)
+    x = x / x.std(axis=0)
+    assert told(x, max(share, 1e-5), t=t, terms=10) == ""
+
+
+def test_a_throw_is_in_a_plane_and_throws_are_not():
+    t = np.linspace(0, 1.5, 90)
+    runs = [
+        (t, np.stack([4 * np.cos(a) * t, 4 * np.sin(a) * t, 8 * t - 4.9 * t**2], axis=1))
+        for a in (0.5, 2.5)
+    ]
+    one, noise, terms = runs[:1], np.full(3, 1e-5), np.ones(3, dtype=int)
+    assert "in a plane (x - 1.83 y = 0)" in " ".join(shapes(one, noise, "xyz", terms))
+    assert list(shapes(runs, noise, "xyz", terms)) == []
+
+
+def test_an_arc_that_is_passed_once_is_no_circle():
+    angle = np.linspace(-1, 1, 600)
+    x = 2 * np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    assert told(x) == ""
+    assert "on a circle" in told(2 * np.stack([np.sin(2 * angle), np.cos(2 * angle)], axis=1))
+
+
+def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
+    damped = solved(lambda _, s: [s[1], -4 * s[0] - 0.05 * s[1]], [1, 0])
+    assert told(damped) == ""
+    cycle = solved(lambda _, s: [s[1], -s[0] + 1.5 * (1 - s[0] ** 2) * s[1]], [1, 0], 5 * TIMES)
+    assert told(cycle[300:], t=TIMES[300:] * 5, terms=3) == ""
+    assert "closed orbit" in told(cycle[300:], t=TIMES[300:] * 5, terms=30)
+
+
+def test_noise_that_could_hide_anything_tells_no_shape():
+    assert told(NAMED["plane"][0][::20], 0.4, t=TIMES[::20]) == ""
+
+
+def test_terms_that_cancel_are_told():
+    x = np.stack([np.cos(TIMES), np.sin(TIMES)], axis=1)
+    plain = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=3)
+    assert list(cancelling(plain, x)) == []
+    assert list(cancelling(plain.shift((1e4, 0)), x + [1e4, 0])) == []
+    idle = PolynomialSystem.from_terms(
+        {"x": {"y": 999, "x^2 y": -1e3, "y^3": -1e3}, "y": {"x": 1}}, degree=3
+    )
+    (warning,) = cancelling(idle, x)
+    assert warning.startswith("the terms of dx/dt cancel")
+
+
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [("bob", 2), ("bob", 1), ("ellipse", 2), ("pendulum", 1), ("pendulum, angle", 2)],
+)
+def test_a_law_on_a_shape_is_never_simply_ok(name, order):
+    x, words = NAMED[name]
+    noisy = x + 0.01 * x.std() * np.random.default_rng(0).standard_normal(x.shape)
+    found = discover(TIMES, noisy, order=order, degree=2 if name == "bob" else 3)
+    assert any(words in warning for warning in found.warnings)

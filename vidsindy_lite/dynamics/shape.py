@@ -1,0 +1,295 @@
+"""Where a motion takes place, looked at before any law: a coordinate at rest, a line, a plane, a
+circle, a sphere, one closed orbit.
+
+There the terms of a library depend on each other, and many laws fit alike. A motion is on a shape
+if its distance from it, less the noise, is nothing of the size of the shape: not because noise may
+hide it, but because the data are good enough to tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from ..arrays import Floats, Ints
+from .library import monomials
+from .polynomials import PolynomialSystem
+from .rounds import Round, on_circle, on_sphere
+from .trajectories import Trajectory
+
+Complexes = NDArray[np.complex128]
+
+CLOSE = 0.005
+"""Distance from a shape, over the size of the shape, that is none: scales and cameras are off by
+as much."""
+TOLD = 0.1
+"""Distance, over the size of the shape, that noise must not hide."""
+FAINT = 0.5
+"""The same of a coordinate at rest, over its noise."""
+SURE = 3.0
+"""Standard errors between what a squared distance is and what it may be."""
+LAPS = 1.6
+"""Laps of a closed orbit that have to be seen."""
+SWEPT = 1.5
+"""Ways along an arc, over its length: what turns back on it, or goes round, is bound to it."""
+PIECES = 50
+"""Averages of the angle that tell the way along an arc."""
+NEARLY = 0.3
+"""Distance of two laps, in standard deviations of the motion, at which it is looked at closer."""
+SPARE = 1
+"""Numbers of an orbit beyond the coefficients of a law that it takes to test it."""
+HARMONICS = 25
+"""Of a closed orbit, at most."""
+ENOUGH = 3000
+"""Samples of a closed orbit that are looked at, at most."""
+CANDIDATES = 4
+"""Periods that are tried, at most."""
+LEAST = 1e-300
+"""Keeps a quotient finite where nothing is left."""
+CANCELLED = 300.0
+"""Terms of an equation, their sizes added, over their sum: from here on they cancel."""
+
+
+def shapes(
+    runs: Sequence[Trajectory], noise: Floats, names: Sequence[str], terms: Ints
+) -> Iterator[str]:
+    """What there is to say of where a motion takes place, with what to do about it.
+
+    Parameters
+    ----------
+    runs : sequence of (t, x)
+        The data, in the user's units.
+    noise : ndarray, shape (d,)
+        Estimated standard deviation of the errors of each coordinate.
+    names : sequence of str
+        Of the coordinates.
+    terms : ndarray of int, shape (d,)
+        How many coefficients of each coordinate's equation the data have to settle.
+    """
+    x = np.concatenate([values for _, values in runs])
+    away = x - x.mean(axis=0)
+    part = [_distance(away[:, [j]], size)[1] / size for j, size in enumerate(noise)]
+    moves = np.array(part) > FAINT
+    for j in np.flatnonzero(~moves).tolist():
+        yield f"{names[j]} moves by no more than a part of its noise: leave it out"
+    if not moves.any():
+        return
+    names = [name for name, moving in zip(names, moves, strict=True) if moving]
+    x, noise, terms = x[:, moves], noise[moves], terms[moves]
+    orbit = list(_closed(runs[0][0], x, noise, terms)) if len(runs) == 1 else []
+    yield from _flat_or_round(x, noise, names, plain=bool(orbit) and x.shape[1] == 2)
+    yield from orbit
+
+
+def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str], plain: bool) -> Iterator[str]:
+    """What there is to say of a line, a plane, a circle or a sphere.
+
+    A circle that is a closed orbit of two coordinates is ``plain``: these may be place and speed.
+    """
+    d, scale = x.shape[1], x.std(axis=0)
+    standard = (x - x.mean(axis=0)) / scale
+    _, directions = np.linalg.eigh(standard.T @ standard)  # the narrowest first
+    across = [
+        _on(standard @ normal[:, None], float(np.linalg.norm(normal * noise / scale)), 1.0)
+        for normal in directions.T[: d - 1]
+    ]
+    flat = across.index(False) if False in across else d - 1
+    if (d - flat == 2 and d <= 3) or (d == 3 and not flat):
+        told = _round(x, noise, planar=d - flat == 2, whole=not plain)
+        if told:
+            yield told
+            return
+    if flat:
+        shape = {1: "on a line", 2: "in a plane"}.get(d - flat, f"in {d - flat} of {d} dimensions")
+        relations = [_relation(row, x, names) for row in directions[:, :flat].T / scale]
+        yield (
+            f"the motion stays {shape} ({'; '.join(relations)}): there its coordinates depend "
+            f"on each other and many laws fit alike; give {d - flat} of them, or add runs that "
+            "leave it"
+        )
+
+
+def _relation(normal: Floats, x: Floats, names: Sequence[str]) -> str:
+    """What is constant along a motion, as text."""
+    share = np.abs(normal) * x.std(axis=0)
+    normal = np.where(share > CLOSE * share.max(), normal / normal[share.argmax()], 0.0)
+    named = sorted(zip(normal, names, strict=True), key=lambda part: part[0] != 1)
+    sides = " ".join(f"{'-' if a < 0 else '+'} {abs(a):.4g} {name}" for a, name in named if a)
+    constant = float(normal @ x.mean(axis=0))
+    nil = abs(constant) < 1e-3 * float(np.linalg.norm(normal * x.std(axis=0)))
+    return f"{sides.removeprefix('+ 1 ')} = {0 if nil else constant:.4g}"
+
+
+def _round(x: Floats, noise: Floats, planar: bool, whole: bool) -> str:
+    """What there is to say of a motion on a circle or a sphere; nothing if it is on none.
+
+    A whole circle counts only if it may.
+    """
+    try:
+        where = on_circle(x) if planar else on_sphere(x)
+    except ValueError:  # nothing round is closer than what is flat
+        return ""
+    widths = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(x.T)), 0.0))
+    toward = x - where.centre
+    reach = np.linalg.norm(toward, axis=1)
+    outward = (toward / reach[:, None]) ** 2
+    size = widths[-2 if planar else 0]
+    if not _on((reach - where.radius)[:, None], float(np.sqrt((outward @ noise**2).mean())), size):
+        return ""
+    return _told(where, planar) if not planar or _bound(where.angle, whole) else ""
+
+
+def _told(where: Round, planar: bool) -> str:
+    shape, angles = ("circle", "angle") if planar else ("sphere", "angles")
+    centre = ", ".join(
+        f"{c:.4g} +- {e:.1g}" for c, e in zip(where.centre, where.centre_errors, strict=True)
+    )
+    return (
+        f"the motion stays on a {shape} (centre {centre}; radius {where.radius:.5g} +- "
+        f"{where.radius_error:.1g}): there its coordinates depend on each other and many laws fit "
+        f"alike; give the {angles} that on_{shape} finds, with order=2"
+    )
+
+
+def _bound(angle: Floats, whole: bool) -> bool:
+    """Whether a motion along an arc turns back on it, or goes round, if that counts."""
+    pieces = [piece.mean() for piece in np.array_split(angle, min(PIECES, len(angle)))]
+    length = float(np.ptp(pieces))
+    return bool(np.abs(np.diff(pieces)).sum() > SWEPT * length or whole and length > np.pi)
+
+
+def _closed(t: Floats, x: Floats, noise: Floats, terms: Ints) -> Iterator[str]:
+    """Is the motion one lap after the other on the same orbit, and that too plain for a law?"""
+    scale = x.std(axis=0)
+    standard, errors = (x - x.mean(axis=0)) / scale, float(np.sqrt(((noise / scale) ** 2).mean()))
+    thin = slice(None, None, -(-len(t) // ENOUGH))
+    for period in _periods(t, standard, errors):
+        orbit = _Orbit.near(t[thin] - t[0], standard[thin], period)
+        if _on(orbit.residual, errors, 1.0):
+            scant = np.flatnonzero(orbit.numbers() <= terms + SPARE)
+            if len(scant):
+                told, wanted = orbit.numbers()[scant[0]], terms[scant[0]]
+                yield (
+                    f"the motion repeats one closed orbit (period {orbit.period:.4g}) of which the "
+                    f"data tell {told} numbers, where a law has {wanted} coefficients: what it "
+                    "says off this orbit is not tested; add runs from other starts"
+                )
+            return
+
+
+def _periods(t: Floats, x: Floats, noise: float) -> list[float]:
+    """Lags after which a motion is near where it was, the shortest first; a few at most."""
+    size = min(len(t), ENOUGH)
+    even = np.linspace(t[0], t[-1], size)
+    u = np.stack([np.interp(even, t, column) for column in x.T], axis=1)
+    spectrum = np.abs(np.fft.rfft(u, 2 * size, axis=0)) ** 2
+    together = np.fft.irfft(spectrum, 2 * size, axis=0)[:size].sum(axis=1)
+    squares = np.append(0.0, np.cumsum((u**2).sum(axis=1)))
+    lags = np.arange(int(size / LAPS))
+    later, earlier = squares[-1] - squares[lags], squares[size - lags]
+    apart = (later + earlier - 2 * together[lags]) / np.minimum(later, earlier) / 2
+    first = int((apart > 0.5).argmax())
+    inner = apart[1:-1]
+    low = (inner <= apart[:-2]) & (inner <= apart[2:]) & (inner < NEARLY**2 + noise**2)
+    found = np.flatnonzero(low) + 1
+    return [float(even[k] - t[0]) for k in found[found > first][:CANDIDATES]] if first else []
+
+
+@dataclass(frozen=True, eq=False)
+class _Orbit:
+    """A closed orbit through samples, as a Fourier series in the time.
+
+    Parameters
+    ----------
+    period : float
+    waves : ndarray of complex, shape (k, d)
+        Amplitudes of the harmonics.
+    residual : ndarray, shape (n, d)
+        What the series leaves of the samples, made up for the freedom that it used.
+    """
+
+    period: float
+    waves: Complexes
+    residual: Floats
+
+    @classmethod
+    def near(cls, t: Floats, x: Floats, period: float) -> _Orbit:
+        """The orbit with the period near one that fits best."""
+        laps = t[-1] / period
+        most = int(np.clip(len(t) / laps / 6, 1, HARMONICS))
+        for harmonics in sorted({min(2, most), min(6, most), most}):
+            reach = 0.5 / laps / harmonics
+
+            def left(log: float, around: float = period, harmonics: int = harmonics) -> float:
+                return float((_series(t, x, around * np.exp(log), harmonics)[1] ** 2).sum())
+
+            found = minimize_scalar(
+                left, bounds=(-reach, reach), method="bounded", options={"xatol": 1e-4 * reach}
+            )
+            period *= float(np.exp(found.x))
+        waves, residual = _series(t, x, period, most)
+        unused = max(1 - (2 * most + 1) / len(t), 0.1)
+        return cls(period, waves, residual / np.sqrt(unused))
+
+    def numbers(self) -> Ints:
+        """How many numbers of each coordinate stand out from the noise, (d,).
+
+        Counted from a time at which the largest first harmonic is at its height.
+        """
+        strongest = self.waves[0, np.abs(self.waves[0]).argmax()]
+        turns = (strongest.conj() / np.abs(strongest)) ** np.arange(1, len(self.waves) + 1)
+        parts = self.waves * turns[:, None]
+        error = np.sqrt(2 * (self.residual**2).mean(axis=0) / len(self.residual))
+        return np.asarray(
+            sum((np.abs(part) > SURE * error).sum(axis=0) for part in (parts.real, parts.imag))
+        )
+
+
+def _series(t: Floats, x: Floats, period: float, harmonics: int) -> tuple[Complexes, Floats]:
+    """Amplitudes of harmonics, (k, d), that fit samples best, and what they leave, (n, d)."""
+    first = np.exp(2j * np.pi / period * t)
+    powers = np.cumprod(np.repeat(first[:, None], harmonics, axis=1), axis=1)
+    terms = np.hstack([np.ones((len(t), 1)), powers.real, powers.imag])
+    gram = terms.T @ terms + 1e-9 * len(t) * np.eye(terms.shape[1])
+    found = np.linalg.solve(gram, terms.T @ x)
+    return found[1 : 1 + harmonics] - 1j * found[1 + harmonics :], x - terms @ found
+
+
+def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
+    """The equations of a law whose terms cancel along a motion, seen from its middle."""
+    if law.functions:
+        return  # such a law has no other frame
+    middle = x.mean(axis=0)
+    central, away = law.shift(-middle), x - middle
+    sums = central(away)
+    for j, name in enumerate(law.names):
+        parts = np.abs(central.coefficients[:, j] * monomials(away, central.exponents)).sum(axis=1)
+        times = float(np.sqrt((parts**2).mean() / max((sums[:, j] ** 2).mean(), LEAST)))
+        if times > CANCELLED:
+            yield (
+                f"the terms of d{name}/dt cancel (their sizes add up to {times:.0f} times their "
+                "sum): something is constant on these data; look for it, or add runs from other "
+                "starts"
+            )
+
+
+def _on(residual: Floats, noise: float, size: float) -> bool:
+    """Whether distances from a shape of some size, (n, k), are those of noise."""
+    least, most = _distance(residual, noise)
+    return bool(least < CLOSE * size and most < TOLD * size)
+
+
+def _distance(residual: Floats, noise: float) -> tuple[float, float]:
+    """Root mean square of a distance less its noise, at least and at most.
+
+    What it is more than the noise, or what it has in common with its neighbour, whichever is more.
+    """
+    square = float((residual**2).mean())
+    shared = float((residual[1:] * residual[:-1]).mean())
+    more = max(square - noise**2, shared)
+    unsure = SURE * square * np.sqrt(2 / residual.size)
+    return float(np.sqrt(max(more - unsure, 0.0))), float(np.sqrt(max(more, 0.0) + unsure))
