@@ -269,9 +269,6 @@ save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "eq
 # *Three periods of the videos with the tracks that are found in them, the path in space that the three
 # agree on, and the law that follows from all fifteen periods.*
 
-# %%
-folder.cleanup()
-
 # %% [markdown]
 # ## What we learned
 #
@@ -291,38 +288,52 @@ folder.cleanup()
 # %% [markdown]
 # ## Exercises
 #
-# **1.** How few samples are enough? Discover from every second, fourth and eighth of the points in
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
+#
+# **1.** (Explore.) How few samples are enough? Discover from every second, fourth and eighth of the points in
 # `found.x`.
-#
+
+# %% tags=["hide-cell"]
+from vidsindy_lite import discover
+
+for step in (2, 4, 8):
+    fewer = discover(found.t[::step], found.x[::step])
+    scored = score(fewer, shot.truth)
+    print(step, scored, *fewer.warnings, sep="\n")
+    assert scored.exact or fewer.warnings
+
+# %% [markdown]
 # <details><summary>Solution</summary>
-#
-# ```python
-# from vidsindy_lite import discover
-#
-# for step in (2, 4, 8):
-#     fewer = discover(found.t[::step], found.x[::step])
-#     print(step, score(fewer, shot.truth), *fewer.warnings, sep="\n")
-# ```
 #
 # From the 1,500 frames of the full profile, even every eighth point, 12 in a period, gives exactly
-# the true terms with errors of a few millionths. From the 400 frames of the quick profile, every
-# eighth is too few, 50 points in all: one term is missed, a false one is found, and a warning says
-# that another law fits as well.
+# the true terms. The 400 frames of the quick profile hold 50 such points, which is too few; a warning says so.
 # </details>
 #
-# **2.** A camera in a drawer: does it work with two of the three?
+# **2.** (Explore.) A camera in a drawer: does it work with two of the three?
+
+# %% tags=["hide-cell"]
+from vidsindy_lite import Rig
+
+pair = Rig(shot.rig.uncalibrated(keep=0).cameras[:2])
+two = discover_from_videos(shot.paths[:2], pair, shot.t)
+print(two.discovery.equations("native"))
+assert score(two.discovery, shot.truth).exact
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# Yes, the same terms with similar errors: two views leave one condition per frame, the epipolar one,
+# and there are hundreds of frames for two unknowns.
+# </details>
+#
+# **3.** (Prove.) The law has a frame of its own in which it is shortest. Show that a polynomial law of degree $p$
+# keeps its degree under any shift of the origin, and that its terms of degree $p$ do not change at all.
 #
 # <details><summary>Solution</summary>
 #
-# ```python
-# from vidsindy_lite import Rig
-#
-# pair = Rig(shot.rig.uncalibrated(keep=0).cameras[:2])
-# print(discover_from_videos(shot.paths[:2], pair, shot.t).equations("native"))
-# ```
-#
-# Yes, the same terms with similar errors: two views leave one condition per frame, the epipolar one,
-# and there are hundreds of frames for two unknowns. (Run it before the folder is cleaned up.)
+# Put $\mathbf x=\mathbf y+\boldsymbol\Delta$ into a monomial and multiply out: $\prod_i(y_i+\Delta_i)^{p_i}$
+# is $\prod_iy_i^{p_i}$ plus monomials of a lower degree. A term of the highest degree gets nothing from any other,
+# as there is none above it. In Lorenz' law, the quadratic terms $xz$ and $xy$ are the same in every frame.
 # </details>
 
 # %% [markdown]
@@ -332,4 +343,5 @@ folder.cleanup()
 # would differ from run to run.
 
 # %%
+folder.cleanup()
 print(versions())

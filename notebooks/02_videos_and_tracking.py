@@ -482,9 +482,6 @@ save_figure("figure_S3", fig, caption=caption, numbers={"t": shot.t, "x": x, "tr
 # *Figure S3: the path of SprottF as three cameras see it through two posts each. Where fewer than two
 # see the target (shaded) there is no position; elsewhere it lies on the truth (dashed).*
 
-# %%
-folder.cleanup()
-
 # %% [markdown]
 # ## What we learned
 #
@@ -506,36 +503,57 @@ folder.cleanup()
 # %% [markdown]
 # ## Exercises
 #
-# **1.** A target of 8 px or one of 40 px: which is tracked better when there is noise?
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
 #
+# **1.** (Explore.) A target of 8 px or one of 40 px: which is tracked better when there is noise?
+
+# %% tags=["hide-cell"]
+rms_of = {}
+for size in (8, 16, 40):
+    noisy = replace(scene, size=size, noise_variance=0.01)
+    rms_of[size] = np.sqrt(np.nanmean(errors_of(noisy, seed) ** 2))
+print({size: f"{rms:.2f} px" for size, rms in rms_of.items()})
+assert rms_of[8] > 1.5 * rms_of[40]
+
+# %% [markdown]
 # <details><summary>Solution</summary>
 #
-# ```python
-# for size in (8, 16, 40):
-#     noisy = replace(scene, size=size, noise_variance=0.01)
-#     print(size, np.sqrt(np.nanmean(errors_of(noisy, seed) ** 2)))
-# ```
-#
-# The larger one: 0.16, 0.09 and 0.06 px (150 frames). Noise enters at the rim (inside, the coverage is
+# The larger one. Noise enters at the rim (inside, the coverage is
 # one), in about $R$ pixels at the distance $R$, so the variance of the centroid goes as
-# $R\cdot R^2/(R^2)^2=1/R$. (Run it before the folder is cleaned up.)
+# $R\cdot R^2/(R^2)^2=1/R$.
 # </details>
 #
-# **2.** What if the target hardly moves? Track it on a circle with a radius of 5 px.
+# **2.** (Explore.) What if the target hardly moves? Track it on circles with a radius of 5 and of 10 px.
+
+# %% tags=["hide-cell"]
+angle = np.linspace(0, 20, frames)
+for radius in (5, 10):
+    circle = 256 + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    off = errors_of(scene, seed, circle)
+    seen = np.isfinite(off)
+    print(f"radius {radius} px: seen in {seen.mean():.0%} of the frames")
+    assert not seen.any() or np.sqrt(np.mean(off[seen] ** 2)) < 0.1
+assert seen.all()
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# A target of 18 px never leaves its place on the smaller circle: the median
+# takes its middle for background, and what differs from that are slivers, which end
+# where the background has the colour of the target. Rather than to guess where that ends, `track` gives no position
+# at all. On the larger circle every frame is as exact as ever.
+# </details>
+#
+# **3.** (Prove.) The centroid of a disc is exact if its coverage of every pixel is. Why, and what does
+# an 8-bit colour do to it?
 #
 # <details><summary>Solution</summary>
 #
-# ```python
-# angle = np.linspace(0, 20, frames)
-# truth = 256 + 5 * np.column_stack([np.cos(angle), np.sin(angle)])
-# print(np.isfinite(errors_of(scene, seed)).sum())
-# ```
-#
-# 0: there is no position at all. The target, 18 px wide, never leaves its place, so that the median
-# takes its middle for background, and what differs from that are slivers. `track` sees that they end
-# where the background has the colour of the target, and does not guess where that ends. As its
-# docstring says, the target must stay away from each place for at least a fifth of the frames. A
-# radius of 10 px is enough: 0.001 px on average, in every frame.
+# The coverage of a pixel is the area of the disc within it, so that
+# $\sum_i c_i=\pi R^2$; and $\sum_i c_i\mathbf p_i$ with pixel centres $\mathbf p_i$ differs from $\int\mathbf x\,dA$
+# only in the pixels of the rim, where the centre of the covered part is not that of the pixel. These differences
+# have opposite signs at opposite ends of the disc and nearly cancel. Rounding to 1/255 of the contrast adds
+# independent errors of $1/(255\sqrt{12})$ in the $2\pi R$ pixels of the rim, a few ten-thousandths of a pixel together.
 # </details>
 
 # %% [markdown]
@@ -545,4 +563,5 @@ folder.cleanup()
 # would differ from run to run.
 
 # %%
+folder.cleanup()
 print(versions())

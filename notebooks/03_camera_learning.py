@@ -354,36 +354,50 @@ assert "cameras[1] and cameras[2]" in message
 # %% [markdown]
 # ## Exercises
 #
-# **1.** The normal of camera 3 was measured one degree wrong. Do the residuals tell?
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
 #
+# **1.** (Explore.) The normal of camera 3 was measured one degree wrong. Do the residuals tell?
+
+# %% tags=["hide-cell"]
+from dataclasses import replace
+
+tilt = np.deg2rad(1) * truth.cameras[2].rows[0]
+wrong = replace(start.cameras[2], normal=start.cameras[2].normal + tilt)
+tilted = learn_cameras(rounded, Rig([*start.cameras[:2], wrong]))
+missed, right = (np.hstack(residuals(rounded, rig)) for rig in (tilted, learn_cameras(rounded, start)))
+print([f"{np.sqrt(np.mean(r**2)):.1f} px" for r in (missed, right)])
+assert np.mean(missed**2) > 25 * np.mean(right**2)
+
+# %% [markdown]
 # <details><summary>Solution</summary>
 #
-# ```python
-# from dataclasses import replace
-#
-# tilt = np.deg2rad(1) * truth.cameras[2].rows[0]
-# wrong = replace(start.cameras[2], normal=start.cameras[2].normal + tilt)
-# rig = learn_cameras(rounded, Rig([*start.cameras[:2], wrong]))
-# print(np.sqrt(np.mean(np.hstack(residuals(rounded, rig)) ** 2)))
-# ```
-#
-# Yes: their rms is 2.6 px instead of 0.2 px. The path is off by up to 7 px rms (along x), so look
+# Yes: they are many times larger than those of whole pixels alone. Look
 # at the residuals before anything else.
 # </details>
 #
-# **2.** Are two cameras enough, one of them calibrated?
+# **2.** (Explore.) Are two cameras enough, one of them calibrated?
+
+# %% tags=["hide-cell"]
+pair = learn_cameras(rounded[:2], Rig(start.cameras[:2]))
+two = np.sqrt(np.mean((reconstruct(rounded[:2], pair) - x) ** 2, axis=0)) / pixel
+print(f"two cameras: {two.round(2)} px, three: {rmse.round(2)} px")
+assert two.max() < 3 * rmse.max()
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# Yes. Two views leave one condition per frame, the epipolar one, and with it two unknowns against
+# hundreds of equations. The path is somewhat less exact, and
+# only one number of four per frame is left to raise an alarm.
+# </details>
+#
+# **3.** (Prove.) Why can no number of frames tell the scale of all cameras at once?
 #
 # <details><summary>Solution</summary>
 #
-# ```python
-# pair = Rig(start.cameras[:2])
-# found = learn_cameras(tracks[:2], pair)
-# print(cameras.calibration_errors(found, Rig(truth.cameras[:2])))
-# ```
-#
-# Yes. Two views leave one condition per frame, the epipolar one, and with it two unknowns against
-# hundreds of equations. From whole pixels the path is off by 0.38 px rms along x instead of 0.23 px, and
-# only one number of four per frame is left to raise an alarm.
+# If $\mathbf x$ and the cameras fit the pixels, so do $\lambda\mathbf x$, the positions times $\lambda$ and the scales
+# times $\lambda$: $s\,\mathcal T\mathbf x_c+\Delta_c=\mathbf R^-\mathbf x$ is linear in all of them. Here the measured
+# positions would betray it, if they were exact; the one calibrated camera settles it without them.
 # </details>
 
 # %% [markdown]

@@ -24,7 +24,7 @@
 # * the equations found, term by term with standard errors, beside the truth;
 # * the discovered laws set in motion, and for how long their forecasts hold;
 # * PySINDy, E-SINDy, WeakSINDy and Model-A on the same trajectories, in five trials;
-# * the same from whole pixels, as in the paper.
+# * all of it from whole pixels, which is the paper's regime, and from sub-pixel tracks, which is an upper bound.
 #
 # **What you need**: the [tour](00_tour.ipynb); how the law is found is the subject of
 # [notebook 04](04_spline_ado.ipynb).
@@ -148,9 +148,21 @@ print(f"thresholds: {baselines.THRESHOLDS[0]:g} to {baselines.THRESHOLDS[-1]:g},
       f"{len(baselines.THRESHOLDS)} values; fitted to the first {baselines.TRAINING:.0%}; "
       f"as good as the best: up to {baselines.TOLERANCE:g} times its error")  # fmt: skip
 
+# %% [markdown]
+# "Camera pixels can only take approximate integer values", says the paper, so this is its regime: tracks that
+# are rounded to **whole pixels**, cameras and path learned anew from them. Our tracker keeps the digits
+# behind the point, and from clean and lossless videos it reads them to a thousandth of a pixel. What it makes of
+# them is an upper bound, of no use in a comparison with the paper.
+
 # %%
 tasks = grid(names, {"clean": (0,)}, trials, METHODS, frames)
-results = tabulate(sweep(run_trial, tasks, jobs=jobs, desc="trials"))
+whole = [
+    replace(task, source="whole pixels")
+    for task in tasks
+    if task.trial == seed or task.method in ("ours", "PySINDy")
+]
+trialled = tabulate(sweep(run_trial, tasks + whole, jobs=jobs, desc="trials"))
+results, coarse = (trialled[trialled.source == name] for name in ("videos", "whole pixels"))
 
 # %% [markdown]
 # Medians over the trials, in the paper's units and beside its numbers. "Terms found" counts the
@@ -158,7 +170,7 @@ results = tabulate(sweep(run_trial, tasks, jobs=jobs, desc="trials"))
 
 
 # %%
-def beside_paper(table, methods):
+def beside_paper(table, results, methods):
     rows = summary(results[results.method.isin(methods)], ["system", "method"])
     keys = zip(rows.method.replace("ours", "Ours"), rows.system, strict=True)
     printed = [SCORES.get((table, *key)) for key in keys]
@@ -167,13 +179,15 @@ def beside_paper(table, methods):
     return rows
 
 
-table_1 = beside_paper("Table 1", ("ours", "PySINDy"))
-caption = f"Ours and PySINDy on the same trajectories, medians of {len(trials)} trials; 0.001 is 0.001 or less."
+two = ("ours", "PySINDy")
+parts = {"whole": beside_paper("Table 1", coarse, two), "sub": beside_paper("Table 1", results, two)}
+table_1 = pd.concat(parts, names=["pixels"]).reset_index(level=0)
+caption = f"Ours and PySINDy on the same tracks, medians of {len(trials)} trials; 0.001 is 0.001 or less."
 save_table("table_1", table_1.to_dict("records"), caption=caption)
 
 # %%
-table_S3 = beside_paper("Table S3", ("ours", "E-SINDy", "WeakSINDy", "Model-A"))
-caption = f"Ours, E-SINDy, WeakSINDy and Model-A, medians of {len(trials)} trials; 0.001 is 0.001 or less."
+table_S3 = beside_paper("Table S3", results, ("ours", "E-SINDy", "WeakSINDy", "Model-A"))
+caption = f"Ours, E-SINDy, WeakSINDy and Model-A, from sub-pixel tracks, medians of {len(trials)} trials; 0.001 is 0.001 or less."
 save_table("table_S3", table_S3.to_dict("records"), caption=caption)
 
 # %%
@@ -184,13 +198,13 @@ assert (ours.recall == 1).all()
 assert (ours.l2 <= (0.1e-2 if full else 0.5e-2)).all()
 
 # %% [markdown]
-# No method is better than ours in any row to the two decimals that the paper prints; beyond them
+# From sub-pixel tracks, no method is better than ours in any row to the two decimals that the paper prints; beyond them
 # there is only what the tracker left. An error of 0.001 stands for any below: a few grey levels of the
 # videos decide on it.
 
 # %%
 assert ours.groupby("system").l2.median().max() < LEAST
-rows = pd.concat((table_1, table_S3))
+rows = pd.concat((parts["sub"], table_S3))
 best = rows[rows.method == "ours"].drop_duplicates("system").set_index("system")["l2 (e-2)"]
 assert (rows["l2 (e-2)"] > rows.system.map(best) - 0.005).all()
 
@@ -320,14 +334,9 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # ## Whole pixels
 #
-# A thousandth of a pixel is a luxury of these videos. The paper says that "camera pixels can only
-# take approximate integer values", so let us throw away the digits behind the point: the same
-# tracks, rounded to whole pixels; cameras and path learned anew, for the first trial and all
-# methods.
+# What do all methods make of the paper's regime? Here is the first trial.
 
 # %%
-tasks = [replace(task, source="whole pixels") for task in tasks if task.trial == seed]
-coarse = tabulate(sweep(run_trial, tasks, jobs=jobs, desc="whole pixels"))
 rows = [
     {
         "system": row.system, "method": row.method,
@@ -335,23 +344,23 @@ rows = [
         "l2 (e-2)": significant(100 * row.l2),
         "worst coefficient (%)": significant(100 * row.max_coefficient_error),
     }
-    for row in coarse.itertuples()
+    for row in coarse[coarse.trial == seed].itertuples()
 ]  # fmt: skip
 caption = "From tracks rounded to whole pixels, one trial."
 save_table("discovery_whole_pixels", rows, caption=caption)
 
 # %%
 mine = coarse[coarse.method == "ours"]
-assert mine.exact.all()
-assert (mine.l2 <= 0.5e-2).all()
-assert (mine.status == "ok").all()
+print(f"ours: {rate(mine.exact)} exact, {rate(mine.status == 'ok')} not doubted")
+assert mine.exact.mean() >= 0.9
+assert (mine[mine.exact].l2 <= 0.5e-2).all()
+assert (mine.status == "ok").mean() >= 0.8
 
 # %% [markdown]
-# The errors are far larger than before and still well below the paper's, and the terms are still
-# right.
+# The errors are far larger than before and still well below the paper's.
 
 # %%
-both = pd.concat((results[results.trial == seed], coarse))
+both = trialled[trialled.trial == seed].copy()
 both["source"] = both.source.replace("videos", "as tracked")
 fig = plots.plot_methods(both)
 caption = (
@@ -375,15 +384,15 @@ save_figure("discovery_methods", fig, caption=caption, numbers=numbers)
 print(
     both.groupby(["source", "method"], sort=False).exact.agg(rate).unstack(sort=False).to_string()
 )
-error = coarse.groupby("method").l2.median()
+error = coarse[coarse.trial == seed].groupby("method").l2.median()
 assert all(error[method] > 2 * error["ours"] for method in baselines.BASELINES)
 
 # %% [markdown]
 # ## What we learned
 #
 # * Seven systems, one call, nothing chosen by hand: all true terms, no false one, from three videos
-#   with one calibrated camera. From clean videos the relative error is below $10^{-5}$,
-#   from whole pixels of $10^{-4}$.
+#   with one calibrated camera. From whole pixels the relative error is of the order of $10^{-4}$, from the sub-pixel tracks of
+#   lossless videos below $10^{-5}$.
 # * The offset of the reference frame was not given and is found with the law.
 # * The standard errors are what they claim to be: nine of ten coefficients lie within two of them.
 # * With paths as exact as these, other methods find most laws as well. What sets them apart is
@@ -404,38 +413,54 @@ assert all(error[method] > 2 * error["ours"] for method in baselines.BASELINES)
 # %% [markdown]
 # ## Exercises
 #
-# **1.** The paper's law for Tsucs2 has 0.63 in place of 1 as the coefficient of x in dy/dt. How
-# much of this does the relative $\ell_2$ error show?
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
 #
+# **1.** (Explore.) The paper's law for Tsucs2 has 0.63 in place of 1 as the coefficient of x in dy/dt. How
+# much of this does the relative $\ell_2$ error show?
+
+# %% tags=["hide-cell"]
+from vidsindy_lite.study import score
+
+truth = SYSTEMS["Tsucs2"].shift(REFERENCE_OFFSET)
+wrong = truth.coefficients.copy()
+wrong[truth.terms.index("x"), 1] = 0.63
+scored = score(replace(truth, coefficients=wrong), truth)
+print(f"l2 {scored.l2:.4f}, worst coefficient {scored.max_coefficient_error:.0%}")
+assert scored.l2 < 0.002
+assert round(scored.max_coefficient_error, 2) == 0.37
+
+# %% [markdown]
 # <details><summary>Solution</summary>
 #
-# ```python
-# from vidsindy_lite.study import score
-#
-# truth = SYSTEMS["Tsucs2"].shift(REFERENCE_OFFSET)
-# wrong = truth.coefficients.copy()
-# wrong[truth.terms.index("x"), 1] = 0.63
-# scored = score(replace(truth, coefficients=wrong), truth)
-# print(scored.l2, scored.max_coefficient_error)
-# ```
-#
-# Hardly anything: $\ell_2$ is 0.0017, although the coefficient is wrong by 37 %. The constant 210
+# Hardly anything. The constant 210
 # that the shift creates dominates the norm. Hence the column "worst coefficient".
 # </details>
 #
-# **2.** Add noise of 5 % to the path of the first system and compare the methods again.
+# **2.** (Explore.) Add noise of 5 % to the path of the first system and compare the methods again.
+
+# %% tags=["hide-cell"]
+from vidsindy_lite.study import Trial
+
+five = {m: run_trial(Trial(names[0], "noise", 0.05, seed, m, frames=frames)).score for m in METHODS}
+print(*(f"{method}: {scored}" for method, scored in five.items()), sep="\n")
+assert five["ours"].exact
+assert five["ours"].l2 <= min(scored.l2 for scored in five.values())
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# A twentieth of the spread is enough to tell the methods apart: ours keeps exactly the true terms, with the smallest error; most
+# others find a false term or lose a true one.
+# </details>
+#
+# **3.** (Prove.) Which terms does a shift of the origin add to Lorenz' law, axis by axis?
 #
 # <details><summary>Solution</summary>
 #
-# ```python
-# from vidsindy_lite.study import Trial
-#
-# for method in METHODS:
-#     print(method, run_trial(Trial(names[0], "noise", 0.05, seed, method, frames=frames)).score)
-# ```
-#
-# For Lorenz and 1,500 frames, ours and Model-A keep exactly the true terms, with errors of 0.2 %
-# and 0.9 %; PySINDy and E-SINDy find one false term, and WeakSINDy misses three.
+# With $\mathbf x=\mathbf y+\boldsymbol\Delta$ the term $xz$ gives $\Delta_xz+\Delta_zx$ beside itself, and $xy$ gives
+# $\Delta_xy+\Delta_yx$. So $\Delta_x\neq0$ adds $z$ to dy/dt and $y$ to dz/dt, $\Delta_y\neq0$ adds $x$ to dz/dt, and
+# $\Delta_z$ changes the coefficient of $x$ in dy/dt, which may even vanish. Constants come with every shift but
+# those along which the law does not move.
 # </details>
 
 # %% [markdown]

@@ -421,31 +421,45 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 # %% [markdown]
 # ## Exercises
 #
-# **1.** Roll a ball of 57.15 mm instead. How much does the size of the ball matter?
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
 #
+# **1.** (Explore.) Roll a ball of 57.15 mm instead. How much does the size of the ball matter?
+
+# %% tags=["hide-cell"]
+larger = [camera.ball_image(x, 57.15 / 2)[0] for camera in truth.cameras]
+error = rms(reconstruct(larger, learn_cameras(larger, start)) - x)
+print(f"{error:.3f} mm rms")
+assert error < 0.1
+
+# %% [markdown]
 # <details><summary>Solution</summary>
 #
-# ```python
-# larger = [camera.ball_image(x, 57.15 / 2)[0] for camera in truth.cameras]
-# print(rms(reconstruct(larger, learn_cameras(larger, start)) - x))
-# ```
-#
-# Hardly: 0.045 mm rms instead of 0.038 mm. The shift of the centroid, and the error with it, grows with
+# Hardly. The shift of the centroid, and the error with it, grows with
 # the square of the radius.
 # </details>
 #
-# **2.** Are two perspective cameras enough, one of them calibrated?
+# **2.** (Explore.) Are two perspective cameras enough, one of them calibrated?
+
+# %% tags=["hide-cell"]
+pair = learn_cameras(rounded[:2], Rig(start.cameras[:2]))
+print(f"{rms(reconstruct(rounded[:2], pair) - x):.2f} mm rms from whole pixels")
+assert rms(reconstruct(rounded[:2], pair) - x) < 3
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# Yes, nearly as good as with three. But
+# with one condition per frame left, little would tell that a camera was measured wrong.
+# </details>
+#
+# **3.** (Prove.) The image of a ball is an ellipse. Which way is its centre off the image of the ball's centre?
 #
 # <details><summary>Solution</summary>
 #
-# ```python
-# pair = Rig(start.cameras[:2])
-# rig = learn_cameras(rounded[:2], pair)
-# print(rms(reconstruct(rounded[:2], rig) - x))
-# ```
-#
-# Yes: 0.83 mm rms from whole pixels instead of 0.64 mm, and from the tracks as good as with three. But
-# with one condition per frame left, little would tell that a camera was measured wrong.
+# The outline is where a cone about the ball meets the sensor. Its axis leads to the ball's centre, at an angle $\beta$ to
+# the optical axis; its sides leave at $\beta\pm\rho$ with $\sin\rho=r/d$, and meet the sensor at $f\tan(\beta\pm\rho)$. As the
+# tangent bends upwards, their middle lies farther out than $f\tan\beta$, by about
+# $f\rho^2\tan\beta/\cos^2\beta$: outwards, and growing with the square of the radius.
 # </details>
 
 # %% [markdown]

@@ -342,7 +342,6 @@ print(no_video := complaint())
 assert "(0, 7, 0) do" in wrong_lag
 assert (folders[shown] / "none" / "report.html").exists()
 assert "must be a video file" in no_video
-home.cleanup()
 
 # %% [markdown]
 # What cannot work ends in one error and the exit status 2, with a report that shows the tracks and the step
@@ -395,7 +394,9 @@ else:
 # %% [markdown]
 # ## Exercises
 #
-# **1.** A ball on a turntable is filmed. Why can the lags of its videos not be told, and does it matter?
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
+#
+# **1.** (Prove.) A ball on a turntable is filmed. Why can the lags of its videos not be told, and does it matter?
 #
 # <details><summary>Solution</summary>
 #
@@ -403,13 +404,17 @@ else:
 # not matter as long as every turn is like the other: the views agree at each of these lags.
 # </details>
 #
-# **2.** Take away the positions of cameras 1 and 2 instead of that of camera 3. What happens?
-#
+# **2.** (Explore.) Take away the positions of cameras 1 and 2 instead of that of camera 3. What happens?
+
+# %% tags=["hide-cell"]
+try:
+    learn_cameras(tracks, Rig([replace(c, position=None) for c in (first, second)] + [third]))
+    raise AssertionError("not refused")
+except ValueError as refusal:
+    print(refusal)
+
+# %% [markdown]
 # <details><summary>Solution</summary>
-#
-# ```python
-# learn_cameras(tracks, Rig([replace(c, position=None) for c in (first, second)] + [third]))
-# ```
 #
 # It is refused: one position is left, and the scene could be moved along the line of view of that camera
 # without any change in the images, if the two others are moved with it.
@@ -422,4 +427,5 @@ else:
 # would differ from run to run.
 
 # %%
+home.cleanup()
 print(versions())

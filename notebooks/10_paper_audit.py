@@ -780,36 +780,51 @@ save_table("audit", findings, caption=caption)
 # %% [markdown]
 # ## Exercises
 #
-# **1.** How many false positives would make the row of RayleighBenard, WeakSINDy consistent?
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
 #
+# **1.** (Explore.) How many false positives would make the row of RayleighBenard, WeakSINDy consistent?
+
+# %% tags=["hide-cell"]
+row = SCORES["Table S3", "WeakSINDy", "RayleighBenard"]
+print(audit.counts_behind(row, 11))
+assert not audit.could_be(row, 11)
+assert audit.could_be(replace(row, false_positives=10), 11)
+
+# %% [markdown]
 # <details><summary>Solution</summary>
-#
-# ```python
-# row = SCORES["Table S3", "WeakSINDy", "RayleighBenard"]
-# print(audit.counts_behind(row, 11))
-# print(audit.could_be(replace(row, false_positives=10), 11))
-# ```
 #
 # Ten: $11/(11+10)=52.38\,\%$. Printed are nine, for which P would be 55 %. With recall 100 % in every one of
 # five trials, no average helps.
 # </details>
 #
-# **2.** `fit_coordinates` has six free numbers. Give it a law with one coefficient that is really wrong, say a
+# **2.** (Explore.) `fit_coordinates` has six free numbers. Give it a law with one coefficient that is really wrong, say a
 # half of $-10z$ in NoseHoover's dy/dt. What does it make of it?
+
+# %% tags=["hide-cell"]
+whole = truths["NoseHoover"]
+values = whole.coefficients.copy()
+values[whole.terms.index("z"), 1] *= 0.5
+halved = replace(whole, coefficients=values)
+fit = audit.fit_coordinates(halved, SYSTEMS["NoseHoover"], REFERENCE_OFFSET)
+taken, beyond = fit.misfit / score(halved, whole).l2, fit.misfit / audit.rounding_reach(halved, whole)
+print(f"misfit: {taken:.2f} of l2, {beyond:.0f} times what rounding explains; scales {fit.scale}")
+assert taken < 0.2
+assert beyond > 10
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# It takes most of $\ell_2$ away, by stretching z to the double. That is why a small misfit alone proves
+# nothing: this one is many times what rounding explains. Only a misfit below rounding is evidence.
+# </details>
+#
+# **3.** (Prove.) A table prints precision 100 % and one false positive for a mean of five trials. Can both be true?
 #
 # <details><summary>Solution</summary>
 #
-# ```python
-# truth = truths["NoseHoover"]
-# values = truth.coefficients.copy()
-# values[truth.terms.index("z"), 1] *= 0.5
-# wrong = replace(truth, coefficients=values)
-# fit = audit.fit_coordinates(wrong, SYSTEMS["NoseHoover"], REFERENCE_OFFSET)
-# print(score(wrong, truth).l2, fit.misfit, audit.rounding_reach(wrong, truth), fit.scale)
-# ```
-#
-# It takes nine tenths of $\ell_2$ away, by stretching z to the double. That is why a small misfit alone proves
-# nothing: this one is 25 times what rounding explains. Only a misfit below rounding is evidence.
+# If the mean of the precisions is 100 %, each of them is, as none can be more; then no trial has a false term, and
+# their mean number is 0. A number rounded up to 1 would need a mean of at least $\tfrac12$, three false terms in five trials, and each of
+# these trials has a precision below one. So no.
 # </details>
 
 # %% [markdown]

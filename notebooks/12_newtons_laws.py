@@ -227,7 +227,7 @@ assert swung.status == "ok"
 assert abs(swung.coefficients[row, 1] + 9.81) < 5 * swung.standard_errors[row, 1]
 
 # %% [markdown]
-# Polynomials alone imitate the sine by its series along this swing, and take what is left for kicks. Let go at
+# Polynomials alone imitate the sine by its series along this swing, with a doubt, or with kicks that nobody gave. Let go at
 # 2.8 rad, the law with the sine is still that of the pendulum; the series sends it off to infinity.
 
 # %%
@@ -279,6 +279,8 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 # %% [markdown]
 # ## Exercises
 #
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
+#
 # **1.** (Prove.) Show that along one throw with linear drag $\ddot y=-g-c\,\dot y$ can be written as
 # $\ddot y=-a\,\dot x$ on the path.
 #
@@ -290,41 +292,46 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 # </details>
 #
 # **2.** (Explore.) Throw twice. Is that enough?
-#
+
+# %% tags=["hide-cell"]
+two = discover(runs[:2], degree=2, order=2)
+print(two)
+assert (two.system.support == fallen.system.support).all()
+
+# %% [markdown]
 # <details><summary>Solution</summary>
 #
-# ```python
-# print(discover(runs[:2], degree=2, order=2))
-# ```
-#
-# The law is right, with error bars twice as wide; it is still doubted, since two throws are 1.3 turns of the
-# motion together.
+# The law is right, with error bars that are wider.
 # </details>
 #
 # **3.** (Implement.) Let the order be found: what does `order="auto"` say of the throws, and why?
-#
+
+# %% tags=["hide-cell"]
+open_order = discover(runs, degree=2, order="auto")
+print(open_order.note)
+assert open_order.system.names == fallen.system.names
+
+# %% [markdown]
 # <details><summary>Solution</summary>
 #
-# ```python
-# print(discover(runs, degree=2, order="auto").note)
-# ```
-#
-# Order 2: the law of order 1 misses the data.
+# Order 2: no law of order 1 does as well.
 # </details>
 #
 # **4.** (Explore.) Let the pendulum hang in a wind that pushes with $0.5\cos\theta$. Is the push found beside the
 # sine, and what does a start at 0.1 rad say of it?
-#
+
+# %% tags=["hide-cell"]
+pushed = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -0.1, "cos(x)": 0.5}}
+windy_law = PolynomialSystem.from_terms(pushed, library=sines)
+laws_of = {}
+for angle in (1.5, 0.1):
+    clean = windy_law.simulate(u, np.array([angle, 0.0]))[:, :1]
+    noisy = clean + 0.01 * clean.std() * rng.standard_normal(clean.shape)
+    print(laws_of.setdefault(angle, discover(u, noisy, order=2, library=sines)))
+assert (laws_of[1.5].system.support == windy_law.support).all()
+
+# %% [markdown]
 # <details><summary>Solution</summary>
-#
-# ```python
-# pushed = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -0.1, "cos(x)": 0.5}}
-# windy_law = PolynomialSystem.from_terms(pushed, library=sines)
-# for angle in (1.5, 0.1):
-#     clean = windy_law.simulate(u, np.array([angle, 0.0]))[:, :1]
-#     noisy = clean + 0.01 * clean.std() * rng.standard_normal(clean.shape)
-#     print(discover(u, noisy, order=2, library=sines))
-# ```
 #
 # At 1.5 rad it is. At 0.1 rad the pendulum is a spring about another point: a line is as good as a sine, and a
 # constant as a cosine. The first is said in a warning.

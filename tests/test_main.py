@@ -163,7 +163,7 @@ def test_lags_that_are_no_numbers(here, capsys):
 def test_a_library_that_is_none(here, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["discover", *VIDEOS, "--rig", "rig.toml", "--library", "tan(1)"])
-    message = "argument --library: must be a sum of polynomial(degree) and fourier(harmonics), got"
+    message = "argument --library: must be a sum of polynomial(degree), fourier(harmonics) and"
     assert message in capsys.readouterr().err
 
 
@@ -227,6 +227,17 @@ def test_from_tracks_to_a_report_and_back(tracked, capsys):
     for one, other in zip(*both, strict=True):
         assert one["term"] == other["term"]
         assert one["coefficient"] == pytest.approx(other["coefficient"], rel=1e-4)
+
+
+def test_frames_in_a_unit_of_time_that_contradict_the_file_are_told(tracked, capsys):
+    text = (tracked / "a.csv").read_text().splitlines()
+    rows = [f"{int(row.split(',')[0]) / 50:.6f},{row.partition(',')[2]}" for row in text[1:]]
+    (tracked / "timed.csv").write_text("\n".join(["t,u,v", *rows]))
+    command = ["discover", "--rig", "rig.toml", "--degree", "2", "--tracks"]
+    assert main([*command, "timed.csv", "b.csv", "c.csv", "--fps", "25"]) == 1
+    told = "fps: 25 frames in a unit of time are taken as given, though timed.csv states 50"
+    assert told in capsys.readouterr().out
+    assert main([*command, "timed.csv", "b.csv", "c.csv", "--fps", "50"]) == 0
 
 
 def test_a_refusal_has_one_line_and_a_picture(tracked, capsys):

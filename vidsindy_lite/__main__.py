@@ -355,7 +355,8 @@ COMMANDS = {
         "--degree": _count(None, "highest degree of the polynomials (default: 3)"),
         "--library": _text(
             "TERMS", "in place of --degree: polynomial(N), fourier(N) with the sines and cosines "
-            "of the coordinates, or a sum such as 'polynomial(1) + fourier(1)'", type=_library
+            "of the coordinates, rational(N) with denominators, or a sum such as "
+            "'polynomial(1) + fourier(1)'", type=_library
         ),
         "--order": _choice(
             "1", ("1", "2", "auto"),

@@ -41,6 +41,14 @@ def check_path(name: str, value: str | os.PathLike) -> Path:
     return path
 
 
+def check_output(name: str, value: str | os.PathLike) -> Path:
+    """A file that can be written: its folder exists, and it is no folder itself."""
+    path = check_path(name, value)
+    if path.is_dir() or not path.parent.is_dir():
+        raise ValueError(f"{name}: must be a file in a folder that exists, got '{path}'")
+    return path
+
+
 def check_choice(name: str, value: str, known: Iterable[str]) -> None:
     """One of the known names."""
     if value not in known:

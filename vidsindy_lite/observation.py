@@ -31,10 +31,12 @@ from .cameras import (
     trailing_errors,
 )
 from .checks import check_path, check_tracks, check_vector
+from .dynamics import smooth as smooth_curves
 from .refusal import Refused, refusing
 from .vision import Hint, Track, VideoInfo, check_detector, frame_clock, track, video_info
 
 _OTHER_LAG = 0.02  # frames by which it may differ without a word
+_SMOOTHED = 8  # frames of a stretch, from which its curve can be told from noise
 _WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
 
 
@@ -207,14 +209,13 @@ def _observed(
     told = best
     if lags is not None:
         told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
-    shared = systematic_errors(raw, rig, learned, told), trailing_errors(tracks, learned)
     return Observation(
         tracks=tracks,
         rig=learned,
         lags=told,
         t=clock.times,
         x=reconstruct(tracks, learned),
-        systematic=np.concatenate(shared),
+        systematic=_shared_errors(raw, tracks, rig, learned, told, clock.times),
         warnings=(
             *_rig_warnings(tracks, rig, learned, names, used, best),
             *learned.warnings,
@@ -222,6 +223,35 @@ def _observed(
             *told.warnings,
         ),
     )
+
+
+def _smoothed(t: Floats, values: Floats) -> Floats:
+    """What (n, k) values that change with the motion would be without the noise of its frames."""
+    clean, rng = values.copy(), np.random.default_rng(0)
+    seen = np.flatnonzero(np.isfinite(values).all(axis=1))
+    for stretch in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1):
+        if len(stretch) >= _SMOOTHED:
+            curve = smooth_curves([(t[stretch], values[stretch])], rng).splines[0]
+            clean[stretch] = curve(t[stretch])
+    return clean
+
+
+def _shared_errors(
+    raw: Sequence[Floats], tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: Lags, t: Floats
+) -> Floats:
+    """Errors of the path that all frames share, (k, n, 3), as those of the motion alone.
+
+    A mode that holds the noise of each frame would explain that very noise: in a fit, its size
+    would grow beyond all measure, and bend the path with it.
+    """
+    trails = trailing_errors(tracks, learned, [_smoothed(t, track) for track in tracks])
+    learning = systematic_errors(raw, rig, learned, lags)
+    if not len(learning):
+        return trails
+    flat = np.moveaxis(learning, 1, 0).reshape(len(t), -1)
+    flat[~np.isfinite(reconstruct(tracks, learned)).all(axis=1)] = np.nan
+    steady = np.nan_to_num(_smoothed(t, flat)).reshape(len(t), len(learning), -1)
+    return np.concatenate((np.moveaxis(steady, 0, 1), trails))
 
 
 def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]) -> Floats | None:

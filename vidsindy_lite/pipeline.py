@@ -17,6 +17,8 @@ from .observation import Observation, observe, observe_tracks
 from .refusal import refusing
 from .vision import Hint, TrackFile, read_tracks
 
+_OTHER_CLOCK = 1e-3  # share by which given and stated frame rates may differ without a word
+
 
 @dataclass(frozen=True, eq=False)
 class VideoDiscovery(Observation):
@@ -124,8 +126,8 @@ def discover_from_tracks(
     read = _read(tracks)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
     seen = observe_tracks(pixels, rig, _times(read, t, fps), lags=lags, names=names)
-    doubts = tuple(warning for track in read for warning in track.warnings)
-    seen = replace(seen, warnings=(*seen.warnings, *doubts))
+    doubts = [warning for track in read for warning in track.warnings]
+    seen = replace(seen, warnings=(*seen.warnings, *doubts, *_contradicted(read, fps)))
     return _with_law(seen, names, library=terms, order=order, seed=seed, progress=progress)
 
 
@@ -166,6 +168,20 @@ def _times(
         silent = next(track.name for track in read if track.t is None)
         raise ValueError(f"t: must be given, or fps, as {silent} states no times")
     return stated
+
+
+def _contradicted(read: Sequence[TrackFile], fps: float | None) -> list[str]:
+    """Which files state other frames in a unit of time than the given ones."""
+    stated = [
+        (track.name, 1 / np.median(np.diff(track.t)))
+        for track in read
+        if fps is not None and track.t is not None and len(track.t) > 1
+    ]
+    return [
+        f"fps: {fps:g} frames in a unit of time are taken as given, though {name} states {rate:.4g}"
+        for name, rate in stated
+        if fps is not None and abs(rate / fps - 1) > _OTHER_CLOCK
+    ]  # fmt: skip
 
 
 def _with_law(

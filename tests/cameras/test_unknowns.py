@@ -54,9 +54,9 @@ def test_all_equations_of_a_frame_are_left_out():
     assert module._without_outliers(every, 1.0)[0].frames.tolist() == [0, 0, 1, 1, 2, 2]
 
 
-def motion(first, second, misfit):
+def motion(first, second, misfit, frames=40):
     """Equations whose two unknowns, 3 and 4, show by so many pixels rms, missed by others."""
-    waves = np.sqrt(2) * np.cos(2 * np.pi * np.outer(np.arange(40), [1, 2, 3]) / 40)
+    waves = np.sqrt(2) * np.cos(2 * np.pi * np.outer(np.arange(frames), [1, 2, 3]) / frames)
     design = waves[:, :2] * [first, second]
     return design, design @ [3, 4] + misfit * waves[:, 2]
 
@@ -69,6 +69,13 @@ def test_motion_must_be_twice_the_misfit(unknown):
     message = r"cameras\[1\], got 1.9 px rms of telling motion against a misfit of 1 px"
     with pytest.raises(ValueError, match=message):
         solve(*motion(10.0, 1.9, 5.0), unknown)
+
+
+def test_in_many_frames_less_motion_tells(unknown):
+    turned, _ = solve(*motion(10.0, 1.9, 5.0, 1500), unknown)
+    np.testing.assert_allclose(turned, [3 + 4j], rtol=1e-12)
+    with pytest.raises(ValueError, match="got 1.5 px rms of telling motion"):
+        solve(*motion(10.0, 1.5, 5.0, 1500), unknown)
 
 
 def test_exact_motion_must_be_more_than_rounding(unknown):

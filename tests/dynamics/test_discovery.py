@@ -146,8 +146,15 @@ def test_a_file_that_holds_no_discovery_is_refused(tmp_path, text):
 
 
 def test_a_missing_file_is_told_with_the_argument(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"path: must be .*, got no file .*law\.json"):
-        Discovery.load(tmp_path / "law.json")
+    for path in (tmp_path / "law.json", tmp_path):
+        with pytest.raises(FileNotFoundError, match="path: must be .*, none at"):
+            Discovery.load(path)
+
+
+def test_a_file_that_cannot_be_written_is_told_with_the_argument(spring, tmp_path):
+    for path in (tmp_path, tmp_path / "none" / "law.json"):
+        with pytest.raises(ValueError, match="path: must be a file in a folder that exists, got"):
+            spring[2].save(path)
 
 
 def test_steps_are_timed_from_the_beginning():

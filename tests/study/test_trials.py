@@ -89,6 +89,24 @@ def test_ours_is_told_the_systematic_errors_of_what_cameras_reconstructed(filmed
     assert 0 < 10 * rms["videos"] < rms["whole pixels"]
 
 
+def test_tracks_are_corrupted_each_by_its_own_draw_before_the_cameras_are_learned(
+    filmed, monkeypatch
+):
+    given, observe = [], experiments.observe_tracks
+    monkeypatch.setattr(experiments, "film_result", lambda task: filmed)
+    monkeypatch.setattr(experiments, "discover", lambda t, x, systematic: SYSTEMS["SprottE"])
+    monkeypatch.setattr(
+        experiments,
+        "observe_tracks",
+        lambda tracks, *rest, **o: given.extend(tracks) or observe(tracks, *rest, **o),
+    )
+    run_trial(Trial("SprottE", "noise", 0.02, 1, source="tracks", frames=200))
+    off = [track - true for track, true in zip(given, filmed.tracks, strict=True)]
+    for wrong, true in zip(off, filmed.tracks, strict=True):
+        np.testing.assert_allclose(wrong.std(axis=0), 0.02 * true.std(axis=0), rtol=0.2)
+    assert abs(np.corrcoef(off[0][:, 0], off[1][:, 0])[0, 1]) < 0.3
+
+
 def test_unknown_source_is_named(filmed):
     with pytest.raises(ValueError, match="source: must be one of videos, .* got 'memory'"):
         source_path(filmed, "memory")

@@ -117,6 +117,14 @@ def test_empty_rows_are_frames_without_a_target(tmp_path, text):
     np.testing.assert_array_equal(track.pixels, [nan, [1, 2], nan, [3, 4]])
 
 
+def test_zeros_are_frames_without_a_target_and_said(tmp_path):
+    (track,) = read(tmp_path, "u,v\n1,2\n0,0\n0,5\n0.0,0\n")
+    nan = [np.nan, np.nan]
+    np.testing.assert_array_equal(track.pixels, [[1, 2], nan, [0, 5], nan])
+    assert track.warnings == ("a.csv: 0, 0 in 2 of 4 rows is taken for not seen",)
+    assert read(tmp_path, "u,v\n1,2\n0,5\n")[0].warnings == ()
+
+
 @pytest.mark.parametrize("digits", [2, 3, 6])
 def test_rounded_times_of_an_even_clock_are_even_again(tmp_path, digits):
     kept = np.delete(np.arange(90), [4, 30, 31])

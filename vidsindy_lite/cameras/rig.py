@@ -24,6 +24,7 @@ from ..checks import (
     check_instance,
     check_integer,
     check_number,
+    check_output,
     check_path,
     check_rows,
     check_vector,
@@ -191,8 +192,13 @@ class Rig:
         ----------
         path : path-like
             Overwritten if it exists.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be there: it is a folder, or its folder does not exist.
         """
-        check_path("path", path).write_text(self.text(), encoding="utf-8")
+        check_output("path", path).write_text(self.text(), encoding="utf-8")
 
     def text(self) -> str:
         """What `save` writes."""

@@ -94,7 +94,9 @@ def _of_shape(modes: Floats, x: Floats) -> Floats:
     return (sizes[kept, None] * ways[kept]).reshape(-1, *x.shape)
 
 
-def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
+def trailing_errors(
+    tracks: Sequence[Floats], rig: Rig, motion: Sequence[Floats] | None = None
+) -> Floats:
     """Errors of the reconstructed path if tracks stay a constant distance behind the motion.
 
     A codec that codes changes leaves out the smallest ones, so that a trace of the target stays
@@ -107,6 +109,8 @@ def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
         One per camera, at the same instants.
     rig : Rig
         All cameras calibrated.
+    motion : sequence of ndarray, shape (n, 2), optional
+        The tracks without their noise; by default the tracks themselves.
 
     Returns
     -------
@@ -123,7 +127,7 @@ def trailing_errors(tracks: Sequence[Floats], rig: Rig) -> Floats:
     noise = 1.4826 * np.median(missed) * np.sqrt(count / (count - 3)) if missed.size else 0.0
     modes = []
     for i, track in enumerate(views.tracks):
-        step = np.gradient(track, axis=0)
+        step = np.gradient(track if motion is None else motion[i], axis=0)
         # Noise has no direction: the trail ends where the target moves by less than that.
         length = np.sqrt((step**2).sum(axis=1, keepdims=True) + noise**2)
         trail = _TRAIL * noise * np.nan_to_num(step / np.maximum(length, 1e-300))

@@ -33,6 +33,8 @@ Complex = NDArray[np.complex128]
 _OUTLIER = 8.0
 _ROUNDING = 1e-6  # pixels; missing by less is no disagreement
 _ROUNDS = 20  # of leaving outliers out
+# Motion must tell by so many times the misfit in countless frames, and over sqrt(n) more in n.
+_TELLING, _FEW = 1.45, 8.0
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,7 @@ def solve(design: Floats, target: Floats, unknowns: Unknowns) -> tuple[Complex, 
 
     The design is in pixels: a singular value over sqrt(n) is the motion, in pixels rms, that tells
     one combination of the parameters. Noise on a target that does not move makes 0.6-1.4 times the
-    misfit of it, so twice the misfit is asked for.
+    misfit of it, and somewhat more in few frames.
     """
     turns, loose = unknowns.uncalibrated, unknowns.unplaced
     wanted = "scale, angle and position" if len(loose) else "scale and angle"
@@ -206,7 +208,8 @@ def solve(design: Floats, target: Floats, unknowns: Unknowns) -> tuple[Complex, 
     _, singular, right = np.linalg.svd(design, full_matrices=False)
     motion = singular / np.sqrt(len(design))
     # What is missed by measurements is no noise; a later search takes these for what they are.
-    weak = motion <= max(1e-9 * motion[0], 0.0 if unknowns.measured else 2 * misfit)
+    asked_for = min(2.0, _TELLING + _FEW / np.sqrt(len(design))) * misfit
+    weak = motion <= max(1e-9 * motion[0], 0.0 if unknowns.measured else asked_for)
     if weak.any():
         share = np.linalg.norm(right[weak].reshape(weak.sum(), -1, 2), axis=(0, 2))
         raise ValueError(

@@ -19,7 +19,7 @@ from ..arrays import Floats, Ints
 from ..checks import check_instance, check_integer
 from .library import Function, monomial_exponents, name_latex
 
-FAMILIES = "polynomial(degree) and fourier(harmonics)"
+FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
 """What can be written as text."""
 STEP = 1e-3
 """Step of a difference, relative to the size of the coordinate."""
@@ -35,6 +35,8 @@ class Library:
         Highest total degree of the monomials; none by default, not even the constant.
     harmonics : int
         Of each measured coordinate q: sin(q), cos(q), ..., sin(n q), cos(n q).
+    denominators : int
+        Highest degree of a polynomial below a fraction line, each equation its own.
     functions : tuple of (str, callable)
         Terms of one's own, with their names.
 
@@ -47,6 +49,7 @@ class Library:
 
     degree: int | None = None
     harmonics: int = 0
+    denominators: int = 0
     functions: tuple[tuple[str, Callable[..., ArrayLike]], ...] = ()
 
     @classmethod
@@ -61,6 +64,14 @@ class Library:
         The coordinates are taken as they are: no origin is searched for a law with such terms.
         """
         return cls(harmonics=check_integer("harmonics", harmonics, 1))
+
+    @classmethod
+    def rational(cls, degree: int) -> Library:
+        """Denominators: polynomials up to a degree with the constant 1, one for each equation.
+
+        The law is ``D(x) x' = N(x)``, with all other terms of the library in the numerator.
+        """
+        return cls(denominators=check_integer("degree", degree, 1))
 
     @classmethod
     def terms(cls, functions: Mapping[str, Callable[..., ArrayLike]]) -> Library:
@@ -100,11 +111,10 @@ class Library:
         """
         total = cls()
         for part in text.split("+"):
-            match = re.fullmatch(r"\s*(polynomial|fourier)\s*\(\s*(\d+)\s*\)\s*", part)
+            match = re.fullmatch(r"\s*(polynomial|fourier|rational)\s*\(\s*(\d+)\s*\)\s*", part)
             if match is None:
                 raise ValueError(f"library: must be a sum of {FAMILIES}, got {part.strip()!r}")
-            family = cls.polynomial if match[1] == "polynomial" else cls.fourier
-            total += family(int(match[2]))
+            total += getattr(cls, match[1])(int(match[2]))
         return total
 
     def __add__(self, other: Library) -> Library:
@@ -118,12 +128,14 @@ class Library:
         return Library(
             max(degrees, default=None),
             max(self.harmonics, other.harmonics),
+            max(self.denominators, other.denominators),
             tuple(functions.items()),
         )
 
     def __str__(self) -> str:
         parts = [] if self.degree is None else [f"polynomial({self.degree})"]
         parts += [f"fourier({self.harmonics})"] if self.harmonics else []
+        parts += [f"rational({self.denominators})"] if self.denominators else []
         parts += [f"terms({', '.join(name for name, _ in self.functions)})"] * bool(self.functions)
         return " + ".join(parts)
 
@@ -132,8 +144,8 @@ class Library:
 
         Returns
         -------
-        exponents : ndarray of int, shape (l, d + k)
-            Of the d variables and k functions in each term.
+        exponents : ndarray of int, shape (l, d + k), or (l, 2 d + k) with denominators
+            Of the d variables, k functions and d slopes in each term.
         functions : tuple of Function, length k
 
         Raises
@@ -156,6 +168,13 @@ class Library:
         exponents = np.zeros((len(powers) + len(functions), d + len(functions)), dtype=int)
         exponents[: len(powers), :d] = powers
         exponents[len(powers) :, d:] = np.eye(len(functions), dtype=int)
+        if self.denominators:
+            exponents = np.pad(exponents, ((0, 0), (0, d)))
+            below = monomial_exponents(d, self.denominators)[1:]
+            for slope in range(d - measured, d):
+                rows = np.zeros((len(below), exponents.shape[1]), dtype=int)
+                rows[:, :d], rows[:, slope - d] = below, 1
+                exponents = np.concatenate([exponents, rows])
         return exponents, tuple(functions)
 
 

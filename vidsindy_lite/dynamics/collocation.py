@@ -19,7 +19,7 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from ..arrays import Bools, Floats, Ints
-from .library import Function, along_state, extended, monomials, shift_generators
+from .library import Function, along_state, law_variables, monomials, shift_generators
 from .selection import RIDGE, equilibrated
 from .splines import WIDTH, Grid, Segment, normal_band, rows_from
 
@@ -172,8 +172,8 @@ class Collocation:
     ----------
     grid : Grid
         Data, knots and nodes; `Collocation.of` makes it from segments.
-    exponents : ndarray of int, shape (l, d + k)
-        The library.
+    exponents : ndarray of int, shape (l, d + k) or (l, 2 d + k)
+        The library; of an implicit law with terms that hold a slope.
     data_weights : ndarray, shape (d,)
         1 / variance of the measurement noise.
     precision : ndarray, shape (n, d)
@@ -295,8 +295,11 @@ class Collocation:
         x, slope = self.node_states(state.control_points)
         law = state.coefficients + self.known
         rows = law.any(axis=1)
-        z = extended(x - state.offset, self.functions)
-        return slope - monomials(z, self.exponents[rows]) @ law[rows]
+        exponents, law = self.exponents[rows], law[rows]
+        z, below = law_variables(x - state.offset, self.functions, exponents, law)
+        if not (below > 0).all():  # a pole on the path would leave the curve free to jump there
+            return np.full_like(slope, np.inf)
+        return slope - monomials(z, exponents) @ law
 
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
@@ -366,13 +369,14 @@ class Collocation:
         d, l = self.d, len(self.exponents)
         law = state.coefficients + self.known
         x, slope = self.node_states(state.control_points)
-        terms = monomials(extended(x - state.offset, self.functions), self.exponents)
+        z, below = law_variables(x - state.offset, self.functions, self.exponents, law)
+        terms = monomials(z, self.exponents)
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
         residual = root * (slope - terms @ law)
         # (nodes, equation, coordinate): how the law changes with the state.
         rates = (terms @ (self._generators @ law)).transpose(1, 2, 0)
-        rates = along_state(rates, x - state.offset, self.functions)
-        jacobian = root[:, :, None] * rates
+        root = root / below
+        jacobian = root[:, :, None] * along_state(rates, x - state.offset, self.functions)
         # Minus the terms in their own equation, and the rates of the law for the offset.
         offset_columns = columns[columns >= d * l] - d * l
         term_columns = columns[columns < d * l]
@@ -387,7 +391,7 @@ class Collocation:
             place = np.flatnonzero(term_columns == first)
             unknowns[:, j, 1 + place] = -root[:, j, None] * terms[:, [k]]
         unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
-        return self._physics_rows(root, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
+        return self._physics_rows(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
 
     def _physics_rows(self, root: Floats, jacobian: Floats) -> sparse.csr_array:
         """Jacobian of the weighted physics residual in the control points, (k d, r d)."""

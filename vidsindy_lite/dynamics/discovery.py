@@ -192,10 +192,15 @@ class Discovery:
         errors = self.native_standard_errors if native else self.standard_errors
         lines = []
         for j, side in law.sides().items():
-            rows = np.flatnonzero(law.coefficients[:, j])
-            terms = (_with_error(law.coefficients[r, j], errors[r, j], law.terms[r]) for r in rows)
-            text = " ".join(terms).removeprefix("+ ") or "0"
-            lines.append(f"{side} = {text}")
+            above, below = (
+                " ".join(
+                    _with_error(sign * law.coefficients[r, j], errors[r, j], law.factors[r])
+                    for r in np.flatnonzero(law.support[:, j] & rows)
+                )
+                for sign, rows in ((1, ~law.implicit), (-1, law.implicit))
+            )
+            text = above.removeprefix("+ ") or "0"
+            lines.append(f"{side} = ({text}) / (1 {below})" if below else f"{side} = {text}")
         return "\n".join(lines)
 
     def curve(self, t: Floats) -> Floats:
@@ -242,7 +247,13 @@ class Discovery:
         return draw_path(self)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write everything to a text file (JSON), with all digits; `load` reads it."""
+        """Write everything to a text file (JSON), with all digits; `load` reads it.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be there: it is a folder, or its folder does not exist.
+        """
         from .storage import write  # which needs this class
 
         write(self, path)

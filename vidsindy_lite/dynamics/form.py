@@ -24,8 +24,9 @@ class Form:
     ----------
     names : tuple of str
         Of the d state variables: first those that were measured.
-    exponents : ndarray of int, shape (l, d + k)
-        The library: with every term all that divides it.
+    exponents : ndarray of int, shape (l, d + k) or (l, 2 d + k)
+        The library: with every term all that divides it. Slopes are variables, too, if the law may
+        be a fraction.
     functions : tuple of Function, length k
         Of the state, in the units of the data.
     candidates : ndarray of bool, shape (l, d)
@@ -64,20 +65,30 @@ class Form:
         candidates = np.zeros(known.shape, dtype=bool)
         candidates[[row[tuple(powers)] for powers in wanted.tolist()], d - measured :] = True
         shared, first = np.arange(candidates.size).reshape(d, -1), 0
-        for k, powers in enumerate(np.eye(wanted.shape[1], dtype=int)[d:].tolist()):
-            direction = functions[k].direction
+        alone = np.eye(wanted.shape[1], dtype=int)[d:].tolist()
+        for powers, function in zip(alone, functions, strict=False):
+            direction = function.direction
             if direction is not None:
                 equation, here = d - measured + direction, row[tuple(powers)]
                 candidates[here, np.arange(d) != equation] = False
                 first = shared[equation, here] if direction == 0 else first
                 shared[equation, here] = first
+        # A slope multiplies terms of its own equation alone.
+        slopes = exponents[:, d + len(functions) :]
+        candidates &= (slopes.sum(axis=1) == 0)[:, None] | (slopes > 0 if slopes.size else False)
         # A function of the state does not move with the origin, so that none is sought.
-        movable = (np.arange(d) < measured) & (not functions)
+        movable = (np.arange(d) < measured) & (exponents.shape[1] == d)
         return cls(names, exponents, functions, candidates, known, movable, shared.ravel())
 
     def law(self, coefficients: Floats) -> PolynomialSystem:
         """The law with these coefficients, (l, d), in the units of the data."""
         return PolynomialSystem(self.names, self.exponents, coefficients, functions=self.functions)
+
+    @property
+    def implicit(self) -> Bools:
+        """Which terms hold a slope, (l,)."""
+        slopes = self.exponents[:, len(self.names) + len(self.functions) :]
+        return np.asarray(slopes.any(axis=1))
 
     @property
     def degree(self) -> int:

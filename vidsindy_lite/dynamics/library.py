@@ -1,8 +1,8 @@
 """The library: monomials of the state, and what a shift of the origin does to them (paper: Eq. 10).
 
 A library that holds all divisors of its monomials is closed under a shift of the origin. Its
-monomials may have functions of the state as further variables, after the coordinates; these stay as
-they are when the origin is shifted.
+monomials may have functions of the state as further variables, after the coordinates, and after
+these the slopes; such variables stay as they are when the origin is shifted.
 """
 
 from __future__ import annotations
@@ -67,8 +67,32 @@ def extended(x: Floats, functions: Sequence[Function]) -> Floats:
     return np.column_stack([x, *(f.value(x) for f in functions)]) if functions else x
 
 
+def law_variables(
+    x: Floats, functions: Sequence[Function], exponents: Ints, law: Floats
+) -> tuple[Floats, Floats]:
+    """All that the monomials of a law, (l, d), are made of at points (n, d), and its denominators.
+
+    Where exponents leave room for slopes, terms with a slope, ``b psi(x) x'``, are those that a
+    denominator ``1 - b psi`` brings over: the slopes are what the law makes them.
+
+    Returns
+    -------
+    variables : ndarray, shape (n, d + k) or (n, 2 d + k)
+    denominators : ndarray, shape (n, d), or (1, d) if all are 1
+    """
+    d, z = x.shape[1], extended(x, functions)
+    if exponents.shape[1] == z.shape[1]:
+        return z, np.ones((1, d))
+    z = np.column_stack([z, np.ones_like(x)])
+    implicit, terms = exponents[:, -d:].any(axis=1), monomials(z, exponents)
+    below = 1 - terms[:, implicit] @ law[implicit]
+    with np.errstate(divide="ignore", invalid="ignore"):  # at a pole
+        z[:, -d:] = (terms[:, ~implicit] @ law[~implicit]) / below
+    return z, below
+
+
 def along_state(rates: Floats, x: Floats, functions: Sequence[Function]) -> Floats:
-    """Derivatives in coordinates and functions, (n, m, d + k), as those in coordinates alone.
+    """Derivatives in coordinates and functions, (n, m, >= d + k), as those in coordinates alone.
 
     The chain rule: (n, m, d).
     """

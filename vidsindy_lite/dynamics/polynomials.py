@@ -24,6 +24,7 @@ from .library import (
     along_state,
     closure,
     extended,
+    law_variables,
     monomial_gradients,
     monomials,
     name_latex,
@@ -39,8 +40,10 @@ class PolynomialSystem:
     ----------
     names : sequence of str, length d
         Names of the state variables: a letter, then letters, digits and underscores.
-    exponents : array_like of int, shape (l, d + k)
-        The monomials of the library, one row each, in the variables and in k functions of them.
+    exponents : array_like of int, shape (l, d + k) or (l, 2 d + k)
+        The monomials of the library, one row each, in the variables and in k functions of them. If
+        the law is a fraction, also in the slopes: a term with a slope, brought to the other side,
+        belongs to the denominator.
     coefficients : array_like, shape (l, d)
         ``Lambda``; column j is the right-hand side of variable j.
     functions : tuple of Function
@@ -68,7 +71,7 @@ class PolynomialSystem:
         powers = check_array("exponents", self.exponents)
         coefficients = check_array("coefficients", self.coefficients).copy()
         width = len(names) + len(self.functions)
-        if powers.ndim != 2 or powers.shape[1] != width:
+        if powers.ndim != 2 or powers.shape[1] not in (width, width + len(names)):
             raise ValueError(f"exponents: must have shape (l, {width}), got shape {powers.shape}")
         whole = np.isfinite(powers) & (powers >= 0) & (powers == np.rint(powers))
         if not whole.all():
@@ -123,6 +126,7 @@ class PolynomialSystem:
         held, measured = library or Library(), m if accelerations else len(names)
         _, functions = held.resolve(names, measured)
         known = (*names, *(function.name for function in functions))
+        known += tuple(f"{name}'" for name in names if held.denominators)
         parsed = [
             (_parse_term(term, known), column, check_number(f"coefficient of {term}", value))
             for column, terms in enumerate(given)
@@ -148,9 +152,28 @@ class PolynomialSystem:
     @cached_property
     def terms(self) -> tuple[str, ...]:
         """Names of the monomials, e.g. ``("1", "x", "x^2", "xy")``."""
+        return self._named(tuple(f"{name}'" for name in self.names))
+
+    @cached_property
+    def factors(self) -> tuple[str, ...]:
+        """The same names without the slopes that terms hold."""
+        return self._named(("1",) * self.d)
+
+    def _named(self, slopes: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of the monomials, given those of the slopes; factors of 1 are left out."""
         names = (*self.names, *(function.name for function in self.functions))
         between = "" if all(len(name) == 1 for name in names) else " "
-        return tuple(_term_text(e, names, "{}^{}", between) for e in self.exponents)
+        return tuple(_term_text(e, names + slopes, "{}^{}", between) for e in self.exponents)
+
+    @property
+    def is_polynomial(self) -> bool:
+        """Whether terms are products of the variables alone: only then can the origin be moved."""
+        return self.exponents.shape[1] == self.d
+
+    @cached_property
+    def implicit(self) -> Bools:
+        """Which terms hold a slope, bool, shape (l,); none, unless the law is a fraction."""
+        return np.asarray(self.exponents[:, self.d + len(self.functions) :].any(axis=1))
 
     @cached_property
     def order(self) -> int:
@@ -171,8 +194,13 @@ class PolynomialSystem:
         return self.coefficients != 0
 
     def library(self, x: Floats) -> Floats:
-        """Candidate terms ``phi(x)``: (n, d) points to (n, l) values."""
-        return monomials(extended(self._points(x), self.functions), self.exponents)
+        """Candidate terms ``phi(x)``: (n, d) points to (n, l) values; slopes are the law's."""
+        z, _ = self._variables(self._points(x))
+        return monomials(z, self.exponents)
+
+    def _variables(self, x: Floats) -> tuple[Floats, Floats]:
+        """See `law_variables`."""
+        return law_variables(x, self.functions, self.exponents, self.coefficients)
 
     def __call__(self, x: Floats) -> Floats:
         """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
@@ -194,10 +222,9 @@ class PolynomialSystem:
         """
         x = check_array("x", x)
         points = self._points(np.atleast_2d(x))
-        rates = monomial_gradients(extended(points, self.functions), self.exponents)
-        jacobian = along_state(
-            np.einsum("nli,lj->nji", rates, self.coefficients), points, self.functions
-        )
+        z, below = self._variables(points)
+        rates = np.einsum("nli,lj->nji", monomial_gradients(z, self.exponents), self.coefficients)
+        jacobian = along_state(rates, points, self.functions) / below[:, :, None]
         return jacobian.reshape(*x.shape, self.d)
 
     def shift(self, offset: Sequence[float] | Floats) -> PolynomialSystem:
@@ -213,12 +240,12 @@ class PolynomialSystem:
         Raises
         ------
         ValueError
-            If the law has functions of the state, and the shift is not zero.
+            If the law is no polynomial, and the shift is not zero.
         """
         shift = check_vector("offset", offset, self.d)
-        if self.functions and shift.any():
+        if not self.is_polynomial and shift.any():
             raise ValueError(
-                f"offset: must be zero for a law with {self.functions[0].name}, got {offset!r:.60}"
+                f"offset: must be zero for a law that is no polynomial, got {offset!r:.60}"
             )
         exponents = closure(self.exponents)
         rows = {tuple(e): row for row, e in enumerate(exponents)}
@@ -255,10 +282,15 @@ class PolynomialSystem:
         t, x0 = check_times(t), check_vector("x0", x0, self.d)
         active = self.support.any(axis=1)
         exponents, coefficients = self.exponents[active], self.coefficients[active]
+        above, below = ~self.implicit[active], self.implicit[active]
 
         def rate(x: Floats) -> Floats:  # sums and products one by one: no digit is left to a BLAS
             z = extended(x[None], self.functions)
-            return (monomials(z, exponents).T * coefficients).sum(axis=0)
+            if below.any():
+                z = np.column_stack([z, np.ones((1, self.d))])
+            parts = monomials(z, exponents[:, : z.shape[1]]).T * coefficients
+            with np.errstate(divide="ignore", invalid="ignore"):  # at a pole the path ends
+                return parts[above].sum(axis=0) / (1 - parts[below].sum(axis=0))
 
         return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
 
@@ -275,9 +307,23 @@ class PolynomialSystem:
         Of a law of second order its accelerations, e.g. ``x'' = -30 x - 0.25 vx``.
         """
         return "\n".join(
-            f"{side} = {_sum_text(self.coefficients[:, j], self.terms, digits)}"
+            f"{side} = {self._right(j, self.factors, digits, '({}) / ({})', ' ')}"
             for j, side in self.sides().items()
         )
+
+    def _right(
+        self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str
+    ) -> str:
+        """The right-hand side of an equation, given how terms, fractions and products are written.
+
+        Terms without their slopes.
+        """
+        column = self.coefficients[:, j]
+        above = _sum_text(np.where(self.implicit, 0.0, column), terms, digits, times)
+        below = np.where(self.implicit, -column, 0.0)
+        if not below.any():
+            return above
+        return fraction.format(above, _sum_text(below, terms, digits, times, "1"))
 
     def latex(self, digits: int = 4) -> str:
         """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
@@ -287,10 +333,10 @@ class PolynomialSystem:
             m = self.d // 2
             names = names[:m] + tuple(left[j] for j in range(m))
             left = {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
-        names += tuple(function.latex for function in self.functions)
+        names += tuple(function.latex for function in self.functions) + ("1",) * self.d
         terms = [_term_text(e, names, "{}^{{{}}}", " ") for e in self.exponents]
         rows = (
-            f"{side} &= " + _sum_text(self.coefficients[:, j], terms, digits, r"\,")
+            f"{side} &= " + self._right(j, terms, digits, r"\frac{{{}}}{{{}}}", r"\,")
             for j, side in left.items()
         )
         return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
@@ -333,14 +379,16 @@ def _term_text(exponents: Ints, names: tuple[str, ...], power: str, between: str
     """A monomial as text, given how a power is written and what stands between two factors."""
     factors = [
         name if e == 1 else power.format(name, e)
-        for name, e in zip(names, exponents, strict=True)
-        if e
+        for name, e in zip(names, exponents, strict=False)
+        if e and name != "1"
     ]
     return between.join(factors) or "1"
 
 
-def _sum_text(coefficients: Floats, terms: Sequence[str], digits: int, times: str = " ") -> str:
-    text = ""
+def _sum_text(
+    coefficients: Floats, terms: Sequence[str], digits: int, times: str, text: str = ""
+) -> str:
+    """A sum of terms as text, after what comes before it."""
     # The highest monomials last, the constant first in the library: print it the way it is read.
     for row in sorted(np.flatnonzero(coefficients).tolist(), key=lambda r: terms[r] == "1"):
         value, term = coefficients[row], terms[row]

@@ -19,7 +19,7 @@ from .candidates import Library
 from .collocation import CLEANEST, Collocation, Fit, State
 from .errors import effective_noise, spread_to_unseen
 from .form import Form
-from .library import Function, extended, monomials
+from .library import Function, extended, law_variables, monomials
 from .polynomials import PolynomialSystem
 from .smoothing import smooth
 from .splines import DEGREE, Segment, clamped_knots
@@ -51,8 +51,9 @@ class Units:
         Mean and standard deviation of the data.
     time : float
         Length of a standard time unit.
-    sizes : ndarray, shape (k,)
-        Root mean squares of the functions of the state in the library.
+    sizes : ndarray, shape (k,) or (k + d,)
+        Root mean squares of the functions of the state in the library; of an implicit law also
+        the units of the slopes.
     """
 
     centre: Floats
@@ -136,12 +137,13 @@ class Problem:
         centre, scale, sizes = self.units.centre, self.units.scale, self.units.sizes
         return tuple(
             function.standardised(centre, scale, size)
-            for function, size in zip(self.form.functions, sizes.tolist(), strict=True)
+            for function, size in zip(self.form.functions, sizes.tolist(), strict=False)
         )
 
     def terms(self, x: Floats) -> Floats:
-        """All candidate terms at standard points, (n, l)."""
-        return monomials(extended(x, self.functions), self.exponents)
+        """All candidate terms at standard points, (n, l); those with a slope are 0."""
+        z, _ = law_variables(x, self.functions, self.exponents, np.zeros(self.known.shape))
+        return monomials(z, self.exponents)
 
     @property
     def known(self) -> Floats:
@@ -250,7 +252,7 @@ def pose(
     if not (scale > 1e-12 * np.abs(centre)).all():
         still = int(np.argmin(scale))
         raise ValueError(f"x: every coordinate must move, got a constant column {still}")
-    if form.functions:  # they are what they are in the frame of the data
+    if not form.movable.any():  # terms are what they are in the frame of the data
         centre = np.zeros_like(centre)
     step = typical_step(measured)
     trajectories = [(t / step, (values - centre) / scale) for t, values in measured]
@@ -273,7 +275,7 @@ def pose(
     )
     if order == 2:
         problem = _with_velocities(problem, curves)
-    if form.functions:
+    if not form.movable.any():
         problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))
 
@@ -314,8 +316,9 @@ def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
     """The same with the functions of the library in units of their own, and checked."""
     pieces = zip(problem.curves, problem.stretches, strict=True)
     x = problem.units.point(np.concatenate([curve(t) for curve, (_, (t, _)) in pieces]))
-    values = extended(x, problem.form.functions)[:, problem.d :]
-    for function, column in zip(problem.form.functions, values.T, strict=True):
+    functions = problem.form.functions
+    values = extended(x, functions)[:, problem.d :]
+    for function, column in zip(functions, values.T, strict=True):
         if not np.isfinite(column).all():
             where = ", ".join(f"{v:g}" for v in x[np.argmin(np.isfinite(column))])
             raise ValueError(
@@ -327,7 +330,10 @@ def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
             scale = problem.units.scale[-len(problem.measured[0][1].T) :]
             common = np.sqrt(((sizes[k : k + len(scale)] / scale) ** 2).mean())
             sizes[k : k + len(scale)] = common * scale
-    sized = replace(problem, units=replace(problem.units, sizes=np.where(sizes > 0, sizes, 1.0)))
+    sizes = np.where(sizes > 0, sizes, 1.0)
+    if problem.form.implicit.any():
+        sizes = np.append(sizes, problem.units.scale / problem.units.time)
+    sized = replace(problem, units=replace(problem.units, sizes=sizes))
     # Each coordinate in an order of its own: what depends on each other there does so everywhere.
     apart = rng.permuted(problem.units.standard(x), axis=0)
     _check_independent(problem.form, sized.terms(apart))
@@ -336,7 +342,7 @@ def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
 
 def _check_independent(form: Form, terms: Floats) -> None:
     """Refuse candidates that depend on each other at any points, given as terms (n, l)."""
-    searched = form.candidates.any(axis=1)
+    searched = form.candidates.any(axis=1) & ~form.implicit
     columns = terms[np.isfinite(terms).all(axis=1)][:, searched]
     columns /= np.maximum(np.linalg.norm(columns, axis=0), LEAST)
     _, sizes, shares = np.linalg.svd(columns, full_matrices=False)

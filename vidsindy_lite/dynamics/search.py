@@ -61,12 +61,19 @@ def search(problem: Problem, rng: np.random.Generator, history: History) -> Fit:
 
 
 def candidates(problem: Problem, rng: np.random.Generator, history: History) -> list[Fit]:
-    """Supports worth refining, from all terms up to degree 2, and if need be from all terms."""
+    """Supports worth refining, from all terms up to degree 2, and if need be from all terms.
+
+    Terms of denominators come last: a factor above and below the line changes nothing.
+    """
     collocation = problem.collocation(problem.segments())
     control = fit_curves(collocation, problem.curves)
     found, degree = [], problem.form.degree
-    for start in sorted({min(2, degree), degree}):
-        fit = unpruned(problem, collocation, control, start, history)
+    degrees, implicit = problem.exponents.sum(axis=1), problem.form.implicit
+    starts = {f"degree {k}": ~implicit & (degrees <= k) for k in (min(2, degree), degree)}
+    if implicit.any():
+        starts["all"] = degrees <= degree
+    for name, rows in starts.items():
+        fit = unpruned(problem, collocation, control, rows, f"unpruned, {name}", history)
         found += _in_sparse_frames(problem, fit, rng, history)
         if not _leaves_something_over(problem, fit):
             break
@@ -74,10 +81,15 @@ def candidates(problem: Problem, rng: np.random.Generator, history: History) -> 
 
 
 def unpruned(
-    problem: Problem, collocation: Collocation, control: Floats, degree: int, history: History
+    problem: Problem,
+    collocation: Collocation,
+    control: Floats,
+    rows: Bools,
+    stage: str,
+    history: History,
 ) -> Fit:
-    """Fit all terms up to a degree while the physics weight rises."""
-    d, rows = problem.d, problem.exponents.sum(axis=1) <= degree
+    """Fit all terms of some rows of the library, (l,), while the physics weight rises."""
+    d = problem.d
     x, slope = collocation.node_states(control)
     coefficients = np.zeros(problem.known.shape)
     terms = problem.terms(x)[:, rows]
@@ -89,12 +101,12 @@ def unpruned(
     for weight in FIRST_WEIGHTS:
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         state = fit.state
-        history.add(f"unpruned, degree {degree}", problem, fit, weight)
+        history.add(stage, problem, fit, weight)
     return fit
 
 
 def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
-    """Would the terms of higher degree together explain more of the data than chance does?"""
+    """Would the other terms together explain more of the data than chance does?"""
     searched = problem.form.searched
     left_out = len(searched) - int(fit.state.free()[searched].sum())
     if not left_out:

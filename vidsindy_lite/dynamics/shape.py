@@ -261,7 +261,7 @@ def _series(t: Floats, x: Floats, period: float, harmonics: int) -> tuple[Comple
 
 def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
     """The equations of a law whose terms cancel along a motion, seen from its middle."""
-    if law.functions:
+    if not law.is_polynomial:
         return  # such a law has no other frame
     middle = x.mean(axis=0)
     central, away = law.shift(-middle), x - middle

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.interpolate import BSpline
 
-from ..checks import check_path
+from ..checks import check_output, check_path
 from .candidates import Library, restored
 from .discovery import Discovery, Step
 from .library import Function
@@ -25,8 +25,9 @@ TYPES: dict[str, Any] = {
 
 def write(found: Discovery, path: str | os.PathLike) -> None:
     """Write a discovery to a file."""
+    file = check_output("path", path)
     text = json.dumps({"format": FORMAT, "discovery": _encoded(found)}, indent=1)
-    check_path("path", path).write_text(text + "\n", encoding="utf-8")
+    file.write_text(text + "\n", encoding="utf-8")
 
 
 def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
@@ -42,8 +43,8 @@ def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
         If the file holds none, or the library not all functions of the law.
     """
     file = check_path("path", path)
-    if not file.exists():
-        raise FileNotFoundError(f"path: must be a file that `save` has written, got no file {file}")
+    if not file.is_file():
+        raise FileNotFoundError(f"path: must be a file that `save` has written, none at '{file}'")
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         found = _decoded(content["discovery"]) if content["format"] == FORMAT else None

@@ -10,7 +10,7 @@ numbers; ours runs with its default seed. `tables` turns results into rows.
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -36,8 +36,9 @@ METHODS = ("ours", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
 """Ours, and the `baselines.BASELINES` by their names there."""
 RANDOM_METHODS = ("E-SINDy", "WeakSINDy", "Model-A")
 """The baselines that draw random numbers: the number of the trial is their seed."""
-SOURCES = ("videos", "whole pixels", "truth")
-"""Where a path comes from: the tracks, the tracks rounded to whole pixels, or the simulation."""
+SOURCES = ("videos", "tracks", "whole pixels", "truth")
+"""Where a path comes from: the tracks; the tracks, which are corrupted in its place before the
+cameras are learned; the tracks rounded to whole pixels; or the simulation."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,9 @@ class Trial:
     condition : str
         One of `CONDITIONS`.
     level : float
-        Standard deviation of the noise over that of each coordinate, or fraction of the rows that
-        are hidden; 0 if, and only if, the condition is "clean".
+        Standard deviation of the noise over that of each coordinate (of the path, or of the pixels
+        if the source is "tracks"), or fraction of the rows that are hidden, in each view anew; 0
+        if, and only if, the condition is "clean".
     trial : int
         Number of the repetition, the seed of its film, corruption and method.
     method : str
@@ -94,13 +96,17 @@ class Trial:
 
     def corrupt(self, x: Floats) -> Floats:
         """Do to a path what the condition says; the same whatever the method and the source."""
+        return self.corrupt_each([x])[0]
+
+    def corrupt_each(self, paths: Sequence[Floats]) -> list[Floats]:
+        """Do what the condition says to several paths or tracks, to each by its own draw."""
         if self.condition == "clean":
-            return x
+            return list(paths)
         # The names and numbers themselves are the entropy: no trial depends on any other.
         place = f"{self.system} {self.condition}".encode()
         entropy = (*place, round(1e6 * self.level), self.trial)
         rng = np.random.default_rng(np.random.SeedSequence(entropy))
-        return CORRUPTIONS[self.condition](x, self.level, rng)
+        return [CORRUPTIONS[self.condition](x, self.level, rng) for x in paths]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +164,7 @@ def run_trial(trial: Trial) -> TrialResult:
     TrialResult
     """
     filmed = film_result(trial.film)
-    path, systematic = source_path(filmed, trial.source)
-    x = trial.corrupt(path)
+    x, systematic = _corrupted_path(filmed, trial)
     began = time.perf_counter()
     found = find_law(trial.method, filmed.t, x, systematic, trial.trial)
     seconds = time.perf_counter() - began
@@ -182,11 +187,23 @@ def source_path(filmed: FilmResult, source: str) -> tuple[Floats, Floats | None]
     check_choice("source", source, SOURCES)
     if source == "truth":
         return filmed.truth.simulate(filmed.t, np.array(filmed.truth.x0)), None
-    if source == "videos":
-        return filmed.x, filmed.systematic
-    tracks = [np.round(track) for track in filmed.tracks]
-    coarse = observe_tracks(tracks, filmed.rig.uncalibrated(keep=0), filmed.t, lags=TOGETHER)
-    return coarse.x, coarse.systematic
+    if source == "whole pixels":
+        return _reconstructed(filmed, [np.round(track) for track in filmed.tracks])
+    return filmed.x, filmed.systematic
+
+
+def _corrupted_path(filmed: FilmResult, trial: Trial) -> tuple[Floats, Floats | None]:
+    """The path that a trial is about, and its systematic errors, if any."""
+    if trial.source == "tracks":
+        return _reconstructed(filmed, trial.corrupt_each(filmed.tracks))
+    path, systematic = source_path(filmed, trial.source)
+    return trial.corrupt(path), systematic
+
+
+def _reconstructed(filmed: FilmResult, tracks: list[Floats]) -> tuple[Floats, Floats]:
+    """The path that other tracks of a film give, and its systematic errors."""
+    seen = observe_tracks(tracks, filmed.rig.uncalibrated(keep=0), filmed.t, lags=TOGETHER)
+    return seen.x, seen.systematic
 
 
 def find_law(

@@ -13,7 +13,8 @@ Tracker (OSP)      the name of the mass over ``t``, ``x``, ``y``; better ``pixel
 =================  ===============================================================================
 
 Separators may be commas, semicolons, tabs or spaces, and decimals commas where these separate
-nothing. A file without a header holds u and v, or a frame's number (or time), u and v.
+nothing. A file without a header holds u and v, or a frame's number (or time), u and v. A row whose
+pixels are empty, no number or exactly 0, 0 is a frame in which the target was not seen.
 """
 
 from __future__ import annotations
@@ -243,7 +244,10 @@ def _whole(
     t = next((columns[key] for key in _TIME if key in columns), None)
     frames = next((columns[key] for key in _FRAME if key in columns), None)
     pixels = np.column_stack((u, v))
-    pixels[~np.isfinite(pixels).all(axis=1)] = np.nan
+    unset = (pixels == 0).all(axis=1)
+    if unset.any():  # what many programs write where nothing was found
+        doubts += (f"{name}: 0, 0 in {unset.sum()} of {len(unset)} rows is taken for not seen",)
+    pixels[unset | ~np.isfinite(pixels).all(axis=1)] = np.nan
     if t is not None and (not np.isfinite(t).all() or (np.diff(t) <= 0).any()):
         raise ValueError(f"tracks: {name} must have increasing times")
     if frames is None or t is not None:
