@@ -11,8 +11,8 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
+from ..arrays import Floats
 from ..dynamics import Collocation, Segment, State, Units, smooth, subset_search, term_penalties
-from ..dynamics.collocation import Fit
 from .corruption import add_noise
 from .sweeps import sweep
 from .systems import Benchmark
@@ -48,19 +48,21 @@ class Case:
 def wrong_terms(case: Case) -> list[tuple[int, int]]:
     """False and lost terms of the cheapest law at each of `CHANCES`."""
     law = specimen(case.number)
-    fit = _true_fit(law, case)
-    model = fit.collocation.linearise(fit.state, np.arange(law.exponents.size))
-    present, right = fit.state.coefficients.T.ravel(), law.support.T.ravel()
+    information, gradient, present = _around_truth(law, case)
+    right = law.support.T.ravel()
     counts = []
     for chance in CHANCES:
         price = np.tile(term_penalties(law.exponents, law.d, chance), law.d)
-        kept, _, _ = subset_search(model.information, model.gradient, present, price, right)
+        kept, _, _ = subset_search(information, gradient, present, price, right)
         counts.append((int((kept & ~right).sum()), int((right & ~kept).sum())))
     return counts
 
 
-def _true_fit(law: Benchmark, case: Case) -> Fit:
-    """The true terms, fitted in units of the spread and of a radian of the period."""
+def _around_truth(law: Benchmark, case: Case) -> tuple[Floats, Floats, Floats]:
+    """The quadratic model of all terms around the fitted true ones: see `subset_search`.
+
+    In units of the spread and of a radian of the period.
+    """
     rng = np.random.default_rng([case.number, case.samples])
     t, clean = law.trajectory(case.samples, SAMPLES_PER_PERIOD)
     t, scale, time = t * (2 * np.pi / law.period), clean.std(axis=0), law.period / (2 * np.pi)
@@ -69,7 +71,9 @@ def _true_fit(law: Benchmark, case: Case) -> Fit:
     state = State(control, true, law.support, np.zeros(law.d), np.zeros(law.d, dtype=bool))
     segment = Segment(t, add_noise(clean, case.noise, rng) / scale, t)
     precision, physics = np.full((2, law.d), [[case.noise**-2], [EXACT]])
-    return Collocation.of([segment], law.exponents, precision, physics).solve(state)
+    fit = Collocation.of([segment], law.exponents, precision, physics).solve(state)
+    model = fit.collocation.linearise(fit.state, np.arange(law.exponents.size))
+    return model.information, model.gradient, fit.state.coefficients.T.ravel()
 
 
 def price_curve(
