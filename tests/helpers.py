@@ -85,6 +85,15 @@ def by_hand(rng, rig, **more):
     )
 
 
+def aligned_error(found, x):
+    """Root mean square of what the best similarity leaves."""
+    a, b = found - found.mean(axis=0), x - x.mean(axis=0)
+    u, s, v = np.linalg.svd(b.T @ a)
+    s[2] *= (sign := np.sign(np.linalg.det(u @ v)))
+    turned = a @ (u @ np.diag([1, 1, sign]) @ v).T * s.sum() / np.sum(a**2)
+    return np.sqrt(np.mean(np.sum((turned - b) ** 2, axis=1)))
+
+
 class TinyRepository:
     """A folder laid out like the repository, to fill with tiny notebooks."""
 

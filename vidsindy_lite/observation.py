@@ -25,6 +25,7 @@ from .cameras import (
     learn_cameras,
     learn_lags,
     list_lags,
+    posed,
     reconstruct,
     smooth,
     systematic_errors,
@@ -99,7 +100,9 @@ def observe(
         One video per camera of the rig: a file, a folder of images, or a pattern of their names,
         see `read_video`.
     rig : Rig
-        Positions and normals of all cameras, scale and angle of at least one.
+        Positions and normals of all cameras, scale and angle of at least one. Or of three or more
+        perspective cameras nothing but the scale, which may be rough; then the videos must start
+        within a frame or two of each other, or their lags be given.
     t : array_like, shape (n,), optional
         Time of each frame of the first video, increasing; all videos then have the same frame rate.
         By default as the file states, in seconds from its first frame.
@@ -197,6 +200,10 @@ def _observed(
     progress: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    if not rig.is_measured:
+        with refusing("cameras", raw, names):
+            begun = np.zeros(len(raw)) if lags is None else lags
+            rig = posed(align(raw, begun, clock.rates, clock.uneven), rig, lags is not None)
     with refusing("lags", raw, names):
         best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress)
         if lags is not None:

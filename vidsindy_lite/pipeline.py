@@ -34,7 +34,8 @@ class VideoDiscovery(Observation):
 
     def __str__(self) -> str:
         warnings = (f"warning: {text}" for text in self.warnings)
-        return "\n".join([self.discovery.statement(), *warnings])
+        notes = [f"frame: {self.rig.note}"] if self.rig.note else []
+        return "\n".join([self.discovery.statement(), *notes, *warnings])
 
 
 def discover_from_videos(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import HAND, by_hand, room, walk
+from helpers import HAND, aligned_error, by_hand, room, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -28,15 +28,6 @@ def film(rng, rig, noise=0.5, n=400):
             seen = camera.project(walk(np.arange(n) + late))
         tracks.append(seen + noise * rng.normal(size=seen.shape))
     return x, tracks
-
-
-def aligned_error(found, x):
-    """Root mean square of what the best similarity leaves."""
-    a, b = found - found.mean(axis=0), x - x.mean(axis=0)
-    u, s, v = np.linalg.svd(b.T @ a)
-    s[2] *= (sign := np.sign(np.linalg.det(u @ v)))
-    turned = a @ (u @ np.diag([1, 1, sign]) @ v).T * s.sum() / np.sum(a**2)
-    return np.sqrt(np.mean(np.sum((turned - b) ** 2, axis=1)))
 
 
 @given(SEEDS, st.integers(3, 5))

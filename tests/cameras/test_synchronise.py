@@ -3,6 +3,7 @@
 import warnings
 from dataclasses import replace
 
+import helpers
 import numpy as np
 import pytest
 from helpers import trajectory
@@ -613,3 +614,25 @@ def test_the_nearest_frame_of_an_uneven_video():
 def test_clocks_that_are_none(clocks, message):
     with pytest.raises(ValueError, match=message):
         align([np.ones((3, 2))] * 2, (0, 0), clocks=clocks)
+
+
+# -------------------------------------------------------------------------------- rolling shutters
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_lags_and_rolling_shutters_are_told_apart(known):
+    """Both move a track in time, the one by where the target is."""
+    rng = np.random.default_rng(8)
+    rig, lags, frames = helpers.room(rng, 4, readout=0.4), (0, 6.3, -4.6, 0.5), np.arange(400)
+    tracks = []
+    for camera, lag in zip(rig.cameras, lags, strict=True):
+        seen = camera.project(helpers.walk(2 * (frames + lag)))
+        for _ in range(15):
+            late = camera.readout * (seen[:, 1] - 359.5) / 720
+            seen = camera.project(helpers.walk(2 * (frames + lag + late)))
+        tracks.append(seen + 0.2 * rng.normal(size=seen.shape))
+    if not known:
+        rig = vl.Rig(replace(c, readout=0.0, readout_error=0.5) for c in rig.cameras)
+    found = learn_lags(tracks, rig)
+    assert found.agree
+    np.testing.assert_allclose(found.frames, lags, atol=0.05 if known else 0.1)

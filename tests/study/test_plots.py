@@ -108,3 +108,27 @@ def test_the_map_of_origins_counts_in_whole_terms():
     count = 6.6 + np.add.outer(axis**2, axis**2) * 3
     figure = plots.plot_origin_map(axis, axis, count, np.zeros((2, 2)), (0, 0), (0, 0))
     np.testing.assert_array_equal(figure.axes[1].get_yticks() % 1, 0)
+
+
+def test_standings_show_every_rate_and_leave_out_who_did_not_take_part():
+    rates = pandas.DataFrame(
+        {"ours": [1.0, 0.5], "PySINDy": [0.25, np.nan]}, index=["stored", "noise 2 %"]
+    )
+    figure = plots.plot_standings({"ODEBench": rates, "flows": rates})
+    for axes in figure.axes:
+        lines = {line.get_label(): line for line in axes.lines}
+        np.testing.assert_array_equal(lines["ours"].get_xdata(), [100, 50])
+        np.testing.assert_array_equal(lines["PySINDy"].get_xdata(), [25, np.nan])
+        assert [text.get_text() for text in axes.get_yticklabels()] == ["stored", "noise 2 %"]
+        assert (np.abs(lines["ours"].get_ydata() - axes.get_yticks()) < 0.4).all()
+    assert [text.get_text() for text in figure.legends[0].texts] == ["ours", "PySINDy"]
+
+
+def test_lorenz_grids_have_the_rate_in_every_cell():
+    rates = np.array([[1.0, 0.5, 0.25], [0.0, 0.75, 1.0]])
+    grids = {"ours": rates, "theirs": 1 - rates}
+    figure = plots.plot_lorenz_grids(grids, np.array([0.1, 0.4]), np.array([4.0, 7.0, 10.0]))
+    for axes, shown in zip(figure.axes, grids.values(), strict=True):
+        texts = {text.get_position(): text.get_text() for text in axes.texts}
+        assert texts == {(c, r): f"{100 * v:.0f}" for (r, c), v in np.ndenumerate(shown)}
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["10", "40"]

@@ -18,6 +18,7 @@
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
     adjust        bundle adjustment: cameras, clocks, path together (`changes`: of what), `shutter`
     causes        why views do not agree, by trying one thing at a time
+    unmeasured    rigs of which only the lenses are known: a start
     covariance    of errors that depend on their neighbours
     messages      all warnings
     eq4           beside the way: calibration as the paper writes it, to compare
@@ -38,3 +39,4 @@ from .rig import Rig, rig_template
 from .synchronise import DISAGREEMENT, disagreement, learn_lags
 from .triangulate import reconstruct, residuals
 from .uncertainty import systematic_errors, trailing_errors
+from .unmeasured import posed

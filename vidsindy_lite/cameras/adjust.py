@@ -130,14 +130,14 @@ def adjust(
     while not settled and steps < (_STEPS if most is None else most):
         weights = problem.weights(state, noise)
         moved, step = _downhill(problem, state, weights, noise)
-        if moved is None:  # rounding is all that is left
-            settled = True
-        else:
-            state, before = moved, noise
-            noise = _noise(state.misses)
-            enough = _IN_TIME if problem.timed else _ENOUGH
-            settled = step <= max(_SETTLED, enough * noise) and noise >= before * (1 - 1e-3)
         steps += 1
+        if moved is None:  # rounding is all that is left, or points ran out of numbers
+            settled = step == 0
+            break
+        state, before = moved, noise
+        noise = _noise(state.misses)
+        enough = _IN_TIME if problem.timed else _ENOUGH
+        settled = step <= max(_SETTLED, enough * noise) and noise >= before * (1 - 1e-3)
     return problem.result(state, noise, settled, steps)
 
 
@@ -324,6 +324,8 @@ def _downhill(
     rows = np.vstack((design, np.diag(prior)))
     target = -np.append((root * reduced.misses).ravel(), prior * state.change)
     size = np.sqrt(np.sum(rows**2, axis=0))
+    if not np.isfinite(size).all():
+        return None, np.inf
     size[size == 0] = 1.0
     factor, triangle = np.linalg.qr(rows / size)
     aim = factor.T @ target

@@ -34,6 +34,7 @@ from .triangulate import (
     points_of_views,
 )
 from .unknowns import Unknowns, agreement, calibrated, names, solve
+from .unmeasured import posed
 
 _TOO_FAR = 5.0  # standard errors that a measurement may be off
 
@@ -69,7 +70,9 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     rig : Rig
         At least one calibrated camera. If a position is missing, two
         others must be given, with independent normals, and all cameras be orthographic: in depth
-        from a single camera nothing would fix the origin.
+        from a single camera nothing would fix the origin. Or three or more perspective cameras,
+        all with a scale (the focal length) and none with a position: where they stand is found,
+        too, in a frame of their own, which ``note`` of the result describes.
 
     Returns
     -------
@@ -86,13 +89,15 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     -----
     Paper: Eq. (4); by itself it is `learn_cameras_eq4`.
     """
-    unknowns = check_learnable(rig)
+    check_learnable(rig)
+    rig = posed(tracks, rig)
+    unknowns = Unknowns.of(rig)
     views, footage = check_views(tracks, rig), Footage.of(check_seen(tracks, rig))
     errors = np.array([known_to(camera) for camera in rig.cameras])
     if not errors.any():
-        return Rig(rig.cameras)
+        return Rig(rig.cameras, note=rig.note)
     if not unknowns.any:
-        return _closest(footage, rig.cameras, errors)
+        return replace(_closest(footage, rig.cameras, errors), note=rig.note)
     if all_orthographic(rig.cameras):
         equations, decided = agreement(views, unknowns)
         start = unknowns.vector(*solve(equations.design, equations.target, unknowns))
@@ -105,7 +110,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
         _, settled = intersect(learned.cameras, views.tracks)
         left = int((~settled).sum())
         doubts = (unsettled_points(left, views.frames),) if left else ()
-    return replace(learned, warnings=learned.warnings + doubts)
+    return replace(learned, warnings=learned.warnings + doubts, note=rig.note)
 
 
 def check_learnable(rig: Rig) -> Unknowns:
@@ -124,6 +129,13 @@ def check_learnable(rig: Rig) -> Unknowns:
         )
     unknowns = Unknowns.of(rig)
     loose = unknowns.unplaced
+    if not rig.is_measured:
+        if unknowns.uncalibrated.size:
+            raise ValueError(
+                "rig: scale or field_of_view must be given, at least roughly, of cameras of which "
+                f"nothing else is known, got none of {names(unknowns.uncalibrated)}"
+            )
+        return unknowns
     if loose.size and not rig.is_orthographic:
         raise ValueError(
             "rig: all positions must be given if a camera is perspective, got none of "

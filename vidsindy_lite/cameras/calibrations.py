@@ -322,18 +322,13 @@ def _camera(
 ) -> PerspectiveCamera:
     """Ours of K, distortion, R, t."""
     camera = PerspectiveCamera(
-        position=-rotation.T @ shift,
-        normal=-rotation[2],
         scale=1 / inner[0, 0],
-        angle=0.0,
         image_size=size,
         principal_point=inner[:2, 2],
         aspect=inner[1, 1] / inner[0, 0],
         distortion=dist if dist.any() else None,
     )
-    # T' R^- is (right, up): its first row is that of R.
-    across, along = camera.rows @ rotation[0]
-    return camera.calibrated(complex(across, -along) * camera.calibration[0])
+    return camera.posed(rotation, shift)
 
 
 def _opencv(i: int, camera: object) -> dict[str, Floats]:

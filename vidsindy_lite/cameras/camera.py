@@ -58,7 +58,7 @@ class Camera(ABC):
     model: ClassVar[str]  # its name in the file of a rig
 
     position: Floats | None = None
-    normal: Floats
+    normal: Floats = None  # type: ignore[assignment]  # of a pinhole of which nothing is known
     scale: float | None = None
     angle: float | None = None
     image_size: tuple[int, int] = (512, 512)

@@ -25,7 +25,7 @@ Paper: Section "Coordinates Transformation", Eq. (4)-(6).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -80,9 +80,10 @@ class PerspectiveCamera(Camera):
 
     Parameters
     ----------
-    position : array_like, shape (3,)
-        The pinhole. Scene units.
-    normal : array_like, shape (3,)
+    position : array_like, shape (3,), optional
+        The pinhole. Scene units. None, if `normal` is, too: nothing is known of where the camera
+        stands; then nothing may be known of any camera's of the rig.
+    normal : array_like, shape (3,), optional
         Normal of the view plane, from the scene to the camera: against the line of view.
     scale : float, optional
         s, scene units per pixel at distance 1: the inverse of the focal length in pixels, OpenCV's
@@ -110,9 +111,13 @@ class PerspectiveCamera(Camera):
     distortion_error: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.position is None and self.normal is None:  # any direction, until it is found
+            self._set(normal=(0, 0, 1), angle=None if self.scale is None else 0.0)
+        elif self.position is None:
+            raise ValueError(
+                "position: must be given for a perspective camera with a normal, got None"
+            )
         super().__post_init__()
-        if not self.is_placed:
-            raise ValueError("position: must be given for a perspective camera, got None")
         if self.distortion is not None:
             given = check_array("distortion", self.distortion)
             if given.ndim != 1 or len(given) > len(lens.NAMES) or not np.isfinite(given).all():
@@ -137,6 +142,16 @@ class PerspectiveCamera(Camera):
     def _last_row(self) -> Floats:
         """The distance in front of the camera."""
         return np.append(-self.normal, self.normal @ np.asarray(self.position))
+
+    def posed(self, rotation: Floats, shift: Floats) -> PerspectiveCamera:
+        """The same camera with OpenCV's pose: x is at rotation @ x + shift, right, down, forward.
+
+        Its scale must be known.
+        """
+        camera = replace(self, position=-rotation.T @ shift, normal=-rotation[2])
+        # T' R^- is (right, up): its first row is that of the rotation.
+        across, along = camera.rows @ rotation[0]
+        return camera.calibrated(complex(across, -along) * camera.calibration[0])
 
     @property
     def focal_length(self) -> float:

@@ -3,7 +3,9 @@
 A file holds one [[camera]] table per video, whose keys are the arguments of its model of camera,
 and model unless it is orthographic; target is a hint for the tracker, e.g. {frame = 10, box =
 [120, 80, 24, 24]}. Without scale and angle, or position, these are learned
-(`learn_cameras`); of the other keys, what is left out has its default.
+(`learn_cameras`); of the other keys, what is left out has its default. Perspective cameras, three
+or more, may leave out position and normal, all of them: then `distance`, before the first table, is
+how far the first is from the second.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from ..checks import (
     check_number,
     check_output,
     check_path,
+    check_positive,
     check_rows,
     check_vector,
 )
@@ -33,6 +36,7 @@ from .camera import Camera
 from .geometry import rotation_to_z
 from .models import MODELS, OrthographicCamera, all_orthographic, independent
 
+_FEWEST = 3  # cameras of which nothing is measured
 _MOST = 100  # cameras of a template
 _HEAD = """\
 # Rig file: one [[camera]] table per video, in the order of the videos.
@@ -69,11 +73,15 @@ class Rig:
     cameras : sequence of Camera
         Two or more, orthographic or perspective, that do not all look along the same lines: two
         orthographic normals must not be parallel, or two pinholes not coincide, or there is one
-        camera of each kind.
-
+        camera of each kind. Or three or more perspective ones without position and normal.
     warnings : tuple of str, optional
         What `learn_cameras` has to say of the cameras that it learned. Not part of a file, nor of
         what makes two rigs equal.
+    note : str, optional
+        In which frame the cameras are, where that was found and not given; as the warnings.
+    distance : float, optional
+        Of the first camera and the second, if nothing else is measured: what gives the path its
+        unit of length.
 
     Raises
     ------
@@ -83,6 +91,8 @@ class Rig:
 
     cameras: tuple[Camera, ...]
     warnings: tuple[str, ...] = field(default=(), compare=False)
+    note: str = field(default="", compare=False)
+    distance: float | None = None
 
     def __post_init__(self) -> None:
         cameras = tuple(self.cameras) if isinstance(self.cameras, Iterable) else (self.cameras,)
@@ -91,12 +101,39 @@ class Rig:
             check_instance(f"cameras[{i}]", camera, Camera)
         if len(cameras) < 2:
             raise ValueError(f"cameras: must be two or more, got {len(cameras)}")
-        if not independent(cameras):
+        self._check_measured()
+        if self.is_measured and not independent(cameras):
             kind = "normal" if isinstance(cameras[0], OrthographicCamera) else "position"
             raise ValueError(
                 f"cameras: must have at least two independent {kind}s, got only "
                 f"{[getattr(camera, kind).tolist() for camera in cameras]}"
             )
+
+    def _check_measured(self) -> None:
+        """That of perspective cameras all have a place, or none; a distance is for the latter."""
+        loose = [not isinstance(c, OrthographicCamera) and not c.is_placed for c in self.cameras]
+        if any(loose) and not all(loose):
+            raise ValueError(
+                "cameras: must all have a position, or none if all are perspective, got none of "
+                f"cameras[{loose.index(True)}]"
+            )
+        if all(loose) and len(loose) < _FEWEST:
+            raise ValueError(
+                f"cameras: must be {_FEWEST} or more if nothing is measured of where they stand, "
+                f"got {len(loose)}"
+            )
+        if self.distance is not None:
+            if self.is_measured:
+                raise ValueError(
+                    "distance: must not be given with positions, which tell the unit of length, "
+                    f"got {self.distance}"
+                )
+            object.__setattr__(self, "distance", check_positive("distance", self.distance))
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether something is known of where the cameras stand, or where they look."""
+        return any(isinstance(c, OrthographicCamera) or c.is_placed for c in self.cameras)
 
     @property
     def is_orthographic(self) -> bool:
@@ -176,12 +213,13 @@ class Rig:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: must be a TOML file: {error}") from error
         tables = content.get("camera")
-        if len(content) != 1 or not isinstance(tables, list):
+        if not content.keys() <= {"camera", "distance"} or not isinstance(tables, list):
             raise ValueError(
-                f"{path}: must hold [[camera]] tables and nothing else, got {sorted(content)}"
+                f"{path}: must hold [[camera]] tables and at most a distance, got {sorted(content)}"
             )
         try:
-            return cls(tuple(_from_table(i, table) for i, table in enumerate(tables)))
+            cameras = tuple(_from_table(i, table) for i, table in enumerate(tables))
+            return cls(cameras, distance=content.get("distance"))
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from error
 
@@ -206,6 +244,10 @@ class Rig:
             "# Cameras of a rig; scale in scene units per pixel (of a perspective camera: at "
             "distance 1), angle in radians."
         ]
+        if self.note:
+            lines += [f"# Frame: {self.note}."]
+        if self.distance is not None:
+            lines += [f"distance = {self.distance!r}"]
         for camera in self.cameras:
             lines += ["", "[[camera]]"]
             # repr of a float is its shortest exact decimal form, and valid TOML.
@@ -309,10 +351,11 @@ def _by_hand(table: dict[str, Any], model: str) -> dict[str, Any]:
         across = check_number("field_of_view", table["field_of_view"])
         if not 0 < across < 180:
             raise ValueError(f"field_of_view: must be between 0 and 180 degrees, got {across:g}")
-        x, y = rotation_to_z(known.get("normal", ()))[:2, 2]
-        roll = check_number("roll", table.get("roll", 0.0))
         known["scale"] = 2 * np.tan(np.deg2rad(across) / 2) / width
-        known["angle"] = float(np.arctan2(x, y) + np.deg2rad(roll))
+        roll = check_number("roll", table.get("roll", 0.0))
+        if "normal" in known:
+            x, y = rotation_to_z(known["normal"])[:2, 2]
+            known["angle"] = float(np.arctan2(x, y) + np.deg2rad(roll))
     elif "roll" in table:
         raise ValueError("roll: must be given with a field_of_view")
     return known
@@ -331,6 +374,8 @@ def _to_table(camera: Camera) -> dict[str, object]:
         default = isinstance(value, float) and value == part.default
         if value is not None and not default:
             known[part.name] = value
+    if not isinstance(camera, OrthographicCamera) and not camera.is_placed:
+        known = {key: value for key, value in known.items() if key not in ("normal", "angle")}
     return {key: np.asarray(value).tolist() for key, value in known.items()}
 
 
@@ -348,7 +393,7 @@ def _from_table(index: int, table: object) -> Camera:
             if key not in keys:
                 raise ValueError(f"{key}: must be one of {', '.join(keys)}")
         known = _by_hand(known, model)
-        if "normal" not in known:
+        if "normal" not in known and (model == OrthographicCamera.model or "position" in known):
             raise ValueError(f"normal: must be given, got keys {', '.join(table)}")
         return MODELS[model](**known)
     except ValueError as error:

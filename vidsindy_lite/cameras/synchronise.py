@@ -30,7 +30,16 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from .adjust import Adjustment, adjust
-from .alignment import Curve, Footage, Lags, check_clocks, check_lags, check_rates, list_lags
+from .alignment import (
+    Curve,
+    Footage,
+    Lags,
+    align,
+    check_clocks,
+    check_lags,
+    check_rates,
+    list_lags,
+)
 from .calibrate import check_learnable
 from .camera import Camera
 from .changes import PARTS, known_to
@@ -41,6 +50,7 @@ from .rig import Rig
 from .shutter import steadied
 from .triangulate import Views, check_seen, residuals, residuals_of_views
 from .unknowns import Unknowns
+from .unmeasured import posed
 
 DISAGREEMENT = 1.0
 """Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
@@ -126,16 +136,19 @@ def learn_lags(
         If the rig has no calibrated camera, there is not one track, rate, lag and clock per
         camera, a track has a wrong shape, or a track never shows the target.
     """
-    unknowns, tracks = check_learnable(rig), check_seen(tracks, rig)
+    check_learnable(rig)
+    tracks = check_seen(tracks, rig)
     first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
     given = check_rates(rates, len(tracks))
+    rig = posed(align(tracks, first, given, clocks), rig, synchronous=False)
     with tqdm(desc="synchronise", unit="fit", delay=2, disable=not progress) as bar:
         still = [
             steadied(track, camera.readout, camera.image_size[1])
             for track, camera in zip(tracks, rig.cameras, strict=True)
         ]
+        at_once = Rig(tuple(replace(camera, readout=0.0) for camera in rig.cameras))
         curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
-        found = _learned(_Videos(curves, unknowns, given, bar), first)
+        found = _learned(_Videos(curves, Unknowns.of(at_once), given, bar), first)
     return found if clocks is None else replace(found, clocks=tuple(c.clock for c in curves))
 
 
@@ -164,10 +177,11 @@ class _Videos:
             return None
         return rough_cameras(Views.of(tracks), self.unknowns)
 
-    def errors(self, loose: bool = False) -> Floats:
+    def errors(self, step: int = 1, loose: bool = False) -> Floats:
         """What is known of cameras, and of all lags but the first one's nothing."""
         errors = np.array([known_to(camera) for camera in self.unknowns.cameras])
-        errors[:, PARTS["readout"]] = 0.0  # was undone
+        if step > 1:  # which are too few to tell where the target was between two
+            errors[:, PARTS["readout"]] = 0.0
         errors[1:, PARTS["lag"]] = np.inf
         if loose:
             ways = np.zeros(errors.shape, bool)
@@ -183,7 +197,7 @@ class _Videos:
         cameras = self.cameras(footage)
         if cameras is None:
             return None
-        errors = self.errors(loose)
+        errors = self.errors(step, loose)
         return _Fitted.of(footage, cameras, errors, most=None if step == 1 else _ROUGH_STEPS)
 
 

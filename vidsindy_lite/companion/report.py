@@ -297,7 +297,10 @@ def _page(
     """The report as one HTML page."""
     total = 4 + (paths is not None)
     figures = tqdm(_figures(found, paths), desc="report", total=total, disable=not progress)
-    about = {"limit": DISAGREEMENT, "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS}
+    about = {
+        "note": found.rig.note, "limit": DISAGREEMENT,
+        "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
+    }  # fmt: skip
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
     return page("report.html", figures=figures, film=film, **about, **content)
 

@@ -6,8 +6,9 @@ solver: `discover`; its stages (search, then polish and settle) use collocation 
 selection of terms, origin, gaps, errors that last, precision (whom to trust how far),
 process_noise (is the motion kicked?), and persistence: which law stays the same while more error
 is tolerated
-discovery: the result, with error bars from the last fit; diagnostics: all its warnings, those of
-the motion's shape among them; rounds: circles and spheres, whose angles are coordinates
+discovery: the result, with error bars from the last fit; diagnostics: all its warnings, of which
+shape looks at where the motion takes place and beyond at terms that the library lacks
+rounds: circles and spheres, whose angles are coordinates
 storage: the result as a file; drawing: its path of laws as a picture
 law: polynomials, on a library of monomials, also of functions of the state; candidates are the
 libraries that a user asks for; integrate solves a law
@@ -17,11 +18,11 @@ beside the way: cramer_rao, the least errors that any estimate could have
 """
 
 from .candidates import Library, check_library
-from .collocation import Collocation, State, Status
+from .collocation import Collocation, Status
 from .cramer_rao import cramer_rao
 from .discovery import Discovery
 from .integrate import runge_kutta_4
-from .library import monomial_exponents, monomial_gradients, monomials, variable_names
+from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
 from .order import check_order
 from .origin import ShiftedLaw
 from .persistence import Plateau
@@ -33,4 +34,5 @@ from .sindy import SplineSINDy
 from .smoothing import smooth
 from .solver import discover
 from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis
+from .state import State
 from .trajectories import Trajectory, check_trajectory, cut, typical_step

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import Floats
-from .collocation import CLEANEST, Fit, Linearisation, State, Status
+from .beyond import beyond_the_library
+from .collocation import CLEANEST, Fit, Linearisation, Status
 from .errors import residual_noise
 from .library import shift_matrix
 from .persistence import Path
@@ -20,6 +21,7 @@ from .polynomials import PolynomialSystem
 from .problem import Problem
 from .selection import closest_rival, subset_search
 from .shape import cancelling, shapes
+from .state import State
 from .trajectories import Trajectory, typical_step
 
 MISFIT = 1.5
@@ -185,10 +187,12 @@ def _selection(
     problem: Problem, fit: Fit, path: Path, law: PolynomialSystem
 ) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), fit.state, path)
-    if max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest:
-        return  # weaker errors than those tolerated say nothing about the law
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
+    tolerant = max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
+    yield from beyond_the_library(problem, fit, noisy=not tolerant)
+    if tolerant:
+        return  # weaker errors than those tolerated say nothing about the law
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = fit.collocation.linearise(fit.state, problem.form.searched)
     yield from _left_over(model, fit.state)

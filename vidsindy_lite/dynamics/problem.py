@@ -16,13 +16,14 @@ from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
 from .candidates import Library
-from .collocation import CLEANEST, Collocation, Fit, State
+from .collocation import CLEANEST, Collocation, Fit
 from .errors import effective_noise, spread_to_unseen
 from .form import Form
 from .library import Function, extended, law_variables, monomials
 from .polynomials import PolynomialSystem
 from .smoothing import smooth
 from .splines import DEGREE, Segment, clamped_knots
+from .state import State
 from .trajectories import Trajectory, cut, typical_step
 
 FALSE_ALARM = 0.004

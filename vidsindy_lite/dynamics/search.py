@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import Bools, Floats
-from .collocation import Collocation, Fit, State
+from .collocation import Collocation, Fit
 from .discovery import History
 from .gaps import Gap, gaps, join
 from .library import closure_mask, divides, shift_matrix
@@ -23,6 +23,7 @@ from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
 from .problem import Problem, fit_curves
 from .selection import subset_search
+from .state import State
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
 """Physics weights of the unpruned fits, relative to the misfit of a plain regression."""

@@ -6,12 +6,14 @@
     Table S1      three videos,  noise or gaps,      one row a trial,
                   observed       one method's law    rows of the paper's tables
 
-* `systems`, `corruption`: the seven benchmarks, and noise and gaps as the paper names them.
+* `systems`, `corruption`: the seven benchmarks and other flows; noise and gaps as the paper names
+  them, and the errors that measurements have.
 * `films`, `realistic`, `lab`: what is filmed: benchmarks, a scene with trees, a ball on a table.
 * `trials`, `baselines`, `paper_ado`: who finds the law: `discover`, the methods of the paper's
   tables, the paper's own optimiser.
 * `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
 * `metrics`, `tables`: how good a law is, and many of them side by side.
+* `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
 * `published`, `audit`: the paper's numbers, and whether they agree with each other.
 * `sweeps`: many tasks in parallel, each computed once.
 * `plots`: a figure a function.
@@ -24,9 +26,13 @@ The names below are at hand at once. Modules that need large libraries are impor
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
 from .metrics import Score, pulls, score, term_errors, trajectory_error
+from .odebench import ODEBENCH
 from .published import ABLATION, DATASETS_CLAIMED, LAB, LAWS, SCORES, SYSTEMS_S1
 from .realistic import DISTURBANCES, START, SceneTask, run_scene
+from .rivals import LORENZ_GRID, R2_GIVEN, R2_RATES, R2_SOURCE
+from .scoreboard import CONTESTANTS, ERRORS, MOTIONS, FlowContest, LorenzContest, OdeContest
+from .scoreboard import run_contest, standings
 from .sweeps import sweep
-from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
+from .systems import FLOWS, REFERENCE_OFFSET, SYSTEMS, Benchmark
 from .tables import LEAST, by_condition, rate, significant, summary, tabulate
 from .trials import METHODS, Trial, grid, run_trial

@@ -1,13 +1,16 @@
-"""The seven chaotic systems of the paper's Table S1, as data, and the frame they are seen in."""
+"""The seven chaotic systems of the paper's Table S1, as data, their frame, and five others."""
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Floats, Ints  # noqa: F401 (Ints: in the signature that is inherited)
+# Function, Ints: in the signature that is inherited.
+from ..arrays import Floats, Ints  # noqa: F401
 from ..checks import check_integer, check_positive, check_vector
-from ..dynamics import PolynomialSystem, monomial_exponents
+from ..dynamics import Function, PolynomialSystem, monomial_exponents  # noqa: F401
 from .metrics import coefficients_in
 from .published import SYSTEMS_S1
 
@@ -67,12 +70,25 @@ PERIODS = {
 """Characteristic periods, as in ``dysts``."""
 
 
-def _benchmark(name: str) -> Benchmark:
-    """A system as Table S1 prints it."""
-    law, library = SYSTEMS_S1[name].law, monomial_exponents(3, degree=3)
+def _benchmark(
+    name: str, law: PolynomialSystem, x0: Sequence[float], period: float
+) -> Benchmark:
+    """A system in the library of degree 3."""
+    library = monomial_exponents(3, degree=3)
     coefficients = coefficients_in(law, library)
-    return Benchmark(law.names, library, coefficients, name, SYSTEMS_S1[name].x0, PERIODS[name])
+    return Benchmark(law.names, library, coefficients, name, tuple(x0), period)
 
 
-SYSTEMS: dict[str, Benchmark] = {name: _benchmark(name) for name in PERIODS}
+SYSTEMS: dict[str, Benchmark] = {
+    name: _benchmark(name, SYSTEMS_S1[name].law, SYSTEMS_S1[name].x0, period)
+    for name, period in PERIODS.items()
+}
 """The systems of Table S1 in their native frame, by name."""
+
+FLOWS: dict[str, Benchmark] = SYSTEMS | {
+    name: _benchmark(name, PolynomialSystem.from_terms(flow["law"]), flow["x0"], flow["period"])
+    for name, flow in tomllib.loads(
+        Path(__file__).with_name("flows.toml").read_text("utf-8")
+    ).items()
+}
+"""The same and five other chaotic flows; ``flows.toml`` says where they come from."""

@@ -207,15 +207,15 @@ def _reconstructed(filmed: FilmResult, tracks: list[Floats]) -> tuple[Floats, Fl
 
 
 def find_law(
-    method: str, t: Floats, x: Floats, systematic: Floats | None, seed: int
+    method: str, t: Floats, x: Floats, systematic: Floats | None, seed: int, degree: int = 3
 ) -> Discovery | PolynomialSystem:
     """What one of the `METHODS` finds; only ours can use what is known of systematic errors."""
     if method == "ours":
-        return discover(t, x, systematic=systematic)
+        return discover(t, x, degree=degree, systematic=systematic)
     from .baselines import BASELINES  # pysindy takes seconds to import
 
     options = {"seed": seed} if method in RANDOM_METHODS else {}
-    return BASELINES[method](t, x, **options)
+    return BASELINES[method](t, x, degree, **options)
 
 
 def grid(

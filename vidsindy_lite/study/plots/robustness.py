@@ -15,8 +15,8 @@ from ...arrays import Floats
 if TYPE_CHECKING:  # pandas and seaborn are imported where they draw
     from pandas import DataFrame
 
-_COLOURS = {"ours": "C0", "PySINDy": "C1", "E-SINDy": "C2", "WeakSINDy": "C3", "Model-A": "C4"}
-_MARKERS = {"ours": "o", "PySINDy": "s", "E-SINDy": "^", "WeakSINDy": "v", "Model-A": "D"}
+COLOURS = {"ours": "C0", "PySINDy": "C1", "E-SINDy": "C2", "WeakSINDy": "C3", "Model-A": "C4"}
+MARKERS = {"ours": "o", "PySINDy": "s", "E-SINDy": "^", "WeakSINDy": "v", "Model-A": "D"}
 _TITLES = {"noise": "noise", "blocks": "random blocks missing", "fibers": "fibers missing"}
 
 VERDICTS = {
@@ -53,8 +53,8 @@ def plot_robustness(
         chosen = _beside(trials[trials.condition == condition])
         for axes, value in zip(column, ("l2 (%)", "wrong_terms"), strict=True):
             sns.lineplot(
-                chosen, x="place", y=value, hue="method", style="method", palette=_COLOURS,
-                markers=_MARKERS, dashes=False, estimator="median", errorbar=("pi", 50),
+                chosen, x="place", y=value, hue="method", style="method", palette=COLOURS,
+                markers=MARKERS, dashes=False, estimator="median", errorbar=("pi", 50),
                 err_style="bars", err_kws={"capsize": 2, "elinewidth": 1}, lw=1.4, legend="full",
                 markeredgewidth=0, ax=axes,
             )  # fmt: skip
@@ -123,8 +123,8 @@ def plot_methods(trials: DataFrame) -> Figure:
         for k, method in enumerate(methods):
             chosen = trials[(trials.source == source) & (trials.method == method)]
             place = np.arange(len(chosen)) + 0.13 * (k - (len(methods) - 1) / 2)
-            style = {"marker": _MARKERS[method], "color": _COLOURS[method], "ms": 8, "mew": 1.5}
-            for exact, face in ((True, _COLOURS[method]), (False, "white")):
+            style = {"marker": MARKERS[method], "color": COLOURS[method], "ms": 8, "mew": 1.5}
+            for exact, face in ((True, COLOURS[method]), (False, "white")):
                 at = (chosen.exact == exact).to_numpy()
                 axes.plot(place[at], 100 * chosen.l2[at], ls="", mfc=face, **style)
             axes.plot([], [], ls="", label=method, **style)

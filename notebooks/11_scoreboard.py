@@ -1,0 +1,391 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # The scoreboard
+#
+# In this notebook, we present benchmarks that others use, and errors that are no white noise. Ours and three other
+# methods get the same samples in one run; what is published of the same benchmarks stands beside it.
+#
+# **What you will see**
+#
+# * ODEBench: 63 equations from textbooks, whose stored trajectories err smoothly;
+# * the Lorenz system over noise and length, beside the best published method;
+# * eight chaotic flows with drift, outliers, coarse steps, correlated noise, kicks;
+# * for each: how often the law is exact, how often it is wrong and nothing said so, how long it takes.
+#
+# **What you need**: [notebook 06](06_robustness_and_ablation.ipynb), of which this is the sequel outside the
+# paper's protocol.
+#
+# **Covers** nothing in the paper, whose errors are noise and gaps.
+
+# %% tags=["parameters"]
+profile: str = "full"  # full or quick
+seed: int = 0  # of all errors
+jobs: int = 2  # contests at a time
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from vidsindy_lite import discover
+from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+from vidsindy_lite.study import (
+    CONTESTANTS,
+    ERRORS,
+    FLOWS,
+    LORENZ_GRID,
+    MOTIONS,
+    ODEBENCH,
+    R2_GIVEN,
+    R2_RATES,
+    R2_SOURCE,
+    FlowContest,
+    LorenzContest,
+    OdeContest,
+    corruption,
+    plots,
+    run_contest,
+    score,
+    standings,
+    sweep,
+)
+
+plt.style.use("vidsindy_lite.study.plots.vidsindy")
+full = profile == "full"
+both = CONTESTANTS[:2]  # ours and PySINDy see everything, the slower ones less
+
+# %% [markdown]
+# ## The rules
+#
+# * Everybody gets the same samples, candidate terms up to the same degree, and nothing else: no noise level, no
+#   origin, no threshold. Ours runs with its defaults.
+# * The baselines are those of [notebook 05](05_discovery.ipynb). Their thresholds are chosen without the truth, by
+#   the error of the derivatives on the last fifth of the record.
+# * **Exact** means: every true term and no other.
+# * Only ours says whether it trusts its law. *Wrong and ok* is the worst that can happen, *right but doubted* the
+#   price of caution.
+
+
+# %%
+def count(table):
+    """One row a condition and method: how many are exact, and how far the status can be trusted."""
+    groups = table.groupby(["condition", "method"], sort=False)
+    return [
+        {
+            "condition": condition, "method": method, "cases": len(group),
+            "exact (%)": 100 * group.exact.mean(),
+            "wrong and ok": group["wrong, ok"].sum() if method == "ours" else None,
+            "right but doubted": group["exact, doubted"].sum() if method == "ours" else None,
+            "seconds": group.seconds.median(),
+        }
+        for (condition, method), group in groups
+    ]  # fmt: skip
+
+
+# %%
+def shares(table):
+    """Share of exact laws, a row a condition, a column a method."""
+    found = table.pivot_table("exact", "condition", "method", sort=False).astype(float)
+    return found.reindex(columns=[name for name in CONTESTANTS if name in found])
+
+
+# %% [markdown]
+# ## ODEBench: trajectories that are not quite those of their equations
+#
+# [ODEBench](https://arxiv.org/abs/2310.05573) collects 63 equations of one to four variables. Truth and found law
+# are the same type, so 37 of them are data like this one:
+
+# %%
+equation = ODEBENCH[27]
+print(f"{equation.number}, {equation.name} ({equation.source})", equation.law.text(), sep="\n")
+
+# %% [markdown]
+# The benchmark stores 512 samples on $[0, 10]$, integrated by LSODA with a relative tolerance of $10^{-5}$. We
+# integrate in the same way, and once to twelve digits. The difference is small and smooth:
+
+# %%
+numbers = list(ODEBENCH) if full else [3, 24, 28]
+cubic = [number for number in numbers if ODEBENCH[number].is_cubic]
+off = {}
+for number in cubic:
+    stored, tight = (OdeContest(number, tight=tight).data().x for tight in (False, True))
+    off[number] = (np.abs(stored - tight).max(axis=0) / tight.std(axis=0)).max()
+low, middle, high = np.quantile(list(off.values()), [0.1, 0.5, 0.9])
+print(f"largest error over the spread: {low:.0e}, {middle:.0e}, {high:.0e} (a tenth, half, nine tenths)")
+assert 1e-6 < middle < 1e-2
+
+# %% [markdown]
+# Noise is as published: samples are multiplied by $1+\sigma\,\varepsilon$, and a share $\rho$ of them is dropped.
+# All methods fit cubic laws; 35 equations have one. The two slower methods see the stored data alone.
+
+# %%
+levels = [(0, 0), (0.02, 0), (0.05, 0), (0.05, 0.5)] if full else [(0, 0), (0.02, 0)]
+tasks = [OdeContest(n, tight=True, methods=both, seed=seed) for n in cubic]
+for noise, dropped in levels:
+    for n in numbers:
+        methods = CONTESTANTS if full and not noise and n in cubic else both
+        tasks += [OdeContest(n, 0, noise, dropped, methods=methods, seed=seed)]
+ode = standings(sweep(run_contest, tasks, jobs=jobs, desc="ODEBench"))
+laws, others = ode[ode.inside], ode[~ode.inside]
+
+# %%
+caption = "ODEBench, the equations with a cubic law, from their first start: how many laws are exact."
+save_table("score_odebench", count(laws), caption=caption)
+
+# %%
+rate = shares(laws)
+if full:
+    assert rate.ours["exact"] > 0.8
+    assert rate.ours["stored"] > 0.75
+    assert rate.ours["stored"] > 1.5 * rate.drop(columns="ours").loc["stored"].max()
+    assert (rate.ours > rate.PySINDy + 0.2).all()
+    assert (laws.groupby("condition")["wrong, ok"].sum() <= 7).all()
+
+# %% [markdown]
+# A smooth error of $10^{-4}$ is a change of the law: least squares takes it for small terms. Ours looks for the law
+# that *persists* while more and more error is tolerated ([notebook 04](04_spline_ado.ipynb)); `found.plot_path()`
+# draws that.
+
+# %%
+data = OdeContest(49).data()  # the Brusselator
+found = discover(data.t, data.x)
+fig = found.plot_path()
+caption = "The Brusselator, as stored by ODEBench: terms over the error that is tolerated."
+path = [[(p.low, p.high, int(p.terms.sum())) for p in plateaus] for plateaus in found.path]
+save_figure("score_path", fig, caption=caption, numbers=dict(zip("xy", path, strict=True)))
+
+# %% [markdown]
+# *The Brusselator, as stored. Where nothing is tolerated (left), the law has terms that imitate the
+# integrator; they go one by one, and the plateau that lasts (orange) is the law.*
+#
+# ### Equations that are no cubic polynomial
+#
+# A sine, a fraction or a fifth power is outside the library, and any law that comes out is an approximation along
+# the path. What does the status say of it?
+
+# %%
+mine = others[(others.method == "ours") & others.condition.isin(["stored", "stored, noise 2 %"])]
+rows = [
+    {"condition": condition} | group.status.value_counts().to_dict()
+    for condition, group in mine.groupby("condition", sort=False)
+]
+rows = [{key: row.get(key, 0) for key in ("condition", "ok", "suspect", "refused")} for row in rows]
+caption = "Status of laws that cannot be right: the library lacks a function that the equation needs."
+save_table("score_outside", rows, caption=caption)
+
+# %% [markdown]
+# A status can only doubt what the data refute. Where a cubic follows the path to within the errors, nothing in one
+# record speaks against it: such a law forecasts near the recorded path and nowhere else.
+#
+# ### Beside published numbers
+#
+# Others count something easier: the laws whose path from the true start explains 90 % of the variance of the
+# trajectory that they were fitted to. That needs no right term. All 63 equations count.
+
+# %%
+print(f"published: {R2_SOURCE}; given: {R2_GIVEN}")
+everyone = ode[ode.condition.str.startswith("stored") & ode.method.isin(both)]
+ours = everyone.assign(good=everyone.r2 > 0.9).pivot_table("good", "level", "method", sort=False)
+rows = [
+    {"noise (%)": 100 * noise, "dropped (%)": 100 * dropped}
+    | {f"{method}, here": 100 * ours.loc[[(noise, dropped)], method].iloc[0] for method in both}
+    | {method: 100 * known[noise, dropped] for method, known in R2_RATES.items()}
+    for noise, dropped in levels
+]
+caption = "ODEBench, percent of 63 laws with R2 above 0.9; columns without 'here' are published."
+save_table("score_r2", rows, caption=caption)
+
+# %%
+if full:
+    assert all(row["ours, here"] > 70 for row in rows)
+
+# %% [markdown]
+# ## The Lorenz system over noise and length
+#
+# Start at $(-8,8,27)$, steps of .01, quadratic terms; the noise is relative to the standard deviation of all
+# coordinates *together*, so that 40 % of it is 69 % of that of $x$. The best published method,
+# ODR-BINDy, is told the variance of the noise. Ours is not, and looks for the origin, too.
+
+# %%
+shown = np.isin(np.round(1000 * LORENZ_GRID.levels), [50, 100, 200, 250, 300, 400] if full else [100])
+lengths = LORENZ_GRID.lengths if full else LORENZ_GRID.lengths[[0, -1]]
+draws = range(seed, seed + (2 if full else 1))
+cells = [(noise, length) for noise in LORENZ_GRID.levels[shown] for length in lengths]
+tasks = [LorenzContest(float(T), float(s), n) for s, T in cells for n in draws]
+lorenz = standings(sweep(run_contest, tasks, jobs=jobs, desc="Lorenz grid"))
+print(f"{LORENZ_GRID.method}: {LORENZ_GRID.source}; given: {LORENZ_GRID.given}")
+
+# %%
+exact = lorenz.exact.to_numpy(float).reshape(shown.sum(), len(lengths), len(draws)).mean(axis=2)
+theirs = LORENZ_GRID.rates[shown][:, np.isin(LORENZ_GRID.lengths, lengths)]
+grids = {f"ours, {len(draws)} draws": exact, f"{LORENZ_GRID.method}, published": theirs}
+fig = plots.plot_lorenz_grids(grids, LORENZ_GRID.levels[shown], lengths)
+caption = "Share of exact Lorenz laws in percent, over noise and length: ours beside the published."
+save_figure("score_lorenz", fig, caption=caption, numbers=grids)
+
+# %% [markdown]
+# *Percent of exact laws by length (column) and noise (row). Ours is not told the noise. With two draws a cell, a
+# cell says little and a row something.*
+
+# %%
+rows = [
+    {"noise (%)": 100 * level, "ours (%)": 100 * mine.mean(), "ODR-BINDy (%)": 100 * known.mean()}
+    for level, mine, known in zip(LORENZ_GRID.levels[shown], exact, theirs, strict=True)
+]
+save_table("score_lorenz_rows", rows, caption="Exact Lorenz laws, mean over the lengths.")
+
+# %%
+silent = lorenz["wrong, ok"].mean()
+print(f"exact in {exact.mean():.0%}, wrong and ok in {silent:.0%}")
+if full:
+    assert exact[:2].mean() > 0.9
+    assert exact.mean() > theirs.mean() - 0.2
+
+# %% [markdown]
+# Nearly all misses drop one term, $-y$ in $\dot y$, which noise of this size buries: the law without it fits as well.
+#
+# ## Errors as they are
+#
+# Eight flows, four of the paper's and four others, 15 periods each, seen from an origin that is unknown. Every
+# kind of error is a function of [`study.corruption`](../vidsindy_lite/study/corruption.py).
+
+# %%
+four = ("Lorenz", "RayleighBenard", "NoseHoover", "WangSun")  # of the paper's
+flows = (*four, "Roessler", "Arneodo", "Halvorsen", "Chen") if full else four[:1]
+errors = (*ERRORS, *MOTIONS) if full else ("64 values", "drift 0.2 %", "kicks 1 %")
+few = flows[::4]  # of the slower methods
+tasks = [
+    FlowContest(flow, error, methods=CONTESTANTS if full and flow in few else both, seed=seed)
+    for error in errors
+    for flow in flows
+]
+flow_table = standings(sweep(run_contest, tasks, jobs=jobs, desc="flows"))
+save_table("score_errors", count(flow_table), caption=f"Exact laws of {len(flows)} flows, cubic terms.")
+
+# %%
+rate_flows = shares(flow_table)
+fig = plots.plot_standings({"ODEBench": rate, "chaotic flows": rate_flows})
+caption = "Exact laws by benchmark, condition and method, in percent."
+numbers = {f"{c}, {m}": value for table in (rate, rate_flows) for m in table for c, value in table[m].items()}
+save_figure("score_methods", fig, caption=caption, numbers=numbers)
+
+# %% [markdown]
+# *Exact laws in percent. The slower methods, E-SINDy and WeakSINDy, see the stored data of ODEBench and two of the
+# flows.*
+
+# %%
+print(rate_flows.mul(100).round().to_string(na_rep=""))
+if full:
+    assert rate_flows.ours.mean() > 0.8
+    assert (rate_flows.ours > 0.55).all()
+    assert rate_flows.ours.mean() > rate_flows.PySINDy.mean() + 0.3
+
+# %% [markdown]
+# ## How far can the status be trusted?
+#
+# All contests of this page together.
+
+# %%
+together = {"ODEBench": laws, "Lorenz grid": lorenz, "flows": flow_table}
+rows = []
+for benchmark, table in together.items():
+    mine = table[table.method == "ours"]
+    doubted = mine["exact, doubted"].sum() / max(mine.exact.sum(), 1)
+    rows.append({
+        "benchmark": benchmark, "cases": len(mine), "exact (%)": 100 * mine.exact.mean(),
+        "wrong and ok (%)": 100 * mine["wrong, ok"].mean(), "doubted of the exact (%)": 100 * doubted,
+        "seconds": mine.seconds.median(),
+    })  # fmt: skip
+save_table("score_summary", rows, caption="Ours on all benchmarks of this page.")
+
+# %%
+if full:
+    assert all(row["wrong and ok (%)"] < 25 for row in rows)
+    assert rows[0]["wrong and ok (%)"] < 15
+    assert rows[2]["wrong and ok (%)"] < 10
+
+# %% [markdown]
+# ## What we learned
+#
+# * Smooth errors, not noise, separate methods: a thousandth of an integrator's error costs least squares
+#   most of its laws, and ours hardly one.
+# * On the Lorenz grid ours, which is not told the noise, comes near the best published method, which is.
+# * Explained variance says little about terms: most laws explain 90 % of a trajectory, and far fewer are right.
+# * Whether a law is outside the library, one record cannot always say. Then the status is ok and the law an
+#   approximation.
+#
+# **What the paper says and what we found.**
+#
+# * The paper's errors are white noise and gaps, its systems seven. Of integration, drift, distortion, correlated
+#   noise or kicks it says nothing, and compares with PySINDy, E-SINDy and WeakSINDy alone: the same
+#   order of methods is found here, on systems and errors that nobody chose for it.
+
+# %% [markdown]
+# ## Exercises
+#
+# Each solution is folded: its code, which has run with this notebook, and what to see in it.
+#
+# **1.** (Explore.) How coarse may an integrator be before the law of a flow is lost?
+
+# %% tags=["hide-cell"]
+flow = FLOWS["Roessler"]
+t = flow.times(1500 if full else 400)
+for rtol in (1e-6, 1e-4, 1e-2):
+    path = corruption.coarse_path(flow, t, flow.x0, "RK45", rtol, rtol)
+    told = discover(t, path)
+    print(f"{rtol:g}: {score(told, flow)}; {told.status}")
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# The plateau of the law begins where the error of the integrator ends, and there is room for an error of about a
+# hundredth. Beyond it, the integrator's error is as large as the smallest terms.
+# </details>
+#
+# **2.** (Prove.) A clock that is wrong by $\tau(t)$ turns $\dot{\mathbf x}=\mathbf f(\mathbf x)$ into what law? For which
+# $\tau$ are the terms the same?
+#
+# <details><summary>Solution</summary>
+#
+# With $\mathbf y(t)=\mathbf x(t+\tau(t))$, $\dot{\mathbf y}=(1+\dot\tau)\,\mathbf f(\mathbf y)$. A constant $\dot\tau$
+# scales all coefficients alike and leaves the terms as they are; any other makes the law depend on time.
+# </details>
+#
+# **3.** (Implement.) Add a kind of error of your own, a dead zone: changes smaller than 1 % of the range are not seen.
+
+# %% tags=["hide-cell"]
+t, clean = flow.trajectory(1500 if full else 400)
+held = clean.copy()
+for k in range(1, len(held)):
+    small = np.abs(clean[k] - held[k - 1]) < 0.01 * np.ptp(clean, axis=0)
+    held[k, small] = held[k - 1, small]
+told = discover(t, held)
+print(f"{score(told, flow)}; {told.status}")
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# Such an error lags behind the motion and depends on where that turns: it is neither white nor a function of the
+# place. Compare with `corruption.quantise` at the same size.
+# </details>
+
+# %% [markdown]
+# ## Run time and versions
+#
+# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
+# would differ from run to run.
+
+# %%
+print(versions())

@@ -1,0 +1,147 @@
+"""Rigs of which only the lenses are known: where they stand, their frame, and what is refused."""
+
+import numpy as np
+import pytest
+from helpers import aligned_error, room, walk
+
+import vidsindy_lite as vl
+from vidsindy_lite.cameras import posed
+from vidsindy_lite.observation import observe_tracks
+
+FRAMES = 400
+
+
+def lenses(rng, rig, off=0.05, **more):
+    """The rig with nothing but focal lengths, within a share of the true ones."""
+    return vl.Rig(
+        [
+            vl.PerspectiveCamera(
+                scale=c.scale * (1 + off * rng.uniform(-1, 1)), image_size=c.image_size,
+                scale_error=off / 2,
+            )
+            for c in rig.cameras
+        ],
+        **more,
+    )  # fmt: skip
+
+
+def filmed(rng, rig, late=(0.0,) * 5, noise=0.5):
+    tracks = [
+        c.project(walk(np.arange(FRAMES) + lag)) for c, lag in zip(rig.cameras, late, strict=False)
+    ]
+    return [track + noise * rng.normal(size=track.shape) for track in tracks]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("cameras", [3, 4])
+def test_the_path_is_found_but_for_a_similarity(seed, cameras):
+    rng = np.random.default_rng([seed, cameras])
+    rig = room(rng, cameras)
+    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig)
+    learned = vl.learn_cameras(tracks, lenses(rng, rig))
+    assert learned.warnings == ()
+    size = np.ptp(x, axis=0).max()
+    # No mirror image: `aligned_error` allows for none.
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 0.005 * size
+
+
+def test_exact_tracks_and_lenses_give_the_exact_rig():
+    rng = np.random.default_rng(7)
+    rig = room(rng)
+    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig, noise=0.0)
+    learned = vl.learn_cameras(tracks, lenses(rng, rig, off=0.0))
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 1e-6
+
+
+def test_the_frame_is_that_of_the_first_camera_and_is_told():
+    rng = np.random.default_rng(1)
+    rig = room(rng)
+    tracks = filmed(rng, rig)
+    learned = posed(tracks, lenses(rng, rig))
+    first, second, _ = learned.cameras
+    np.testing.assert_allclose(first.normal, [0, 0, 1], atol=1e-12)
+    assert abs(first.angle) < 1e-12
+    np.testing.assert_allclose(np.linalg.norm(first.position - second.position), 1, rtol=1e-9)
+    path = vl.reconstruct(tracks, learned)
+    np.testing.assert_allclose(path.mean(axis=0), 0, atol=1e-3)
+    u = tracks[0] - tracks[0].mean(axis=0)
+    assert np.sum(path[:, 0] * u[:, 0]) > 0
+    assert np.sum(path[:, 1] * u[:, 1]) < 0  # v is down
+    assert "x is to the right and y up in the image of the first camera" in learned.note
+    assert learned.note in learned.text()
+    assert vl.learn_cameras(tracks, learned).note == learned.note
+    assert posed(tracks, learned) is learned
+
+
+def test_a_known_distance_gives_the_unit_of_length():
+    rng = np.random.default_rng(2)
+    rig = room(rng)
+    tracks = filmed(rng, rig)
+    first, second, _ = (c.position for c in rig.cameras)
+    distance = float(np.linalg.norm(first - second))
+    seen = observe_tracks(
+        tracks, lenses(rng, rig, distance=distance), np.arange(FRAMES) / 30
+    )
+    spread = [np.sqrt(np.mean(np.var(x, axis=0))) for x in (seen.x, walk(np.arange(FRAMES)))]
+    assert abs(spread[0] / spread[1] - 1) < 0.01
+    assert seen.warnings == ()
+    assert "the first camera is" in seen.rig.note
+
+
+def test_small_lags_are_learned_beside():
+    rng = np.random.default_rng(3)
+    rig, late = room(rng, 4), (0, 0.7, -0.9, 0.3)
+    tracks = filmed(rng, rig, late)
+    seen = observe_tracks(tracks, lenses(rng, rig), np.arange(FRAMES) / 30)
+    np.testing.assert_allclose(seen.lags.frames, late, atol=0.1)
+    x = walk(np.arange(FRAMES))
+    inside = np.isfinite(seen.x).all(axis=1)
+    assert aligned_error(seen.x[inside], x[inside]) < 0.005 * np.ptp(x, axis=0).max()
+
+
+def test_a_line_tells_no_rig():
+    rng = np.random.default_rng(4)
+    rig = room(rng)
+    x = np.outer(np.sin(np.arange(FRAMES) / 40), [0.5, 0.3, 0.2])
+    tracks = [c.project(x) + 0.5 * rng.normal(size=(FRAMES, 2)) for c in rig.cameras]
+    warnings = vl.learn_cameras(tracks, lenses(rng, rig)).warnings
+    assert any("the search for the cameras did not converge" in text for text in warnings)
+
+
+def test_tracks_at_other_instants_tell_no_rig():
+    rng = np.random.default_rng(4)
+    rig = room(rng)
+    tracks = filmed(rng, rig, (0, 60, -45))
+    with pytest.raises(ValueError, match="rig: the tracks must tell where the cameras stand"):
+        posed(tracks, lenses(rng, rig))
+
+
+def test_a_file_of_lenses(tmp_path):
+    text = '[[camera]]\nmodel = "perspective"\nfield_of_view = 60\nscale_error = 0.03\n'
+    (tmp_path / "rig.toml").write_text("distance = 2.5\n" + 3 * text)
+    rig = vl.Rig.load(tmp_path / "rig.toml")
+    assert not rig.is_measured
+    assert rig.distance == 2.5
+    assert [c.focal_length for c in rig.cameras] == pytest.approx([512 / 2 / np.tan(np.pi / 6)] * 3)
+    rig.save(tmp_path / "again.toml")
+    assert "normal" not in (tmp_path / "again.toml").read_text()
+    assert vl.Rig.load(tmp_path / "again.toml") == rig
+
+
+def test_what_is_no_rig_of_lenses():
+    lens = vl.PerspectiveCamera(scale=1e-3)
+    flat = vl.OrthographicCamera(normal=(0, 0, 1), position=(0, 0, 1), scale=1.0, angle=0.0)
+    with pytest.raises(ValueError, match="cameras: must be 3 or more if nothing is measured"):
+        vl.Rig([lens, lens])
+    with pytest.raises(ValueError, match=r"must all have a position, or none .* cameras\[1\]"):
+        vl.Rig([flat, lens, lens])
+    with pytest.raises(ValueError, match="distance: must not be given with positions"):
+        vl.Rig([flat, vl.OrthographicCamera(normal=(1, 0, 0))], distance=2.0)
+    with pytest.raises(ValueError, match="distance: must be positive"):
+        vl.Rig([lens] * 3, distance=0.0)
+    blind = vl.Rig([vl.PerspectiveCamera(), lens, lens])
+    tracks = [walk(np.arange(20))[:, :2]] * 3
+    with pytest.raises(ValueError, match=r"scale or field_of_view .* none of cameras\[0\]"):
+        vl.learn_cameras(tracks, blind)
+    with pytest.raises(ValueError, match="camera: position must be known"):
+        lens.project(np.zeros((1, 3)))

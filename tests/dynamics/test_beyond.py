@@ -1,0 +1,81 @@
+"""Laws that are approximations along their data are doubted, and true laws are not."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from vidsindy_lite.dynamics import Library, discover, monomial_exponents
+from vidsindy_lite.dynamics.beyond import _single_gains, _widened
+
+TIMES = np.linspace(0, 20, 600)
+WORDS = "terms of higher degree explain what the law leaves"
+
+
+def swung(pull, start):
+    """Positions of a body that a law of second order moves."""
+    rate = lambda _, s: [s[1], pull(s[0], s[1])]  # noqa: E731
+    return solve_ivp(rate, (0, TIMES[-1]), [start, 0], t_eval=TIMES, rtol=1e-9, atol=1e-10).y[:1].T
+
+
+def noisy(x, share, seed=0):
+    return x + share * x.std() * np.random.default_rng(seed).standard_normal(x.shape)
+
+
+OUTSIDE = {
+    "sine": (lambda x, v: -9.81 * np.sin(x) - 0.2 * v, 1.6),
+    "rational": (lambda x, v: -3 * x / (1 + x**2) - 0.05 * v, 2.0),
+    "exponential": (lambda x, v: -2 * (1 - np.exp(-x)) * np.exp(-x) - 0.03 * v, 1.2),
+}
+INSIDE = {
+    "Duffing": (lambda x, v: x - x**3 - 0.1 * v, 1.5),
+    "Van der Pol": (lambda x, v: -x + 1.5 * (1 - x**2) * v, 0.5),
+    "spring": (lambda x, v: -4 * x - 0.1 * v, 1.5),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "share"), [("sine", 0.0), *((name, 0.01) for name in OUTSIDE), ("rational", 0.05)]
+)
+def test_a_cubic_for_another_function_is_doubted(name, share):
+    found = discover(TIMES, noisy(swung(*OUTSIDE[name]), share), order=2)
+    assert found.status == "suspect"
+    if name == "sine":
+        assert any(WORDS in warning and "x^5 in dvx/dt" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.05])
+@pytest.mark.parametrize("name", INSIDE)
+def test_a_true_law_is_not(name, share):
+    found = discover(TIMES, noisy(swung(*INSIDE[name]), share, seed=3), order=2)
+    assert not any(WORDS in warning for warning in found.warnings)
+
+
+def test_a_degree_that_is_too_low_is_told():
+    x = noisy(swung(lambda x, v: -4 * x - 0.2 * x**3 - 0.1 * v, 1.5), 0.01)
+    found = discover(TIMES, x, order=2, library=Library.polynomial(1))
+    assert any(WORDS in warning for warning in found.warnings)
+
+
+def test_the_wider_library_keeps_the_old_one_and_within_the_budget():
+    cubic = monomial_exponents(3, 3)
+    wide = _widened(cubic, 3, 1000)
+    assert (wide[: len(cubic)] == cubic).all()
+    assert len(wide) == len(monomial_exponents(3, 5))
+    pairs, single = _widened(cubic, 3, 30), _widened(cubic, 3, 6)
+    assert ((pairs[len(cubic) :] > 0).sum(axis=1) <= 2).all()
+    assert len(single) == len(cubic) + 6
+    assert _widened(cubic, 3, 5) is cubic
+
+
+def test_what_a_single_term_explains_is_what_a_refit_gains():
+    rng = np.random.default_rng(0)
+    design, data = rng.standard_normal((50, 4)), rng.standard_normal(50)
+    design = np.hstack([design, design[:, :1]])  # and one that the law has already
+
+    def left(columns):
+        part = design[:, columns]
+        return ((data - part @ np.linalg.lstsq(part, data, rcond=None)[0]) ** 2).sum()
+
+    gains = _single_gains(design.T @ design, design.T @ data, 2)
+    wanted = [left([0, 1]) - left([0, 1, k]) for k in (2, 3)]
+    assert gains == pytest.approx([*wanted, 0.0])

@@ -1,0 +1,130 @@
+"""The scoreboard: everybody gets the same data, and what they made of it is counted right."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.study import FLOWS, SYSTEMS, rivals, scoreboard
+from vidsindy_lite.study.odebench import TIMES
+from vidsindy_lite.study.scoreboard import (
+    ERRORS,
+    MOTIONS,
+    FlowContest,
+    LorenzContest,
+    OdeContest,
+    run_contest,
+    standings,
+)
+
+CONTESTS = [OdeContest(24, 1, 0.02, 0.5), LorenzContest(4, 0.1), FlowContest("Chen", "64 values")]
+
+
+@pytest.mark.parametrize("contest", CONTESTS, ids=lambda contest: type(contest).__name__)
+def test_data_repeat_and_depend_on_the_seed(contest):
+    one, again = contest.data(), contest.data()
+    np.testing.assert_array_equal(one.x, again.x)
+    other = type(contest)(**vars(contest) | {"seed": 5}).data()
+    assert one.x.shape == other.x.shape
+    assert (one.x != other.x).any()
+
+
+def test_odebench_is_corrupted_as_it_is_published():
+    data = OdeContest(24, 1, noise=0.02, dropped=0.5).data()
+    assert len(data.t) == len(data.x) == 256
+    assert set(data.t) <= set(TIMES)
+    assert (np.diff(data.t) > 0).all()
+    clean = OdeContest(24, 1).data()
+    kept = np.isin(TIMES, data.t)
+    ratio = data.x[1:] / clean.x[kept][1:]  # it starts at x = 0
+    assert ratio.std() == pytest.approx(0.02, rel=0.15)
+    assert OdeContest(28).data().truth is None
+    tight = OdeContest(24, 1, tight=True).data().x
+    exact = 0.2 * np.cos(np.sqrt(2.1) * TIMES)
+    assert np.abs(tight[:, 1] - exact).max() < 1e-9
+    assert 1e-7 < np.abs(clean.x[:, 1] - exact).max() < 1e-4
+
+
+def test_the_lorenz_grid_is_that_of_its_authors():
+    data = LorenzContest(7, 0.4, seed=3).data()
+    assert len(data.t) == 700
+    assert data.degree == 2
+    clean = SYSTEMS["Lorenz"].simulate(data.t, (-8, 8, 27))
+    assert (data.x - clean).std() == pytest.approx(0.4 * 12.75, rel=0.1)
+
+
+@pytest.mark.parametrize("error", [*ERRORS, *MOTIONS])
+def test_flows_are_seen_from_one_origin_whatever_the_error(error):
+    contest = FlowContest("Lorenz", error, samples=300)
+    data = contest.data()
+    clean = SYSTEMS["Lorenz"].trajectory(300)[1]
+    shift = (data.x - clean).mean(axis=0)
+    origin = FlowContest("Lorenz", "drift 0.2 %", samples=300).data().truth
+    np.testing.assert_array_equal(data.truth.coefficients, origin.coefficients)
+    start = data.truth(clean[0] + np.round(shift, 1))
+    assert np.isfinite(start).all()
+    assert (data.x - clean - shift).any()
+
+
+def test_flows_have_the_period_that_is_written_down():
+    for name, flow in FLOWS.items():
+        if name not in SYSTEMS:
+            _, x = flow.trajectory(3000)
+            rates = flow(x) / x.std(axis=0)
+            period = 2 * np.pi / np.sqrt((rates**2).mean(axis=0).mean())
+            assert 0.5 < flow.period / period < 2, name
+
+
+def test_bad_contests_are_refused():
+    with pytest.raises(ValueError, match="flow: must be one of .* got 'Lorentz'"):
+        FlowContest("Lorentz", "drift 0.2 %")
+    with pytest.raises(ValueError, match="error: must be one of .* got 'noise'"):
+        FlowContest("Lorenz", "noise")
+    with pytest.raises(ValueError, match="methods: must be one of .* got 'Model-A'"):
+        run_contest(LorenzContest(4, 0.1, methods=("Model-A",)))
+
+
+def test_outcomes_are_counted(monkeypatch):
+    """Of a right law, a wrong one, and none at all."""
+    truth = LorenzContest(4, 0.1).data().truth
+
+    def find(method, t, x, systematic, seed, degree):
+        if method == "PySINDy":
+            raise ValueError("x: is too short")
+        return truth if method == "ours" else truth.shift((1, 0, 0))
+
+    monkeypatch.setattr(scoreboard, "find_law", find)
+    outcomes = run_contest(LorenzContest(4, 0.1, methods=("ours", "PySINDy", "E-SINDy")))
+    table = standings([outcomes])
+    assert list(table.exact) == [True, False, False]
+    assert list(table.status) == ["silent", "refused", "silent"]
+    assert table.condition.unique() == ["noise 10 %"]
+    assert not table["wrong, ok"].any()
+
+
+def test_a_law_that_is_right_follows_the_motion_and_one_that_blows_up_does_not():
+    data = OdeContest(54, tight=True).data()
+    assert scoreboard._r2(data.truth, *data.clean) > 0.99
+    runaway = data.truth.shift((0, 0, 0))
+    wild = type(runaway).from_terms({"x": {"x^3": 1}, "y": {"y": 1}, "z": {"1": 1}})
+    assert scoreboard._r2(wild, *data.clean) == -np.inf
+
+
+@pytest.mark.slow
+def test_a_contest_with_all_methods():
+    contest = LorenzContest(4, 0.025, methods=scoreboard.CONTESTANTS)
+    table = standings([run_contest(contest)]).set_index("method")
+    assert table.exact["ours"]
+    assert table.status.to_dict() == {
+        "ours": "ok", "PySINDy": "silent", "E-SINDy": "silent", "WeakSINDy": "silent"
+    }  # fmt: skip
+    assert (table.seconds > 0).all()
+
+
+def test_published_rates():
+    grid = rivals.LORENZ_GRID
+    assert grid.rates.shape == (len(grid.levels), len(grid.lengths)) == (16, 7)
+    assert grid.rates.mean() == pytest.approx(0.787, abs=5e-4)
+    levels = np.isin(np.round(grid.levels, 3), (0.1, 0.2, 0.25, 0.3, 0.4))
+    assert grid.rates[levels].mean() == pytest.approx(0.735, abs=5e-4)
+    assert rivals.R2_RATES["SINDy"][0.05, 0.5] == pytest.approx(0.095)
+    assert np.isnan(rivals.R2_RATES["ODEFormer"][0.02, 0.0])
+    assert all(len(row) == 5 for row in rivals.R2_RATES.values())

@@ -1,0 +1,156 @@
+"""Beyond the library: whether terms of higher degree explain what a law leaves of its data.
+
+A cubic imitates a sine, the drag of air or the pull of a planet on the path that was recorded, and
+nowhere else. What it leaves is small but follows the state, so that terms of the next two degrees
+explain it: Rao's score test, of all of them together and of the best of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from ..arrays import Floats, Ints
+from .collocation import Fit
+from .library import monomial_exponents
+from .problem import Problem
+from .selection import inverse
+
+HIGHER = 2
+"""Degrees beyond that of the library: an odd function needs two."""
+BUDGET = 2e7
+"""Most entries of the derivatives of the data in the terms that are tried."""
+CHANCE_OF_ALL, CHANCE_OF_ONE = 1e-4, 1e-3
+"""Probability below which what all higher terms explain, or the best of them, is no chance."""
+MOST = 0.9
+"""Share of what is left that a term explains which a law lacks: errors that last, of an integrator
+or a lens, are spread over several (up to two thirds were seen)."""
+DEPENDENT = 1e-9
+"""Share of a term that those of the law leave, below which they have it already."""
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """What terms of higher degree would explain.
+
+    Parameters
+    ----------
+    gain, best : float
+        What all of them lower the objective by, in chi-square units, and what the best does.
+    count : int
+        How many there are.
+    left : float
+        The objective, of which they explain a part.
+    term : str
+        The best of them, and its equation.
+    """
+
+    gain: float
+    best: float
+    count: int
+    left: float
+    term: str
+
+    @property
+    def significant(self) -> bool:
+        """Whether that is more than chance makes."""
+        return bool(self.count and (self._all or self._one))
+
+    @property
+    def decisive(self) -> bool:
+        """Whether one term explains nearly all that is left, be that noise or not."""
+        return bool(self.count and self._one and self.best > MOST * self.left)
+
+    @property
+    def _all(self) -> bool:
+        return bool(chi2.sf(self.gain, self.count) < CHANCE_OF_ALL)
+
+    @property
+    def _one(self) -> bool:
+        return bool(chi2.sf(self.best, 1) * self.count < CHANCE_OF_ONE)
+
+
+def beyond(problem: Problem, fit: Fit) -> Beyond:
+    """The score test of the terms beyond a polynomial library, at the last fit."""
+    size, form = len(problem.exponents), problem.form
+    equations = np.flatnonzero(form.candidates.any(axis=0))
+    budget = BUDGET / fit.collocation.grid.x.size / len(equations)
+    exponents = _widened(problem.exponents, form.degree, budget)
+    l, new = len(exponents), len(exponents) - size
+
+    def padded(array: NDArray[Any]) -> NDArray[Any]:
+        return np.vstack([array, np.zeros((new, array.shape[1]), array.dtype)])
+
+    # With a known part of its own shape: a collocation is made for its library.
+    known = padded(fit.collocation.known)
+    collocation = replace(fit.collocation, exponents=exponents, known=known)
+    state = replace(
+        fit.state,
+        coefficients=padded(fit.state.coefficients),
+        active=padded(fit.state.active),
+        shared=None,
+    )
+    own = np.flatnonzero(state.free())
+    extra = np.concatenate([j * l + np.arange(size, l) for j in equations.tolist()])
+    model = collocation.linearise(state, np.concatenate([own, extra]))
+    gain = float(model.newton()[1] - model.fall)
+    single = _single_gains(model.information, model.gradient, len(own))
+    place = int(single.argmax()) if new else 0
+    law = problem.law(fit.state)
+    term = ""
+    if new:
+        names = replace(law, exponents=exponents, coefficients=np.zeros((l, problem.d))).terms
+        equation = law.names[equations[place // new]]
+        term = f"{names[size + place % new]} in d{equation}/dt"
+    return Beyond(
+        gain=gain,
+        best=float(single.max(initial=0.0)),
+        count=len(extra),
+        left=float(collocation.objective(state)),
+        term=term,
+    )
+
+
+def _widened(exponents: Ints, degree: int, budget: float) -> Ints:
+    """A library with the monomials of the next degrees; of few variables each, if they are many."""
+    d = exponents.shape[1]
+    higher = monomial_exponents(d, degree + HIGHER)
+    higher = higher[higher.sum(axis=1) > degree]
+    for variables in (d, 2, 1):
+        kept = higher[(higher > 0).sum(axis=1) <= variables]
+        if len(kept) <= budget:
+            return np.concatenate([exponents, kept])
+    return exponents
+
+
+def _single_gains(information: Floats, gradient: Floats, own: int) -> Floats:
+    """What each further column explains by itself, if the first ``own`` are fitted anew."""
+    response = inverse(information[:own, :own]) @ information[:own, own:]
+    left = gradient[own:] - gradient[:own] @ response
+    whole = np.diag(information)[own:]
+    apart = whole - (information[:own, own:] * response).sum(axis=0)
+    new = apart > DEPENDENT * whole
+    return np.where(new, left**2 / np.where(new, apart, 1.0), 0.0)
+
+
+def beyond_the_library(problem: Problem, fit: Fit, noisy: bool) -> Iterator[str]:
+    """A warning if the law is an approximation on these data.
+
+    Errors that last may follow the state, too; they are no reason to doubt, unless a single term
+    explains nearly all of them. What is ``noisy`` has errors of single samples.
+    """
+    if not problem.law(fit.state).is_polynomial:
+        return  # whose library was chosen
+    found = beyond(problem, fit)
+    if found.decisive or (noisy and found.significant):
+        yield (
+            f"terms of higher degree explain what the law leaves ({found.term}: chi-square "
+            f"{found.best:.0f}, all {found.count} together {found.gain:.0f}): it may be an "
+            "approximation along these data, as of a sine or a drag; raise the degree, or name "
+            "its terms with library="
+        )

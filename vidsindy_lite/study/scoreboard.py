@@ -1,0 +1,370 @@
+"""The scoreboard: benchmarks that others use, and errors that are no white noise.
+
+A contest is data, as a frozen dataclass that says how they are made, and the methods that get
+them::
+
+    outcomes = sweep(run_contest, [FlowContest("Lorenz", "drift 0.2 %"), ...])
+    table = standings(outcomes)
+
+* `OdeContest`: an equation of ODEBench from one of its two starts;
+* `LorenzContest`: a cell of the Lorenz grid, noise against length;
+* `FlowContest`: a chaotic flow with one of the `ERRORS` or `MOTIONS`.
+
+All methods get the same samples, the same degree and the defaults; the thresholds of the baselines
+are chosen by one rule, without the truth (see `baselines`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats
+from ..checks import check_choice
+from ..dynamics import PolynomialSystem
+from . import corruption
+from .metrics import score
+from .odebench import ODEBENCH, TIMES
+from .systems import FLOWS, Benchmark
+from .trials import METHODS, find_law
+
+if TYPE_CHECKING:  # pandas is imported where a frame is made
+    from pandas import DataFrame
+
+CONTESTANTS = METHODS[:4]
+"""Ours, and the baselines of the paper."""
+
+# --------------------------------------------------------------------------------- kinds of errors
+
+Error = Callable[[Floats, np.random.Generator], Floats]
+
+
+def _outliers(x: Floats, rng: np.random.Generator) -> Floats:
+    return corruption.add_outliers(corruption.add_noise(x, 0.02, rng), 0.02, rng)
+
+
+ERRORS: dict[str, Error] = {
+    "white noise 20 %": lambda x, rng: corruption.add_noise(x, 0.2, rng),
+    "noise that grows 5 %": lambda x, rng: corruption.add_proportional_noise(x, 0.05, rng),
+    "outliers 2 %": _outliers,
+    "correlated noise 5 %": lambda x, rng: corruption.add_correlated_noise(x, 0.05, rng),
+    "averaged noise 5 %": lambda x, rng: corruption.add_averaged_noise(x, 0.05, rng),
+    "64 values": lambda x, rng: corruption.quantise(x, 1 / 64, rng),
+    "clock jitter 30 %": lambda x, rng: corruption.jitter(x, 0.3, rng),
+    "drift 0.2 %": lambda x, rng: corruption.add_drift(x, 0.002, rng),
+    "bent space 0.3 %": lambda x, rng: corruption.distort(x, 0.003, rng),
+}
+"""Errors of a measurement; a percentage is that of the spread (of the signal for noise that grows,
+of the samples for outliers, of the step for jitter, of the range for bent space)."""
+
+Motion = Callable[[Benchmark, Floats, Floats, np.random.Generator], Floats]
+
+
+def _coarse(flow: Benchmark, t: Floats, spread: Floats, rng: np.random.Generator) -> Floats:
+    tolerance = 1e-4
+    return corruption.coarse_path(
+        flow, t, flow.x0, "RK45", rtol=tolerance, atol=tolerance * float(spread.min())
+    )
+
+
+def _kicked(level: float) -> Motion:
+    def path(flow: Benchmark, t: Floats, spread: Floats, rng: np.random.Generator) -> Floats:
+        return corruption.kicked_path(flow, t, flow.x0, level * spread / flow.period**0.5, rng)
+
+    return path
+
+
+MOTIONS: dict[str, Motion] = {
+    "coarse steps": _coarse,
+    "kicks 1 %": _kicked(0.01),
+    "kicks 5 %": _kicked(0.05),
+}
+"""Motions that are not quite those of the law: a careless integrator, kicks in percent of the
+spread a period."""
+
+# --------------------------------------------------------------------------------------- contests
+
+
+class Data(NamedTuple):
+    """What the methods get, and what they cannot see.
+
+    Parameters
+    ----------
+    t, x : ndarray, shapes (n,) and (n, d)
+    degree : int
+        Of the candidate terms.
+    truth : PolynomialSystem or None
+        None if no polynomial is right.
+    clean : tuple of ndarray, or None
+        Times and states of the motion without errors, if a law is to follow it from its start.
+    """
+
+    t: Floats
+    x: Floats
+    degree: int
+    truth: PolynomialSystem | None
+    clean: tuple[Floats, Floats] | None = None
+
+
+@dataclass(frozen=True)
+class OdeContest:
+    """An equation of ODEBench, with its noise and its dropped samples.
+
+    Parameters
+    ----------
+    number : int
+        Of the equation.
+    start : int
+        Which of its two initial states.
+    noise : float
+        Samples are multiplied by ``1 + noise * normal``.
+    dropped : float
+        Share of the samples that are left out.
+    tight : bool
+        Integrated to twelve digits; else as the stored trajectories of the benchmark are.
+    methods : tuple of str
+        Of `CONTESTANTS`.
+    seed : int
+    """
+
+    number: int
+    start: int = 0
+    noise: float = 0.0
+    dropped: float = 0.0
+    tight: bool = False
+    methods: tuple[str, ...] = ("ours",)
+    seed: int = 0
+
+    @property
+    def condition(self) -> str:
+        """The same for all that belong to one row of a table."""
+        words = ["exact" if self.tight else "stored"]
+        words += [f"noise {100 * self.noise:g} %"] if self.noise else []
+        words += [f"{100 * self.dropped:g} % dropped"] if self.dropped else []
+        return ", ".join(words)
+
+    @property
+    def name(self) -> str:
+        return f"{self.number} {ODEBENCH[self.number].name}"
+
+    def data(self) -> Data:
+        """As the benchmark makes them."""
+        equation = ODEBENCH[self.number]
+        x0 = equation.starts[self.start]
+        if self.tight and equation.law is not None:
+            clean = equation.law.simulate(TIMES, np.array(x0))
+        else:
+            clean = corruption.coarse_path(equation.rate, TIMES, x0)
+        rng = np.random.default_rng([self.seed, self.number, self.start])
+        kept = np.sort(rng.permutation(len(TIMES))[: round((1 - self.dropped) * len(TIMES))])
+        x = corruption.add_proportional_noise(clean[kept], self.noise, rng)
+        return Data(TIMES[kept], x, 3, equation.law, (TIMES, clean))
+
+
+@dataclass(frozen=True)
+class LorenzContest:
+    """A draw of the Lorenz grid: start (-8, 8, 27), steps of 0.01, degree 2.
+
+    Parameters
+    ----------
+    length : float
+        Time units.
+    noise : float
+        Standard deviation over that of all coordinates together.
+    seed : int
+    methods
+        See `OdeContest`.
+    """
+
+    length: float
+    noise: float
+    seed: int = 0
+    methods: tuple[str, ...] = ("ours",)
+
+    @property
+    def condition(self) -> str:
+        return f"noise {100 * self.noise:g} %"
+
+    @property
+    def name(self) -> str:
+        return f"{self.length:g} time units"
+
+    def data(self) -> Data:
+        law = FLOWS["Lorenz"]
+        t = np.arange(round(100 * self.length)) / 100
+        clean = law.simulate(t, np.array([-8.0, 8.0, 27.0]))
+        rng = np.random.default_rng([self.seed, round(1000 * self.noise), round(100 * self.length)])
+        return Data(t, clean + self.noise * clean.std() * rng.standard_normal(clean.shape), 2, law)
+
+
+@dataclass(frozen=True)
+class FlowContest:
+    """A chaotic flow with errors of one kind, seen from an origin that nobody knows.
+
+    Parameters
+    ----------
+    flow : str
+        Of `FLOWS`.
+    error : str
+        Of `ERRORS` or `MOTIONS`.
+    samples : int
+        A hundred a period.
+    methods, seed
+        See `OdeContest`.
+    """
+
+    flow: str
+    error: str
+    samples: int = 1500
+    methods: tuple[str, ...] = ("ours",)
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_choice("flow", self.flow, FLOWS)
+        check_choice("error", self.error, (*ERRORS, *MOTIONS))
+
+    @property
+    def condition(self) -> str:
+        return self.error
+
+    @property
+    def name(self) -> str:
+        return self.flow
+
+    def data(self) -> Data:
+        flow = FLOWS[self.flow]
+        rng = np.random.default_rng([self.seed, *f"{self.flow} {self.error}".encode()])
+        t, x = flow.trajectory(self.samples)
+        spread = x.std(axis=0)
+        if self.error in MOTIONS:
+            x = MOTIONS[self.error](flow, t, spread, rng)
+        # Up to two standard deviations away, with few digits, the same for all errors.
+        place = np.random.default_rng([self.seed, *self.flow.encode()]).uniform(-2, 2, flow.d)
+        origin = np.round(place * spread, 2)
+        x = x + origin
+        return Data(
+            t, ERRORS[self.error](x, rng) if self.error in ERRORS else x, 3, flow.shift(origin)
+        )
+
+
+Contest = OdeContest | LorenzContest | FlowContest
+
+# --------------------------------------------------------------------------------------- outcomes
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a method made of a contest.
+
+    Parameters
+    ----------
+    contest : Contest
+    method : str
+    law : PolynomialSystem or None
+        None if it was refused.
+    exact : bool
+        Every true term and no other.
+    status : str
+        ``"ok"``, ``"suspect"`` or ``"refused"``; ``"silent"`` if the method does not say.
+    seconds : float
+        Of processor time.
+    r2 : float
+        Of the law's path from the true start, all coordinates together; NaN where nobody asks,
+        -inf if it ends.
+    """
+
+    contest: Contest
+    method: str
+    law: PolynomialSystem | None
+    exact: bool
+    status: str
+    seconds: float
+    r2: float = np.nan
+
+
+def run_contest(contest: Contest) -> tuple[Outcome, ...]:
+    """Let all methods of a contest find the law.
+
+    Parameters
+    ----------
+    contest : OdeContest, LorenzContest or FlowContest
+
+    Returns
+    -------
+    tuple of Outcome
+        In the order of the methods.
+    """
+    data = contest.data()
+    return tuple(_outcome(contest, method, data) for method in contest.methods)
+
+
+def _outcome(contest: Contest, method: str, data: Data) -> Outcome:
+    check_choice("methods", method, CONTESTANTS)
+    began = time.process_time()
+    try:
+        found = find_law(method, data.t, data.x, None, contest.seed, data.degree)
+    except ValueError:  # of data that no law can be found from
+        return Outcome(contest, method, None, False, "refused", time.process_time() - began)
+    seconds = time.process_time() - began
+    law = found if isinstance(found, PolynomialSystem) else found.system
+    return Outcome(
+        contest,
+        method,
+        law,
+        exact=data.truth is not None and score(law, data.truth).exact,
+        status="silent" if isinstance(found, PolynomialSystem) else found.status,
+        seconds=seconds,
+        r2=np.nan if data.clean is None else _r2(law, *data.clean),
+    )
+
+
+def _r2(law: PolynomialSystem, t: Floats, clean: Floats) -> float:
+    """Explained share of the variance of a clean path, by the law's path from the same start."""
+    try:
+        path = corruption.coarse_path(law, t, clean[0])
+    except ValueError:
+        return -np.inf
+    return float(1 - ((path - clean) ** 2).sum() / ((clean - clean.mean(axis=0)) ** 2).sum())
+
+
+def standings(outcomes: Iterable[Sequence[Outcome]]) -> DataFrame:
+    """Outcomes as a frame, one row each.
+
+    Parameters
+    ----------
+    outcomes : iterable of sequence of Outcome
+        As a sweep of `run_contest` gives them.
+
+    Returns
+    -------
+    DataFrame
+        Columns: condition, name, level (noise and share dropped, of ODEBench), inside (the library
+        holds the law), method, exact, status, seconds, r2; and the two ways in which a status can
+        be wrong, "wrong, ok" and "exact, doubted".
+    """
+    import pandas
+
+    return pandas.DataFrame([_row(one) for contest in outcomes for one in contest])
+
+
+def _row(one: Outcome) -> dict[str, object]:
+    contest, level, inside = one.contest, None, True
+    if isinstance(contest, OdeContest):
+        level, inside = (contest.noise, contest.dropped), ODEBENCH[contest.number].is_cubic
+    return {
+        "condition": contest.condition,
+        "name": contest.name,
+        "level": level,
+        "inside": inside,
+        "method": one.method,
+        "exact": one.exact,
+        "status": one.status,
+        "wrong, ok": not one.exact and one.status == "ok",
+        "exact, doubted": one.exact and one.status == "suspect",
+        "seconds": one.seconds,
+        "r2": one.r2,
+    }
