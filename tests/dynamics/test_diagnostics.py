@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.collocation import Collocation, State, Status
+from vidsindy_lite.dynamics.collocation import Collocation, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
 from vidsindy_lite.dynamics.persistence import Plateau, follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import Units, pose
 from vidsindy_lite.dynamics.splines import DEGREE, Segment
+from vidsindy_lite.dynamics.state import State
 from vidsindy_lite.dynamics.trajectories import check_trajectories
 from vidsindy_lite.study import SYSTEMS, corruption
 

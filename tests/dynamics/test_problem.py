@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.collocation import Fit, State, Status
+from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.errors import residual_noise
 from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
 from vidsindy_lite.dynamics.search import _candidate, _closed, _variants
+from vidsindy_lite.dynamics.state import State
 
 
 def posed(noise=0.0, seen=slice(None)):

@@ -5,10 +5,11 @@ import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import PolynomialSystem
-from vidsindy_lite.dynamics.collocation import Collocation, Fit, State, Status
+from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.process_noise import evidence
 from vidsindy_lite.dynamics.splines import Segment
+from vidsindy_lite.dynamics.state import State
 
 LAW = PolynomialSystem.from_terms(
     {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3

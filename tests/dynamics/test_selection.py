@@ -7,8 +7,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from vidsindy_lite.dynamics import selection
 from vidsindy_lite.dynamics.selection import (
+    _moved_by_newcomers,
     _Quadratic,
+    _single_changes,
     _Tableau,
     closest_rival,
     equilibrated,
@@ -153,25 +156,25 @@ def test_the_closest_rival_is_priced_as_it_is():
     assert cost > 9
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(2, 8))
-def test_the_update_for_a_newcomer_is_a_fit_with_it(seed, m):
+@given(st.integers(0, 2**32 - 1), st.integers(2, 8), st.floats(0.1, 100), st.integers(1, 2))
+def test_a_newcomer_moves_others_if_a_fit_with_it_says_so(seed, m, price, batches):
     information, pull, rng = random_problem(seed, m)
-    model = _Quadratic.of(information, pull, rng.standard_normal(m), np.ones(m))
+    model = _Quadratic.of(information, pull, rng.standard_normal(m), np.full(m, price))
     support = rng.random(m) < 0.5
     assume(not support.all())
     before = _Tableau.of(model, model.fit(support))
-    number = int(rng.integers(len(before.outside)))
-    support[before.outside[number]] = True
-    updated, direct = before.joined(model, number), _Tableau.of(model, model.fit(support))
-    stays = np.isin(direct.inside, before.inside)
-    np.testing.assert_array_equal(updated.outside, direct.outside)
-    for name in ("left", "room"):
-        expected = getattr(direct, name)
-        np.testing.assert_allclose(getattr(updated, name), expected, rtol=1e-5, atol=1e-6)
-    for name in ("fitted", "spread"):
-        expected = getattr(direct, name)[stays]
-        np.testing.assert_allclose(getattr(updated, name), expected, rtol=1e-5, atol=1e-6)
-    np.testing.assert_allclose(updated.response, direct.response[:, stays], rtol=1e-5, atol=1e-6)
+    assume((before.room > 1e-6).all())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(selection, "BATCH", 10**6 if batches == 1 else 1)
+        moved = _moved_by_newcomers(model, before)
+    for number, entry in enumerate(before.outside):
+        joined = support.copy()
+        joined[entry] = True
+        fixed = model.forced(entry)
+        changes = _single_changes(fixed, _Tableau.of(fixed, fixed.fit(joined)))
+        least = min(cost for cost, _, _ in changes)
+        assume(abs(least) > 1e-4)
+        assert moved[number] == (least < 0)
 
 
 def test_a_penalty_of_minus_infinity_keeps_a_worthless_column():

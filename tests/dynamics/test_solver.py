@@ -1,5 +1,7 @@
 """Discovery: exact recovery, its uncertainty, its warnings, bad input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import kstest
@@ -202,18 +204,23 @@ def test_same_seed_same_result():
     assert (first.covariance == second.covariance).all()
 
 
-def test_the_progress_bar_reaches_its_end(monkeypatch):
-    bars = []
+@pytest.mark.parametrize("again", [0, 1, 2])
+def test_the_progress_bar_moves_through_all_searches_to_its_end(monkeypatch, again):
+    bars, weighed = [], iter(range(again))
 
     class Bar(solver.tqdm):
         def close(self):
             bars.append((self.n, self.total))
             super().close()
 
+    def another(problem, fit):
+        return problem if next(weighed, None) is None else replace(problem)
+
     monkeypatch.setattr(solver, "tqdm", Bar)
+    monkeypatch.setattr(solver, "with_precision", another)
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
-    assert bars[0] == (3, 3)
+    assert bars[0] == (2 + again, 2 + again)
 
 
 def test_history_tells_the_fit(lorenz):

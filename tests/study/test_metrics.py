@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vidsindy_lite.dynamics import PolynomialSystem
+from vidsindy_lite.dynamics import Library, PolynomialSystem
 from vidsindy_lite.study.metrics import pulls, score, term_errors, trajectory_error
 from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
 
@@ -126,6 +126,13 @@ def test_text_of_a_score():
 def test_what_is_no_law_is_refused():
     with pytest.raises(ValueError, match=r"found: must be a PolynomialSystem \(.*\), got 1"):
         score(1, SYSTEMS["Lorenz"])
+
+
+def test_laws_of_other_functions_are_not_compared():
+    sine = PolynomialSystem.from_terms({"x": {"sin(x)": -1.0}}, library=Library.fourier())
+    with pytest.raises(ValueError, match="found: must have a library with the functions"):
+        score(PolynomialSystem.from_terms({"x": {"x": -1.0}}), sine)
+    assert score(sine, sine).terms_found
 
 
 def test_swapped_arguments_are_told():

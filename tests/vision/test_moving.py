@@ -232,6 +232,15 @@ def test_the_toss():
 
 
 @pytest.mark.slow
+def test_the_can():
+    path = real("can_1")
+    truth = np.genfromtxt(path.with_suffix(".csv"), delimiter=",", skip_header=1)[:, 1:]
+    off = (track(path).in_frames - truth)[67:]  # before, the reference has lost the can
+    error = np.linalg.norm(off - np.nanmedian(off, axis=0), axis=1)
+    assert (error < 6).mean() >= 0.95
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "first"), [("diabolo", 15), ("pendulum", 17)])
 def test_clips_without_reference_have_smooth_tracks(name, first):
     found = track(real(name))

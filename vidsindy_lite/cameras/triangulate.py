@@ -55,10 +55,6 @@ class Views:
             ),
         )
 
-    def only(self, frames: Ints) -> Views:
-        """What was seen in these frames, each taken once."""
-        return Views.of([track[np.unique(frames)] for track in self.tracks])
-
     @property
     def frames(self) -> int:
         """Number of frames."""

@@ -18,7 +18,7 @@ beside the way: cramer_rao, the least errors that any estimate could have
 """
 
 from .candidates import Library, check_library
-from .collocation import Collocation, State, Status
+from .collocation import Collocation, Status
 from .cramer_rao import cramer_rao
 from .discovery import Discovery
 from .integrate import runge_kutta_4
@@ -34,4 +34,5 @@ from .sindy import SplineSINDy
 from .smoothing import smooth
 from .solver import discover
 from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis
+from .state import State
 from .trajectories import Trajectory, check_trajectory, cut, typical_step

@@ -93,6 +93,7 @@ def beyond(problem: Problem, fit: Fit) -> Beyond:
         fit.state,
         coefficients=padded(fit.state.coefficients),
         active=padded(fit.state.active),
+        shared=None,
     )
     own = np.flatnonzero(state.free())
     extra = np.concatenate([j * l + np.arange(size, l) for j in equations.tolist()])
@@ -143,7 +144,7 @@ def beyond_the_library(problem: Problem, fit: Fit, noisy: bool) -> Iterator[str]
     Errors that last may follow the state, too; they are no reason to doubt, unless a single term
     explains nearly all of them. What is ``noisy`` has errors of single samples.
     """
-    if problem.form.functions:
+    if not problem.law(fit.state).is_polynomial:
         return  # whose library was chosen
     found = beyond(problem, fit)
     if found.decisive or (noisy and found.significant):

@@ -12,13 +12,14 @@ from scipy.stats import chi2
 
 from ..arrays import Floats
 from .beyond import beyond_the_library
-from .collocation import CLEANEST, Fit, Linearisation, State, Status
+from .collocation import CLEANEST, Fit, Linearisation, Status
 from .errors import residual_noise
 from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
 from .selection import closest_rival
 from .shape import cancelling, shapes
+from .state import State
 from .trajectories import Trajectory, typical_step
 
 MISFIT = 1.5

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats
-from .collocation import Fit, Linearisation, State
+from .collocation import Fit, Linearisation
 from .errors import effective_noise, residual_noise
 from .problem import Problem
 from .selection import minimiser, subset_search
+from .state import State
 
 TOLERATED = 0.03
 """Error that a first search tolerates, relative to the spread of the data: finer terms come after

@@ -11,18 +11,20 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline, make_lsq_spline
+from scipy.interpolate import BSpline
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
 from .candidates import Library
-from .collocation import CLEANEST, Collocation, Fit, State
+from .collocation import CLEANEST, Collocation, Fit
 from .errors import effective_noise, spread_to_unseen
 from .form import Form
 from .library import Function, extended, law_variables, monomials
 from .polynomials import PolynomialSystem
 from .smoothing import smooth
-from .splines import DEGREE, Segment, clamped_knots
+from .splines import DEGREE, Segment, basis, clamped_knots, normal_band
+from .state import State
 from .trajectories import Trajectory, cut, typical_step
 
 FALSE_ALARM = 0.004
@@ -399,9 +401,9 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
     for segment, curve in zip(collocation.segments, curves, strict=True):
         b = segment.breakpoints
         dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
-        control.append(
-            make_lsq_spline(dense, curve(dense), clamped_knots(b), DEGREE, method="norm-eq").c
-        )
+        rows = basis([clamped_knots(b)], np.array([0, len(b) + 2]), [dense])
+        factor = cholesky_banded(normal_band(rows), lower=True)
+        control.append(cho_solve_banded((factor, True), rows.T @ curve(dense)))
     return np.concatenate(control)
 
 

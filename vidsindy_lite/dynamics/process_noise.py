@@ -16,10 +16,11 @@ import numpy as np
 from scipy.linalg import cho_solve_banded
 
 from ..arrays import Bools, Floats
-from .collocation import CLEANEST, Collocation, Fit, State
+from .collocation import CLEANEST, Collocation, Fit
 from .errors import prediction_gain, residual_noise
 from .problem import Problem, fit_curves
 from .splines import Segment
+from .state import State
 
 PROBES = 8
 """Random vectors of a trace (Hutchinson): they leave an error of a hundredth at 1,500 samples."""

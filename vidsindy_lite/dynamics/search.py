@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import Bools, Floats
-from .collocation import Collocation, Fit, State
+from .collocation import Collocation, Fit, Status
 from .discovery import History
 from .gaps import Gap, gaps, join
 from .library import closure_mask, divides, shift_matrix
@@ -23,17 +23,24 @@ from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
 from .problem import Problem, fit_curves
 from .selection import subset_search
+from .state import State
+from .trajectories import Trajectory
 
 FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
 """Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
 SEARCH_WEIGHTS = (1e2, 1e4, 1e8)
 """Physics weights of the subset searches in the law's own frame."""
+REFINED = 3
+"""Most candidates that are refined."""
 FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
 NEEDLESS_START = 0.1
 """Chance that a second start, from terms of all degrees, is made though the first left nothing."""
 FAINT = 0.02
 """What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
+ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
+"""A search is made on so many samples and turns of the motion, if they are no more than that share
+of the data."""
 LONGEST_SEARCH = 10
 """Most rounds of a subset search."""
 CONSISTENT = 1.5
@@ -46,18 +53,47 @@ def search(problem: Problem, rng: np.random.Generator, history: History) -> Fit:
     """The terms that make the motion: the cheapest law at a tolerated error.
 
     If the law leaves larger errors than were tolerated, or errors that last, the search is made
-    again and tolerates them. Kicks are tolerated as they are.
+    again and tolerates them. Kicks are tolerated as they are. Long data are searched in part: all
+    of them then decide on the terms once more.
     """
     tolerated = problem.noise if problem.kicked else np.maximum(problem.noise, TOLERATED)
+    stretches = _enough(problem)
     for _ in range(LONGEST_CLIMB):
         tolerant = replace(problem, noise=tolerated)
-        found = candidates(tolerant, rng, history)
-        fit = bridge(tolerant, cheapest(tolerant, found, history), history)
+        part = replace(tolerant, stretches=stretches)
+        fit = cheapest(part, candidates(part, rng, history), history)
+        if stretches is not problem.stretches:
+            fit = _of_all_data(tolerant, fit, history)
+        fit = bridge(tolerant, fit, history)
         left = problem.errors(fit)
         if (left <= CONSISTENT * tolerated).all() or (tolerated >= LARGEST).all():
             break
         tolerated = np.maximum(tolerated, np.minimum(left, LARGEST))
     return fit
+
+
+def _enough(problem: Problem) -> list[tuple[int, Trajectory]]:
+    """The stretches of data, or of long ones so much of each as a search needs."""
+    samples = sum(len(t) for _, (t, _) in problem.stretches)
+    time = sum(t[-1] - t[0] for _, (t, _) in problem.stretches)
+    share = max(ENOUGH_SAMPLES / samples, ENOUGH_TURNS * 2 * np.pi / time)
+    if share > LARGEST_SHARE:
+        return problem.stretches
+    cut = []
+    for i, (t, x) in problem.stretches:
+        end = t[0] + max(share * (t[-1] - t[0]), 2 * np.pi)
+        cut.append((i, (t[t <= end], x[t <= end])))
+    return cut
+
+
+def _of_all_data(problem: Problem, fit: Fit, history: History) -> Fit:
+    """A law of a part of the data on all of them, its terms searched again."""
+    collocation = problem.collocation(problem.segments())
+    state = replace(fit.state, control_points=fit_curves(collocation, problem.curves))
+    for weight in SEARCH_WEIGHTS:
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=10)
+        state = fit.state
+    return select(problem, fit, FINAL_WEIGHT, "subset search, all data", history)
 
 
 def candidates(problem: Problem, rng: np.random.Generator, history: History) -> list[Fit]:
@@ -73,8 +109,13 @@ def candidates(problem: Problem, rng: np.random.Generator, history: History) -> 
     if implicit.any():
         starts["all"] = degrees <= degree
     for name, rows in starts.items():
-        fit = unpruned(problem, collocation, control, rows, f"unpruned, {name}", history)
-        found += _in_sparse_frames(problem, fit, rng, history)
+        stage = f"unpruned, {name}"
+        fit, weight = unpruned(problem, collocation, control, rows, stage, history)
+        here = _in_sparse_frames(problem, fit, weight, rng, history)
+        if weight < FIRST_WEIGHTS[-1]:
+            best = sorted(here, key=lambda candidate: candidate.criterion)[: REFINED - 1]
+            here = _climbed(problem, [_at_home(problem, fit), *best], weight, history)
+        found += here
         if not _leaves_something_over(problem, fit):
             break
     return found
@@ -87,8 +128,13 @@ def unpruned(
     rows: Bools,
     stage: str,
     history: History,
-) -> Fit:
-    """Fit all terms of some rows of the library, (l,), while the physics weight rises."""
+) -> tuple[Fit, float]:
+    """Fit all terms of some rows of the library, (l,), while the physics weight rises.
+
+    The last weight comes back, too. Many terms that the data hardly tell apart cannot be fitted at
+    a large one: such a fit does not converge, and even those before it lean on the terms. Then the
+    first fit is the start.
+    """
     d = problem.d
     x, slope = collocation.node_states(control)
     coefficients = np.zeros(problem.known.shape)
@@ -98,11 +144,28 @@ def unpruned(
     coefficients[~active] = 0.0
     still, shared = np.zeros(d, dtype=bool), problem.form.shared
     state = State(control, coefficients, active, np.zeros(d), still, shared)
+    fits: list[tuple[Fit, float]] = []
     for weight in FIRST_WEIGHTS:
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
         state = fit.state
         history.add(stage, problem, fit, weight)
-    return fit
+        fits.append((fit, weight))
+        if fit.status is not Status.CONVERGED:
+            return fits[0]
+    return fits[-1]
+
+
+def _at_home(problem: Problem, fit: Fit) -> Fit:
+    """The cheapest support where the data have their origin, from all terms of a fit."""
+    law = _as_shifted(problem, fit)
+    return _candidate(problem, fit, law, problem.home, np.zeros(problem.d, dtype=bool))
+
+
+def _climbed(problem: Problem, found: list[Fit], weight: float, history: History) -> list[Fit]:
+    """Candidates of a small physics weight, searched again while it rises."""
+    for higher in FIRST_WEIGHTS[FIRST_WEIGHTS.index(weight) :]:
+        found = [select(problem, fit, higher, "subset search, climbing", history) for fit in found]
+    return found
 
 
 def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
@@ -116,11 +179,10 @@ def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
 
 
 def _in_sparse_frames(
-    problem: Problem, fit: Fit, rng: np.random.Generator, history: History
+    problem: Problem, fit: Fit, weight: float, rng: np.random.Generator, history: History
 ) -> list[Fit]:
     """Supports in the frames where the law is sparsest, by the quadratic model."""
-    weight, stage = FIRST_WEIGHTS[-1], "subset search, centred frame"
-    fit = select(problem, fit, weight, stage, history)
+    fit = select(problem, fit, weight, "subset search, centred frame", history)
     closed, law = _closed(problem, fit, weight)
     x, movable = fit.collocation.grid.x, problem.form.movable
     low, high = (
@@ -157,10 +219,16 @@ def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]
     collocation = problem.weighted(fit.collocation, weight)
     # A law exact in another frame has no firm minimum here: some steps are near enough.
     closed = collocation.solve(state, tolerance=0.1, max_steps=8)
-    state, columns = closed.state, np.flatnonzero(closed.state.free())
-    information = np.diag(np.where(state.free()[:-d], 0.0, 1e30))
-    information[np.ix_(columns, columns)] = collocation.linearise(state, columns).information
-    return closed, ShiftedLaw(exponents, state.coefficients, information, problem.form.movable)
+    return closed, _as_shifted(problem, closed)
+
+
+def _as_shifted(problem: Problem, fit: Fit) -> ShiftedLaw:
+    """The law of a fit, whose terms are closed under shifts, with its information."""
+    state, columns = fit.state, np.flatnonzero(fit.state.free())
+    information = np.diag(np.where(state.free()[: -problem.d], 0.0, 1e30))
+    information[np.ix_(columns, columns)] = fit.collocation.linearise(state, columns).information
+    movable = problem.form.movable
+    return ShiftedLaw(problem.exponents, state.coefficients, information, movable)
 
 
 def _candidate(
@@ -222,7 +290,7 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
 def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
     """Refine the cheapest candidates; the lowest criterion wins."""
     ordered = sorted(found, key=lambda fit: fit.criterion)
-    kept = list({_key(fit.state): fit for fit in reversed(ordered)}.values())[::-1][:3]
+    kept = list({_key(fit.state): fit for fit in reversed(ordered)}.values())[::-1][:REFINED]
     for weight in SEARCH_WEIGHTS:
         refined = [
             select(problem, fit, weight, "subset search, own frame", history) for fit in kept

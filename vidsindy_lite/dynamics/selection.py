@@ -18,6 +18,8 @@ NONE = np.array([], dtype=int)
 """No entries."""
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
+BATCH = 1_000_000
+"""Most numbers of an array over newcomers, those outside and those inside."""
 PLATEAU = 1e-6
 """Changes of the function below this are taken for rounding."""
 NOTHING = 1e-250
@@ -180,16 +182,41 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """A lower value reached by forcing one entry in, which may let several others go."""
     tableau = _Tableau.of(model, best)
-    for i, entry in enumerate(tableau.outside):
-        # Most newcomers change nothing for the others, which a rank-one update tells.
-        if tableau.room[i] > COLLINEAR:
-            changes = _single_changes(model, tableau.joined(model, i))
-            if not min(cost for cost, _, _ in changes) < -PLATEAU:
-                continue
+    promising = _moved_by_newcomers(model, tableau)
+    for entry in tableau.outside[promising]:
         trial = _descend(model.forced(entry), _changed(best.support, NONE, entry))
         if trial.value + model.penalty[entry] < best.value - PLATEAU:
             return _descend(model, trial.support)
     return None
+
+
+def _moved_by_newcomers(model: _Quadratic, tableau: _Tableau) -> Bools:
+    """Which newcomers make a single drop, add or swap of the others worth its price, (outside,).
+
+    As rank-one updates of the tableau tell, for many newcomers at once: first axis. Those that are
+    combinations of the entries inside are among them: for these no update tells.
+    """
+    outside, inside, room = tableau.outside, tableau.inside, tableau.room
+    price, share = model.penalty[outside], np.maximum(room, COLLINEAR)[:, None]
+    shared = model.matrix[outside[:, None], inside]
+    common = model.matrix[outside[:, None], outside] - shared @ tableau.response.T
+    pull = tableau.left[:, None] / share
+    fitted, spread = tableau.fitted - tableau.response * pull, tableau.spread
+    spread = spread + tableau.response**2 / share
+    left, free = tableau.left - common * pull, room - common**2 / share
+    np.fill_diagonal(free, 0.0)  # the newcomer itself is in
+    loss = fitted**2 / spread - model.penalty[inside]
+    moved = (room <= COLLINEAR) | (loss < -PLATEAU).any(axis=1)
+    moved |= (price - _gain(left, free) < -PLATEAU).any(axis=1)
+    unsure = np.flatnonzero(~moved)
+    for many in np.array_split(unsure, 1 + tableau.response.size * len(unsure) // BATCH):
+        response = tableau.response - (common / share)[many, :, None] * tableau.response[many, None]
+        swapped_left = left[many, :, None] + response * (fitted / spread)[many, None]
+        swapped_room = free[many, :, None] + response**2 / spread[many, None]
+        swapped_room[np.arange(len(many)), many] = 0.0
+        swap = loss[many, None] + price[:, None] - _gain(swapped_left, swapped_room)
+        moved[many] = (swap < -PLATEAU).any(axis=(1, 2))
+    return moved
 
 
 def _changed(support: Bools, dropped: Ints, added: Ints) -> Bools:
@@ -224,22 +251,6 @@ class _Tableau:
         room = 1 - (response * shared).sum(axis=1)
         return cls(
             inside, outside, fit.fitted, np.diag(fit.inverse), response, fit.left[outside], room
-        )
-
-    def joined(self, model: _Quadratic, i: int) -> _Tableau:
-        """The same after outside entry number i has joined to stay: rank-one updates."""
-        others, entry = np.arange(len(self.outside)) != i, self.outside[i]
-        response, outside = self.response[others], self.outside[others]
-        common = model.matrix[outside, entry] - response @ model.matrix[self.inside, entry]
-        weight = common / self.room[i]
-        return _Tableau(
-            inside=self.inside,
-            outside=outside,
-            fitted=self.fitted - self.response[i] * (self.left[i] / self.room[i]),
-            spread=self.spread + self.response[i] ** 2 / self.room[i],
-            response=response - weight[:, None] * self.response[i],
-            left=self.left[others] - weight * self.left[i],
-            room=self.room[others] - weight * common,
         )
 
 

@@ -21,6 +21,8 @@ PROBES = 24
 """Random vectors with which the trace of the influence matrix is estimated."""
 PENALTIES = 10.0 ** np.arange(-4, 11.6, 0.5)
 """Of the squared second derivative, in units of the median time step."""
+COARSE = 4
+"""One penalty in so many is tried first, then those beside the best."""
 
 
 @dataclass(frozen=True)
@@ -59,22 +61,27 @@ def smooth(stretches: Sequence[Trajectory], rng: np.random.Generator) -> Smooth:
     probes = np.zeros((n, PROBES))
     probes[np.arange(n), np.arange(n) % PROBES] = rng.choice([-1.0, 1.0], size=n)
     right = grid.samples.T @ np.concatenate([grid.x, probes], axis=1)
-    best = np.full(d, np.inf)
-    control, noise = np.zeros((grid.r, d)), np.zeros(d)
-    for penalty in PENALTIES:
-        band = grid.sample_band + penalty * roughness
-        band[0] += 1e-12 * band[0].max()
-        solved = cho_solve_banded((cholesky_banded(band, lower=True), True), right)
-        fitted = grid.samples @ solved
-        trace = (probes * fitted[:, d:]).sum()
-        free = max(n - trace, 1e-9 * n)
-        squares = ((grid.x - fitted[:, :d]) ** 2).sum(axis=0)
-        score = n * squares / free**2
-        better = score < best
-        best[better] = score[better]
-        control[:, better] = solved[:, :d][:, better]
-        # E |K e|^2 = variance tr(K K'), K = I - influence: holds where hardly anything is smoothed.
-        noise[better] = np.sqrt(squares[better] / ((probes - fitted[:, d:]) ** 2).sum())
+    best, noise = np.full(d, np.inf), np.zeros(d)
+    control, chosen = np.zeros((grid.r, d)), np.zeros(d, dtype=int)
+    every = np.arange(len(PENALTIES))
+    coarse = every % COARSE == 0
+    for refined in (False, True):
+        near = np.abs(every[:, None] - chosen).min(axis=1) < COARSE
+        for index in every[near & ~coarse if refined else coarse]:
+            band = grid.sample_band + PENALTIES[index] * roughness
+            band[0] += 1e-12 * band[0].max()
+            solved = cho_solve_banded((cholesky_banded(band, lower=True), True), right)
+            fitted = grid.samples @ solved
+            trace = (probes * fitted[:, d:]).sum()
+            free = max(n - trace, 1e-9 * n)
+            squares = ((grid.x - fitted[:, :d]) ** 2).sum(axis=0)
+            score = n * squares / free**2
+            better = score < best
+            best[better], chosen[better] = score[better], index
+            control[:, better] = solved[:, :d][:, better]
+            # E |K e|^2 = variance tr(K K'), K = I - influence: holds where hardly anything is
+            # smoothed.
+            noise[better] = np.sqrt(squares[better] / ((probes - fitted[:, d:]) ** 2).sum())
     return Smooth(tuple(grid.splines(control)), noise)
 
 

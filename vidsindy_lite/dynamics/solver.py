@@ -130,7 +130,7 @@ def _solved(
     )
     history = History()
     problem = pose(trajectories, shared, library, probes, order)
-    with tqdm(total=3, disable=not progress, desc="discover", leave=False) as bar:
+    with tqdm(total=2, disable=not progress, desc="discover", leave=False) as bar:
         fit = polish(problem, search(problem, starts, history), history)
         bar.update()
         for _ in range(MOST_WEIGHINGS):
@@ -138,14 +138,17 @@ def _solved(
             if weighed is problem:
                 break
             problem = weighed
+            bar.total += 1
             fit = polish(problem, search(problem, starts, history), history)
+            bar.update()
         if (problem.errors(fit) > CONSISTENT * problem.noise).any():
             problem = with_process_noise(problem, fit, probes)
         if problem.kicked:
+            bar.total += 1
             fit = search(problem, starts, history)
             problem = rebalanced(problem, fit, probes)
             fit = polish(problem, fit, history)
-        bar.update()
+            bar.update()
         fit, path = settle(problem, fit, history)
         bar.update()
     return conclude(problem, fit, path, history), problem

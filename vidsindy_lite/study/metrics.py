@@ -91,6 +91,10 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
             )
     if law.d != truth.d:
         raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {law.d}")
+    if [f.name for f in law.functions] != [f.name for f in truth.functions] or (
+        law.exponents.shape[1] != truth.exponents.shape[1]
+    ):
+        raise ValueError("found: must have a library with the functions of truth, got others")
     if not truth.support.any():
         raise ValueError("truth: must have at least one term, got none")
     library = np.unique(np.concatenate([law.exponents, truth.exponents]), axis=0)

@@ -27,12 +27,10 @@ _BLOCKS = 12  # into which each side is cut: errors within one may be the same
 
 
 class Aligned(NamedTuple):
-    """The map (3, 3) of one view to another, the standard error of the places that it gives, and
-    the share of the one that the other shows, too."""
+    """The map (3, 3) of one view to another, and the standard error of the places it gives."""
 
     map: Floats
     error: float
-    shared: float
 
 
 def pyramid(small: Image) -> list[Floats32]:
@@ -61,21 +59,24 @@ def align(before: list[Floats32], after: list[Floats32], guess: Floats) -> Align
         if fitted is None:
             return None
         found = np.linalg.inv(scale) @ fitted.map @ scale
-    return fitted and Aligned(found, 2 * fitted.error, fitted.shared)
+    return fitted and Aligned(found, 2 * fitted.error)
 
 
 def explains(before: list[Floats32], after: list[Floats32], here: Floats) -> bool:
     """Does a map make most parts of two views more alike than they are without it?"""
+    return more_alike(unlike(before, after, here), unlike(before, after, np.eye(3)))
+
+
+def unlike(before: list[Floats32], after: list[Floats32], here: Floats) -> Floats:
+    """Grey levels by which the parts of two views differ, see `parts_unlike`, laid by a map."""
     key, view = before[0], after[0]
     half = np.diag([0.5, 0.5, 1.0])
-    moved = cv2.warpAffine(
-        view, (half @ here @ np.linalg.inv(half))[:2], key.shape[::-1],
+    moved = cv2.warpPerspective(
+        view, half @ here @ np.linalg.inv(half), key.shape[::-1],
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderValue=_OUTSIDE,
     )  # fmt: skip
-    known = moved >= 0
     brighter = np.median(view) / max(float(np.median(key)), 1.0)
-    parts = [parts_unlike(np.asarray(x) - brighter * key, known) for x in (moved, view)]
-    return more_alike(*parts)
+    return parts_unlike(np.asarray(moved) - brighter * key, np.asarray(moved) >= 0)
 
 
 def parts_unlike(change: Floats32, known: Bools) -> Floats:
@@ -137,8 +138,7 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
         if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < _CLOSE:
             break
     miss = miss - (slopes @ delta).astype(np.float32)
-    error = _error(slopes, weight * miss, normal, (u, v))
-    return Aligned(here, error, float(known.mean()))
+    return Aligned(here, _error(slopes, weight * miss, normal, (u, v)))
 
 
 def _error(

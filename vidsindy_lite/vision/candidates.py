@@ -40,11 +40,11 @@ def reduce(image: Image, factor: int) -> Image:
     if factor == 1:
         return image
     size = (-(-image.shape[1] // factor), -(-image.shape[0] // factor))
-    padded = cv2.copyMakeBorder(
-        image, 0, size[1] * factor - image.shape[0], 0, size[0] * factor - image.shape[1],
-        cv2.BORDER_REPLICATE,
-    )  # fmt: skip
-    return np.asarray(cv2.resize(padded, size, interpolation=cv2.INTER_AREA), np.uint8)
+    right, bottom = size[0] * factor - image.shape[1], size[1] * factor - image.shape[0]
+    if right or bottom:
+        padded = cv2.copyMakeBorder(image, 0, bottom, 0, right, cv2.BORDER_REPLICATE)
+        image = np.asarray(padded, np.uint8)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 @dataclass(frozen=True)
@@ -175,13 +175,14 @@ class Difference:
         now, then = frame.astype(np.float32), background.astype(np.float32)
         factor = light(now, then, known)
         self.lights.append(factor)
-        change = now - then * factor
+        np.multiply(then, factor, out=then)
+        change = now - then
         strength = np.sqrt(np.einsum("ijk,ijk->ij", change, change)) / tolerance
         differs = ((strength > 1) & known).astype(np.uint8)
         closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         mask = np.asarray(closed, np.uint8)
         self._note(mask, here)
-        return blobs(mask, strength, now / factor, then, frame.shape[:2])
+        return blobs(mask, strength, frame, background, factor)
 
     def _note(self, mask: Image, here: Floats) -> None:
         """Count how often each place of the plate differs from it."""
@@ -213,9 +214,10 @@ class Difference:
 
 
 def blobs(
-    mask: Image, strength: Floats32, now: Floats32, then: Floats32, shape: tuple[int, ...]
+    mask: Image, strength: Floats32, frame: Image, ground: Image, factor: Floats32
 ) -> list[Candidate]:
-    """The connected parts of a mask as candidates."""
+    """The connected parts of a mask as candidates, in a frame that is brighter by a factor."""
+    shape = mask.shape
     count, labels, stats, centres = cv2.connectedComponentsWithStats(mask)
     areas = stats[1:, cv2.CC_STAT_AREA]
     total = np.bincount(labels.ravel(), strength.ravel(), count)[1:]
@@ -225,20 +227,20 @@ def blobs(
     for k in order:
         left, top, width, height, area = stats[k]
         mean = total[k - 1] / area
-        if area < 2 and mean < 3:
+        if (area < 2 and mean < 3) or area > _FILLS * mask.size:
             continue
         window = np.s_[top : top + height, left : left + width]
         here = labels[window] == k
-        weight = np.where(here, strength[window], 0)
-        inner = here & (strength[window] >= 0.7 * np.percentile(strength[window][here], 90))
-        colour = now[window][inner].mean(axis=0)
-        ground = then[window][inner].mean(axis=0)
+        strong = strength[window]
+        weight = np.where(here, strong, 0)
+        own = np.sort(strong[here])
+        inner = here & (strong >= 0.7 * own[int(0.9 * (len(own) - 1))])
+        colour = frame[window][inner].mean(axis=0) / factor
+        behind = ground[window][inner].mean(axis=0)
         quality = 1 - np.exp(-(mean - 1) * np.sqrt(min(area, 25)) / 4)
-        if area > _FILLS * mask.size:
-            continue
         if left == 0 or top == 0 or left + width == shape[1] or top + height == shape[0]:
             quality *= 0.6
-        if _is_shadow(colour, ground):
+        if _is_shadow(colour, behind):
             quality *= 0.5
         u, v = np.arange(width), np.arange(height)
         centre = np.array([weight.sum(axis=0) @ u, weight.sum(axis=1) @ v]) / weight.sum()

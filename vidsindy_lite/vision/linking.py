@@ -108,18 +108,22 @@ def best_path(seen: Sightings) -> tuple[Ints, float]:
         old = states // _STATES
         price = _prices(seen, old, new, speed.reshape(-1, 2)[states], moving.ravel()[states])
         worth = value.ravel()[states][:, None] - price
+        # Of the states of each row before them only the best counts, and of these the few best.
+        first = np.flatnonzero(np.diff(old, prepend=-1))
+        best = np.maximum.reduceat(worth, first, axis=0)
+        order = np.argsort(-best, axis=0)[:_STATES]
         for column, j in enumerate(new):
-            order = np.argsort(-worth[:, column])
-            _, first = np.unique(old[order], return_index=True)  # each row before it once
-            best = order[np.sort(first)[:_STATES]]
-            best = best[worth[best, column] > 0]
-            n = len(best)
-            if not n:
+            chosen = order[:, column]
+            chosen = chosen[best[chosen, column] > 0]
+            if not len(chosen):
                 continue
-            value[j, :n] = gain[j] + worth[best, column]
-            before[j, :n] = states[best]
-            step = seen.centre[j] - seen.centre[old[best]]
-            speed[j, :n] = step / (i - seen.frame[old[best]])[:, None]
+            ends = np.append(first, len(old))
+            at = [first[r] + worth[first[r] : ends[r + 1], column].argmax() for r in chosen]
+            n = len(chosen)
+            value[j, :n] = gain[j] + best[chosen, column]
+            before[j, :n] = states[at]
+            step = seen.centre[j] - seen.centre[old[at]]
+            speed[j, :n] = step / (i - seen.frame[old[at]])[:, None]
             moving[j, :n] = True
     rows, state = [], int(value.argmax())
     while state >= 0:

@@ -96,7 +96,7 @@ def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
     found = []
     for sample, here in zip(samples, maps, strict=True):
         then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1])
-        a, b = sample.astype(np.float32)[::3, ::3], then.astype(np.float32)[::3, ::3]
+        a, b = sample[::3, ::3].astype(np.float32), then[::3, ::3].astype(np.float32)
         known = known[::3, ::3]
         if known.any():
             found.append(1.4826 * np.median(np.abs(a - b * light(a, b, known))[known]))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .aligning import Aligned, align, explains, pyramid
+from .aligning import Aligned, align, explains, pyramid, unlike
 
 _PARTS = 12  # parts into which each side of the image is cut; one corner is followed in each
 _WIDTH = 21  # reduced pixels: what is smoother than this is light
@@ -25,9 +25,9 @@ _FLAT = 2.0  # smallest eigenvalue of the gradient's covariance in a corner, gre
 _EXACT = 1.0  # reduced pixels by which a corner may miss its place
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
-_MANY = 60  # corners for a homography; with fewer, all pixels tell more
+_SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
 _TELLING = 10  # corners that must share a motion, if it is to be the camera's
-_LEFT = 0.5  # share of a key frame that is left, below which there must be a new one
+_LEFT = 0.6  # share of a key frame that is left, below which there must be a new one
 
 
 class CameraMotion(NamedTuple):
@@ -158,21 +158,45 @@ class Steadying:
         self.key, self.points, self.base, self.drift = relief, _corners(relief.fine), base, error
         self.last = np.eye(3)  # from the key frame to the newest
 
-    def _locate(self, relief: _Relief) -> Aligned | None:
-        """Where the key frame lies in another: by corners, or by all pixels if these are few."""
+    def _by_corners(self, relief: _Relief) -> tuple[Aligned | None, int]:
+        """Where the key frame lies in another, by its corners, and how many of them say so."""
         assert self.key is not None
         guess = carry(self.last, self.points) if len(self.points) else self.points
         ends, found = _follow(self.key.fine, relief.fine, self.points, guess)
         a, b = self.points[found], ends[found]
         best, good = _similar(a, b, 2 * _EXACT)
-        if best is None or good.sum() < _MANY:
-            return align(self.key.levels, relief.levels, self.last)
-        full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
-        if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
-            best, good = np.asarray(full, float), obey[:, 0] > 0
+        if best is None or good.sum() < _SOME:
+            return None, 0
+        if good.sum() >= _MANY:
+            full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
+            if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
+                best, good = np.asarray(full, float), obey[:, 0] > 0
         miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
-        error = float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))
-        return Aligned(best, error, len(miss) / len(self.points))
+        return Aligned(best, float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))), len(miss)
+
+    def _locate(self, relief: _Relief) -> Aligned | None:
+        """Where the key frame lies in another: by corners; if these are few, perhaps by pixels."""
+        assert self.key is not None
+        found, count = self._by_corners(relief)
+        if found is not None and count >= _MANY:
+            return found
+        direct = align(self.key.levels, relief.levels, self.last)
+        both = [one for one in (found, direct) if one is not None]
+        return min(both, key=lambda one: self._unlike(relief, one.map)) if both else None
+
+    def _unlike(self, relief: _Relief, here: Floats) -> float:
+        """Grey levels by which most parts of the key frame differ from another, by a map."""
+        assert self.key is not None
+        parts = unlike(self.key.levels, relief.levels, here)
+        return float(np.median(parts[0]))
+
+    def _shared(self, here: Floats) -> float:
+        """Share of the key frame that is still in view."""
+        assert self.key is not None
+        size = np.array(self.key.fine.shape[::-1])
+        u, v = np.meshgrid(*np.outer(size, np.linspace(0, 1, 9)))
+        places = carry(here, np.column_stack([u.ravel(), v.ravel()]))
+        return float(((places >= 0) & (places < size)).all(axis=1).mean())
 
     def add(self, small: Image) -> None:
         """The next frame."""
@@ -188,7 +212,7 @@ class Steadying:
         self.last = located.map
         self.maps.append(self.base @ np.linalg.inv(self.last))
         self.errors.append(float(np.hypot(self.drift, located.error)))
-        if located.shared < _LEFT:
+        if self._shared(self.last) < _LEFT:
             self._start(relief, self.maps[-1], self.errors[-1])
 
     def motion(self) -> CameraMotion:

@@ -127,6 +127,7 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     samples = sample_frames(path)
     model = BackgroundModel(samples)
     if detector == "auto" and model.unrest:
+        del model  # its images are large
         return _follow(path, samples, target)
     found, blurred = _track_blobs(path, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):

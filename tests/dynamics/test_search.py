@@ -1,0 +1,68 @@
+"""The search for terms: what it does where data are long, or where too many terms fit alike."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.dynamics import PolynomialSystem, check_trajectory, search
+from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.collocation import Collocation, Status
+from vidsindy_lite.dynamics.discovery import History
+from vidsindy_lite.dynamics.problem import fit_curves, pose
+
+CIRCLE = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=2)
+
+
+def posed(times, degree=2):
+    runs = [check_trajectory(t, CIRCLE.simulate(t, (1, 0.5))) for t in times]
+    shared = [np.empty((*x.shape, 0)) for _, x in runs]
+    return pose(runs, shared, Library.polynomial(degree), np.random.default_rng(0))
+
+
+def test_short_data_are_searched_as_they_are():
+    problem = posed([np.linspace(0, 20, 400)])
+    assert search._enough(problem) is problem.stretches
+
+
+def test_of_long_data_each_stretch_gives_its_share(monkeypatch):
+    monkeypatch.setattr(search, "ENOUGH_SAMPLES", 300)
+    monkeypatch.setattr(search, "ENOUGH_TURNS", 3)
+    problem = posed([np.linspace(0, 80, 2000), np.linspace(0, 40, 1000)])
+    part = search._enough(problem)
+    assert [i for i, _ in part] == [0, 1]
+    samples = sum(len(t) for _, (t, _) in part)
+    assert 300 <= samples <= 0.5 * 3000
+    for (_, (t, x)), (_, (whole, _)) in zip(part, problem.stretches, strict=True):
+        np.testing.assert_array_equal(t, whole[: len(t)])
+        assert len(x) == len(t)
+        assert t[-1] - t[0] >= 0.99 * 2 * np.pi
+
+
+def test_all_data_decide_on_the_terms_of_a_part(monkeypatch):
+    monkeypatch.setattr(search, "ENOUGH_SAMPLES", 150)
+    monkeypatch.setattr(search, "ENOUGH_TURNS", 2)
+    problem, history = posed([np.linspace(0, 60, 1500)]), History()
+    fit = search.search(problem, np.random.default_rng(0), history)
+    assert sum(len(s.t) for s in fit.collocation.segments) == 1500
+    assert "subset search, all data" in [step.stage for step in history.steps]
+    assert fit.state.active.sum() == 2
+
+
+@pytest.mark.parametrize("fails_at", [None, 1, 3])
+def test_terms_that_cannot_be_told_apart_are_searched_from_the_first_fit(monkeypatch, fails_at):
+    problem = posed([np.linspace(0, 20, 400)])
+    collocation = problem.collocation(problem.segments())
+    control = fit_curves(collocation, problem.curves)
+    solve, calls = Collocation.solve, []
+
+    def solved(self, state, **options):
+        fit = solve(self, state, **options)
+        calls.append(fit)
+        status = Status.MAX_STEPS if len(calls) - 1 == fails_at else Status.CONVERGED
+        return search.replace(fit, status=status)
+
+    monkeypatch.setattr(Collocation, "solve", solved)
+    every = np.ones(len(problem.exponents), dtype=bool)
+    _, weight = search.unpruned(problem, collocation, control, every, "", History())
+    expected = search.FIRST_WEIGHTS[-1 if fails_at is None else 0]
+    assert weight == expected
+    assert len(calls) == (4 if fails_at is None else fails_at + 1)
