@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vidsindy_lite.dynamics import discover
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
@@ -167,3 +168,21 @@ def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
     (warning,) = diagnose(problem, fit, replace(path, plateaus=plateaus), law, margins)
     assert "dy/dt is settled by how large an error is tolerated" in warning
     assert "with x^2, without x^3" in warning
+
+
+def test_an_origin_that_the_data_do_not_tell_is_a_warning():
+    law = PolynomialSystem.from_terms({"x": {"x": 1.8, "x^2": -0.11}}, degree=3)
+    t = np.linspace(0, 10, 512)
+    rng = np.random.default_rng(5)
+    x = law.simulate(t, [11.0])
+    found = discover(t, x + 0.6 * x.std() * rng.standard_normal(x.shape))
+    assert found.status == "suspect"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_the_same_law_around_another_origin_is_no_rival(noise):
+    # One law, two ways to write it: the constant of dx/dt, or an origin away from the data's.
+    truth = SYSTEMS["NoseHoover"].shift((10, 10, 0))
+    t, x = truth.trajectory(1000)
+    found = discover(t, corruption.add_noise(x, noise, np.random.default_rng(1)))
+    assert found.status == "ok"

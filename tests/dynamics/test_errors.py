@@ -55,10 +55,11 @@ def test_each_coordinate_has_its_own_inflation():
     assert slow == pytest.approx(9, rel=0.15)
 
 
-def fit_with(residual):
+def fit_with(residual, precision=1.0):
     """A fit that leaves these errors."""
     n, d = residual.shape
-    data = SimpleNamespace(data_residual=lambda control: (residual, None))
+    precision = np.broadcast_to(precision, residual.shape)
+    data = SimpleNamespace(data_residual=lambda _: (residual.copy(), None), precision=precision)
     state = SimpleNamespace(control_points=None, moving=np.zeros(d, dtype=bool))
     return SimpleNamespace(collocation=data, state=state)
 
@@ -79,3 +80,11 @@ def test_few_errors_foretell_little():
 
 def test_errors_of_what_was_not_seen_foretell_nothing():
     assert prediction_gain(fit_with(np.zeros((100, 1))))[0] == 0
+
+
+def test_what_uneven_errors_foretell_is_counted_in_their_own_sizes():
+    rng, size = np.random.default_rng(7), np.where(np.arange(4000) < 200, 30.0, 1.0)[:, None]
+    error = size * np.concatenate([rng.standard_normal(200), lasting(3800, 0.9, rng)])[:, None]
+    weighed = prediction_gain(fit_with(error, size**-2.0))[0]
+    assert weighed == pytest.approx(3800 * np.log(1 - 0.9**2), rel=0.2)
+    assert prediction_gain(fit_with(error))[0] > 0.2 * weighed  # the large ones hide the others

@@ -7,6 +7,8 @@ import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics import precision as weighing
+from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.problem import pose
 
 LAW = PolynomialSystem.from_terms(
     {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3
@@ -107,3 +109,24 @@ def test_benchmarks_from_clean_data_are_not_weighed():
     found = vl.discover(t, x)
     assert found.status == "ok"
     assert np.abs(found.native.coefficients).max() == pytest.approx(4.0, abs=1e-4)
+
+
+def posed(x):
+    data = [(TIMES, x)]
+    nothing = [np.empty((*x.shape, 0))]
+    return pose(data, nothing, Library.polynomial(3), np.random.default_rng(0))
+
+
+def test_precision_is_foreseen_before_any_law_is_known():
+    x, size = uneven("for a while", np.random.default_rng(5))
+    known = weighing.foreseen(posed(x)).precision[0][:, 0]
+    late = TIMES > 28
+    ratio = np.median(known[~late]) / np.median(known[late])
+    assert ratio == pytest.approx((0.2 / 0.02) ** 2, rel=0.4)
+
+
+def test_noise_that_looks_even_before_a_law_is_known_stays_even():
+    even = posed(PATH + 0.05 * np.random.default_rng(6).standard_normal(PATH.shape))
+    assert weighing.foreseen(even) is even
+    exact = posed(PATH)
+    assert weighing.foreseen(exact) is exact

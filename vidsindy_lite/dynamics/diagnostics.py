@@ -6,6 +6,7 @@ A warning is a necessary sign of trouble, not a sufficient one: a law without on
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -14,10 +15,11 @@ from ..arrays import Floats
 from .beyond import beyond_the_library
 from .collocation import CLEANEST, Fit, Linearisation, Status
 from .errors import residual_noise
+from .library import shift_matrix
 from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
-from .selection import closest_rival
+from .selection import closest_rival, subset_search
 from .shape import cancelling, shapes
 from .state import State
 from .trajectories import Trajectory, typical_step
@@ -49,6 +51,8 @@ WILD = 2.0
 APART = 0.2
 """Root mean square distance of the law's two frames along the curve, relative to the speed: more
 than terms that cannot be told from zero make."""
+VANISHED = 1e-6
+"""What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
 ADVICE = {
     Status.MAX_STEPS: "its coefficients may be off by more than their errors; use cleaner samples, "
     "or a lower degree",
@@ -84,7 +88,7 @@ def diagnose(
         *_unfinished(fit),
         *_unmet(problem, fit),
         *_another_in_the_data(problem, fit, law),
-        *_selection(problem, fit, path),
+        *_selection(problem, fit, path, law),
         *_sampling(problem),
         *_standstill(law),
         *_narrow(law, margins),
@@ -179,7 +183,9 @@ def _another_in_the_data(problem: Problem, fit: Fit, law: PolynomialSystem) -> I
         )
 
 
-def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
+def _selection(
+    problem: Problem, fit: Fit, path: Path, law: PolynomialSystem
+) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), fit.state, path)
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
@@ -191,6 +197,7 @@ def _selection(problem: Problem, fit: Fit, path: Path) -> Iterator[str]:
     model = fit.collocation.linearise(fit.state, problem.form.searched)
     yield from _left_over(model, fit.state)
     yield from _near_tie(problem, fit.state, model)
+    yield from _nearer_home(problem, fit, law)
 
 
 def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]:
@@ -247,6 +254,35 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[
         f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
         "do not settle it: use a longer or cleaner trajectory"
     )
+
+
+def _nearer_home(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
+    """Would another law, with one axis less away from home, fit almost as well?"""
+    state, exponents = fit.state, problem.exponents
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
+    own = problem.penalties @ state.active.sum(axis=1) + problem.axis_penalty
+    for axis in np.flatnonzero(state.moving).tolist():
+        home = np.arange(problem.d) == axis
+        origin = np.where(home, problem.home, state.offset)
+        moved = shift_matrix(exponents, state.offset - origin) @ state.coefficients
+        there = replace(state, coefficients=moved, offset=origin, moving=state.moving & ~home)
+        columns = problem.columns(there)
+        model = fit.collocation.linearise(there, columns)
+        present = there.flat()[columns]
+        support = (present != 0) | (columns >= exponents.size)
+        _, solution, value = subset_search(
+            model.information, model.gradient, present, prices[columns], support
+        )
+        rival = model.along(there, solution - present, 1.0)
+        matrix = shift_matrix(exponents, rival.offset - problem.home)
+        parts = np.abs(matrix) @ np.abs(rival.coefficients)
+        terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
+        if value - own < NEAR_TIE and (terms != law.support).any():
+            yield (
+                f"the data hardly tell where the law's origin is in {problem.form.names[axis]}: "
+                f"other terms around the origin of the data fit almost as well (criterion "
+                f"{value - own:+.1f}); use a longer or cleaner trajectory"
+            )
 
 
 def _standstill(law: PolynomialSystem) -> Iterator[str]:

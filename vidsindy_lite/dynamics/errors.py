@@ -86,6 +86,7 @@ def prediction_gain(fit: Fit) -> Floats:
     noise (Levinson's recursion; its order by the Bayesian information criterion).
     """
     residual, _ = fit.collocation.data_residual(fit.state.control_points)
+    residual *= np.sqrt(fit.collocation.precision)
     n = len(residual)
     lags = range(min(ORDER, n // 10) + 1)
     covariances = np.stack([(residual[k:] * residual[: n - k]).sum(axis=0) for k in lags])

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Bools, Floats
-from .collocation import Fit
+from .collocation import CLEANEST, Fit
 from .errors import inflation
 from .problem import Problem
 
@@ -50,32 +50,61 @@ def with_precision(problem: Problem, fit: Fit) -> Problem:
     fit : Fit
         A law that fits as far as its measurements allow.
     """
-    collocation, known = fit.collocation, fit.collocation.precision
+    collocation, segments = fit.collocation, fit.collocation.segments
+    splines = collocation.grid.splines(fit.state.control_points)
     residual, _ = collocation.data_residual(fit.state.control_points)
-    residual *= np.sqrt(known)
-    spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(collocation.counts, 1))
-    factors, causes = np.ones_like(residual), _causes(problem, fit)
+    path = [
+        np.stack([spline(s.t), spline(s.t, 1)]) for s, spline in zip(segments, splines, strict=True)
+    ]
+    pieces = [(s.trajectory, s.t) for s in segments]
+    return _weighed(problem, pieces, path, residual, collocation.precision)
+
+
+def foreseen(problem: Problem) -> Problem:
+    """The same by the smoothed curves, before any law is known.
+
+    A wrong law explains what it misses by measurements of its own choice; a curve has no law.
+    """
+    stretches, steps = problem.stretches, 1e-3
+    path, residual = [], []
+    for (_, (t, x)), curve in zip(stretches, problem.curves, strict=True):
+        path.append(np.stack([curve(t), (curve(t + steps) - curve(t - steps)) / (2 * steps)]))
+        residual.append(np.nan_to_num(path[-1][0] - x))
+    seen = np.concatenate([np.isfinite(x) for _, (_, x) in stretches]).astype(float)
+    pieces = [(number, t) for number, (t, _) in stretches]
+    return _weighed(problem, pieces, path, np.concatenate(residual), seen)
+
+
+def _weighed(
+    problem: Problem,
+    pieces: list[tuple[int, Floats]],
+    path: list[Floats],
+    residual: Floats,
+    known: Floats,
+) -> Problem:
+    """The problem with the precision that residuals of a path tell, (n, d) in pieces.
+
+    A piece is the number of a trajectory and times, its path states and slopes, (2, n, d); what is
+    ``known`` are the precisions so far.
+    """
+    residual = residual * np.sqrt(known)
+    signal, speed = np.concatenate(path, axis=1)
+    causes = [(signal - problem.home) ** 2, speed**2]  # what the variance of the noise may follow
+    spread = np.sqrt((residual**2).sum(axis=0) / np.maximum((known > 0).sum(axis=0), 1))
+    factors, noise = np.ones_like(residual), problem.noise.copy()
     for j in np.flatnonzero(spread > NOISELESS):
         seen = known[:, j] > 0
         factors[seen, j] = _factors(residual[seen, j], [cause[seen, j] for cause in causes])
+        left = (factors[seen, j] * residual[seen, j] ** 2).sum() / (factors[seen, j] > 0).sum()
+        noise[j] *= np.sqrt(left) / spread[j]
     if (factors == 1).all():
         return problem
     precision = [values.copy() for values in problem.precision]
-    ends = np.cumsum([len(segment.t) for segment in collocation.segments])[:-1]
-    for segment, factor in zip(collocation.segments, np.split(factors, ends), strict=True):
-        rows = np.searchsorted(problem.trajectories[segment.trajectory][0], segment.t)
-        precision[segment.trajectory][rows] *= factor
-    return replace(problem, precision=precision)
-
-
-def _causes(problem: Problem, fit: Fit) -> list[Floats]:
-    """What the variance of the noise may follow, each (n, d): the signal, its speed, the time."""
-    segments = fit.collocation.segments
-    splines = fit.collocation.grid.splines(fit.state.control_points)
-    pairs = list(zip(segments, splines, strict=True))
-    signal = np.concatenate([spline(s.t) for s, spline in pairs]) - problem.home
-    speed = np.concatenate([spline(s.t, 1) for s, spline in pairs])
-    return [signal**2, speed**2]
+    ends = np.cumsum([len(t) for _, t in pieces])[:-1]
+    for (number, t), factor in zip(pieces, np.split(factors, ends), strict=True):
+        rows = np.searchsorted(problem.trajectories[number][0], t)
+        precision[number][rows] *= factor
+    return replace(problem, precision=precision, noise=np.maximum(noise, CLEANEST))
 
 
 def _factors(residual: Floats, causes: list[Floats]) -> Floats:

@@ -407,15 +407,17 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
     return np.concatenate(control)
 
 
-def term_penalties(exponents: Ints, equations: int | None = None) -> Floats:
+def term_penalties(
+    exponents: Ints, equations: int | None = None, false_alarm: float = FALSE_ALARM
+) -> Floats:
     """Price of a term of each kind: how much of the chi-square it has to explain, shape (l,).
 
-    Half of `FALSE_ALARM` goes to the constants, half of the rest to the linear terms, and so on;
-    the terms of one degree in all equations share evenly (Bonferroni). So a term has to be
-    significant among all that could have been, and of two laws that fit alike the one of lower
-    degree wins. All equations are searched unless their number is given.
+    Half of the chance of a false alarm goes to the constants, half of the rest to the linear
+    terms, and so on; the terms of one degree in all equations share evenly (Bonferroni). So a term
+    has to be significant among all that could have been, and of two laws that fit alike the one of
+    lower degree wins. All equations are searched unless their number is given.
     """
     degrees = exponents.sum(axis=1)
     equations = exponents.shape[1] if equations is None else equations
     rivals = equations * np.bincount(degrees)[degrees] * 2.0 ** (degrees + 1)
-    return chi2.isf(FALSE_ALARM / rivals, df=1)
+    return chi2.isf(false_alarm / rivals, df=1)

@@ -74,7 +74,10 @@ def subset_search(
 def closest_rival(
     information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
 ) -> Change:
-    """The single change of a support that costs least.
+    """The other support that costs least, of those next to a support.
+
+    Every entry has to leave or to join, in turn, and the others then leave and join as they like:
+    laws that share little may fit alike where the motion is short or slow.
 
     Parameters
     ----------
@@ -88,16 +91,24 @@ def closest_rival(
     cost : float
         By how much the function with penalties rises.
     dropped, added : ndarray of int
-        The entries that leave and enter, at most one each.
+        The entries that leave and enter.
     """
     model = _Quadratic.of(information, gradient, present, penalty)
     fit = model.fit(support)
-    rivals = []
-    for cost, dropped, added in _single_changes(model, _Tableau.of(model, fit)):
-        if np.isfinite(cost):  # a rough one where terms are tied together: work it out again
-            cost = model.fit(_changed(support, dropped, added)).value - fit.value
-        rivals.append((cost, dropped, added))
-    return min(rivals, key=lambda rival: rival[0])
+    tableau, rivals = _Tableau.of(model, fit), []
+    for entry in fit.inside[np.isfinite(penalty[fit.inside])]:
+        rivals.append(_descend(model.priced(entry, np.inf), _changed(support, entry, NONE)))
+    moved = _moved_by_newcomers(model, tableau)
+    for entry, moves in zip(tableau.outside, moved, strict=True):
+        start = _changed(support, NONE, entry)
+        rivals.append(_descend(model.priced(entry, -np.inf), start) if moves else model.fit(start))
+    if not rivals:
+        return np.inf, NONE, NONE
+    rival = min((model.fit(rival.support) for rival in rivals), key=lambda rival: rival.value)
+    dropped, added = (
+        np.flatnonzero(changed) for changed in (support & ~rival.support, rival.support & ~support)
+    )
+    return rival.value - fit.value, dropped, added
 
 
 def minimiser(information: Floats, gradient: Floats, present: Floats, support: Bools) -> Floats:
@@ -142,10 +153,10 @@ class _Quadratic:
         matrix, scale = equilibrated(information)
         return cls(matrix, scale, gradient * scale, present / scale, penalty)
 
-    def forced(self, entry: int) -> _Quadratic:
-        """The same with an entry that has to stay in."""
+    def priced(self, entry: int, price: float) -> _Quadratic:
+        """The same with another price of an entry: minus infinity keeps it in, infinity out."""
         penalty = self.penalty.copy()
-        penalty[entry] = -np.inf
+        penalty[entry] = price
         return replace(self, penalty=penalty)
 
     def fit(self, support: Bools) -> _Fit:
@@ -184,7 +195,7 @@ def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     tableau = _Tableau.of(model, best)
     promising = _moved_by_newcomers(model, tableau)
     for entry in tableau.outside[promising]:
-        trial = _descend(model.forced(entry), _changed(best.support, NONE, entry))
+        trial = _descend(model.priced(entry, -np.inf), _changed(best.support, NONE, entry))
         if trial.value + model.penalty[entry] < best.value - PLATEAU:
             return _descend(model, trial.support)
     return None

@@ -25,7 +25,7 @@ from .collocation import Fit
 from .discovery import Discovery, History, conclude
 from .order import SETTLED, UNLIKELY, accelerated, advised, better, check_order
 from .persistence import Path, Plateau, follow, typical
-from .precision import with_precision
+from .precision import foreseen, with_precision
 from .problem import Problem, fit_curves, pose
 from .process_noise import rebalanced, with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, search
@@ -129,7 +129,7 @@ def _solved(
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     history = History()
-    problem = pose(trajectories, shared, library, probes, order)
+    problem = foreseen(pose(trajectories, shared, library, probes, order))
     with tqdm(total=2, disable=not progress, desc="discover", leave=False) as bar:
         fit = polish(problem, search(problem, starts, history), history)
         bar.update()

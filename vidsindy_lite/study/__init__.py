@@ -11,6 +11,7 @@
 * `films`, `realistic`, `lab`: what is filmed: benchmarks, a scene with trees, a ball on a table.
 * `trials`, `baselines`, `paper_ado`: who finds the law: `discover`, the methods of the paper's
   tables, the paper's own optimiser.
+* `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
 * `metrics`, `tables`: how good a law is, and many of them side by side.
 * `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
 * `published`, `audit`: the paper's numbers, and whether they agree with each other.

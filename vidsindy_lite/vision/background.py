@@ -114,7 +114,7 @@ def _remove_ghosts(background: Image, samples: Image, floor: float) -> None:
         mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]]
         inside = mask > 0
         expected = cv2.inpaint(view, mask, 3, cv2.INPAINT_TELEA)[inside].astype(float)
-        looks = [_median(samples[g][:, *window])[inside] for g in (group, ~group)]
+        looks = [_median(samples[:, *window][g])[inside] for g in (group, ~group)]
         view[inside] = min(looks, key=lambda look: np.abs(look - expected).sum())
 
 
