@@ -37,6 +37,7 @@ _STEPS = 60
 _SETTLED = 1e-11  # pixels, or ...
 _ENOUGH = 1e-7  # ... of sigma, by which a last step moves the images, or ...
 _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
+_BACK = 1e-6  # of a unit: nearer to where it was two steps before, a search goes to and fro
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
 _RIPPLES = 1.05  # noise is less between frames than at them, so that a better lag may cost more
 _LOST = 0.05  # share of what is seen that a step in time may lead out of the video
@@ -126,7 +127,7 @@ def adjust(
     change = np.zeros(errors.shape) if begin is None else begin
     problem, state = _Problem.of(footage, start, errors, change, used)
     noise = _noise(state.misses)
-    settled, steps = False, 0
+    settled, steps, earlier = False, 0, np.full(problem.unit.shape, np.inf)
     while not settled and steps < (_STEPS if most is None else most):
         weights = problem.weights(state, noise)
         moved, step = _downhill(problem, state, weights, noise)
@@ -134,10 +135,13 @@ def adjust(
         if moved is None:  # rounding is all that is left, or points ran out of numbers
             settled = step == 0
             break
-        state, before = moved, noise
+        # A frame at the end of a video may come and go with a lag, for ever.
+        to_and_fro = bool((np.abs(moved.change - earlier) <= _BACK * problem.unit).all())
+        earlier, state, before = state.change, moved, noise
         noise = _noise(state.misses)
         enough = _IN_TIME if problem.timed else _ENOUGH
-        settled = step <= max(_SETTLED, enough * noise) and noise >= before * (1 - 1e-3)
+        still = step <= max(_SETTLED, enough * noise) or (problem.timed and to_and_fro)
+        settled = still and noise >= before * (1 - 1e-3)
     return problem.result(state, noise, settled, steps)
 
 
