@@ -27,6 +27,7 @@ from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
 from .metrics import Score, pulls, score, term_errors, trajectory_error
 from .odebench import ODEBENCH
+from .price import price_curve
 from .published import ABLATION, DATASETS_CLAIMED, LAB, LAWS, SCORES, SYSTEMS_S1
 from .realistic import DISTURBANCES, START, SceneTask, run_scene
 from .rivals import LORENZ_GRID, R2_GIVEN, R2_RATES, R2_SOURCE

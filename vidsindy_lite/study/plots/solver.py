@@ -202,6 +202,30 @@ def plot_windows(thresholds: Floats, exact: Mapping[str, Bools]) -> Figure:
     return figure
 
 
+def plot_price(chances: Floats, false: Floats, lost: Floats, chosen: float) -> Figure:
+    """Wrong terms of a law against the price of a term.
+
+    Parameters
+    ----------
+    chances : ndarray, shape (k,)
+        Chance of a false alarm: the larger, the cheaper is a term.
+    false, lost : ndarray, shape (k,)
+        Terms of a law, means.
+    chosen : float
+        The chance that the solver takes.
+    """
+    figure, axes = plt.subplots(figsize=(7, 3.6))
+    axes.plot(chances, false + lost, "o-C0", label="wrong")
+    axes.plot(chances, lost, "s--C2", label="lost")
+    axes.plot(chances, false, "^:C1", label="false")
+    axes.axvline(chosen, color="0.5", lw=1)
+    at = {"xy": (chosen, 0.02), "xycoords": ("data", "axes fraction")}
+    axes.annotate(" the solver's", **at, ha="left", va="bottom", color="0.4")
+    axes.set(xscale="log", ylim=(0, None), xlabel="chance of a false term", ylabel="terms per law")
+    axes.legend(loc="upper center", ncols=3)
+    return figure
+
+
 def plot_origin_map(
     x_axis: Floats,
     y_axis: Floats,
