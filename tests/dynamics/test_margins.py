@@ -59,7 +59,7 @@ def test_a_disturbance_of_the_ninth_digit_does_not_count(name, noise):
     check_disturbed(name, noise, n=400, draws=1)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "noise"), MORE)
 def test_a_disturbance_of_the_ninth_digit_does_not_count_anywhere(name, noise):
     check_disturbed(name, noise, n=800, draws=2)
