@@ -30,7 +30,7 @@ from .video import read_video
 
 DETECTORS = ("auto", "background", "learned")
 
-_KEPT = 0.67  # share of the frames below which many of them are lost
+_KEPT = 0.5  # share of the frames below which many of them are lost
 _SOFT = 1.0  # of a sharp outline it is 0.6, see `Blob`
 _FEW = 0.95  # share of views that are whole, below which a blurred outline cannot be trusted
 _ROUGH = 1.0  # pixels that a track may scatter about a smooth motion
