@@ -17,7 +17,7 @@ help:
 	@echo "make figures QUICK=1  the same code in its small profile, into build/quick/"
 	@echo "make figures FORCE=1  also those that this clone has executed and nothing has changed"
 	@echo "make test             all tests, the notebooks in the quick profile among them"
-	@echo "make test-fast        the quick ones of the tests, in less than 90 seconds"
+	@echo "make test-fast        the quick ones of the tests, in a few minutes"
 	@echo "make bench            speed and memory, as ratios"
 	@echo "make lint             style, types, and who may import whom"
 	@echo "make demo             three videos of one target, and its equations, in a minute"
