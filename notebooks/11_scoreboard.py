@@ -260,7 +260,7 @@ if full:
 # ## Errors as they are
 #
 # Eight flows, four of the paper's and four others, 15 periods each, seen from an origin that is unknown. Every
-# kind of error is a function of [`study.corruption`](../vidsindy_lite/study/corruption.py).
+# kind of error is a function of `study.corruption`.
 
 # %%
 four = ("Lorenz", "RayleighBenard", "NoseHoover", "WangSun")  # of the paper's

@@ -74,7 +74,7 @@ def test_whole_pixels_are_coarser_but_near(filmed):
 def test_ours_is_told_the_systematic_errors_of_what_cameras_reconstructed(filmed, monkeypatch):
     told = {}
 
-    def watch(t, x, systematic=None):
+    def watch(t, x, systematic=None, **_):
         told[source] = systematic
         return SYSTEMS["SprottE"]
 
@@ -94,7 +94,7 @@ def test_tracks_are_corrupted_each_by_its_own_draw_before_the_cameras_are_learne
 ):
     given, observe = [], experiments.observe_tracks
     monkeypatch.setattr(experiments, "film_result", lambda task: filmed)
-    monkeypatch.setattr(experiments, "discover", lambda t, x, systematic: SYSTEMS["SprottE"])
+    monkeypatch.setattr(experiments, "discover", lambda t, x, **_: SYSTEMS["SprottE"])
     monkeypatch.setattr(
         experiments,
         "observe_tracks",
@@ -150,7 +150,7 @@ def test_every_method_gets_the_same_data(condition, level, no_videos, monkeypatc
     seen = {}
     for method in experiments.METHODS:
 
-        def watch(t, x, seed=None, systematic=None, method=method):
+        def watch(t, x, *_, method=method, **__):
             seen[method] = (t, x)
             return SYSTEMS["Lorenz"]
 
@@ -243,7 +243,7 @@ def test_grid_is_every_combination_once_and_zero_is_clean():
 def trials(no_videos, monkeypatch):
     """Twelve trials as a table; those of level .2 and number 1 have another law."""
 
-    def found(t, x, systematic=None):
+    def found(t, x, systematic=None, **_):
         wrong = np.isclose((x - x[0]).std(), odd)
         return SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET if not wrong else (0, 0, 0))
 

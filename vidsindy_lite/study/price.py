@@ -4,12 +4,14 @@ What the criterion prefers is asked at the truth's own fit, so that no search ha
 cheap price lets false terms in, a dear one loses true terms, and the sum of both has a minimum.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..arrays import Floats
 from ..dynamics import Collocation, Segment, State, Units, smooth, subset_search, term_penalties
@@ -17,6 +19,9 @@ from .corruption import add_noise
 from .sweeps import sweep
 from .systems import Benchmark
 from .zoo import specimen
+
+if TYPE_CHECKING:  # pandas is imported where a frame is made
+    from pandas import DataFrame
 
 CHANCES = tuple(float(chance) for chance in 10.0 ** np.arange(-6, 0.1, 0.5))
 """Chances of a false term that are tried."""
@@ -78,7 +83,7 @@ def _around_truth(law: Benchmark, case: Case) -> tuple[Floats, Floats, Floats]:
 
 def price_curve(
     specimens: int, noises: Sequence[float], lengths: Sequence[int], jobs: int = 2
-) -> pd.DataFrame:
+) -> DataFrame:
     """False and lost terms of the zoo at each chance of a false alarm, per law.
 
     Parameters
@@ -95,6 +100,8 @@ def price_curve(
     DataFrame
         Columns ``false alarm``, ``noise (%)``, ``samples``, ``false``, ``lost``.
     """
+    import pandas
+
     cases = [Case(*case) for case in product(range(specimens), noises, lengths)]
     rows = [
         (chance, 100 * case.noise, case.samples, *count)
@@ -103,4 +110,4 @@ def price_curve(
     ]
     names = ["false alarm", "noise (%)", "samples", "false", "lost"]
     by = names[:3]
-    return pd.DataFrame(rows, columns=names).groupby(by, sort=True).mean().reset_index()
+    return pandas.DataFrame(rows, columns=names).groupby(by, sort=True).mean().reset_index()
