@@ -184,10 +184,12 @@ def _rig_export(options: argparse.Namespace) -> int:
 
 def _write(text: str, output: str | None) -> int:
     """Text for the terminal, or in UTF-8 for a file."""
+    from .checks import check_output
+
     if output is None:
         print(text, end="")
     else:
-        Path(output).write_text(text, encoding="utf-8")
+        check_output("output", output).write_text(text, encoding="utf-8")
     return 0
 
 

@@ -168,6 +168,23 @@ def test_the_command_line(tmp_path, capsys):
     assert len(vl.Rig.load(tmp_path / "t.toml").cameras) == 3
 
 
+@pytest.mark.parametrize("name", ["rig-template", "rig-import", "rig-export"])
+def test_the_command_line_names_what_cannot_be_written(tmp_path, capsys, name):
+    calibration, there = tmp_path / "a.toml", str(tmp_path / "none" / "b.toml")
+    calibration.write_text(toml(rooms(10)), encoding="utf-8")
+    rig = tmp_path / "rig.toml"
+    assert main(["rig-import", str(calibration), "--output", str(rig)]) == 0
+    given = {
+        "rig-template": ["--output", there],
+        "rig-import": [str(calibration), "--output", there],
+        "rig-export": [str(rig), there],
+    }
+    assert main([name, *given[name]]) == 2
+    argument = "path" if name == "rig-export" else "output"
+    told = f"error: {argument}: must be a file in a folder that exists, got '{there}'"
+    assert capsys.readouterr().err.splitlines() == [told]
+
+
 # ---------------------------------------------------------------------------------------- bad input
 
 

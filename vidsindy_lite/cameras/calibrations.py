@@ -34,7 +34,7 @@ from scipy.linalg import rq
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Floats
-from ..checks import check_array, check_image_size, check_path
+from ..checks import check_array, check_image_size, check_output, check_path
 from .camera import turn
 from .models import PerspectiveCamera
 from .rig import Rig
@@ -117,10 +117,10 @@ def write_calibration(rig: Rig, path: str | os.PathLike) -> None:
     ------
     ValueError
         If a camera is orthographic or not calibrated, has a distortion that a ``.csv`` cannot hold,
-        or the name ends otherwise.
+        the name ends otherwise, or its folder does not exist.
     """
     check_calibrated("rig", rig)
-    file = check_path("path", path)
+    file = check_output("path", path)
     parts = [_opencv(i, camera) for i, camera in enumerate(rig.cameras)]
     if file.suffix == ".toml":
         tables = [_table(i, part) for i, part in enumerate(parts)]
