@@ -6,9 +6,10 @@ solver: `discover`; its stages (search, then polish and settle) use collocation 
 selection of terms, origin, gaps, errors that last, precision (whom to trust how far),
 process_noise (is the motion kicked?), and persistence: which law stays the same while more error
 is tolerated
-discovery: the result, with its history, with error bars from the last fit; diagnostics: all its warnings, of which
+discovery: the result, with error bars from the last fit; diagnostics: all its warnings, of which
 shape looks at where the motion takes place and beyond at terms that the library lacks
 physics: what a law of motion says of a body, in named numbers
+history: how a discovery went
 rounds: circles and spheres, whose angles are coordinates
 storage: the result as a file; drawing: its path of laws as a picture
 law: polynomials, on a library of monomials, also of functions of the state; candidates are the
