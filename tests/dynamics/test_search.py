@@ -6,8 +6,8 @@ import pytest
 from vidsindy_lite.dynamics import PolynomialSystem, check_trajectory, search
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, Status
-from vidsindy_lite.dynamics.discovery import History
 from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.problem import fit_curves, pose
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=2)

@@ -8,6 +8,8 @@ process_noise (is the motion kicked?), and persistence: which law stays the same
 is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings, of which
 shape looks at where the motion takes place and beyond at terms that the library lacks
+physics: what a law of motion says of a body, in named numbers
+history: how a discovery went
 rounds: circles and spheres, whose angles are coordinates
 storage: the result as a file; drawing: its path of laws as a picture
 law: polynomials, on a library of monomials, also of functions of the state; candidates are the

@@ -16,8 +16,8 @@ from scipy.stats import chi2
 
 from ..arrays import Bools, Floats
 from .collocation import Collocation, Fit, Status
-from .discovery import History
 from .gaps import Gap, gaps, join
+from .history import History
 from .library import closure_mask, divides, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED

@@ -23,8 +23,9 @@ from ..arrays import Floats
 from ..checks import check_integer
 from .candidates import Library, check_library
 from .collocation import Fit
-from .discovery import Discovery, History, conclude
+from .discovery import Discovery, conclude
 from .form import Form
+from .history import History
 from .order import SETTLED, UNLIKELY, accelerated, advised, better, check_order
 from .persistence import Path, Plateau, follow, typical
 from .precision import foreseen, with_precision
