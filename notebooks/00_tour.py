@@ -46,7 +46,7 @@
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
-system: str = "Lorenz"  # one of vidsindy_lite.SYSTEMS
+system: str = "Lorenz"  # one of vidsindy_lite.study.SYSTEMS
 seed: int = 0  # of the scenes in the videos
 
 # %%

@@ -33,6 +33,7 @@
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
+system: str = "Lorenz"  # one of vidsindy_lite.study.SYSTEMS
 frames: int = 500  # video frames per camera
 seed: int = 0  # of all pixel noise
 
@@ -65,7 +66,7 @@ trials = {"full": 100, "quick": 12}[profile]
 # [notebook 01](01_projection_proofs.ipynb), is `camera.rows` in the code.
 
 # %%
-t, x = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET).trajectory(frames)
+t, x = SYSTEMS[system].shift(REFERENCE_OFFSET).trajectory(frames)
 truth = Rig.around(x)
 tracks = [camera.project(x) for camera in truth.cameras]
 pixel = np.mean([camera.scale for camera in truth.cameras])  # scene units
