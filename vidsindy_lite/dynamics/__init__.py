@@ -23,6 +23,7 @@ from .candidates import Library, check_library
 from .collocation import Collocation, Status
 from .cramer_rao import cramer_rao
 from .discovery import Discovery
+from .form import Form
 from .integrate import runge_kutta_4
 from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
 from .order import check_order

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+SMALLEST, LARGEST = -5, 6
+"""Numbers of fewer and of more digits are printed with a power of ten."""
+
+
 @dataclass(frozen=True)
 class Simulation:
     """What a law foretells.
@@ -402,6 +406,14 @@ def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:
 
 
 def _with_error(value: float, error: float, term: str) -> str:
-    digits = 4 if error <= 0 else int(np.clip(1 - np.floor(np.log10(error)), 0, 12))
-    number = f"({abs(value):.{digits}f} ± {error:.{digits}f})"
+    """A term of an equation with two digits of its error; one that is known has none."""
+    largest = max(abs(value), error)
+    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
+    power = 0 if SMALLEST <= power < LARGEST else power
+    size, spread = abs(value) / 10.0**power, error / 10.0**power
+    number = f"{size:g}"
+    if error > 0:
+        digits = int(np.clip(1 - np.floor(np.log10(spread)), 0, 12))
+        number = f"({size:.{digits}f} ± {spread:.{digits}f})"
+    number += f"e{power}" if power else ""
     return f"{'-' if value < 0 else '+'} {number}" + ("" if term == "1" else f" {term}")
