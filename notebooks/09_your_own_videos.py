@@ -349,7 +349,7 @@ assert "must be a video file" in no_video
 # status 1.
 #
 # Check in this order: the verdict and its reasons; the tracks; the residuals; whether curve and path stay
-# together; and last whether the law makes sense to you. The README has a table of messages, what causes
+# together; and last whether the law makes sense to you. The [user guide](../docs/guide.md) has a table of messages, what causes
 # them and what to do.
 #
 # ## A position that is not trusted

@@ -724,7 +724,7 @@ note("Table 1, S2", "Tsucs2, own method: 5.39", "hides a coefficient that is off
 note("Sec. 4.1", "a non-dimensional measure is introduced", "it is not defined", "",
      "not reproducible")
 note("Sec. 4.1, Fig. 3", "up to 20 % noise nearly exact", "noise level: of what, is not said", "",
-     "ours is stated in the README")  # fmt: skip
+     "ours is stated in docs/results.md")  # fmt: skip
 
 # %% [markdown]
 # ## In the text

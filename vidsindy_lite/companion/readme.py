@@ -1,4 +1,4 @@
-"""The parts of the README that a run of the notebooks writes: what they found, and in what time.
+"""The parts of README and docs/ that a run of the notebooks writes: what they found, in what time.
 
 Between a line ``<!-- name -->`` and the next ``<!-- end -->`` stands what the macro of that name in
 ``readme.md`` makes of the figures' registry. All else is written by hand.
@@ -21,10 +21,15 @@ from .registry import load_run_times
 PART = re.compile(r"(?<=^<!-- )(?!end )(\w+) -->\n.*?(?=<!-- end -->$)", re.DOTALL | re.MULTILINE)
 
 
+def written_pages(root: Path) -> list[Path]:
+    """The README of a repository and the pages of its docs/."""
+    return [Path(root) / "README.md", *sorted((Path(root) / "docs").glob("*.md"))]
+
+
 def write_readme(root: Path) -> None:
-    """Write the README of a repository anew, with its parts as the figures have them now."""
-    path = Path(root) / "README.md"
-    write_file(path, fill(path.read_text("utf-8"), root).encode())
+    """Write these pages anew, with their parts as the figures have them now."""
+    for path in written_pages(root):
+        write_file(path, fill(path.read_text("utf-8"), root).encode())
 
 
 def fill(text: str, root: Path) -> str:
