@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .arrays import Floats
 from .cameras import Rig
 from .checks import check_integer, check_positive, check_rows
-from .dynamics import Discovery, Library, check_library, check_order, discover
+from .dynamics import Discovery, Library, PolynomialSystem, check_library, check_order, discover
 from .observation import Observation, observe, observe_tracks
 from .refusal import refusing
 from .vision import Hint, TrackFile, read_tracks
@@ -32,9 +32,15 @@ class VideoDiscovery(Observation):
 
     discovery: Discovery
 
+    @property
+    def driven(self) -> str:
+        """Which of several targets drive which others, and by what terms; empty for one target."""
+        return _driven(self.discovery.system) if self.targets > 1 else ""
+
     def __str__(self) -> str:
         warnings = (f"warning: {text}" for text in self.warnings)
         notes = [f"frame: {self.rig.note}"] if self.rig.note else []
+        notes += [f"targets: {self.driven}"] if self.driven else []
         return "\n".join([self.discovery.statement(), *notes, *warnings])
 
 
@@ -46,6 +52,7 @@ def discover_from_videos(
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
     hints: Sequence[Hint | None] | None = None,
+    targets: int = 1,
     degree: int | None = None,
     library: Library | None = None,
     order: int | str = 1,
@@ -58,8 +65,9 @@ def discover_from_videos(
 
     Parameters
     ----------
-    paths, rig, t, lags, detector, hints, progress
-        See `observe`. The unit of time is that of the equations.
+    paths, rig, t, lags, detector, hints, targets, progress
+        See `observe`. The unit of time is that of the equations. The law of several targets is one
+        for all: x1, x2, x3 are the place of the first, x4, x5, x6 of the second, and so on.
     degree, library, order, seed
         See `discover`.
 
@@ -75,7 +83,10 @@ def discover_from_videos(
     terms = check_library(degree, library)
     check_order(order)
     check_integer("seed", seed)
-    seen = observe(paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress)
+    seen = observe(
+        paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
+        progress=progress,
+    )  # fmt: skip
     names = [Path(path).name for path in paths]
     return _with_law(seen, names, library=terms, order=order, seed=seed, progress=progress)
 
@@ -130,6 +141,24 @@ def discover_from_tracks(
     doubts = [warning for track in read for warning in track.warnings]
     seen = replace(seen, warnings=(*seen.warnings, *doubts, *_contradicted(read, fps)))
     return _with_law(seen, names, library=terms, order=order, seed=seed, progress=progress)
+
+
+def _driven(law: PolynomialSystem) -> str:
+    """Which of several targets, of three coordinates each, drive which others by what terms."""
+    names = law.names[: law.d // 2] if law.order == 2 else law.names
+    of = {name: i // 3 + 1 for i, name in enumerate(names)}
+    of |= {name: of[names[i]] for i, name in enumerate(law.names[len(names) :])}
+    target = np.array([of[name] for name in law.names])
+    by: dict[tuple[int, int], list[str]] = {}
+    for j, side in law.sides().items():
+        for row in np.flatnonzero(law.support[:, j]):
+            for other in set(target[law.exponents[row, : law.d] > 0]) - {target[j]}:
+                pair = int(other), int(target[j])
+                by.setdefault(pair, []).append(f"{law.terms[row]} in {side}")
+    free = [str(i) for i in sorted(set(of.values())) if all(i != driven for _, driven in by)]
+    said = [f"{i} drives {j} by {', '.join(terms)}" for (i, j), terms in sorted(by.items())]
+    alone = f"{' and '.join(free)} {'moves' if len(free) == 1 else 'move'} independently"
+    return "; ".join([alone] * bool(free) + said)
 
 
 def _read(tracks: Sequence[ArrayLike | str | os.PathLike]) -> list[TrackFile]:

@@ -15,6 +15,7 @@
     pairs         lags that are promising, from two views at a time
  2. calibrate     tracks -> the same `Rig`, with nothing unknown
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
+    identities    who is who among several targets
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
     adjust        bundle adjustment: cameras, clocks, path together (`changes`: of what), `shutter`
     causes        why views do not agree, by trying one thing at a time
@@ -32,6 +33,7 @@ from .clocks import Clock
 from .calibrations import read_calibration, write_calibration
 from .causes import GROSS, explain, smooth
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
+from .identities import identify, side_by_side, stacked
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .camera import Camera
 from .models import OrthographicCamera, PerspectiveCamera
