@@ -15,12 +15,12 @@
     pairs         lags that are promising, from two views at a time
  2. calibrate     tracks -> the same `Rig`, with nothing unknown
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
-    identities    who is who among several targets
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
     adjust        bundle adjustment: cameras, clocks, path together (`changes`: of what), `shutter`
     causes        why views do not agree, by trying one thing at a time
     unmeasured    rigs of which only the lenses are known: a start
     covariance    of errors that depend on their neighbours
+    identities    beside the way: who is who among several targets
     messages      all warnings
     eq4           beside the way: calibration as the paper writes it, to compare
 

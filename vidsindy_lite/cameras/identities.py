@@ -22,7 +22,7 @@ from .rig import Rig
 from .triangulate import reconstruct, residuals
 
 _SHORTEST = 4  # frames of a run, and of what two runs have in common
-_NEAR = 2.0  # steps of a target, within which it may be taken for another one
+_NEAR, _NOISE = 2.0, 2.0  # by how much closer, in times and pixels, a target is to where it goes
 _CLEAR = 2.0  # factor between the misfits of two orders, from which the better one is sure
 _AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
 
@@ -106,15 +106,15 @@ def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
 
 
 def _runs(number: int, view: Floats) -> list[_Run]:
-    """The runs of a view (n, k, 2)."""
-    step = np.linalg.norm(np.diff(view, axis=0), axis=2).max(axis=1)
-    apart = np.linalg.norm(view[:, :, None] - view[:, None], axis=3)
-    apart[:, *np.diag_indices(view.shape[1])] = np.inf
-    closest = apart.min(axis=(1, 2))
+    """The runs of a view (n, k, 2): until another target might as well be a target's next place."""
     frames = np.flatnonzero(np.isfinite(view).all(axis=(1, 2)))
-    with np.errstate(invalid="ignore"):
-        near = np.minimum(closest[1:], closest[:-1]) < _NEAR * step
-    ends = 1 + np.flatnonzero((np.diff(frames) > 1) | near[frames[:-1]])
+    before = np.concatenate((view[:1], view[:-1]))
+    ahead = np.where(np.isfinite(before), 2 * view - before, view)[:-1]
+    miss = np.linalg.norm(ahead[:, :, None] - view[1:, None], axis=3)
+    own = np.einsum("nkk->nk", miss).max(axis=1)
+    miss[:, *np.diag_indices(view.shape[1])] = np.inf
+    mistaken = miss.min(axis=(1, 2), initial=np.inf) < _NEAR * own + _NOISE
+    ends = 1 + np.flatnonzero((np.diff(frames) > 1) | mistaken[frames[:-1]])
     parts = [part for part in np.split(frames, ends) if len(part) >= _SHORTEST]
     return [_Run(number, part, view[part]) for part in parts]
 
