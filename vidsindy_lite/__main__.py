@@ -92,7 +92,7 @@ def _discover(options: argparse.Namespace) -> int:
     rig, videos = Rig.load(options.rig), options.videos or None
     library = check_library(options.degree, options.library)
     told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
-    told |= {"order": options.order}
+    told |= {"order": options.order, "origin": options.origin}
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"targets": options.targets} if options.targets != 1 else {}
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
@@ -120,7 +120,7 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     from .pipeline import discover_from_tracks, discover_from_videos
     from .vision import frame_clock, load_hints
 
-    shared = {name: getattr(options, name) for name in ("degree", "library", "seed")}
+    shared = {name: getattr(options, name) for name in ("degree", "library", "origin", "seed")}
     shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
     shared |= {"lags": options.lag, "progress": True}
     if options.tracks:
@@ -362,12 +362,17 @@ COMMANDS = {
         "--library": _text(
             "TERMS", "in place of --degree: polynomial(N), fourier(N) with the sines and cosines "
             "of the coordinates, rational(N) with denominators, or a sum such as "
-            "'polynomial(1) + fourier(1)'", type=_library
+            "'polynomial(1) + fourier(1)'; then what is known, as in "
+            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)", type=_library
         ),
         "--order": _choice(
             "1", ("1", "2", "auto"),
             "1 for x' = f(x) (default), 2 for laws of motion, x'' = f(x, x'), auto for the one to "
             "be trusted"
+        ),
+        "--origin": _choice(
+            "learn", ("learn", "data"),
+            "whether the law's own origin is sought (default) or is that of the data"
         ),
         "--detector": _text(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from helpers import room, trajectory, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidsindy_lite as vl
-from helpers import room, trajectory, walk
 from vidsindy_lite.cameras import identify, side_by_side, stacked
 
 FRAMES = 240

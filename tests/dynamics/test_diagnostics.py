@@ -9,6 +9,7 @@ from vidsindy_lite.dynamics import discover
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
+from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.persistence import Plateau, follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import Units, pose
@@ -17,7 +18,7 @@ from vidsindy_lite.dynamics.state import State
 from vidsindy_lite.dynamics.trajectories import check_trajectories
 from vidsindy_lite.study import SYSTEMS, corruption
 
-CUBIC = Library.polynomial(3)
+FORM = Form.of(("x", "y"), Library.polynomial(3))
 
 NOISE = 0.03
 
@@ -38,7 +39,7 @@ def fitted(duffing, dropped=None):
     """The problem in units in which it is standard already, and a fit with the support given."""
     law, t, x = duffing
     problem = replace(
-        pose([(t, x)], [np.empty((*x.shape, 0))], CUBIC, rng=np.random.default_rng(0)),
+        pose([(t, x)], [np.empty((*x.shape, 0))], FORM, rng=np.random.default_rng(0)),
         trajectories=[(t, x)],
         units=Units(np.zeros(2), np.ones(2), 1.0),
         noise=np.full(2, NOISE),

@@ -8,6 +8,7 @@ from vidsindy_lite import study
 from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics import precision as weighing
 from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.problem import pose
 
 LAW = PolynomialSystem.from_terms(
@@ -114,7 +115,7 @@ def test_benchmarks_from_clean_data_are_not_weighed():
 def posed(x):
     data = [(TIMES, x)]
     nothing = [np.empty((*x.shape, 0))]
-    return pose(data, nothing, Library.polynomial(3), np.random.default_rng(0))
+    return pose(data, nothing, Form.of(("x", "y"), Library.polynomial(3)), np.random.default_rng(0))
 
 
 def test_precision_is_foreseen_before_any_law_is_known():

@@ -177,7 +177,7 @@ def test_an_axis_leaves_home_where_terms_make_up_for_its_staying():
     t = np.linspace(0, 20, 100)
     x = moving(duffing, [1.5], [0.0], t)
     library, rng = Library.polynomial(3), np.random.default_rng(0)
-    problem = pose([(t, x)], [np.empty((100, 1, 0))], library, rng, order=2)
+    problem = pose([(t, x)], [np.empty((100, 1, 0))], Form.of(("x",), library, 2), rng)
     exponents, zeros = problem.exponents, np.zeros(2)
     coefficients = np.zeros(exponents.shape)
     for term, value in {(1, 0): -1.0, (0, 1): -0.1, (3, 0): -0.5}.items():
@@ -199,11 +199,11 @@ def test_an_order_that_is_none():
 
 
 def test_what_is_known_is_no_candidate():
-    form = Form.of(2, Library.polynomial(2), order=2)
+    form = Form.of(("x", "y"), Library.polynomial(2), 2)
     assert form.names == ("x", "y", "vx", "vy")
     assert not form.candidates[form.known != 0].any()
     assert form.candidates.sum() == len(form.searched) == 2 * len(form.exponents)
-    first = Form.of(3, Library.polynomial(2), order=1)
+    first = Form.of(("x", "y", "z"), Library.polynomial(2))
     assert first.candidates.all()
     assert not first.known.any()
     assert first.movable.all()

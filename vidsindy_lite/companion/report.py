@@ -303,6 +303,8 @@ def _page(
         "note": found.rig.note, "driven": found.driven, "limit": DISAGREEMENT,
         "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
     }  # fmt: skip
+    law = found.discovery
+    about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
     return page("report.html", figures=figures, film=film, **about, **content)
 

@@ -85,6 +85,7 @@ def diagnose(
         *outliers(problem.measured),
         *_shape(problem, fit),
         *_misfit(problem, fit),
+        *_doubtful_sigma(problem, fit),
         *_unfinished(fit),
         *_unmet(problem, fit),
         *_another_in_the_data(problem, fit, law),
@@ -149,11 +150,24 @@ def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
     residual = residual_noise(fit)
     ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
     j = int(ratio.argmax())
+    told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
     if not ratio[j] < MISFIT:
         yield (
             f"the curve misses the data of {problem.form.names[j]} by {ratio[j]:.1f} times "
-            "the noise estimated beforehand: the law may lie outside the library (raise the "
+            f"{told}: the law may lie outside the library (raise the "
             "degree), the motion may not be autonomous, or errors last for several samples"
+        )
+
+
+def _doubtful_sigma(problem: Problem, fit: Fit) -> Iterator[str]:
+    """Are the errors that were given larger than what is left?"""
+    ratio = problem.noise / residual_noise(fit) if problem.measured_errors else np.zeros(problem.d)
+    j = int(ratio.argmax())
+    if ratio[j] > MISFIT:
+        yield (
+            f"sigma of {problem.form.names[j]} is {ratio[j]:.1f} times the errors that the law "
+            "leaves: the error bars are too wide, and terms may be lost; leave it out, and the "
+            "errors are estimated"
         )
 
 
@@ -313,7 +327,7 @@ def _sampling(problem: Problem) -> Iterator[str]:
     runs, form = problem.trajectories, problem.form
     turns = sum(t[-1] - t[0] for t, _ in runs) / (2 * np.pi)
     # On a line nothing turns; and a body need not turn, if it is seen from several starts.
-    bound = len(form.names) > 1 if form.movable.all() else len(runs) == 1
+    bound = len(form.names) > 1 and (form.movable.all() or len(runs) == 1)
     if turns < TURNS and bound:
         yield (
             f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from ..arrays import Floats, Ints
@@ -16,8 +16,10 @@ from .candidates import Library
 from .collocation import Fit
 from .diagnostics import diagnose
 from .errors import residual_noise
+from .history import History, Step
 from .library import shift_generators, shift_matrix
 from .persistence import Path, Plateau
+from .physics import Physics, physics_of
 from .polynomials import PolynomialSystem
 from .problem import Problem, Units
 from .selection import inverse
@@ -27,59 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Step:
-    """One line of the history of a discovery.
-
-    Parameters
-    ----------
-    stage : str
-        What was done.
-    seconds : float
-        Time since the start.
-    physics_weight : float
-        Relative weight of the physics loss.
-    data_loss : float
-        Mean square residual of the data over the noise variance.
-    physics_loss : float
-        Mean square residual of the law in standard units.
-    terms : int
-        Number of active terms.
-    offset : ndarray, shape (d,)
-        Origin of the law in the data's frame.
-    """
-
-    stage: str
-    seconds: float
-    physics_weight: float
-    data_loss: float
-    physics_loss: float
-    terms: int
-    offset: Floats
-
-
-@dataclass(frozen=True)
-class History:
-    """The steps of a discovery so far, in the order of time."""
-
-    steps: list[Step] = field(default_factory=list)
-    began: float = field(default_factory=time.perf_counter)
-
-    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
-        """Add what a fit at a relative physics weight has reached."""
-        state, collocation = fit.state, fit.collocation
-        data = collocation.data_loss(state.control_points)
-        self.steps.append(
-            Step(
-                stage=stage,
-                seconds=time.perf_counter() - self.began,
-                physics_weight=weight,
-                data_loss=data / collocation.counts.sum(),
-                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
-                terms=int(state.active.sum()),
-                offset=problem.units.point(state.offset),
-            )
-        )
+SMALLEST, LARGEST = -5, 6
+"""Numbers of fewer and of more digits are printed with a power of ten."""
 
 
 @dataclass(frozen=True)
@@ -234,6 +185,28 @@ class Discovery:
         status = f"diverges after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
         return Simulation(t, x, status)
 
+    def physics(self, down: ArrayLike | None = None) -> Physics:
+        """What a law of motion says of a body: g and drag, or springs and periods; its energy.
+
+        Parameters
+        ----------
+        down : array_like, shape (m,), optional
+            Direction of gravity, if it is known: g is the pull along it. By default that of the
+            force that acts on a body at rest.
+
+        Returns
+        -------
+        Physics
+            Named numbers with standard errors, carried through from those of the coefficients, as
+            in ``found.physics()["g"].value``; ``print`` shows them all, and what cannot be said.
+
+        Raises
+        ------
+        ValueError
+            If ``down`` is no direction.
+        """
+        return physics_of(self.system, self.covariance, self.curves, down)
+
     def plot_path(self) -> Figure:
         """Draw `path`: the terms of each equation over the error that is tolerated.
 
@@ -288,6 +261,8 @@ class Discovery:
             sizes = zip(self.model_error, self.system.names, strict=True)
             kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
             lines.append(f"kicked at random, by {kicks} over a unit of time")
+        if said := self.physics().headline:
+            lines.append(said)
         if self.note:
             lines.append(f"note: {self.note}")
         return "\n".join(lines)
@@ -431,6 +406,14 @@ def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:
 
 
 def _with_error(value: float, error: float, term: str) -> str:
-    digits = 4 if error <= 0 else int(np.clip(1 - np.floor(np.log10(error)), 0, 12))
-    number = f"({abs(value):.{digits}f} ± {error:.{digits}f})"
+    """A term of an equation with two digits of its error; one that is known has none."""
+    largest = max(abs(value), error)
+    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
+    power = 0 if SMALLEST <= power < LARGEST else power
+    size, spread = abs(value) / 10.0**power, error / 10.0**power
+    number = f"{size:g}"
+    if error > 0:
+        digits = int(np.clip(1 - np.floor(np.log10(spread)), 0, 12))
+        number = f"({size:.{digits}f} ± {spread:.{digits}f})"
+    number += f"e{power}" if power else ""
     return f"{'-' if value < 0 else '+'} {number}" + ("" if term == "1" else f" {term}")

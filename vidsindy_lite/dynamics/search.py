@@ -16,8 +16,8 @@ from scipy.stats import chi2
 
 from ..arrays import Bools, Floats
 from .collocation import Collocation, Fit, Status
-from .discovery import History
 from .gaps import Gap, gaps, join
+from .history import History
 from .library import closure_mask, divides, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
@@ -138,8 +138,9 @@ def unpruned(
     d = problem.d
     x, slope = collocation.node_states(control)
     coefficients = np.zeros(problem.known.shape)
-    terms = problem.terms(x)[:, rows]
-    coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=problem.noise.min())[0]
+    terms = problem.terms(x)
+    left = slope - terms @ problem.known
+    coefficients[rows] = np.linalg.lstsq(terms[:, rows], left, rcond=problem.noise.min())[0]
     active = rows[:, None] & problem.form.candidates
     coefficients[~active] = 0.0
     still, shared = np.zeros(d, dtype=bool), problem.form.shared
