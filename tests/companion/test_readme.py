@@ -14,6 +14,7 @@ from vidsindy_lite.stamp import PACKAGE
 ROOT = PACKAGE.parent
 PAGES = {path.stem: path.read_text("utf-8") for path in written_pages(ROOT)}
 README, GUIDE, RESULTS = PAGES["README"], PAGES["guide"], PAGES["results"]
+HALF = re.compile(r"^# (?=#+ )", re.MULTILINE)  # before a heading in the .py half of a notebook
 ONE_SCREEN = 60  # lines
 NUMBER = re.compile(r"\d+\.\d*")
 
@@ -153,15 +154,15 @@ def test_anchors_are_those_of_a_code_host():
 def dead_links(page):
     """Relative links of a Markdown page that lead to no file, or to no heading of a page."""
     text = re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
-    text = text.replace("# # ", "# ")  # the .py half of a notebook
     dead = []
     for url in re.findall(r"\]\(([^)\s]+)\)", text):
         path, _, anchor = url.partition("#")
         target = page.parent / path if path else page
         if ":" not in url and not target.exists():
             dead.append(url)
-        elif ":" not in url and anchor and target.suffix == ".md":
-            headings = re.findall(r"^#+ (.*)", target.read_text("utf-8"), re.MULTILINE)
+        elif ":" not in url and anchor and target.suffix in (".md", ".ipynb"):
+            target = target.with_suffix(".py") if target.suffix == ".ipynb" else target
+            headings = re.findall(r"^#+ (.*)", HALF.sub("", target.read_text("utf-8")), re.M)
             if anchor not in map(heading_anchor, headings):
                 dead.append(url)
     return dead
@@ -180,3 +181,7 @@ def test_a_dead_link_is_seen(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# One\n[a](page.md#one) [b](page.md#two) [c](none.md) [d](https://x.org)")
     assert dead_links(page) == ["page.md#two", "none.md"]
+    (tmp_path / "book.ipynb").touch()
+    (tmp_path / "book.py").write_text("# # A book\n# ## One\n# no # heading\n")
+    page.write_text("[a](book.ipynb#one) [b](book.ipynb#a-book) [c](book.ipynb#heading)")
+    assert dead_links(page) == ["book.ipynb#heading"]

@@ -14,6 +14,7 @@ import pandas as pd
 from ..stamp import write_file
 from ..study import LEAST
 from .artifacts import load_table
+from .claims import claims_of
 from .pages import macros
 from .records import read_records
 from .registry import load_run_times
@@ -67,9 +68,15 @@ def fill(text: str, root: Path) -> str:
         times=load_run_times(figures),
         frame=lambda table_id: pd.DataFrame(load_table(table_id, figures).rows, dtype=object),
         numbers=numbers,
+        claimed=lambda: {page.stem: claims_of(page) for page in _claiming(Path(root))},
         least=LEAST,
     )
     return PART.sub(part, text)
+
+
+def _claiming(root: Path) -> list[Path]:
+    """The pages whose claims are listed."""
+    return [root / "README.md", *sorted((root / "notebooks").glob("*.py"))]
 
 
 def _titles(root: Path) -> dict[str, str]:
