@@ -85,6 +85,8 @@ def _discover(options: argparse.Namespace) -> int:
 
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
+    if options.tracks and options.targets != 1:
+        raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
     check_folder_is_free(options.out)
     rig, videos = Rig.load(options.rig), options.videos or None
@@ -92,6 +94,7 @@ def _discover(options: argparse.Namespace) -> int:
     told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
     told |= {"order": options.order, "origin": options.origin}
     told |= {"lags": "learned" if options.lag is None else options.lag}
+    told |= {"targets": options.targets} if options.targets != 1 else {}
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
     told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
     try:
@@ -126,6 +129,7 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     if options.fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
     shared |= {"detector": options.detector, "hints": load_hints(options.rig)}
+    shared |= {"targets": options.targets}
     return discover_from_videos(options.videos, rig, t, **shared)
 
 
@@ -373,6 +377,10 @@ COMMANDS = {
         "--detector": _text(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "
             "ONNX file (default: auto)", default="auto"
+        ),
+        "--targets": _count(
+            1, "how many targets to follow and to find one law for (default: 1); several are told "
+            "from each other by geometry"
         ),
         "--seed": _count(0, "of the search (default: 0)"),
     }),

@@ -16,6 +16,7 @@ from .dynamics import (
     Discovery,
     Form,
     Library,
+    PolynomialSystem,
     check_library,
     check_order,
     discover,
@@ -40,9 +41,15 @@ class VideoDiscovery(Observation):
 
     discovery: Discovery
 
+    @property
+    def driven(self) -> str:
+        """Which of several targets drive which others, and by what terms; empty for one target."""
+        return _driven(self.discovery.system) if self.targets > 1 else ""
+
     def __str__(self) -> str:
         warnings = (f"warning: {text}" for text in self.warnings)
         notes = [f"frame: {self.rig.note}"] if self.rig.note else []
+        notes += [f"targets: {self.driven}"] if self.driven else []
         return "\n".join([self.discovery.statement(), *notes, *warnings])
 
 
@@ -54,6 +61,7 @@ def discover_from_videos(
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
     hints: Sequence[Hint | None] | None = None,
+    targets: int = 1,
     degree: int | None = None,
     library: Library | None = None,
     order: int | str = 1,
@@ -67,8 +75,9 @@ def discover_from_videos(
 
     Parameters
     ----------
-    paths, rig, t, lags, detector, hints, progress
-        See `observe`. The unit of time is that of the equations.
+    paths, rig, t, lags, detector, hints, targets, progress
+        See `observe`. The unit of time is that of the equations. The law of several targets is one
+        for all: x1, x2, x3 are the place of the first, x4, x5, x6 of the second, and so on.
     degree, library, order, origin, seed
         See `discover`.
 
@@ -81,8 +90,12 @@ def discover_from_videos(
     FileNotFoundError, ValueError
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
-    how = _checked(degree, library, order, origin, seed) | {"progress": progress}
-    seen = observe(paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress)
+    check_integer("targets", targets, least=1)
+    how = _checked(degree, library, order, origin, seed, targets) | {"progress": progress}
+    seen = observe(
+        paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
+        progress=progress,
+    )  # fmt: skip
     names = [Path(path).name for path in paths]
     return _with_law(seen, names, how)
 
@@ -139,14 +152,37 @@ def discover_from_tracks(
 
 
 def _checked(
-    degree: int | None, library: Library | None, order: int | str, origin: str, seed: int
+    degree: int | None,
+    library: Library | None,
+    order: int | str,
+    origin: str,
+    seed: int,
+    targets: int = 1,
 ) -> dict[str, Any]:
     """What `discover` takes beside the path, checked before anything is tracked."""
     terms = check_library(degree, library)
     check_order(order, origin, terms)
-    Form.of(variable_names(3), terms, 2 if order == 2 else 1)
+    Form.of(variable_names(3 * targets), terms, 2 if order == 2 else 1)
     check_integer("seed", seed)
     return {"library": terms, "order": order, "origin": origin, "seed": seed}
+
+
+def _driven(law: PolynomialSystem) -> str:
+    """Which of several targets, of three coordinates each, drive which others by what terms."""
+    names = law.names[: law.d // 2] if law.order == 2 else law.names
+    of = {name: i // 3 + 1 for i, name in enumerate(names)}
+    of |= {name: of[names[i]] for i, name in enumerate(law.names[len(names) :])}
+    target = np.array([of[name] for name in law.names])
+    by: dict[tuple[int, int], list[str]] = {}
+    for j, side in law.sides().items():
+        for row in np.flatnonzero(law.support[:, j]):
+            for other in set(target[law.exponents[row, : law.d] > 0]) - {target[j]}:
+                pair = int(other), int(target[j])
+                by.setdefault(pair, []).append(f"{law.terms[row]} in {side}")
+    free = [str(i) for i in sorted(set(of.values())) if all(i != driven for _, driven in by)]
+    said = [f"{i} drives {j} by {', '.join(terms)}" for (i, j), terms in sorted(by.items())]
+    alone = f"{' and '.join(free)} {'moves' if len(free) == 1 else 'move'} independently"
+    return "; ".join([alone] * bool(free) + said)
 
 
 def _read(tracks: Sequence[ArrayLike | str | os.PathLike]) -> list[TrackFile]:

@@ -171,10 +171,11 @@ def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
     assert "with x^2, without x^3" in warning
 
 
-def test_an_origin_that_the_data_do_not_tell_is_a_warning():
+@pytest.mark.parametrize("seed", [2, 3, 5, 6, 8])  # all but 5: the next law at home, not the first
+def test_an_origin_that_the_data_do_not_tell_is_a_warning(seed):
     law = PolynomialSystem.from_terms({"x": {"x": 1.8, "x^2": -0.11}}, degree=3)
     t = np.linspace(0, 10, 512)
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(seed)
     x = law.simulate(t, [11.0])
     found = discover(t, x + 0.6 * x.std() * rng.standard_normal(x.shape))
     assert found.status == "suspect"

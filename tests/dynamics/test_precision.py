@@ -131,3 +131,15 @@ def test_noise_that_looks_even_before_a_law_is_known_stays_even():
     assert weighing.foreseen(even) is even
     exact = posed(PATH)
     assert weighing.foreseen(exact) is exact
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("share", [0.05, 0.6, 1.0])
+def test_residuals_that_are_exactly_zero_are_no_accident(share):
+    residual = 0.01 * np.random.default_rng(3).standard_normal(800)
+    residual[: int(800 * share) - 1] = 0.0
+    pieces = np.repeat(np.eye(8), 100, axis=1)
+    for causes in (np.ones((1, 800)), pieces):
+        cost, variance, _ = weighing._variance(residual, causes)
+        assert np.isfinite(cost)
+        assert (variance > 0).all()

@@ -19,7 +19,7 @@ from .library import shift_matrix
 from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
-from .selection import closest_rival, subset_search
+from .selection import closest_rival, minimiser, subset_search
 from .shape import cancelling, shapes
 from .state import State
 from .trajectories import Trajectory, typical_step
@@ -197,9 +197,7 @@ def _another_in_the_data(problem: Problem, fit: Fit, law: PolynomialSystem) -> I
         )
 
 
-def _selection(
-    problem: Problem, fit: Fit, path: Path, law: PolynomialSystem
-) -> Iterator[str]:
+def _selection(problem: Problem, fit: Fit, path: Path, law: PolynomialSystem) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), fit.state, path)
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
@@ -273,30 +271,37 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[
 def _nearer_home(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
     """Would another law, with one axis less away from home, fit almost as well?"""
     state, exponents = fit.state, problem.exponents
-    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
     own = problem.penalties @ state.active.sum(axis=1) + problem.axis_penalty
     for axis in np.flatnonzero(state.moving).tolist():
         home = np.arange(problem.d) == axis
         origin = np.where(home, problem.home, state.offset)
         moved = shift_matrix(exponents, state.offset - origin) @ state.coefficients
         there = replace(state, coefficients=moved, offset=origin, moving=state.moving & ~home)
-        columns = problem.columns(there)
-        model = fit.collocation.linearise(there, columns)
-        present = there.flat()[columns]
-        support = (present != 0) | (columns >= exponents.size)
-        _, solution, value = subset_search(
-            model.information, model.gradient, present, prices[columns], support
-        )
-        rival = model.along(there, solution - present, 1.0)
-        matrix = shift_matrix(exponents, rival.offset - problem.home)
-        parts = np.abs(matrix) @ np.abs(rival.coefficients)
-        terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
-        if value - own < NEAR_TIE and (terms != law.support).any():
-            yield (
-                f"the data hardly tell where the law's origin is in {problem.form.names[axis]}: "
-                f"other terms around the origin of the data fit almost as well (criterion "
-                f"{value - own:+.1f}); use a longer or cleaner trajectory"
-            )
+        for value, rival in _cheapest_two(problem, fit, there):
+            matrix = shift_matrix(exponents, rival.offset - problem.home)
+            parts = np.abs(matrix) @ np.abs(rival.coefficients)
+            terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
+            if value - own < NEAR_TIE and (terms != law.support).any():
+                yield (
+                    f"the data hardly tell where the law's origin is in {problem.form.names[axis]}:"
+                    " other terms around the origin of the data fit almost as well (criterion "
+                    f"{value - own:+.1f}); use a longer or cleaner trajectory"
+                )
+                break
+
+
+def _cheapest_two(problem: Problem, fit: Fit, there: State) -> Iterator[tuple[float, State]]:
+    """The cheapest law around a state in another frame and its closest rival, with their costs."""
+    columns = problem.columns(there)
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
+    model, present = fit.collocation.linearise(there, columns), there.flat()[columns]
+    quadratic = (model.information, model.gradient, present)
+    start = (present != 0) | (columns >= problem.exponents.size)
+    support, solution, value = subset_search(*quadratic, prices, start)
+    yield value, model.along(there, solution - present, 1.0)
+    cost, dropped, added = closest_rival(*quadratic, prices, support)
+    support[dropped], support[added] = False, True
+    yield value + cost, model.along(there, minimiser(*quadratic, support) - present, 1.0)
 
 
 def _standstill(law: PolynomialSystem) -> Iterator[str]:

@@ -142,9 +142,10 @@ def _variance(residual: Floats, causes: Floats) -> tuple[float, Floats, Bools]:
     causes = causes / causes.mean(axis=1, keepdims=True)
     squares = residual**2
     variance = causes.sum(axis=0)
-    sizes = np.full(len(causes), np.median(squares / variance) / MEDIAN)
+    least = (squares / variance).mean() / LARGEST_RATIO**2  # some residuals are exactly zero
+    sizes = np.full(len(causes), max(np.median(squares / variance) / MEDIAN, least))
     for _ in range(UPDATES):
-        variance = sizes @ causes
+        variance = np.maximum(sizes @ causes, least)
         noise = squares <= GROSS**2 * variance
         up = (causes * (noise * squares / variance**2)).sum(axis=1)
         down = (causes * (noise / variance)).sum(axis=1)
