@@ -274,14 +274,18 @@ save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "eq
 #
 # * Three videos, the geometry of the cameras and **one** calibration are enough for the law of motion:
 #   terms, coefficients and their standard errors.
+#   <!-- by: scored.exact; scored.max_coefficient_error < 1e-4; 05: np.abs(every) < 2 -->
 # * The origin in which the law is sparse is found from the data as well.
+#   <!-- by: law.native.support == SYSTEMS[system].support -->
 # * On clean videos nothing is lost on the way: tracks to a thousandth of a pixel, cameras and path
 #   accordingly, and no false term.
+#   <!-- by: figure videos_tracker; abs(row["scale, learned"] / row["scale, true"] - 1) < 1e-3; scored.exact -->
 #
 # **What the paper says and what we found.** The paper finds the Lorenz system in the cameras' frame
 # with all its terms, one false one (a constant of -0.94 in dx/dt) and $\ell_2=1.50\cdot10^{-2}$. Here
 # the false term is gone, and the error is below a thousandth of a percent. All seven systems stand in
 # notebook [05](05_discovery.ipynb).
+# <!-- by: 10: term.endswith(": 1"); scored.exact; scored.l2 < 1e-5 -->
 #
 # Next: [the geometry of a camera](01_projection_proofs.ipynb).
 

@@ -314,13 +314,16 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 # * A view plane is turned flat by the rotation that takes its **normal to** $\mathbf e_z$. Then
 #   the last row of R is the normal, the first two are the axes of the plane, and the position of the
 #   plane along its normal drops out because $\mathbf R\mathbf n\parallel\mathbf e_z$.
+#   <!-- by: np.allclose(R @ n, e_z; np.allclose(R[2], n; spread[0] < 1e-12 -->
 #
 # **What the paper says and what we found.**
 #
 # * With the paper's $\mathbf v_1=\mathbf R\mathbf v_0$ this fails; the proof's own cancellation
 #   silently uses the other direction.
+#   <!-- by: not np.allclose(text @ n, e_z; abs(coefficient_of_d(np.cross(n, e_z))) < 1e-12 -->
 # * The matrix of the proof has a wrong sign in row 2, column 3; the axis is $0/0$ along z; and the
 #   offset needs *signed* distances to Y'OZ' and X'OZ'.
+#   <!-- by: abs(np.linalg.det(proof) - 1) > 1e-3; np.isnan(axis).all(); min(distance.values()) < 0; figure projection_offset -->
 #
 # Next: [videos and tracking](02_videos_and_tracking.ipynb), where pixels come from images, and
 # [camera learning](03_camera_learning.ipynb), where $s$ and $\vartheta$ come from pixels.

@@ -190,7 +190,7 @@ def test_what_is_left_of_an_interrupted_site_may_be_replaced(tmp_path, monkeypat
             write_file(self.output / "half.html", b"")
             raise KeyboardInterrupt
 
-    for folder in ("figures", "notebooks", "vidsindy_lite"):
+    for folder in ("docs", "figures", "notebooks", "vidsindy_lite"):
         (tmp_path / "root" / folder).mkdir(parents=True)
     for name in ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md"):
         (tmp_path / "root" / name).write_text("# One\n")

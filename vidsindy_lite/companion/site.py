@@ -1,4 +1,4 @@
-"""The README, the notebooks, the figures and the package's reference as a folder of web pages.
+"""README, docs/, the notebooks, the figures and the package's reference as a folder of web pages.
 
 Sphinx makes them, of the notebooks myst-nb. Everything lies in the folder, the search and MathJax
 included, which draws the formulas: the pages need no network and no server.
@@ -20,7 +20,9 @@ from .run import find_notebooks
 SETTINGS = {
     "project": PACKAGE.name,
     "extensions": ["myst_nb", *(f"sphinx.ext.{n}" for n in ("apidoc", "autodoc", "napoleon"))],
-    "include_patterns": ["*.md", "notebooks/*", "figures/README.md", "api/vidsindy_lite*"],
+    "include_patterns": [
+        "*.md", "docs/*.md", "notebooks/*", "figures/README.md", "api/vidsindy_lite*",
+    ],
     "nb_execution_mode": "off",
     "myst_enable_extensions": ["dollarmath"],
     "myst_heading_anchors": 4,
@@ -77,13 +79,14 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
         If there is no repository, or a notebook has not been executed yet.
     """
     root, output = repository_root(root), Path(output)
-    for shown in (root / "figures", root / "notebooks", root / PACKAGE.name):
-        if output.resolve().is_relative_to(shown):
+    for shown in ("docs", "figures", "notebooks", PACKAGE.name):
+        if output.resolve().is_relative_to(root / shown):
             raise ValueError(f"output: must not lie in what is shown, got '{output}'")
     clear(output, "site")
     with TemporaryDirectory() as scratch:
         pages, doctrees = Path(scratch) / "pages", Path(scratch) / "doctrees"
-        shutil.copytree(root / "figures", pages / "figures")
+        for folder in ("figures", "docs"):
+            shutil.copytree(root / folder, pages / folder)
         (pages / "notebooks").mkdir()
         for path in find_notebooks(root):
             shutil.copy(path.with_suffix(".ipynb"), pages / "notebooks")
