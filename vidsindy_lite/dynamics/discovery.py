@@ -86,7 +86,7 @@ class Discovery:
     curves : tuple of scipy.interpolate.BSpline
         The fitted curve, one spline per stretch of data, in units of the data.
     note : str
-        Which order the law has and why, where that was left open.
+        Which order the law has and why, where both were looked for.
     """
 
     system: PolynomialSystem

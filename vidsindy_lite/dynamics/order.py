@@ -26,11 +26,6 @@ a body. Clean flows of first order leave .26 to .64, springs and throws up to .0
 AMBIGUOUS = 0.5
 """Share of the slopes' squares that no cubic law of first order explains, above which a place is
 passed with several velocities. Flows of first order leave up to .15, with noise of 40 %."""
-ADVICE = (
-    "a law of motion, x'' = f(x, x'), may fit better: if these are positions of a body, try order=2"
-)
-SETTLED = "order 1: there is no reason to doubt its law"
-UNLIKELY = "order 1: nothing speaks for accelerations that follow positions and velocities"
 MISFIT = 1.5
 """Errors that one law leaves over those of another, from which on it misses the data."""
 DENSITY = 10
@@ -41,8 +36,6 @@ def check_order(order: object, origin: str, library: Library) -> None:
     """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
     if order not in (1, 2, "auto"):
         raise ValueError(f"order: must be 1, 2 or 'auto', got {order!r}")
-    if order == "auto" and library.given:
-        raise ValueError("order: must be 1 or 2 where terms are given of its equations, got 'auto'")
     check_choice("origin", origin, ("learn", "data"))
 
 
@@ -73,13 +66,6 @@ def unexplained(terms: Floats, values: Floats) -> float:
         return np.nan
     left = values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0]
     return float((left**2).sum() / (values**2).sum())
-
-
-def advised(found: Discovery, curves: Sequence[BSpline]) -> Discovery:
-    """A law of order 1; if it is doubtful and one of order 2 may hold, with that advice."""
-    if found.warnings and accelerated(curves):
-        return replace(found, warnings=(*found.warnings, ADVICE))
-    return found
 
 
 def better(first: Discovery, second: Discovery) -> Discovery:
