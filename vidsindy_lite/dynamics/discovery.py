@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 
 from ..arrays import Floats, Ints
 from ..checks import check_array
+from .absent import intervals, unseen
 from .candidates import Library
 from .collocation import Fit
 from .diagnostics import diagnose
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 SMALLEST, LARGEST = -5, 6
 """Numbers of fewer and of more digits are printed with a power of ten."""
+SHOWN = 3
+"""Most absent terms that are printed."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,10 @@ class Discovery:
         How the fit went.
     curves : tuple of scipy.interpolate.BSpline
         The fitted curve, one spline per stretch of data, in units of the data.
+    absent : ndarray, shape (l, d, 2)
+        Of each candidate term of ``native`` that the law has not, the 95 % interval of what it
+        would be if it alone were added, all else fitted again; NaN for what is in the law or no
+        candidate. See `intervals` of the module ``absent`` for the formula.
     note : str
         Which order the law has and why, where both were looked for.
     """
@@ -101,6 +108,7 @@ class Discovery:
     path: tuple[tuple[Plateau, ...], ...]
     history: tuple[Step, ...]
     curves: tuple[BSpline, ...]
+    absent: Floats
     note: str = ""
 
     @property
@@ -263,6 +271,13 @@ class Discovery:
             lines.append(f"kicked at random, by {kicks} over a unit of time")
         if said := self.physics().headline:
             lines.append(said)
+        if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
+            frame = "in its own frame, " if self.offset.any() else ""
+            more = f" and {len(terms) - SHOWN} more" if len(terms) > SHOWN else ""
+            lines.append(
+                f"not seen, though they may be as large as terms of the law: {frame}"
+                f"{', '.join(terms[:SHOWN])}{more}"
+            )
         if self.note:
             lines.append(f"note: {self.note}")
         return "\n".join(lines)
@@ -315,6 +330,7 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
         warnings=diagnose(problem, fit, path, law, margins),
         path=path.plateaus,
         history=tuple(history.steps),
+        absent=intervals(problem, fit, tolerated),
         curves=tuple(
             BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
             for s in collocation.grid.splines(state.control_points)
