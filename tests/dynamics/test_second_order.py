@@ -193,7 +193,7 @@ def test_all_axes_leave_home_one_after_the_other():
     t, rest = np.linspace(0, 12, 300), np.array([0.7, -0.5])
     x = moving(lambda x, v: -9 * x - 0.1 * v - 4 * x**3, [1, 0.5], [0, 1], t) + rest
     library, rng = Library.polynomial(3), np.random.default_rng(0)
-    problem = pose([(t, x)], [np.empty((300, 2, 0))], library, rng, order=2)
+    problem = pose([(t, x)], [np.empty((300, 2, 0))], Form.of(("x", "y"), library, 2), rng)
     powers = problem.exponents
     alone = (powers > 0).sum(axis=1) <= 1
     active = np.zeros(powers.shape, dtype=bool)
@@ -265,6 +265,20 @@ def test_no_flow_of_the_paper_looks_like_a_body(name, share):
     t, x = SYSTEMS[name].trajectory(1500)
     curves = smooth([(t / t[-1] * 100, noisy(x, share))], np.random.default_rng(0)).splines
     assert not accelerated(curves)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02])
+def test_a_law_outside_the_library_is_no_body(share):
+    """Flows of one and two states (Gompertz, saturated growth, a pendulum and its rate)."""
+    flows = {
+        (0.8,): lambda _, x: 0.32 * x * np.log(2.9 / x),
+        (2.0,): lambda _, x: 0.5 * x * (1 - x / 20) - x**2 / (1 + x**2),
+        (-1.9, 0.0): lambda _, x: [x[1], -0.9 * np.sin(x[0]) - 0.2 * x[1]],
+    }
+    t = np.linspace(0, 10, 512)
+    for start, rate in flows.items():
+        x = solve_ivp(rate, (0, 10), start, t_eval=t, rtol=1e-9).y.T
+        assert discover(t, noisy(x, share)).system.order == 1
 
 
 def test_what_cannot_be_of_second_order_stays_with_the_first():

@@ -26,6 +26,9 @@ a body. Clean flows of first order leave .26 to .64, springs and throws up to .0
 AMBIGUOUS = 0.5
 """Share of the slopes' squares that no cubic law of first order explains, above which a place is
 passed with several velocities. Flows of first order leave up to .15, with noise of 40 %."""
+PASSED = 0.005
+"""The same share, below which every place is passed with one velocity, so that nothing speaks for
+a second order. Flows of first order outside the library leave up to .002, throws .02."""
 MISFIT = 1.5
 """Errors that one law leaves over those of another, from which on it misses the data."""
 DENSITY = 10
@@ -42,7 +45,8 @@ def check_order(order: object, origin: str, library: Library) -> None:
 def accelerated(curves: Sequence[BSpline]) -> bool:
     """Whether smoothed curves look like those of a law of second order.
 
-    Either the slope is no function of the place, or the second derivative is nearly linear in both.
+    The slope is no function of the place; or hardly one, and the second derivative is nearly linear
+    in both.
     """
     places, slopes, bends = [], [], []
     for curve in curves:
@@ -54,7 +58,8 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     x, v, a = (np.concatenate(parts) for parts in (places, slopes, bends))
     linear = np.hstack([np.ones((len(x), 1)), x, v])
     cubic = monomials(x, monomial_exponents(x.shape[1], 3))
-    return unexplained(linear, a) < LINEAR or unexplained(cubic, v) > AMBIGUOUS
+    several = unexplained(cubic, v)
+    return several > AMBIGUOUS or (several > PASSED and unexplained(linear, a) < LINEAR)
 
 
 def unexplained(terms: Floats, values: Floats) -> float:
