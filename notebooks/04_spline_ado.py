@@ -147,7 +147,8 @@ assert (native.support.sum(), moved.support.sum()) == (7, 12)
 #
 # Without the price this is nonlinear least squares, and Gauss-Newton needs the Jacobian $\mathbf J$ of
 # both misfits in all unknowns $(\mathbf P,\boldsymbol\Lambda,\Delta)$ and the normal matrix
-# $\mathbf J^T\mathbf J$. Here are the misfits of a small problem, 48 samples and the seven true terms, ...
+# $\mathbf J^T\mathbf J$. Here are the misfits of a small problem, 48 samples and the seven true terms, ... (The two rows
+# of ones are the weights of data and law, one a coordinate; a `State` holds all unknowns, and which of them are free.)
 
 # %%
 segment = dynamics.Segment.even(t[:48], clean[:48], spacing=3 * t[1], trajectory=0)
@@ -469,7 +470,8 @@ save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 # Right: after the search, with the impostors gone, each true term is far above its penalty (dashed).*
 
 # %% [markdown]
-# How sure is the search? `closest_rival` is the single change that costs least.
+# How sure is the search? `closest_rival` is the single change that costs least, in the units of the loss: squared
+# misfits over the variance of the noise, so that a term is worth its penalty if it lowers the loss by more.
 
 # %%
 cost, dropped, added = dynamics.closest_rival(S, 0 * c, c, penalty, support)
@@ -587,7 +589,8 @@ for s in np.geomspace(0.001, 1, 13):
 
 # %% [markdown]
 # At a thousandth many terms pay; with every step up some go, until those remain that make the motion. They stay
-# over more than a decade. `discover` takes the widest plateau, equation by equation, refines the law with its terms alone, and
+# over more than a decade. Such a range of tolerated errors, over which the terms stay the same, is a *plateau*.
+# `discover` takes the widest plateau, equation by equation, refines the law with its terms alone, and
 # keeps the path in `Discovery.path`. Where another plateau is half as wide, a warning names both.
 
 # %%
@@ -608,7 +611,8 @@ save_figure("solver_path", fig, caption=caption, numbers=dict(zip("xyz", numbers
 #
 # A polynomial law is one in any frame, $\boldsymbol\Lambda(\Delta)=\mathbf T(\Delta)\boldsymbol\Lambda$, and so
 # is its information. So the unpruned fit need not be repeated to ask how many terms are significant at another
-# origin. Each term with score $z$ counts smoothly:
+# origin. Each term with score $z$, its coefficient over its standard error, counts smoothly: as nearly one if
+# it is far above its penalty, as nearly nothing if it is far below.
 #
 # $$N(\Delta)=\sum\frac{z^2}{z^2+\text{penalty}} .$$
 
