@@ -20,7 +20,7 @@ from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
 from .selection import closest_rival, minimiser, subset_search
-from .shape import cancelling, shapes
+from .shape import cancelling, shapes, tied
 from .state import State
 from .trajectories import Trajectory, typical_step
 
@@ -144,6 +144,8 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     yield from shapes(problem.measured, noise, problem.form.names[:measured], terms)
     x, _ = fit.collocation.node_states(fit.state.control_points)
     yield from cancelling(problem.law(fit.state), x - fit.state.offset)
+    if len(problem.measured) == 1:
+        yield from tied(problem.form.names, x)
 
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
