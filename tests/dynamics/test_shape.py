@@ -131,6 +131,18 @@ def test_a_line_and_a_sine_may_be_a_cubic(amplitude, doubted):
     assert list(cancelling(plain, x)) == []
 
 
+@pytest.mark.parametrize(("throws", "doubted"), [(2, True), (3, False)])
+def test_two_throws_in_space_are_not_enough(throws, doubted):
+    starts = [(4, 1, 8), (-2, 5, 6), (1, -4, 9)][:throws]
+    t = np.linspace(0, 1.5, 60)
+    paths = [
+        solved(lambda _, s: [*s[3:], *(np.array([0, 0, -9.81]) - 0.3 * s[3:])], [0, 0, 1, *v], t)
+        for v in starts
+    ]
+    names = ("x", "y", "z", "vx", "vy", "vz")
+    assert bool(list(tied(names, np.concatenate(paths)))) == doubted
+
+
 def test_a_spring_that_is_alike_in_all_directions_is_not_told_from_a_flow():
     t = np.linspace(0, 12, 300)
     for stiff, doubted in (((4, 4), True), ((4, 7), False)):

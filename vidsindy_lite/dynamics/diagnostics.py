@@ -144,8 +144,7 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     yield from shapes(problem.measured, noise, problem.form.names[:measured], terms)
     x, _ = fit.collocation.node_states(fit.state.control_points)
     yield from cancelling(problem.law(fit.state), x - fit.state.offset)
-    if len(problem.measured) == 1:
-        yield from tied(problem.form.names, x)
+    yield from tied(problem.form.names, x)
 
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:

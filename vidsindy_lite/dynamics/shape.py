@@ -290,9 +290,9 @@ def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
 
 
 def tied(names: Sequence[str], x: Floats) -> Iterator[str]:
-    """What to say if along one motion, (n, d), velocities follow from places as in a linear flow.
+    """What to say if along a motion, (n, d), velocities follow from places or from each other.
 
-    So it is in a spring that is equally stiff in all directions.
+    So it is with a spring that is equally stiff in all directions, and two throws in space.
     """
     m = len(names) // 2
     if tuple(names[m:]) != velocity_names(names[:m]):
@@ -301,8 +301,8 @@ def tied(names: Sequence[str], x: Floats) -> Iterator[str]:
         together = np.nan_to_num(np.corrcoef(x.T))
     if np.linalg.eigvalsh(together)[0] < CLOSE**2:
         yield (
-            "places and velocities depend on each other along this motion (velocities are linear "
-            "in places, or in each other): many laws fit alike; add runs from other starts"
+            "places and velocities depend on each other on these data (one of them is linear in "
+            "the others): many laws fit alike; add runs from other starts"
         )
 
 
