@@ -142,7 +142,7 @@ def observe(
     targets : int
         How many targets there are. Several are followed wherever they are apart, and told from each
         other by geometry: in three or more views of a measured rig that start together, or whose
-        lags are given.
+        lags are given. The first is furthest left where the first view first tells them apart.
     progress : bool
         Show progress bars.
 
