@@ -156,6 +156,8 @@ def _follow(path: str | os.PathLike, samples: Image, hint: Hint | None) -> Track
 def _plausible(found: Track, hint: Hint | None) -> bool:
     """Is it a smooth motion, and that of what the hint says?"""
     at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
+    if not len(at):
+        return False
     if hint is None:
         rough = scatter(at, found.pixels[at])
         return not np.isfinite(rough) or rough < _ROUGH
