@@ -32,6 +32,8 @@
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
+system: str = "Lorenz"  # one of vidsindy_lite.study.SYSTEMS
+view: int = 1  # which of the three cameras
 
 # %%
 import matplotlib.pyplot as plt
@@ -48,11 +50,11 @@ e_z = np.array([0.0, 0.0, 1.0])
 
 # %% [markdown]
 # A moving target to look at, and a camera that looks at it. `Rig.around` places three cameras
-# around a scene; here we take the first.
+# around a scene; here we take one of them.
 
 # %%
-t, x = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET).trajectory(frames)
-camera = Rig.around(x).cameras[0]
+t, x = SYSTEMS[system].shift(REFERENCE_OFFSET).trajectory(frames)
+camera = Rig.around(x).cameras[view - 1]
 print("position", camera.position.round(2))
 print("normal  ", camera.normal.round(4))
 
@@ -261,7 +263,8 @@ distance = {
     "X'OY' (depth)": cameras.signed_distance(C, *cameras.plane_through(origin, X, Y)),
 }
 assert np.allclose(list(distance.values())[:2], camera.offset, atol=1e-12)
-assert min(distance.values()) < 0
+behind = cameras.signed_distance(-C, *cameras.plane_through(origin, Y, Z))  # on its other side
+assert np.isclose(behind, -distance["Y'OZ' (delta_x)"])
 
 # %%
 rows = [
@@ -314,13 +317,16 @@ print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round
 # * A view plane is turned flat by the rotation that takes its **normal to** $\mathbf e_z$. Then
 #   the last row of R is the normal, the first two are the axes of the plane, and the position of the
 #   plane along its normal drops out because $\mathbf R\mathbf n\parallel\mathbf e_z$.
+#   <!-- by: np.allclose(R @ n, e_z; np.allclose(R[2], n; spread[0] < 1e-12 -->
 #
 # **What the paper says and what we found.**
 #
 # * With the paper's $\mathbf v_1=\mathbf R\mathbf v_0$ this fails; the proof's own cancellation
 #   silently uses the other direction.
+#   <!-- by: not np.allclose(text @ n, e_z; abs(coefficient_of_d(np.cross(n, e_z))) < 1e-12 -->
 # * The matrix of the proof has a wrong sign in row 2, column 3; the axis is $0/0$ along z; and the
 #   offset needs *signed* distances to Y'OZ' and X'OZ'.
+#   <!-- by: abs(np.linalg.det(proof) - 1) > 1e-3; np.isnan(axis).all(); np.isclose(behind, -distance; figure projection_offset -->
 #
 # Next: [videos and tracking](02_videos_and_tracking.ipynb), where pixels come from images, and
 # [camera learning](03_camera_learning.ipynb), where $s$ and $\vartheta$ come from pixels.

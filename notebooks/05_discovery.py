@@ -262,7 +262,7 @@ for name, law in found.items():
 pulled = {n: np.concatenate(list(group)) for n, group in ours.groupby("system", sort=False).pulls}
 every = np.concatenate(list(pulled.values()))
 print(f"{len(every)} coefficients, {np.mean(np.abs(every) < 2):.0%} within two standard errors")
-assert np.mean(np.abs(every) < 2) > 0.7
+assert np.mean(np.abs(every) < 2) > (0.9 if full else 0.7)
 
 # %%
 fig = plots.plot_pulls(pulled)
@@ -393,20 +393,27 @@ assert all(error[method] > 2 * error["ours"] for method in baselines.BASELINES)
 # * Seven systems, one call, nothing chosen by hand: all true terms, no false one, from three videos
 #   with one calibrated camera. From whole pixels the relative error is of the order of $10^{-4}$, from the sub-pixel tracks of
 #   lossless videos below $10^{-5}$.
+#   <!-- by: ours.exact.all(); ours.groupby("system").l2.median().max() < LEAST; mine.exact.mean() >= 0.9; figure table_1 -->
 # * The offset of the reference frame was not given and is found with the law.
-# * The standard errors are what they claim to be: nine of ten coefficients lie within two of them.
+#   <!-- by: np.allclose(law.offset, REFERENCE_OFFSET -->
+# * The standard errors are not too small: more than nine of ten coefficients lie within two of them.
+#   <!-- by: np.mean(np.abs(every) < 2) -->
 # * With paths as exact as these, other methods find most laws as well. What sets them apart is
 #   noise, of which whole pixels are a first taste.
+#   <!-- by: figure table_S3; error[method] > 2 * error["ours"]; 06: error.loc[level, others] > 1.5 -->
 #
 # **What the paper says and what we found.**
 #
 # * The paper's errors are 0.15 to 6.22 (in $10^{-2}$) with four false positives in seven systems;
-#   here they are below 0.02 even from whole pixels, with none. Five trials differ in nothing but
+#   here they are below 0.03 even from whole pixels, with none. Five trials differ in nothing but
 #   their scenes, so their spread is that of the tracker.
+#   <!-- by: figure table_1 -->
 # * PySINDy's 824 % (NoseHoover) and 856 % (WangSun) are coefficients ten times too large
 #   throughout: a time step wrong by that factor. With the right step they are 1 to 15 % here.
+#   <!-- by: 10: 9 < medians[name] < 11; figure table_1 -->
 # * "Nine datasets" are seven, and the paper's frame of reference has to be guessed from its own
 #   ground truths.
+#   <!-- by: 10: len(SYSTEMS_S1) != DATASETS_CLAIMED; 10: all(scored.exact for scored in ground.values()) -->
 #
 # How noise and gaps change this is [notebook 06](06_robustness_and_ablation.ipynb).
 

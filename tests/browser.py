@@ -19,6 +19,9 @@ SEEN = """(async () => {
         width: document.documentElement.scrollWidth,
         text: document.body.innerText,
         images: document.images.length,
+        wordless: all("img:not([alt]), img[alt='']").map(image => image.src.slice(-80)),
+        cut: all("pre").filter(code => code.scrollWidth > code.clientWidth + 1).map(
+            code => code.innerText.slice(0, 80)),
         broken: all("img").filter(image => !image.naturalWidth).map(image => image.src.slice(-80)),
         formulas: all(".MathJax .math").length,
         unread: all(".MathJax .merror").map(formula => formula.innerText),

@@ -126,6 +126,10 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
             ["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"],
             "degree: must not be given with a library, got 2 and fourier(1)",
         ),
+        (
+            ["--rig", "rig.toml", "--library", "polynomial(1); x: q = 0"],
+            "library: 'q' is no term of the equation of x, which has 1, x, y, z",
+        ),
         (["--rig", "rig.toml", "--seed", "-1"], "seed: must be an integer of at least 0"),
         (["--rig", "rig.toml", "--out", "."], "out: must be a new folder"),
         (["--rig", "rig.toml", "--out", "\udcff"], r"must be made of characters, got '\udcff'"),

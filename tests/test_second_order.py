@@ -41,6 +41,7 @@ def test_a_report_on_accelerations(found, tmp_path):
     written = json.loads((tmp_path / "report" / "result.json").read_text())
     equations = [term["equation"] for term in written["law"]["data"]["terms"]]
     assert equations == ["x''", "x''", "y''", "y''", "z''", "z''"]
+    assert "\nperiod x = 1.147" in (tmp_path / "report" / "report.html").read_text()
 
 
 def test_orders_that_are_none(filmed, capsys):

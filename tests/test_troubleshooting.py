@@ -1,4 +1,4 @@
-"""Every row of the README's table of troubles: its trouble is made, and its message appears."""
+"""Every row of the guide's table of troubles: its trouble is made, and its message appears."""
 
 import re
 from dataclasses import replace
@@ -16,9 +16,9 @@ from vidsindy_lite.stamp import PACKAGE
 from vidsindy_lite.study import add_noise
 from vidsindy_lite.vision import render
 
-README = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
+GUIDE = (PACKAGE.parent / "docs" / "guide.md").read_text(encoding="utf-8")
 pytestmark = pytest.mark.usefixtures("tracked_once")
-TABLE = README.split("## When something is wrong")[1].split("\n## ")[0]
+TABLE = GUIDE.split("## When something is wrong")[1].split("\n## ")[0]
 MESSAGES = re.findall(r"^\| `(.+?)` \|", TABLE, re.MULTILINE)
 SIZE, FRAMES = (96, 96), 120
 

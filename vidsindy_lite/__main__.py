@@ -85,13 +85,16 @@ def _discover(options: argparse.Namespace) -> int:
 
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
+    if options.tracks and options.targets != 1:
+        raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
     check_folder_is_free(options.out)
     rig, videos = Rig.load(options.rig), options.videos or None
     library = check_library(options.degree, options.library)
     told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
-    told |= {"order": options.order}
+    told |= {"order": options.order, "origin": options.origin}
     told |= {"lags": "learned" if options.lag is None else options.lag}
+    told |= {"targets": options.targets} if options.targets != 1 else {}
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
     told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
     try:
@@ -117,7 +120,7 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     from .pipeline import discover_from_tracks, discover_from_videos
     from .vision import frame_clock, load_hints
 
-    shared = {name: getattr(options, name) for name in ("degree", "library", "seed")}
+    shared = {name: getattr(options, name) for name in ("degree", "library", "origin", "seed")}
     shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
     shared |= {"lags": options.lag, "progress": True}
     if options.tracks:
@@ -126,6 +129,7 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     if options.fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
     shared |= {"detector": options.detector, "hints": load_hints(options.rig)}
+    shared |= {"targets": options.targets}
     return discover_from_videos(options.videos, rig, t, **shared)
 
 
@@ -358,16 +362,25 @@ COMMANDS = {
         "--library": _text(
             "TERMS", "in place of --degree: polynomial(N), fourier(N) with the sines and cosines "
             "of the coordinates, rational(N) with denominators, or a sum such as "
-            "'polynomial(1) + fourier(1)'", type=_library
+            "'polynomial(1) + fourier(1)'; then what is known, as in "
+            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)", type=_library
         ),
         "--order": _choice(
             "1", ("1", "2", "auto"),
             "1 for x' = f(x) (default), 2 for laws of motion, x'' = f(x, x'), auto for the one to "
             "be trusted"
         ),
+        "--origin": _choice(
+            "learn", ("learn", "data"),
+            "whether the law's own origin is sought (default) or is that of the data"
+        ),
         "--detector": _text(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "
             "ONNX file (default: auto)", default="auto"
+        ),
+        "--targets": _count(
+            1, "how many targets to follow and to find one law for (default: 1); several are told "
+            "from each other by geometry"
         ),
         "--seed": _count(0, "of the search (default: 0)"),
     }),

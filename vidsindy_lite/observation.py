@@ -22,19 +22,32 @@ from .cameras import (
     check_learnable,
     disagreement,
     explain,
+    identify,
     learn_cameras,
     learn_lags,
     list_lags,
     posed,
     reconstruct,
+    residuals,
+    side_by_side,
     smooth,
+    stacked,
     systematic_errors,
     trailing_errors,
 )
-from .checks import check_path, check_tracks, check_vector
+from .checks import check_integer, check_path, check_tracks, check_vector
 from .dynamics import smooth as smooth_curves
 from .refusal import Refused, refusing
-from .vision import Hint, Track, VideoInfo, check_detector, frame_clock, track, video_info
+from .vision import (
+    Hint,
+    Track,
+    VideoInfo,
+    check_detector,
+    frame_clock,
+    track,
+    track_targets,
+    video_info,
+)
 
 _OTHER_LAG = 0.02  # frames by which it may differ without a word
 _SMOOTHED = 8  # frames of a stretch, from which its curve can be told from noise
@@ -48,7 +61,8 @@ class Observation:
     Parameters
     ----------
     tracks : tuple of ndarray, shape (n, 2)
-        Pixels of the target in each video at the instants ``t``; NaN where it was not seen.
+        Pixels of the target in each video at the instants ``t``; NaN where it was not seen. Of k
+        targets (n, 2 k), side by side, as are their paths and errors below.
     rig : Rig
         The cameras, all calibrated.
     lags : Lags
@@ -77,6 +91,17 @@ class Observation:
         """``"ok"``, or ``"suspect"`` if there is a warning."""
         return "suspect" if self.warnings else "ok"
 
+    @property
+    def targets(self) -> int:
+        """How many targets there are."""
+        return self.x.shape[1] // 3
+
+    @property
+    def residuals(self) -> list[Floats]:
+        """Tracks minus what the cameras see of the path, in the shape of the tracks."""
+        missed = residuals([stacked(track, 2) for track in self.tracks], self.rig)
+        return [side_by_side(one, self.targets) for one in missed]
+
 
 def observe(
     paths: Sequence[str | Path],
@@ -86,6 +111,7 @@ def observe(
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
     hints: Sequence[Hint | None] | None = None,
+    targets: int = 1,
     progress: bool = False,
 ) -> Observation:
     """Track a target in the videos of several fixed cameras and reconstruct its path.
@@ -113,6 +139,10 @@ def observe(
         See `track`.
     hints : sequence of Hint or None, optional
         Which of the things that move is the target, one per video: see `track`.
+    targets : int
+        How many targets there are. Several are followed wherever they are apart, and told from each
+        other by geometry: in three or more views of a measured rig that start together, or whose
+        lags are given.
     progress : bool
         Show progress bars.
 
@@ -132,6 +162,9 @@ def observe(
     """
     check_learnable(rig)
     check_detector(detector)
+    check_integer("targets", targets, least=1)
+    if targets > 1:
+        _check_several(targets, rig, detector, hints)
     files = _check_paths(paths, rig)
     shots = _check_shots(files, rig)
     names = [path.name for path in files]
@@ -141,13 +174,14 @@ def observe(
     videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
     told = _check_hints(hints, files)
     seen = [
-        _track_one(path, shot.frames, detector, hint)
+        _track_one(path, shot.frames, detector, hint, targets)
         for (path, shot), hint in zip(videos, told, strict=True)
     ]
-    tracks = [track.pixels for track in seen]
+    tracks = [np.hstack([track.pixels for track in found]) for found in seen]
     _check_found(tracks, names)
-    doubts = [warning for track in seen for warning in track.warnings]
-    return _observed(tracks, rig, clock, given, names, doubts, progress)
+    doubts = [warning for found in seen for track in found for warning in track.warnings]
+    conclude = _observed if targets == 1 else _several_observed
+    return conclude(tracks, rig, clock, given, names, doubts, progress)
 
 
 def observe_tracks(
@@ -232,6 +266,38 @@ def _observed(
     )
 
 
+def _several_observed(
+    raw: Sequence[Floats],
+    rig: Rig,
+    clock: Clock,
+    lags: Floats | None,
+    names: Sequence[str],
+    doubts: Sequence[str],
+    progress: bool,
+) -> Observation:
+    """What the tracks (n_i, 2 k) of k targets tell: once told apart, they are one long track."""
+    count, begun = raw[0].shape[1] // 2, np.zeros(len(raw)) if lags is None else lags
+    each = [np.split(track, count, axis=1) for track in raw]
+    aligned = [align(one, begun, clock.rates, clock.uneven) for one in zip(*each, strict=True)]
+    tracks = [np.hstack(views) for views in zip(*aligned, strict=True)]
+    with refusing("cameras", tracks, names):
+        who = identify(tracks, rig)
+    rows = [stacked(track, 2) for track in who.tracks]
+    t, step = clock.times, np.diff(clock.times).min()
+    later = (t[-1] - t[0] + 2 * step) * np.arange(count)[:, None]
+    long = Clock.of_tracks((np.append(t, t[-1] + step) + later).ravel()[:-1], rows)
+    seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *who.doubts), progress)
+    modes = [side_by_side(mode, count) for mode in seen.systematic]
+    return replace(
+        seen,
+        tracks=tuple(side_by_side(track, count) for track in seen.tracks),
+        lags=replace(seen.lags, frames=begun, rates=clock.rates),
+        t=t,
+        x=side_by_side(seen.x, count),
+        systematic=np.reshape(modes, (len(modes), len(t), 3 * count)),
+    )
+
+
 def _smoothed(t: Floats, values: Floats) -> Floats:
     """What (n, k) values that change with the motion would be without the noise of its frames."""
     clean, rng = values.copy(), np.random.default_rng(0)
@@ -295,6 +361,16 @@ def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
     return files
 
 
+def _check_several(
+    targets: int, rig: Rig, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
+) -> None:
+    """That several targets can be told apart."""
+    if len(rig.cameras) < 3 or not rig.is_measured:
+        raise ValueError(f"targets: {targets} need three cameras of known places and directions")
+    if detector != "auto" or any(hints or ()):
+        raise ValueError(f"targets: {targets} are found by detector='auto' alone, without hints")
+
+
 def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
     """What each file is, if it is a video of the size that its camera has."""
     shots = [video_info(path) for path in files]
@@ -320,14 +396,16 @@ def _check_hints(
     return hints
 
 
-def _track_one(path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None) -> Track:
-    """Track a video that should have so many frames."""
-    found = track(path, detector, hint)
-    if len(found.pixels) != frames:
+def _track_one(
+    path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None, targets: int
+) -> tuple[Track, ...]:
+    """Track the targets of a video that should have so many frames."""
+    found = (track(path, detector, hint),) if targets == 1 else track_targets(path, targets)
+    if len(found[0].pixels) != frames:
         raise ValueError(
             f"paths: {path.name} must hold the {frames} frames that its header states, got "
-            f"{len(found.pixels)} that can be read: the file is cut off or damaged, or its header "
-            "wrong"
+            f"{len(found[0].pixels)} that can be read: the file is cut off or damaged, or its "
+            "header wrong"
         )
     return found
 

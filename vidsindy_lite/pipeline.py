@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,16 @@ from numpy.typing import ArrayLike
 from .arrays import Floats
 from .cameras import Rig
 from .checks import check_integer, check_positive, check_rows
-from .dynamics import Discovery, Library, check_library, check_order, discover
+from .dynamics import (
+    Discovery,
+    Form,
+    Library,
+    PolynomialSystem,
+    check_library,
+    check_order,
+    discover,
+    variable_names,
+)
 from .observation import Observation, observe, observe_tracks
 from .refusal import refusing
 from .vision import Hint, TrackFile, read_tracks
@@ -32,9 +41,15 @@ class VideoDiscovery(Observation):
 
     discovery: Discovery
 
+    @property
+    def driven(self) -> str:
+        """Which of several targets drive which others, and by what terms; empty for one target."""
+        return _driven(self.discovery.system) if self.targets > 1 else ""
+
     def __str__(self) -> str:
         warnings = (f"warning: {text}" for text in self.warnings)
         notes = [f"frame: {self.rig.note}"] if self.rig.note else []
+        notes += [f"targets: {self.driven}"] if self.driven else []
         return "\n".join([self.discovery.statement(), *notes, *warnings])
 
 
@@ -46,9 +61,11 @@ def discover_from_videos(
     lags: Sequence[float] | None = None,
     detector: str | os.PathLike = "auto",
     hints: Sequence[Hint | None] | None = None,
+    targets: int = 1,
     degree: int | None = None,
     library: Library | None = None,
     order: int | str = 1,
+    origin: str = "learn",
     seed: int = 0,
     progress: bool = False,
 ) -> VideoDiscovery:
@@ -58,9 +75,10 @@ def discover_from_videos(
 
     Parameters
     ----------
-    paths, rig, t, lags, detector, hints, progress
-        See `observe`. The unit of time is that of the equations.
-    degree, library, order, seed
+    paths, rig, t, lags, detector, hints, targets, progress
+        See `observe`. The unit of time is that of the equations. The law of several targets is one
+        for all: x1, x2, x3 are the place of the first, x4, x5, x6 of the second, and so on.
+    degree, library, order, origin, seed
         See `discover`.
 
     Returns
@@ -72,12 +90,14 @@ def discover_from_videos(
     FileNotFoundError, ValueError
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
-    terms = check_library(degree, library)
-    check_order(order)
-    check_integer("seed", seed)
-    seen = observe(paths, rig, t, lags=lags, detector=detector, hints=hints, progress=progress)
+    check_integer("targets", targets, least=1)
+    how = _checked(degree, library, order, origin, seed, targets) | {"progress": progress}
+    seen = observe(
+        paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
+        progress=progress,
+    )  # fmt: skip
     names = [Path(path).name for path in paths]
-    return _with_law(seen, names, library=terms, order=order, seed=seed, progress=progress)
+    return _with_law(seen, names, how)
 
 
 def discover_from_tracks(
@@ -90,6 +110,7 @@ def discover_from_tracks(
     degree: int | None = None,
     library: Library | None = None,
     order: int | str = 1,
+    origin: str = "learn",
     seed: int = 0,
     progress: bool = False,
 ) -> VideoDiscovery:
@@ -108,7 +129,7 @@ def discover_from_tracks(
     fps : float, optional
         Frames of every camera in one unit of time, in place of ``t``. Without either, files have
         to state the times of their rows.
-    degree, library, order, seed, progress
+    degree, library, order, origin, seed, progress
         See `discover_from_videos`.
 
     Returns
@@ -121,15 +142,47 @@ def discover_from_tracks(
         If a file is missing or holds no track, if times are given twice or not at all, or as
         `observe_tracks` and `discover` do.
     """
-    terms = check_library(degree, library)
-    check_order(order)
-    check_integer("seed", seed)
+    how = _checked(degree, library, order, origin, seed) | {"progress": progress}
     read = _read(tracks)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
     seen = observe_tracks(pixels, rig, _times(read, t, fps), lags=lags, names=names)
     doubts = [warning for track in read for warning in track.warnings]
     seen = replace(seen, warnings=(*seen.warnings, *doubts, *_contradicted(read, fps)))
-    return _with_law(seen, names, library=terms, order=order, seed=seed, progress=progress)
+    return _with_law(seen, names, how)
+
+
+def _checked(
+    degree: int | None,
+    library: Library | None,
+    order: int | str,
+    origin: str,
+    seed: int,
+    targets: int = 1,
+) -> dict[str, Any]:
+    """What `discover` takes beside the path, checked before anything is tracked."""
+    terms = check_library(degree, library)
+    check_order(order, origin, terms)
+    Form.of(variable_names(3 * targets), terms, 2 if order == 2 else 1)
+    check_integer("seed", seed)
+    return {"library": terms, "order": order, "origin": origin, "seed": seed}
+
+
+def _driven(law: PolynomialSystem) -> str:
+    """Which of several targets, of three coordinates each, drive which others by what terms."""
+    names = law.names[: law.d // 2] if law.order == 2 else law.names
+    of = {name: i // 3 + 1 for i, name in enumerate(names)}
+    of |= {name: of[names[i]] for i, name in enumerate(law.names[len(names) :])}
+    target = np.array([of[name] for name in law.names])
+    by: dict[tuple[int, int], list[str]] = {}
+    for j, side in law.sides().items():
+        for row in np.flatnonzero(law.support[:, j]):
+            for other in set(target[law.exponents[row, : law.d] > 0]) - {target[j]}:
+                pair = int(other), int(target[j])
+                by.setdefault(pair, []).append(f"{law.terms[row]} in {side}")
+    free = [str(i) for i in sorted(set(of.values())) if all(i != driven for _, driven in by)]
+    said = [f"{i} drives {j} by {', '.join(terms)}" for (i, j), terms in sorted(by.items())]
+    alone = f"{' and '.join(free)} {'moves' if len(free) == 1 else 'move'} independently"
+    return "; ".join([alone] * bool(free) + said)
 
 
 def _read(tracks: Sequence[ArrayLike | str | os.PathLike]) -> list[TrackFile]:
@@ -188,18 +241,11 @@ def _contradicted(read: Sequence[TrackFile], fps: float | None) -> list[str]:
 def _with_law(
     seen: Observation,
     names: Sequence[str],
-    *,
-    library: Library,
-    order: int | str,
-    seed: int,
-    progress: bool,
+    how: dict[str, Any],
 ) -> VideoDiscovery:
-    """An observation with the law that it obeys."""
+    """An observation with the law that it obeys, given what else `discover` takes."""
     with refusing("law", seen.tracks, names):
-        found = discover(
-            seen.t, seen.x, library=library, order=order, seed=seed, progress=progress,
-            systematic=seen.systematic,
-        )  # fmt: skip
+        found = discover(seen.t, seen.x, systematic=seen.systematic, **how)
     # Who keeps the law alone keeps the doubts about what it was found in.
     law = replace(found, warnings=(*seen.warnings, *found.warnings))
     return VideoDiscovery(**vars(seen) | {"warnings": law.warnings}, discovery=law)

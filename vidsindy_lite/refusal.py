@@ -47,7 +47,10 @@ def refusing(step: str, tracks: Sequence[Floats], names: Sequence[str]) -> Itera
 
 def _likely_causes(step: str, tracks: Sequence[Floats], names: Sequence[str]) -> str:
     """Tracker, lags and rig, with what the tracks say of the first."""
-    strange = [name for track, name in zip(tracks, names, strict=True) if _is_strange(track)]
+    strange = [
+        name for track, name in zip(tracks, names, strict=True)
+        if any(map(_is_strange, np.split(track, track.shape[1] // 2, axis=1)))
+    ]  # fmt: skip
     tracker = "the tracker" + (f" (look at {', '.join(strange)})" if strange else "")
     if strange or step == "track":
         return f"{tracker}, the lags, the rig"

@@ -1,21 +1,38 @@
-"""The README's code runs, its generated parts are current, its links lead somewhere."""
+"""The code of README and docs/ runs, generated parts are current, links lead somewhere."""
 
 import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 
 from vidsindy_lite.cameras import Rig
-from vidsindy_lite.companion.readme import HEADLINES, PARTS, fill
+from vidsindy_lite.companion.readme import HEADLINES, PARTS, fill, written_pages
 from vidsindy_lite.stamp import PACKAGE
 
 ROOT = PACKAGE.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = {path.stem: path.read_text("utf-8") for path in written_pages(ROOT)}
+README, GUIDE, RESULTS = PAGES["README"], PAGES["guide"], PAGES["results"]
+HALF = re.compile(r"^# (?=#+ )", re.MULTILINE)  # before a heading in the .py half of a notebook
+ONE_SCREEN = 60  # lines
+NUMBER = re.compile(r"\d+\.\d*")
 
 
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
+def blocks(language, page=GUIDE):
+    return re.findall(rf"^```{language}\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+
+
+def test_the_readme_fits_one_screen():
+    assert README.count("\n") <= ONE_SCREEN
+    assert max(map(len, README.splitlines())) <= 120
+    (code,) = blocks("python", README)
+    assert len(code.split("\n\n", 1)[1].splitlines()) <= 10
+
+
+def test_every_page_of_docs_can_be_reached_from_the_readme():
+    linked = set(re.findall(r"\]\(docs/(\w+)\.md\)", README))
+    assert linked == set(PAGES) - {"README"}
 
 
 @pytest.mark.slow
@@ -24,8 +41,22 @@ def test_the_code_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     smallest, own_videos, test_videos = blocks("python")
     names = {}
-    for code in (smallest, test_videos, own_videos):  # which writes the files that the last reads
-        exec(code, names)
+    exec(smallest, names)
+    said = capsys.readouterr().out
+    exec(test_videos, names)  # which writes the files that the last reads
+    exec(own_videos, names)
+    assert "all true terms found, 0 false" in capsys.readouterr().out
+    printed = next(block for block in blocks("") if block.startswith("dx/dt"))
+    assert NUMBER.sub("", said) == NUMBER.sub("", printed)
+    values = [[float(number) for number in NUMBER.findall(text)] for text in (said, printed)]
+    np.testing.assert_allclose(*values, rtol=0.2, atol=0.01)
+
+
+@pytest.mark.slow
+def test_the_code_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (code,) = blocks("python", README)
+    exec(code, {})
     assert "all true terms found, 0 false" in capsys.readouterr().out
 
 
@@ -45,19 +76,20 @@ def test_a_line_that_does_not_run_is_seen():
 # ---------------------------------------------------------------------------------- generated parts
 
 
-def test_generated_parts_are_those_of_the_figures():
-    assert re.findall(r"^<!-- (\w+) -->$", README.replace("<!-- end -->", ""), re.MULTILINE)
-    assert fill(README, ROOT) == README
+@pytest.mark.parametrize("name", PAGES)
+def test_generated_parts_are_those_of_the_figures(name):
+    assert fill(PAGES[name], ROOT) == PAGES[name]
 
 
-def test_every_part_is_shown():
-    assert all(f"\n<!-- {name} -->\n" in README for name in PARTS)
+def test_every_part_is_shown_once():
+    shown = "\n".join(PAGES.values())
+    assert [shown.count(f"\n<!-- {name} -->\n") for name in PARTS] == [1] * len(PARTS)
 
 
 @pytest.mark.parametrize(("old", "new"), [("35 of 35", "34 of 35"), ("| 0.77 |", "| 0.07 |")])
 def test_an_edited_result_is_seen(old, new):
-    assert old in README
-    assert fill(README.replace(old, new, 1), ROOT) != README.replace(old, new, 1)
+    assert old in RESULTS
+    assert fill(RESULTS.replace(old, new, 1), ROOT) != RESULTS.replace(old, new, 1)
 
 
 def test_every_notebook_has_one_headline():
@@ -96,10 +128,10 @@ def test_a_headline_says_what_its_table_holds(tmp_path, name, rows, headline):
 def test_another_result_is_seen(tmp_path):
     shutil.copytree(ROOT / "figures", tmp_path / "figures")
     shutil.copytree(ROOT / "notebooks", tmp_path / "notebooks")
-    assert fill(README, tmp_path) == README
+    assert fill(RESULTS, tmp_path) == RESULTS
     table = tmp_path / "figures" / "table_1.json"
     table.write_text(table.read_text().replace('"paper: l2 (e-2)": 1.5', '"paper: l2 (e-2)": 1.6'))
-    assert fill(README, tmp_path) != README
+    assert fill(RESULTS, tmp_path) != RESULTS
 
 
 def test_an_unknown_part_is_named():
@@ -122,15 +154,15 @@ def test_anchors_are_those_of_a_code_host():
 def dead_links(page):
     """Relative links of a Markdown page that lead to no file, or to no heading of a page."""
     text = re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
-    text = text.replace("# # ", "# ")  # the .py half of a notebook
     dead = []
     for url in re.findall(r"\]\(([^)\s]+)\)", text):
         path, _, anchor = url.partition("#")
         target = page.parent / path if path else page
         if ":" not in url and not target.exists():
             dead.append(url)
-        elif ":" not in url and anchor and target.suffix == ".md":
-            headings = re.findall(r"^#+ (.*)", target.read_text("utf-8"), re.MULTILINE)
+        elif ":" not in url and anchor and target.suffix in (".md", ".ipynb"):
+            target = target.with_suffix(".py") if target.suffix == ".ipynb" else target
+            headings = re.findall(r"^#+ (.*)", HALF.sub("", target.read_text("utf-8")), re.M)
             if anchor not in map(heading_anchor, headings):
                 dead.append(url)
     return dead
@@ -138,7 +170,7 @@ def dead_links(page):
 
 @pytest.mark.parametrize(
     "page",
-    [ROOT / "README.md", ROOT / "figures" / "README.md", *(ROOT / "notebooks").glob("*.py")],
+    [*written_pages(ROOT), ROOT / "figures" / "README.md", *(ROOT / "notebooks").glob("*.py")],
     ids=lambda page: f"{page.parent.name}/{page.name}",
 )
 def test_links_lead_somewhere(page):
@@ -149,3 +181,7 @@ def test_a_dead_link_is_seen(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# One\n[a](page.md#one) [b](page.md#two) [c](none.md) [d](https://x.org)")
     assert dead_links(page) == ["page.md#two", "none.md"]
+    (tmp_path / "book.ipynb").touch()
+    (tmp_path / "book.py").write_text("# # A book\n# ## One\n# no # heading\n")
+    page.write_text("[a](book.ipynb#one) [b](book.ipynb#a-book) [c](book.ipynb#heading)")
+    assert dead_links(page) == ["book.ipynb#heading"]

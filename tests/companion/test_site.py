@@ -44,6 +44,8 @@ def page_problems(browser, page, width):
     """What a reader would miss on a page, or have to scroll sideways for."""
     seen = browser.open(page, width)
     problems = [f"broken image {image}" for image in seen["broken"]]
+    problems += [f"image without words {image}" for image in seen["wordless"]]
+    problems += [f"code wider than its box: {code}" for code in seen["cut"]]
     problems += [f"console: {error}" for error in seen["errors"]]
     problems += [f"asks the network for {url}" for url in seen["requests"]]
     problems += [f"link to no place on the page: #{anchor}" for anchor in seen["dead"]]
@@ -144,7 +146,9 @@ GOOD = """<!DOCTYPE html><link rel='icon' href='data:,'>
     ("body", "problem"),
     [
         ("", "shows no text"),
-        ("text <img src='missing.png'>", "broken image"),
+        ("text <img src='missing.png' alt='a'>", "broken image"),
+        ("text <img src='data:,'>", "image without words"),
+        ("text <pre style='overflow: auto; width: 99px'>so_long_a_name_of_it</pre>", "code wider"),
         ("text <script>console.error('seen')</script>", "console: .*seen"),
         ("text <script>missing()</script>", "console: Uncaught"),
         ("text <script src='https://cdn.invalid/x.js'></script>", "asks the network"),
@@ -190,7 +194,7 @@ def test_what_is_left_of_an_interrupted_site_may_be_replaced(tmp_path, monkeypat
             write_file(self.output / "half.html", b"")
             raise KeyboardInterrupt
 
-    for folder in ("figures", "notebooks", "vidsindy_lite"):
+    for folder in ("docs", "figures", "notebooks", "vidsindy_lite"):
         (tmp_path / "root" / folder).mkdir(parents=True)
     for name in ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md"):
         (tmp_path / "root" / name).write_text("# One\n")

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, discover, monomial_exponents
-from vidsindy_lite.dynamics.beyond import _single_gains, _widened
+from vidsindy_lite.dynamics.beyond import _widened, newcomers
 
 TIMES = np.linspace(0, 20, 600)
 WORDS = "terms of higher degree explain what the law leaves"
@@ -76,6 +76,7 @@ def test_what_a_single_term_explains_is_what_a_refit_gains():
         part = design[:, columns]
         return ((data - part @ np.linalg.lstsq(part, data, rcond=None)[0]) ** 2).sum()
 
-    gains = _single_gains(design.T @ design, design.T @ data, 2)
+    estimate, variance = newcomers(design.T @ design, design.T @ data, 2)
     wanted = [left([0, 1]) - left([0, 1, k]) for k in (2, 3)]
-    assert gains == pytest.approx([*wanted, 0.0])
+    assert estimate**2 / variance == pytest.approx([*wanted, 0.0])
+    assert (estimate[2], variance[2]) == (0, np.inf)

@@ -106,13 +106,13 @@ def test_one_throw_tells_quadratic_drag_that_is_the_same_in_all_directions(start
 
 def test_directions_of_a_vector_share_their_coefficient_and_no_other_does():
     library = Library.polynomial(0) + DRAG
-    form = Form.of(3, library, order=2)
+    form = Form.of(("x", "y", "z"), library, 2)
     l, entries = len(form.exponents), np.arange(6 * len(form.exponents))
     followers = np.flatnonzero(form.shared != entries)
     assert [int(entry) // l for entry in followers] == [4, 5]
     assert {int(entry) // l for entry in form.shared[followers]} == {3}
     assert len(form.searched) == 3 + 1
-    assert (Form.of(3, Library.polynomial(3), order=2).shared == np.arange(6 * 84)).all()
+    assert (Form.of(("x", "y", "z"), Library.polynomial(3), 2).shared == np.arange(6 * 84)).all()
 
 
 def test_the_law_of_gravitation_is_found_from_positions():

@@ -9,6 +9,7 @@ from vidsindy_lite.dynamics import discover
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
+from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.persistence import Plateau, follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import Units, pose
@@ -17,7 +18,7 @@ from vidsindy_lite.dynamics.state import State
 from vidsindy_lite.dynamics.trajectories import check_trajectories
 from vidsindy_lite.study import SYSTEMS, corruption
 
-CUBIC = Library.polynomial(3)
+FORM = Form.of(("x", "y"), Library.polynomial(3))
 
 NOISE = 0.03
 
@@ -38,7 +39,7 @@ def fitted(duffing, dropped=None):
     """The problem in units in which it is standard already, and a fit with the support given."""
     law, t, x = duffing
     problem = replace(
-        pose([(t, x)], [np.empty((*x.shape, 0))], CUBIC, rng=np.random.default_rng(0)),
+        pose([(t, x)], [np.empty((*x.shape, 0))], FORM, rng=np.random.default_rng(0)),
         trajectories=[(t, x)],
         units=Units(np.zeros(2), np.ones(2), 1.0),
         noise=np.full(2, NOISE),
@@ -170,10 +171,11 @@ def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
     assert "with x^2, without x^3" in warning
 
 
-def test_an_origin_that_the_data_do_not_tell_is_a_warning():
+@pytest.mark.parametrize("seed", [2, 3, 5, 6, 8])  # all but 5: the next law at home, not the first
+def test_an_origin_that_the_data_do_not_tell_is_a_warning(seed):
     law = PolynomialSystem.from_terms({"x": {"x": 1.8, "x^2": -0.11}}, degree=3)
     t = np.linspace(0, 10, 512)
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(seed)
     x = law.simulate(t, [11.0])
     found = discover(t, x + 0.6 * x.std() * rng.standard_normal(x.shape))
     assert found.status == "suspect"

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.discovery import Discovery, _pruned
+from vidsindy_lite.dynamics.discovery import Discovery, _pruned, _with_error
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import Units
@@ -185,3 +185,17 @@ def test_a_curve_forgives_the_rounding_of_its_ends_in_proportion_to_its_length(f
     inside = found.curve(np.array([low - near, high + near]))
     np.testing.assert_array_equal(inside, found.curve(np.array([low, high])))
     assert np.isnan(found.curve(np.array([low - far, high + far]))).all()
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        ((28.076, 0.043), "+ (28.076 ± 0.043) x"),
+        ((-3.2e-7, 1.1e-9), "- (3.200 ± 0.011)e-7 x"),
+        ((9991755739716659200.0, 16163795182168822.0), "+ (9.992 ± 0.016)e18 x"),
+        ((28.0, 0.0), "+ 28 x"),  # known
+        ((-1e7, 0.0), "- 1e7 x"),
+    ],
+)
+def test_numbers_have_the_digits_that_their_errors_allow(number, text):
+    assert _with_error(*number, "x") == text

@@ -8,6 +8,7 @@ from vidsindy_lite import study
 from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics import precision as weighing
 from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.problem import pose
 
 LAW = PolynomialSystem.from_terms(
@@ -114,7 +115,7 @@ def test_benchmarks_from_clean_data_are_not_weighed():
 def posed(x):
     data = [(TIMES, x)]
     nothing = [np.empty((*x.shape, 0))]
-    return pose(data, nothing, Library.polynomial(3), np.random.default_rng(0))
+    return pose(data, nothing, Form.of(("x", "y"), Library.polynomial(3)), np.random.default_rng(0))
 
 
 def test_precision_is_foreseen_before_any_law_is_known():
@@ -130,3 +131,15 @@ def test_noise_that_looks_even_before_a_law_is_known_stays_even():
     assert weighing.foreseen(even) is even
     exact = posed(PATH)
     assert weighing.foreseen(exact) is exact
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("share", [0.05, 0.6, 1.0])
+def test_residuals_that_are_exactly_zero_are_no_accident(share):
+    residual = 0.01 * np.random.default_rng(3).standard_normal(800)
+    residual[: int(800 * share) - 1] = 0.0
+    pieces = np.repeat(np.eye(8), 100, axis=1)
+    for causes in (np.ones((1, 800)), pieces):
+        cost, variance, _ = weighing._variance(residual, causes)
+        assert np.isfinite(cost)
+        assert (variance > 0).all()

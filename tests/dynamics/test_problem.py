@@ -9,6 +9,7 @@ import pytest
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.errors import residual_noise
+from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
 from vidsindy_lite.dynamics.search import _candidate, _closed, _variants
 from vidsindy_lite.dynamics.state import State
@@ -19,8 +20,8 @@ def posed(noise=0.0, seen=slice(None)):
     x = np.stack([3 + 2 * np.sin(t), 0.1 * np.cos(t)], axis=1)
     x += noise * np.array([2, 0.1]) * np.random.default_rng(0).normal(size=x.shape)
     t, x = t[seen], x[seen]
-    library = Library.polynomial(2)
-    return pose([(t, x)], [np.ones((len(t), 2, 1))], library, rng=np.random.default_rng(0))
+    form = Form.of(("x", "y"), Library.polynomial(2))
+    return pose([(t, x)], [np.ones((len(t), 2, 1))], form, rng=np.random.default_rng(0))
 
 
 def fit_of(problem, moving=(True, False)):

@@ -94,6 +94,18 @@ def test_what_is_not_round_is_refused(fit, x, rule):
         fit(x)
 
 
+def test_what_is_on_no_circle_is_said_in_short():
+    rng = np.random.default_rng(0)
+    fine = vl.on_circle(bob(SWING) + 0.01 * rng.standard_normal((400, 3)))
+    assert fine.warnings == ()
+    assert repr(fine).startswith("circle of radius 1.2")
+    assert len(repr(fine)) < 120
+    ellipse = np.stack([1.1 * np.cos(3 * TIMES), np.sin(3 * TIMES)], axis=1)
+    for x in (ellipse, rng.standard_normal((200, 3))):
+        assert "may be on no circle" in str(vl.on_circle(x))
+    assert "may be on no sphere" in str(vl.on_sphere(rng.standard_normal((200, 3))))
+
+
 @pytest.mark.parametrize("zero", [(0, 1), (0.8, -0.6, 0), (0, 0, np.nan)])
 def test_a_zero_that_is_no_direction_is_refused(zero):
     with pytest.raises(ValueError, match="zero: must be"):

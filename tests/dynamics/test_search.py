@@ -6,7 +6,8 @@ import pytest
 from vidsindy_lite.dynamics import PolynomialSystem, check_trajectory, search
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, Status
-from vidsindy_lite.dynamics.discovery import History
+from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.problem import fit_curves, pose
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=2)
@@ -15,7 +16,8 @@ CIRCLE = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=2)
 def posed(times, degree=2):
     runs = [check_trajectory(t, CIRCLE.simulate(t, (1, 0.5))) for t in times]
     shared = [np.empty((*x.shape, 0)) for _, x in runs]
-    return pose(runs, shared, Library.polynomial(degree), np.random.default_rng(0))
+    form = Form.of(("x", "y"), Library.polynomial(degree))
+    return pose(runs, shared, form, np.random.default_rng(0))
 
 
 def test_short_data_are_searched_as_they_are():

@@ -8,11 +8,12 @@ from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
 from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.discovery import History
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.library import shift_matrix
 from vidsindy_lite.dynamics.order import ADVICE, SETTLED, accelerated, better, unexplained
-from vidsindy_lite.dynamics.problem import pose
-from vidsindy_lite.dynamics.search import _thinner
+from vidsindy_lite.dynamics.problem import fit_curves, pose
+from vidsindy_lite.dynamics.search import FINAL_WEIGHT, _thinner, leave_home, select
 from vidsindy_lite.dynamics.smoothing import smooth
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import SYSTEMS
@@ -163,10 +164,7 @@ def test_an_anharmonic_damped_spring_in_space(share):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_place_where_a_spring_rests_is_found(seed, request):
-    if seed == 1:
-        reason = "known defect: of three coordinates one stays in the data's frame"
-        request.applymarker(pytest.mark.xfail(strict=True, reason=reason))
+def test_the_place_where_a_spring_rests_is_found(seed):
     t, rest = np.linspace(0, 12, 1500), np.array([3.0, -2.0, 5.0])
     found = discover(t, noisy(anharmonic_spring(t), 0.01, seed) + rest, order=2)
     assert found_terms(found.native).keys() == SPRING
@@ -177,7 +175,7 @@ def test_an_axis_leaves_home_where_terms_make_up_for_its_staying():
     t = np.linspace(0, 20, 100)
     x = moving(duffing, [1.5], [0.0], t)
     library, rng = Library.polynomial(3), np.random.default_rng(0)
-    problem = pose([(t, x)], [np.empty((100, 1, 0))], library, rng, order=2)
+    problem = pose([(t, x)], [np.empty((100, 1, 0))], Form.of(("x",), library, 2), rng)
     exponents, zeros = problem.exponents, np.zeros(2)
     coefficients = np.zeros(exponents.shape)
     for term, value in {(1, 0): -1.0, (0, 1): -0.1, (3, 0): -0.5}.items():
@@ -191,6 +189,27 @@ def test_an_axis_leaves_home_where_terms_make_up_for_its_staying():
         assert _thinner(problem, replace(state, moving=np.array([True, False]))) == []
 
 
+def test_all_axes_leave_home_one_after_the_other():
+    t, rest = np.linspace(0, 12, 300), np.array([0.7, -0.5])
+    x = moving(lambda x, v: -9 * x - 0.1 * v - 4 * x**3, [1, 0.5], [0, 1], t) + rest
+    library, rng = Library.polynomial(3), np.random.default_rng(0)
+    problem = pose([(t, x)], [np.empty((300, 2, 0))], library, rng, order=2)
+    powers = problem.exponents
+    alone = (powers > 0).sum(axis=1) <= 1
+    active = np.zeros(powers.shape, dtype=bool)
+    for j in (0, 1):
+        own = alone & (powers[:, [1 - j, 3 - j]] == 0).all(axis=1)
+        active[:, 2 + j] = own & (powers[:, 2 + j] <= 1)
+    collocation = problem.weighted(problem.collocation(problem.segments()), FINAL_WEIGHT)
+    control = fit_curves(collocation, problem.curves)
+    state = State(control, 0.0 * active, active, problem.home, np.zeros(4, dtype=bool))
+    at_home = select(problem, collocation.solve(state), FINAL_WEIGHT, "at home", History())
+    fit = leave_home(problem, at_home, History())
+    assert at_home.state.active.sum() == 10
+    assert fit.state.active.sum() == 6
+    assert problem.units.point(fit.state.offset)[:2] == pytest.approx(rest, abs=1e-4)
+
+
 def test_an_order_that_is_none():
     t = np.linspace(0, 1, 50)
     for order in (3, 0, "second"):
@@ -199,11 +218,11 @@ def test_an_order_that_is_none():
 
 
 def test_what_is_known_is_no_candidate():
-    form = Form.of(2, Library.polynomial(2), order=2)
+    form = Form.of(("x", "y"), Library.polynomial(2), 2)
     assert form.names == ("x", "y", "vx", "vy")
     assert not form.candidates[form.known != 0].any()
     assert form.candidates.sum() == len(form.searched) == 2 * len(form.exponents)
-    first = Form.of(3, Library.polynomial(2), order=1)
+    first = Form.of(("x", "y", "z"), Library.polynomial(2))
     assert first.candidates.all()
     assert not first.known.any()
     assert first.movable.all()

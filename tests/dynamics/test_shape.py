@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.dynamics import PolynomialSystem, discover
+from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
 from vidsindy_lite.dynamics.shape import cancelling, shapes
 from vidsindy_lite.study import SYSTEMS
 
@@ -94,7 +94,7 @@ def test_an_arc_that_is_passed_once_is_no_circle():
     angle = np.linspace(-1, 1, 600)
     x = 2 * np.stack([np.sin(angle), np.cos(angle)], axis=1)
     assert told(x) == ""
-    assert "on a circle" in told(2 * np.stack([np.sin(2 * angle), np.cos(2 * angle)], axis=1))
+    assert "on a circle" in told(bob(2 * angle))  # more than half of it, in space
 
 
 def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
@@ -107,6 +107,28 @@ def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
 
 def test_noise_that_could_hide_anything_tells_no_shape():
     assert told(NAMED["plane"][0][::20], 0.4, t=TIMES[::20]) == ""
+
+
+@pytest.mark.parametrize("start", [(0.5, 1.2), (0.8, 1.0)])
+@pytest.mark.parametrize("step", [0.5, 1.5, 2.0])
+def test_a_predator_and_its_prey_are_no_bob(start, step):
+    t = np.arange(15) * step
+    x = solved(lambda _, s: [s[0] * (1 - s[1]), s[1] * (s[0] - 1)], start, t)
+    for share in (0.002, 0.01, 0.05):
+        assert "circle" not in told(x, share, t=t)
+
+
+@pytest.mark.parametrize(("amplitude", "doubted"), [(0.8, True), (1.2, True), (3.0, False)])
+def test_a_line_and_a_sine_may_be_a_cubic(amplitude, doubted):
+    library = Library.polynomial(1) + Library.fourier(1)
+    law = PolynomialSystem.from_terms(
+        {"x": {"vx": 1}, "vx": {"x": -9.5, "sin(x)": 9.4}}, library=library
+    )
+    x = solved(lambda _, s: law(s), [amplitude, 0])
+    (warning,) = list(cancelling(law, x)) or ("",)
+    assert ("cannot be told apart" in warning) == doubted
+    plain = PolynomialSystem.from_terms({"x": {"vx": 1}, "vx": {"sin(x)": -9.4}}, library=library)
+    assert list(cancelling(plain, x)) == []
 
 
 def test_terms_that_cancel_are_told():

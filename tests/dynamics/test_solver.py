@@ -8,6 +8,7 @@ from scipy.stats import kstest
 
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.problem import pose, term_penalties
@@ -233,8 +234,8 @@ def test_history_tells_the_fit(lorenz):
 
 def test_knots_are_halved_once_where_that_does_not_matter(lorenz):
     _, t, x, found = lorenz
-    library, rng = Library.polynomial(3), np.random.default_rng(0)
-    problem = pose([(t, x)], [np.empty((*x.shape, 0))], library, rng)
+    form, rng = Form.of(("x", "y", "z"), Library.polynomial(3)), np.random.default_rng(0)
+    problem = pose([(t, x)], [np.empty((*x.shape, 0))], form, rng)
     spans = [len(segment.breakpoints) - 1 for segment in problem.segments()]
     assert [len(np.unique(curve.t)) - 1 for curve in found.curves] == [2 * n for n in spans]
 

@@ -20,6 +20,7 @@
     causes        why views do not agree, by trying one thing at a time
     unmeasured    rigs of which only the lenses are known: a start
     covariance    of errors that depend on their neighbours
+    identities    beside the way: who is who among several targets
     messages      all warnings
     eq4           beside the way: calibration as the paper writes it, to compare
 
@@ -32,6 +33,7 @@ from .clocks import Clock
 from .calibrations import read_calibration, write_calibration
 from .causes import GROSS, explain, smooth
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
+from .identities import identify, side_by_side, stacked
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .camera import Camera
 from .models import OrthographicCamera, PerspectiveCamera

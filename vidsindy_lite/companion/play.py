@@ -62,8 +62,9 @@ def _view(
 ) -> Iterator[Image]:
     """What one camera saw at these instants, with what it would see of the law; small."""
     camera = found.rig.cameras[i]
-    pixels = camera.project(curve)
-    spread = float(np.sqrt(np.nanmean((found.tracks[i] - pixels) ** 2)))
+    paths = np.split(curve[:, : found.x.shape[1]], found.targets, axis=1)
+    pixels = np.stack([camera.project(x) for x in paths])
+    spread = float(np.sqrt(np.nanmean((found.tracks[i] - np.hstack(list(pixels))) ** 2)))
     width, height = camera.image_size
     scale = _HEIGHT / height
     size = 2 * round(width * scale / 2), _HEIGHT
@@ -76,8 +77,10 @@ def _view(
         while now < number:
             now, frame = next(frames, (number, None))
             image = grey if frame is None else _small(frame, size)
-        trail = pixels[instants[max(j - _TRAIL, 0)] : instants[j] + 1]
-        yield _drawn(image if number >= 0 else grey, (trail + 0.5) * scale - 0.5, spread * scale)
+        shown = image if number >= 0 else grey
+        for trail in pixels[:, instants[max(j - _TRAIL, 0)] : instants[j] + 1]:
+            shown = _drawn(shown, (trail + 0.5) * scale - 0.5, spread * scale)
+        yield shown
 
 
 def _small(frame: Image, size: tuple[int, int]) -> Image:

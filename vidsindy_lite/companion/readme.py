@@ -1,4 +1,4 @@
-"""The parts of the README that a run of the notebooks writes: what they found, and in what time.
+"""The parts of README and docs/ that a run of the notebooks writes: what they found, in what time.
 
 Between a line ``<!-- name -->`` and the next ``<!-- end -->`` stands what the macro of that name in
 ``readme.md`` makes of the figures' registry. All else is written by hand.
@@ -14,6 +14,7 @@ import pandas as pd
 from ..stamp import write_file
 from ..study import LEAST
 from .artifacts import load_table
+from .claims import claims_of
 from .pages import macros
 from .records import read_records
 from .registry import load_run_times
@@ -21,10 +22,15 @@ from .registry import load_run_times
 PART = re.compile(r"(?<=^<!-- )(?!end )(\w+) -->\n.*?(?=<!-- end -->$)", re.DOTALL | re.MULTILINE)
 
 
+def written_pages(root: Path) -> list[Path]:
+    """The README of a repository and the pages of its docs/."""
+    return [Path(root) / "README.md", *sorted((Path(root) / "docs").glob("*.md"))]
+
+
 def write_readme(root: Path) -> None:
-    """Write the README of a repository anew, with its parts as the figures have them now."""
-    path = Path(root) / "README.md"
-    write_file(path, fill(path.read_text("utf-8"), root).encode())
+    """Write these pages anew, with their parts as the figures have them now."""
+    for path in written_pages(root):
+        write_file(path, fill(path.read_text("utf-8"), root).encode())
 
 
 def fill(text: str, root: Path) -> str:
@@ -62,9 +68,15 @@ def fill(text: str, root: Path) -> str:
         times=load_run_times(figures),
         frame=lambda table_id: pd.DataFrame(load_table(table_id, figures).rows, dtype=object),
         numbers=numbers,
+        claimed=lambda: {page.stem: claims_of(page) for page in _claiming(Path(root))},
         least=LEAST,
     )
     return PART.sub(part, text)
+
+
+def _claiming(root: Path) -> list[Path]:
+    """The pages whose claims are listed."""
+    return [root / "README.md", *sorted((root / "notebooks").glob("*.py"))]
 
 
 def _titles(root: Path) -> dict[str, str]:

@@ -25,7 +25,7 @@ from matplotlib.font_manager import findfont, get_font
 from tqdm import tqdm
 
 from ..arrays import Floats
-from ..cameras import DISAGREEMENT, Rig, residuals
+from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_path
 from ..dynamics import Discovery
 from ..pipeline import VideoDiscovery
@@ -36,6 +36,7 @@ from .pages import page
 from .play import law_over_videos
 from .records import as_json
 
+LETTERS = "abcdefgh"  # of several targets, in the heads of tracks
 LONGEST_NAME = 30  # characters above a picture
 PAGE, DATA, RIG, TRACKS = FILES = ("report.html", "result.json", "rig.toml", "tracks.csv")
 FORMAT = 1  # of result.json: counts up when what is in it changes its meaning
@@ -190,7 +191,8 @@ def _write_data(
 ) -> None:
     """The data as JSON, and the tracks as a table that `discover --tracks` reads."""
     (folder / DATA).write_text(json.dumps(content, allow_nan=False, indent=1) + "\n", "utf-8")
-    columns = [f"{axis}{i + 1}" for i in range(len(tracks)) for axis in "uv"]
+    several = [""] if tracks[0].shape[1] == 2 else LETTERS[: tracks[0].shape[1] // 2]
+    columns = [f"{axis}{i + 1}{n}" for i in range(len(tracks)) for n in several for axis in "uv"]
     longest = len(instants)
     whole = [np.pad(t, ((0, longest - len(t)), (0, 0)), constant_values=np.nan) for t in tracks]
     rows = (
@@ -220,12 +222,12 @@ def summary(
     found, paths, options
         See `write_report`.
     """
-    missed = residuals(found.tracks, found.rig)
+    missed = found.residuals
     cameras = []
     names = _names(paths, len(found.rig.cameras))
     for i, camera in enumerate(found.rig.cameras):
         shot, seen = _shot(found, paths, i), np.isfinite(found.tracks[i]).all(axis=1)
-        length = np.hypot(*missed[i].T)
+        length = np.linalg.norm(missed[i].reshape(-1, 2), axis=1)
         length = length[np.isfinite(length)]
         cameras.append({
             "video": names[i], "frames": shot.frames, "fps": shot.fps,
@@ -298,9 +300,11 @@ def _page(
     total = 4 + (paths is not None)
     figures = tqdm(_figures(found, paths), desc="report", total=total, disable=not progress)
     about = {
-        "note": found.rig.note, "limit": DISAGREEMENT,
+        "note": found.rig.note, "driven": found.driven, "limit": DISAGREEMENT,
         "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
     }  # fmt: skip
+    law = found.discovery
+    about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
     return page("report.html", figures=figures, film=film, **about, **content)
 
@@ -313,13 +317,17 @@ def _figures(
     # switched on meanwhile off again: so this comes first.
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        yield "path", _encoded(plot_path(found.t, found.x, found.discovery.curve(found.t)[:, :3]))
+        # Several targets are drawn as one that begins again.
+        t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
+        x = stacked(found.x, 3)
+        curve = found.discovery.curve(found.t)[:, : found.x.shape[1]]
+        yield "path", _encoded(plot_path(t, x, stacked(curve, 3)))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
             yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
-        yield "rig", _encoded(plot_rig(found.rig, found.x))
-        missed = residuals(found.tracks, found.rig)
-        yield "residuals", _encoded(plot_residuals(found.t, missed, DISAGREEMENT))
+        yield "rig", _encoded(plot_rig(found.rig, x))
+        missed = [stacked(one, 2) for one in found.residuals]
+        yield "residuals", _encoded(plot_residuals(t, missed, DISAGREEMENT))
         yield "plateaus", _encoded(found.discovery.plot_path())
 
 
@@ -328,7 +336,7 @@ def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int
     places = [(Path(path), found.lags.frame_at(i, instant)) for i, path in enumerate(paths)]
     images = [read_frame(path, frame) for path, frame in places]
     titles = [f"{_short(path.name, i)}, frame {k}" for i, (path, k) in enumerate(places)]
-    return plot_frames(images, titles, found.tracks, instant)
+    return plot_frames(images, titles, [stacked(track, 2) for track in found.tracks], instant)
 
 
 def _overview(
@@ -345,7 +353,7 @@ def _overview(
         for i, ((width, height), k) in enumerate(zip(sizes, shown, strict=True))
     ]
     titles = [f"{_short(name, i)}, frame {shown[i]}" for i, name in enumerate(names)]
-    return plot_frames(images, titles, tracks, shown)
+    return plot_frames(images, titles, [stacked(track, 2) for track in tracks], shown)
 
 
 def _short(name: str, i: int) -> str:

@@ -2,8 +2,8 @@
 
 The .py half of a pair is the source. The .ipynb half is made here: executed, stripped of all that
 differs between two runs, and stamped with a hash of the code that it depends on. The full profile
-writes ``notebooks/*.ipynb`` and figures/ of the repository, and the tables of its README; the quick
-profile writes the layout of the former two under build/quick/.
+writes ``notebooks/*.ipynb`` and figures/ of the repository, and the tables of README and
+docs/; the quick profile writes the layout of the former two under build/quick/.
 
 A notebook is not executed again if its stamp and its source are the same, its prose included, and
 its outputs are in place byte for byte (see `ledger`).
@@ -223,7 +223,7 @@ def _written_pages(figures: Path, stamps: Mapping[str, str | None], root: Path) 
         try:
             write_readme(root)
         except (ValueError, FileNotFoundError) as missing:
-            problems.append(f"README.md: {missing}")
+            problems.append(f"README and docs: {missing}")
     return problems
 
 

@@ -1,26 +1,31 @@
-"""The README, the notebooks, the figures and the package's reference as a folder of web pages.
+"""README, docs/, the notebooks, the figures and the package's reference as a folder of web pages.
 
 Sphinx makes them, of the notebooks myst-nb. Everything lies in the folder, the search and MathJax
 included, which draws the formulas: the pages need no network and no server.
 """
 
 import os
+import re
 import shutil
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import jupyter_server_mathjax
+import nbformat
 from sphinx.application import Sphinx
 
 from ..stamp import PACKAGE, repository_root
 from .manifest import clear, sign
+from .records import read_records
 from .run import find_notebooks
 
 SETTINGS = {
     "project": PACKAGE.name,
     "extensions": ["myst_nb", *(f"sphinx.ext.{n}" for n in ("apidoc", "autodoc", "napoleon"))],
-    "include_patterns": ["*.md", "notebooks/*", "figures/README.md", "api/vidsindy_lite*"],
+    "include_patterns": [
+        "*.md", "docs/*.md", "notebooks/*", "figures/README.md", "api/vidsindy_lite*",
+    ],
     "nb_execution_mode": "off",
     "myst_enable_extensions": ["dollarmath"],
     "myst_heading_anchors": 4,
@@ -34,7 +39,11 @@ SETTINGS = {
     "html_theme": "furo",
     "html_title": PACKAGE.name,
     "html_copy_source": False,
-    "html_static_path": [str(Path(jupyter_server_mathjax.__file__).parent / "static")],
+    "html_static_path": [
+        str(Path(jupyter_server_mathjax.__file__).parent / "static"),
+        str(Path(__file__).with_suffix(".css")),
+    ],
+    "html_css_files": ["site.css"],
     "html_use_index": False,  # its names are wider than a screen
     "myst_update_mathjax": False,
     "mathjax_options": {"defer": "defer"},
@@ -77,16 +86,18 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
         If there is no repository, or a notebook has not been executed yet.
     """
     root, output = repository_root(root), Path(output)
-    for shown in (root / "figures", root / "notebooks", root / PACKAGE.name):
-        if output.resolve().is_relative_to(shown):
+    for shown in ("docs", "figures", "notebooks", PACKAGE.name):
+        if output.resolve().is_relative_to(root / shown):
             raise ValueError(f"output: must not lie in what is shown, got '{output}'")
     clear(output, "site")
     with TemporaryDirectory() as scratch:
         pages, doctrees = Path(scratch) / "pages", Path(scratch) / "doctrees"
-        shutil.copytree(root / "figures", pages / "figures")
+        for folder in ("figures", "docs"):
+            shutil.copytree(root / folder, pages / folder)
         (pages / "notebooks").mkdir()
         for path in find_notebooks(root):
-            shutil.copy(path.with_suffix(".ipynb"), pages / "notebooks")
+            executed = path.with_suffix(".ipynb")
+            nbformat.write(_described(executed), pages / "notebooks" / executed.name)
         for name in ("LICENSE", "CITATION.cff", "CHANGELOG.md"):
             shutil.copy(root / name, pages)
         parts = root / "README.md", Path(__file__).parent / "contents.md"
@@ -97,3 +108,15 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
         finally:
             sign(output)  # what was interrupted is ours, too, and may be replaced
     return sorted(output.rglob("*.html"))
+
+
+def _described(executed: Path) -> nbformat.NotebookNode:
+    """A notebook whose pictures have the captions of their figures as alternative text."""
+    records = read_records(executed.parent.parent / "figures")
+    captions = {name: record["caption"] for name, record in records.items()}
+    notebook = nbformat.read(executed, as_version=4)
+    for cell in notebook.cells:
+        named = re.findall(r'"(\w+)"', cell.source) if cell.cell_type == "code" else []
+        if said := " ".join(captions[name] for name in named if name in captions):
+            cell.metadata["mystnb"] = {"image": {"alt": said}}
+    return notebook

@@ -7,7 +7,10 @@ selection of terms, origin, gaps, errors that last, precision (whom to trust how
 process_noise (is the motion kicked?), and persistence: which law stays the same while more error
 is tolerated
 discovery: the result, with error bars from the last fit; diagnostics: all its warnings, of which
-shape looks at where the motion takes place and beyond at terms that the library lacks
+shape looks at where the motion takes place and beyond at terms that the library lacks; absent:
+what candidates that are not in the law could be
+physics: what a law of motion says of a body, in named numbers
+history: how a discovery went
 rounds: circles and spheres, whose angles are coordinates
 storage: the result as a file; drawing: its path of laws as a picture
 law: polynomials, on a library of monomials, also of functions of the state; candidates are the
@@ -21,6 +24,7 @@ from .candidates import Library, check_library
 from .collocation import Collocation, Status
 from .cramer_rao import cramer_rao
 from .discovery import Discovery
+from .form import Form
 from .integrate import runge_kutta_4
 from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
 from .order import check_order

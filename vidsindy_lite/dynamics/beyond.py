@@ -102,7 +102,8 @@ def beyond(problem: Problem, fit: Fit) -> Beyond:
     extra = np.concatenate([j * l + np.arange(size, l) for j in equations.tolist()])
     model = collocation.linearise(state, np.concatenate([own, extra]))
     gain = float(model.newton()[1] - model.fall)
-    single = _single_gains(model.information, model.gradient, len(own))
+    estimate, variance = newcomers(model.information, model.gradient, len(own))
+    single = estimate**2 / variance
     place = int(single.argmax()) if new else 0
     law = problem.law(fit.state)
     term = ""
@@ -135,14 +136,18 @@ def _widened(exponents: Ints, d: int, budget: float) -> Ints:
     return exponents
 
 
-def _single_gains(information: Floats, gradient: Floats, own: int) -> Floats:
-    """What each further column explains by itself, if the first ``own`` are fitted anew."""
+def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, Floats]:
+    """What each further column would be, (k,), if it alone joined the first ``own``, fitted anew.
+
+    Its estimate and its variance: 0 and infinity where it is a combination of the first.
+    """
     response = inverse(information[:own, :own]) @ information[:own, own:]
     left = gradient[own:] - gradient[:own] @ response
     whole = np.diag(information)[own:]
     apart = whole - (information[:own, own:] * response).sum(axis=0)
     new = apart > DEPENDENT * whole
-    return np.where(new, left**2 / np.where(new, apart, 1.0), 0.0)
+    room = np.where(new, apart, 1.0)
+    return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)
 
 
 def beyond_the_library(problem: Problem, fit: Fit, noisy: bool) -> Iterator[str]:

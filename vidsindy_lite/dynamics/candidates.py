@@ -10,17 +10,19 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
-from ..checks import check_instance, check_integer
+from ..checks import check_instance, check_integer, check_number
 from .library import Function, monomial_exponents, name_latex
 
 FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
 """What can be written as text."""
+OTHERS = "..."
+"""All terms of an equation that are not named."""
 STEP = 1e-3
 """Step of a difference, relative to the size of the coordinate."""
 
@@ -39,6 +41,8 @@ class Library:
         Highest degree of a polynomial below a fraction line, each equation its own.
     functions : tuple of (str, callable)
         Terms of one's own, with their names.
+    given : tuple of (str, tuple of (str, float or None))
+        Of equations, what is known of their terms; see `where`.
 
     Examples
     --------
@@ -51,6 +55,7 @@ class Library:
     harmonics: int = 0
     denominators: int = 0
     functions: tuple[tuple[str, Callable[..., ArrayLike]], ...] = ()
+    given: tuple[tuple[str, tuple[tuple[str, float | None], ...]], ...] = ()
 
     @classmethod
     def polynomial(cls, degree: int) -> Library:
@@ -100,21 +105,76 @@ class Library:
                 raise ValueError(f"functions: must map a name to a function, got {name!r:.60}")
         return cls(functions=tuple(functions.items()))
 
-    @classmethod
-    def parse(cls, text: str) -> Library:
-        """A library from text such as ``polynomial(3) + fourier(1)``.
+    def where(self, equations: Mapping[str, Mapping[str, float | None]]) -> Library:
+        """The same terms, of which some are known, forbidden or alone allowed in an equation.
+
+        The law is then sought in the frame of the data only, in which these terms are meant.
+
+        Parameters
+        ----------
+        equations : mapping of str to mapping of str to float or None
+            For a variable the terms of its slope (for a law of second order of ``vx``, the
+            acceleration), as in `PolynomialSystem.from_terms`: the coefficient that is known, 0 for
+            a term that is forbidden, None for one that is to be found. ``"..."`` are all others of
+            the equation, which are to be found unless it says otherwise.
 
         Raises
         ------
         ValueError
-            If it names an unknown family.
+            If it is no such mapping.
+
+        Examples
+        --------
+        >>> known = {"y": {"x": 28}}  # dy/dt = 28 x + ...
+        >>> forbidden = {"x": {"z": 0, "z^2": 0}}
+        >>> allowed = {"x": {"x": None, "y": None, "...": 0}}
+        >>> vl.Library.polynomial(2).where(known | forbidden)
         """
-        total = cls()
-        for part in text.split("+"):
+        rows = {name: dict(terms) for name, terms in self.given}
+        given = equations.items() if isinstance(equations, Mapping) else ()
+        if not given or not all(isinstance(terms, Mapping) for _, terms in given):
+            raise ValueError(
+                "equations: must give variables what is known of their terms, e.g. "
+                f"{{'x': {{'y': 10, 'z': 0}}}}, got {equations!r:.60}"
+            )
+        for name, terms in given:
+            checked = {
+                term: None if value is None else check_number(f"coefficient of {term}", value)
+                for term, value in terms.items()
+            }
+            rows[name] = rows.get(name, {}) | checked
+        return replace(self, given=tuple((name, tuple(row.items())) for name, row in rows.items()))
+
+    @classmethod
+    def parse(cls, text: str) -> Library:
+        """A library from text such as ``polynomial(3) + fourier(1)``.
+
+        What is known of an equation follows, as in ``polynomial(2); x: y = 10, z = 0, ... = ?``.
+
+        Raises
+        ------
+        ValueError
+            If it names an unknown family, or what follows is no such list.
+        """
+        total, (families, *equations) = cls(), text.split(";")
+        for part in families.split("+"):
             match = re.fullmatch(r"\s*(polynomial|fourier|rational)\s*\(\s*(\d+)\s*\)\s*", part)
             if match is None:
                 raise ValueError(f"library: must be a sum of {FAMILIES}, got {part.strip()!r}")
             total += getattr(cls, match[1])(int(match[2]))
+        for equation in equations:
+            name, _, listed = equation.partition(":")
+            pairs = [pair.partition("=")[::2] for pair in listed.split(",")]
+            try:
+                row = {
+                    term.strip(): None if value.strip() == "?" else float(value)
+                    for term, value in pairs
+                }
+            except ValueError:
+                raise ValueError(
+                    f"library: what is known must read as 'x: y = 10, z = 0', got {equation!r}"
+                ) from None
+            total = total.where({name.strip(): row})
         return total
 
     def __add__(self, other: Library) -> Library:
@@ -125,19 +185,27 @@ class Library:
             if functions.setdefault(name, rule) is not rule:
                 raise ValueError(f"library: a name may stand for one function, got {name!r} twice")
         degrees = [part.degree for part in (self, other) if part.degree is not None]
-        return Library(
+        total = Library(
             max(degrees, default=None),
             max(self.harmonics, other.harmonics),
             max(self.denominators, other.denominators),
             tuple(functions.items()),
         )
+        given = [(name, dict(terms)) for name, terms in self.given + other.given]
+        for name, terms in given:
+            total = total.where({name: terms})
+        return total
 
     def __str__(self) -> str:
         parts = [] if self.degree is None else [f"polynomial({self.degree})"]
         parts += [f"fourier({self.harmonics})"] if self.harmonics else []
         parts += [f"rational({self.denominators})"] if self.denominators else []
         parts += [f"terms({', '.join(name for name, _ in self.functions)})"] * bool(self.functions)
-        return " + ".join(parts)
+        text = " + ".join(parts)
+        for name, terms in self.given:
+            known = (f"{term} = {'?' if value is None else f'{value:g}'}" for term, value in terms)
+            text += f"; {name}: {', '.join(known)}"
+        return text
 
     def resolve(self, names: tuple[str, ...], measured: int) -> tuple[Ints, tuple[Function, ...]]:
         """The terms of a law in named variables, of which the first ``measured`` were measured.

@@ -19,7 +19,7 @@ from .library import shift_matrix
 from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
-from .selection import closest_rival, subset_search
+from .selection import closest_rival, minimiser, subset_search
 from .shape import cancelling, shapes
 from .state import State
 from .trajectories import Trajectory, typical_step
@@ -85,6 +85,7 @@ def diagnose(
         *outliers(problem.measured),
         *_shape(problem, fit),
         *_misfit(problem, fit),
+        *_doubtful_sigma(problem, fit),
         *_unfinished(fit),
         *_unmet(problem, fit),
         *_another_in_the_data(problem, fit, law),
@@ -149,11 +150,24 @@ def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
     residual = residual_noise(fit)
     ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
     j = int(ratio.argmax())
+    told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
     if not ratio[j] < MISFIT:
         yield (
             f"the curve misses the data of {problem.form.names[j]} by {ratio[j]:.1f} times "
-            "the noise estimated beforehand: the law may lie outside the library (raise the "
+            f"{told}: the law may lie outside the library (raise the "
             "degree), the motion may not be autonomous, or errors last for several samples"
+        )
+
+
+def _doubtful_sigma(problem: Problem, fit: Fit) -> Iterator[str]:
+    """Are the errors that were given larger than what is left?"""
+    ratio = problem.noise / residual_noise(fit) if problem.measured_errors else np.zeros(problem.d)
+    j = int(ratio.argmax())
+    if ratio[j] > MISFIT:
+        yield (
+            f"sigma of {problem.form.names[j]} is {ratio[j]:.1f} times the errors that the law "
+            "leaves: the error bars are too wide, and terms may be lost; leave it out, and the "
+            "errors are estimated"
         )
 
 
@@ -183,9 +197,7 @@ def _another_in_the_data(problem: Problem, fit: Fit, law: PolynomialSystem) -> I
         )
 
 
-def _selection(
-    problem: Problem, fit: Fit, path: Path, law: PolynomialSystem
-) -> Iterator[str]:
+def _selection(problem: Problem, fit: Fit, path: Path, law: PolynomialSystem) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), fit.state, path)
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
@@ -259,30 +271,37 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[
 def _nearer_home(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
     """Would another law, with one axis less away from home, fit almost as well?"""
     state, exponents = fit.state, problem.exponents
-    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
     own = problem.penalties @ state.active.sum(axis=1) + problem.axis_penalty
     for axis in np.flatnonzero(state.moving).tolist():
         home = np.arange(problem.d) == axis
         origin = np.where(home, problem.home, state.offset)
         moved = shift_matrix(exponents, state.offset - origin) @ state.coefficients
         there = replace(state, coefficients=moved, offset=origin, moving=state.moving & ~home)
-        columns = problem.columns(there)
-        model = fit.collocation.linearise(there, columns)
-        present = there.flat()[columns]
-        support = (present != 0) | (columns >= exponents.size)
-        _, solution, value = subset_search(
-            model.information, model.gradient, present, prices[columns], support
-        )
-        rival = model.along(there, solution - present, 1.0)
-        matrix = shift_matrix(exponents, rival.offset - problem.home)
-        parts = np.abs(matrix) @ np.abs(rival.coefficients)
-        terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
-        if value - own < NEAR_TIE and (terms != law.support).any():
-            yield (
-                f"the data hardly tell where the law's origin is in {problem.form.names[axis]}: "
-                f"other terms around the origin of the data fit almost as well (criterion "
-                f"{value - own:+.1f}); use a longer or cleaner trajectory"
-            )
+        for value, rival in _cheapest_two(problem, fit, there):
+            matrix = shift_matrix(exponents, rival.offset - problem.home)
+            parts = np.abs(matrix) @ np.abs(rival.coefficients)
+            terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
+            if value - own < NEAR_TIE and (terms != law.support).any():
+                yield (
+                    f"the data hardly tell where the law's origin is in {problem.form.names[axis]}:"
+                    " other terms around the origin of the data fit almost as well (criterion "
+                    f"{value - own:+.1f}); use a longer or cleaner trajectory"
+                )
+                break
+
+
+def _cheapest_two(problem: Problem, fit: Fit, there: State) -> Iterator[tuple[float, State]]:
+    """The cheapest law around a state in another frame and its closest rival, with their costs."""
+    columns = problem.columns(there)
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
+    model, present = fit.collocation.linearise(there, columns), there.flat()[columns]
+    quadratic = (model.information, model.gradient, present)
+    start = (present != 0) | (columns >= problem.exponents.size)
+    support, solution, value = subset_search(*quadratic, prices, start)
+    yield value, model.along(there, solution - present, 1.0)
+    cost, dropped, added = closest_rival(*quadratic, prices, support)
+    support[dropped], support[added] = False, True
+    yield value + cost, model.along(there, minimiser(*quadratic, support) - present, 1.0)
 
 
 def _standstill(law: PolynomialSystem) -> Iterator[str]:
@@ -313,7 +332,7 @@ def _sampling(problem: Problem) -> Iterator[str]:
     runs, form = problem.trajectories, problem.form
     turns = sum(t[-1] - t[0] for t, _ in runs) / (2 * np.pi)
     # On a line nothing turns; and a body need not turn, if it is seen from several starts.
-    bound = len(form.names) > 1 if form.movable.all() else len(runs) == 1
+    bound = len(form.names) > 1 and (form.movable.all() or len(runs) == 1)
     if turns < TURNS and bound:
         yield (
             f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "

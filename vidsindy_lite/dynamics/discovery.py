@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
-import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from ..arrays import Floats, Ints
 from ..checks import check_array
+from .absent import intervals, unseen
 from .candidates import Library
 from .collocation import Fit
 from .diagnostics import diagnose
 from .errors import residual_noise
+from .history import History, Step
 from .library import shift_generators, shift_matrix
 from .persistence import Path, Plateau
+from .physics import Physics, physics_of
 from .polynomials import PolynomialSystem
 from .problem import Problem, Units
 from .selection import inverse
@@ -27,59 +30,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Step:
-    """One line of the history of a discovery.
-
-    Parameters
-    ----------
-    stage : str
-        What was done.
-    seconds : float
-        Time since the start.
-    physics_weight : float
-        Relative weight of the physics loss.
-    data_loss : float
-        Mean square residual of the data over the noise variance.
-    physics_loss : float
-        Mean square residual of the law in standard units.
-    terms : int
-        Number of active terms.
-    offset : ndarray, shape (d,)
-        Origin of the law in the data's frame.
-    """
-
-    stage: str
-    seconds: float
-    physics_weight: float
-    data_loss: float
-    physics_loss: float
-    terms: int
-    offset: Floats
-
-
-@dataclass(frozen=True)
-class History:
-    """The steps of a discovery so far, in the order of time."""
-
-    steps: list[Step] = field(default_factory=list)
-    began: float = field(default_factory=time.perf_counter)
-
-    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
-        """Add what a fit at a relative physics weight has reached."""
-        state, collocation = fit.state, fit.collocation
-        data = collocation.data_loss(state.control_points)
-        self.steps.append(
-            Step(
-                stage=stage,
-                seconds=time.perf_counter() - self.began,
-                physics_weight=weight,
-                data_loss=data / collocation.counts.sum(),
-                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
-                terms=int(state.active.sum()),
-                offset=problem.units.point(state.offset),
-            )
-        )
+SMALLEST, LARGEST = -5, 6
+"""Numbers of fewer and of more digits are printed with a power of ten."""
+SHOWN = 3
+"""Most absent terms that are printed."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +88,10 @@ class Discovery:
         How the fit went.
     curves : tuple of scipy.interpolate.BSpline
         The fitted curve, one spline per stretch of data, in units of the data.
+    absent : ndarray, shape (l, d, 2)
+        Of each candidate term of ``native`` that the law has not, the 95 % interval of what it
+        would be if it alone were added, all else fitted again; NaN for what is in the law or no
+        candidate. See `intervals` of the module ``absent`` for the formula.
     note : str
         Which order the law has and why, where that was left open.
     """
@@ -150,6 +108,7 @@ class Discovery:
     path: tuple[tuple[Plateau, ...], ...]
     history: tuple[Step, ...]
     curves: tuple[BSpline, ...]
+    absent: Floats
     note: str = ""
 
     @property
@@ -234,6 +193,28 @@ class Discovery:
         status = f"diverges after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
         return Simulation(t, x, status)
 
+    def physics(self, down: ArrayLike | None = None) -> Physics:
+        """What a law of motion says of a body: g and drag, or springs and periods; its energy.
+
+        Parameters
+        ----------
+        down : array_like, shape (m,), optional
+            Direction of gravity, if it is known: g is the pull along it. By default that of the
+            force that acts on a body at rest.
+
+        Returns
+        -------
+        Physics
+            Named numbers with standard errors, carried through from those of the coefficients, as
+            in ``found.physics()["g"].value``; ``print`` shows them all, and what cannot be said.
+
+        Raises
+        ------
+        ValueError
+            If ``down`` is no direction.
+        """
+        return physics_of(self.system, self.covariance, self.curves, down)
+
     def plot_path(self) -> Figure:
         """Draw `path`: the terms of each equation over the error that is tolerated.
 
@@ -288,6 +269,15 @@ class Discovery:
             sizes = zip(self.model_error, self.system.names, strict=True)
             kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
             lines.append(f"kicked at random, by {kicks} over a unit of time")
+        if said := self.physics().headline:
+            lines.append(said)
+        if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
+            frame = "in its own frame, " if self.offset.any() else ""
+            more = f" and {len(terms) - SHOWN} more" if len(terms) > SHOWN else ""
+            lines.append(
+                f"not seen, though they may be as large as terms of the law: {frame}"
+                f"{', '.join(terms[:SHOWN])}{more}"
+            )
         if self.note:
             lines.append(f"note: {self.note}")
         return "\n".join(lines)
@@ -340,6 +330,7 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
         warnings=diagnose(problem, fit, path, law, margins),
         path=path.plateaus,
         history=tuple(history.steps),
+        absent=intervals(problem, fit, tolerated),
         curves=tuple(
             BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
             for s in collocation.grid.splines(state.control_points)
@@ -431,6 +422,14 @@ def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:
 
 
 def _with_error(value: float, error: float, term: str) -> str:
-    digits = 4 if error <= 0 else int(np.clip(1 - np.floor(np.log10(error)), 0, 12))
-    number = f"({abs(value):.{digits}f} ± {error:.{digits}f})"
+    """A term of an equation with two digits of its error; one that is known has none."""
+    largest = max(abs(value), error)
+    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
+    power = 0 if SMALLEST <= power < LARGEST else power
+    size, spread = abs(value) / 10.0**power, error / 10.0**power
+    number = f"{size:g}"
+    if error > 0:
+        digits = int(np.clip(1 - np.floor(np.log10(spread)), 0, 12))
+        number = f"({size:.{digits}f} ± {spread:.{digits}f})"
+    number += f"e{power}" if power else ""
     return f"{'-' if value < 0 else '+'} {number}" + ("" if term == "1" else f" {term}")

@@ -6,14 +6,14 @@ velocities are states that nobody has measured, and their half of the law is kno
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .candidates import Library
-from .library import Function, closure, variable_names
-from .polynomials import PolynomialSystem, velocity_names
+from .candidates import OTHERS, Library
+from .library import Function, closure
+from .polynomials import PolynomialSystem, parse_term, velocity_names
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +49,13 @@ class Form:
     shared: Ints
 
     @classmethod
-    def of(cls, measured: int, library: Library, order: int) -> Form:
-        """A law in all terms of a library, for so many measured coordinates."""
-        names = variable_names(measured)
+    def of(
+        cls, coordinates: tuple[str, ...], library: Library, order: int = 1, origin: str = "learn"
+    ) -> Form:
+        """A law in all terms of a library, for named coordinates that were measured."""
+        measured, names = len(coordinates), coordinates
         if order == 2:
-            names += velocity_names(names)
+            names += velocity_names(coordinates)
         d = len(names)
         wanted, functions = library.resolve(names, measured)
         velocities = np.eye(wanted.shape[1], dtype=int)[measured:d]
@@ -76,9 +78,57 @@ class Form:
         # A slope multiplies terms of its own equation alone.
         slopes = exponents[:, d + len(functions) :]
         candidates &= (slopes.sum(axis=1) == 0)[:, None] | (slopes > 0 if slopes.size else False)
-        # A function of the state does not move with the origin, so that none is sought.
-        movable = (np.arange(d) < measured) & (exponents.shape[1] == d)
-        return cls(names, exponents, functions, candidates, known, movable, shared.ravel())
+        # A function of the state does not move with the origin, so that none is sought; and what is
+        # given is so in the frame of the data.
+        still = origin == "data" or exponents.shape[1] > d or library.given
+        movable = (np.arange(d) < measured) & (not still)
+        form = cls(names, exponents, functions, candidates, known, movable, shared.ravel())
+        for of, terms in library.given:
+            form = form._given(of, dict(terms), d - measured)
+        if not form.candidates.any():
+            raise ValueError("library: must leave a term to be found, got all of them given")
+        return form
+
+    def _given(self, equation: str, terms: dict[str, float | None], first: int) -> Form:
+        """The same with some terms of an equation given; the first equations are none to choose."""
+        if equation not in self.names[first:]:
+            raise ValueError(
+                f"library: must give terms of an equation of {', '.join(self.names[first:])}, "
+                f"got {equation!r}"
+            )
+        j = self.names.index(equation)
+        rows: dict[int, float | None] = {}
+        there = np.flatnonzero(self.candidates[:, j]).tolist()
+        for term, value in terms.items():
+            row = self._row(term)
+            if row is not None and row in there:
+                rows[row] = value
+            elif term != OTHERS:
+                names = self.law(self.known).terms
+                raise ValueError(
+                    f"library: {term!r} is no term of the equation of {equation}, which has "
+                    f"{', '.join(names[k] for k in there)}"
+                )
+        if OTHERS in terms:
+            rows = {**dict.fromkeys(there, terms[OTHERS]), **rows}
+        candidates, known = self.candidates.T.ravel(), self.known.T.ravel()
+        for row, value in rows.items():
+            if value is not None:
+                tied = self.shared == self.shared[j * len(self.known) + row]
+                candidates[tied], known[tied] = False, value
+        shape = self.known.T.shape
+        return replace(self, candidates=candidates.reshape(shape).T, known=known.reshape(shape).T)
+
+    def _row(self, term: str) -> int | None:
+        """Where a term stands in the library; none if it is not there."""
+        slopes = tuple(f"{name}'" for name in self.names)
+        variables = (*self.names, *(function.name for function in self.functions), *slopes)
+        try:
+            powers = parse_term(term, variables[: self.exponents.shape[1]])
+        except ValueError:
+            return None
+        same = (self.exponents == powers).all(axis=1)
+        return int(same.argmax()) if same.any() else None
 
     def law(self, coefficients: Floats) -> PolynomialSystem:
         """The law with these coefficients, (l, d), in the units of the data."""

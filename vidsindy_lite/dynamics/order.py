@@ -14,6 +14,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from ..arrays import Floats
+from ..checks import check_choice
+from .candidates import Library
 from .discovery import Discovery
 from .library import monomial_exponents, monomials
 from .splines import DEGREE
@@ -35,10 +37,13 @@ DENSITY = 10
 """Points per time scale of the motion at which accelerations are looked at."""
 
 
-def check_order(order: object) -> None:
-    """Refuse what is no order of a law."""
+def check_order(order: object, origin: str, library: Library) -> None:
+    """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
     if order not in (1, 2, "auto"):
         raise ValueError(f"order: must be 1, 2 or 'auto', got {order!r}")
+    if order == "auto" and library.given:
+        raise ValueError("order: must be 1 or 2 where terms are given of its equations, got 'auto'")
+    check_choice("origin", origin, ("learn", "data"))
 
 
 def accelerated(curves: Sequence[BSpline]) -> bool:

@@ -128,7 +128,7 @@ class PolynomialSystem:
         known = (*names, *(function.name for function in functions))
         known += tuple(f"{name}'" for name in names if held.denominators)
         parsed = [
-            (_parse_term(term, known), column, check_number(f"coefficient of {term}", value))
+            (parse_term(term, known), column, check_number(f"coefficient of {term}", value))
             for column, terms in enumerate(given)
             for term, value in terms.items()
         ]
@@ -359,7 +359,8 @@ def velocity_names(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"v{name}" for name in names)
 
 
-def _parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
+def parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
+    """The powers of the named factors in a term such as ``x^2 y``."""
     if not isinstance(term, str) or not term.strip():
         raise ValueError(f"term: must be '1' or a product of the variables {names}, got {term!r}")
     exponents = dict.fromkeys(names, 0)

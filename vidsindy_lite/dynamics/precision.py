@@ -42,7 +42,7 @@ NOISELESS = 1e-4
 def with_precision(problem: Problem, fit: Fit) -> Problem:
     """The problem with the precision that a fit shows each measurement to have.
 
-    The same problem where the noise is even and no sample is wrong.
+    The same problem where the noise is even and no sample is wrong, or the errors are given.
 
     Parameters
     ----------
@@ -87,6 +87,8 @@ def _weighed(
     A piece is the number of a trajectory and times, its path states and slopes, (2, n, d); what is
     ``known`` are the precisions so far.
     """
+    if problem.measured_errors:
+        return problem
     residual = residual * np.sqrt(known)
     signal, speed = np.concatenate(path, axis=1)
     causes = [(signal - problem.home) ** 2, speed**2]  # what the variance of the noise may follow
@@ -140,9 +142,10 @@ def _variance(residual: Floats, causes: Floats) -> tuple[float, Floats, Bools]:
     causes = causes / causes.mean(axis=1, keepdims=True)
     squares = residual**2
     variance = causes.sum(axis=0)
-    sizes = np.full(len(causes), np.median(squares / variance) / MEDIAN)
+    least = (squares / variance).mean() / LARGEST_RATIO**2  # some residuals are exactly zero
+    sizes = np.full(len(causes), max(np.median(squares / variance) / MEDIAN, least))
     for _ in range(UPDATES):
-        variance = sizes @ causes
+        variance = np.maximum(sizes @ causes, least)
         noise = squares <= GROSS**2 * variance
         up = (causes * (noise * squares / variance**2)).sum(axis=1)
         down = (causes * (noise / variance)).sum(axis=1)

@@ -16,9 +16,8 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
-from .candidates import Library
 from .collocation import CLEANEST, Collocation, Fit
-from .errors import effective_noise, spread_to_unseen
+from .errors import effective_noise, residual_noise, spread_to_unseen
 from .form import Form
 from .library import Function, extended, law_variables, monomials
 from .polynomials import PolynomialSystem
@@ -108,6 +107,8 @@ class Problem:
     process_noise : ndarray, shape (d,)
         What random kicks leave of each equation, root mean square over a sample; zero for a law
         that holds exactly.
+    measured_errors : bool
+        Whether noise and precision are given by the user, and not to be estimated.
     """
 
     measured: list[Trajectory]
@@ -122,6 +123,7 @@ class Problem:
     penalties: Floats
     slack: Floats
     process_noise: Floats
+    measured_errors: bool = False
 
     @property
     def d(self) -> int:
@@ -211,9 +213,13 @@ class Problem:
     def errors(self, fit: Fit) -> Floats:
         """How large the errors of the data are by a fit, (d,), were they independent.
 
-        A curve that may leave its law follows the errors, too: then they are as estimated.
+        A curve that may leave its law follows the errors, too: then they are as estimated. Of
+        errors that are given only how long they last is estimated.
         """
-        return self.noise if self.kicked else effective_noise(fit)
+        if self.kicked:
+            return self.noise
+        errors = effective_noise(fit)
+        return self.noise * errors / residual_noise(fit) if self.measured_errors else errors
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
@@ -230,11 +236,13 @@ class Problem:
 def pose(
     measured: list[Trajectory],
     systematic: list[Floats],
-    library: Library,
+    form: Form,
     rng: np.random.Generator,
-    order: int = 1,
+    sigma: list[Floats] | None = None,
 ) -> Problem:
     """Pose the problem of a discovery: standard units, gaps, noise, prices.
+
+    The noise is as given by ``sigma``, (n, d) for each trajectory, or as the smoothing estimates.
 
     Raises
     ------
@@ -243,12 +251,11 @@ def pose(
         the library is not finite on the data, or its terms depend on each other.
     """
     x = np.concatenate([values for _, values in measured])
-    form = Form.of(x.shape[1], library, order)
     unknowns = len(form.exponents) + 1
     if len(x) < unknowns:
         raise ValueError(
-            f"x: must hold at least as many samples as unknowns per equation "
-            f"({unknowns} for {library} and d = {x.shape[1]}), got {len(x)} samples"
+            f"x: must hold at least as many samples as unknowns per equation ({unknowns} for this "
+            f"library and d = {x.shape[1]}), got {len(x)} samples"
         )
     centre, scale = x.mean(axis=0), x.std(axis=0)
     if not (scale > 1e-12 * np.abs(centre)).all():
@@ -261,23 +268,30 @@ def pose(
     stretches, curves, noise = _smoothed(trajectories, rng)
     speed = _rms_speed(curves)
     curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]
+    noise = np.maximum(noise, CLEANEST)
+    precision = [np.ones(values.shape) for _, values in measured]
+    if sigma is not None:
+        errors = [np.maximum(part / scale, CLEANEST) for part in sigma]
+        noise = np.median(np.concatenate(errors), axis=0)
+        precision = [(noise / part) ** 2 for part in errors]
     problem = Problem(
         measured=measured,
         trajectories=[(t * speed, values) for t, values in trajectories],
         systematic=[modes / scale[:, None] for modes in systematic],
-        precision=[np.ones(values.shape) for _, values in measured],
+        precision=precision,
         stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
         curves=curves,
         units=Units(centre, scale, step / speed),
-        noise=np.maximum(noise, CLEANEST),
+        noise=noise,
         form=form,
         penalties=term_penalties(form.exponents, x.shape[1]),
         slack=np.ones(len(form.names)),
         process_noise=np.zeros(len(form.names)),
+        measured_errors=sigma is not None,
     )
-    if order == 2:
+    if len(form.names) > x.shape[1]:
         problem = _with_velocities(problem, curves)
-    if not form.movable.any():
+    if form.exponents.shape[1] > len(form.names):
         problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))
 

@@ -56,7 +56,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     every = replace(exact.state, active=problem.form.candidates)
     free = _free(problem)
     start = problem.weighted(problem.collocation(segments), 1.0)
-    kicked = _balanced(_hard_where_known(start, free), every, free, rng)
+    kicked = _balanced(problem, _hard_where_known(start, free), every, rng)
     newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
     measured = evidence(exact) + prediction_gain(exact).sum()
     if not evidence(kicked) + 2 * newcomers < measured or unlike_kicks(kicked, free, rng) > UNLIKE:
@@ -66,7 +66,7 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
 
 def rebalanced(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
     """The problem with the kicks and the noise that a law leaves; all terms together leave less."""
-    balanced = _balanced(fit.collocation, fit.state, _free(problem), rng)
+    balanced = _balanced(problem, fit.collocation, fit.state, rng)
     return _with_variances(problem, balanced.collocation)
 
 
@@ -110,12 +110,15 @@ def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
     return own.solve(exact.state)
 
 
-def _balanced(collocation: Collocation, state: State, free: Bools, rng: np.random.Generator) -> Fit:
+def _balanced(
+    problem: Problem, collocation: Collocation, state: State, rng: np.random.Generator
+) -> Fit:
     """The fit at the variances of noise and kicks that make the data most likely.
 
     Each is the sum of the squares of its residuals, over how many of these the curve and the terms
-    have not used up (MacKay's update).
+    have not used up (MacKay's update). Noise that is given stays.
     """
+    free, told = _free(problem), problem.measured_errors
     grid, d = collocation.grid, collocation.d
     probes = rng.choice([-1.0, 1.0], (grid.r * d, PROBES))
     hardest = HARDEST * collocation.physics_weights
@@ -132,7 +135,8 @@ def _balanced(collocation: Collocation, state: State, free: Bools, rng: np.rando
         kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
         data = np.maximum(collocation.counts - in_data, 1.0) / np.maximum(missed, LEAST)
         law = np.maximum(unfitted - in_law, 1.0) / np.maximum(kicked, LEAST)
-        data = np.where(collocation.counts > 0, data, collocation.data_weights)
+        unknown = (collocation.counts > 0) & (not told)
+        data = np.where(unknown, data, collocation.data_weights)
         law = np.where(free, law, collocation.physics_weights)
         data, law = np.minimum(data, CLEANEST**-2), np.minimum(law, hardest)
         change = np.log([data / collocation.data_weights, law / collocation.physics_weights])

@@ -15,6 +15,10 @@ from ..arrays import Bools, Floats
 from ..checks import check_array
 from .errors import inflation
 
+ASIDE, ASTRAY = 0.1, 0.01
+"""Distance of a motion from what is round, over its radius, that doubts it: of single samples, and
+what neighbours have in common."""
+
 
 @dataclass(frozen=True, eq=False)
 class Round:
@@ -37,6 +41,8 @@ class Round:
     angle : ndarray, shape (n,) or (n, 2)
         Where the motion is, in radians, without leaps; NaN where it was not seen. On a sphere,
         longitude and latitude about the first axis.
+    warnings : tuple of str
+        Why the motion may be on no circle or sphere; empty if nothing was found.
     """
 
     centre: Floats
@@ -46,6 +52,23 @@ class Round:
     distance: float
     axes: Floats
     angle: Floats
+    warnings: tuple[str, ...]
+
+    def __str__(self) -> str:
+        shape = "circle" if len(self.axes) == 2 else "sphere"
+        centre, errors = (
+            ", ".join(f"{number:.{digits}g}" for number in numbers)
+            for numbers, digits in ((self.centre, 6), (self.centre_errors, 2))
+        )
+        return "\n".join(
+            [
+                f"{shape} of radius {self.radius:.6g} ± {self.radius_error:.2g} about ({centre}) ± "
+                f"({errors}), off by {self.distance:.2g}",
+                *(f"warning: {text}" for text in self.warnings),
+            ]
+        )
+
+    __repr__ = __str__
 
 
 def on_circle(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
@@ -131,14 +154,24 @@ def _round(
     centre: Floats, radius: float, errors: Floats, covariance: Floats, off: Floats,
     axes: Floats, angle: Floats,
 ) -> Round:  # fmt: skip
+    distance = float(np.sqrt((off**2).sum(axis=1).mean()))
+    shared = float(np.sqrt(max((off[1:] * off[:-1]).sum(axis=1).mean(), 0.0)))
+    shape = "circle" if len(axes) == 2 else "sphere"
+    doubts: tuple[str, ...] = ()
+    if distance > ASIDE * radius or shared > ASTRAY * radius:
+        doubts = (
+            f"the motion may be on no {shape}: it is off by {100 * distance / radius:.2g} % of the "
+            f"radius, of which neighbours share {100 * shared / radius:.2g} %",
+        )
     return Round(
         centre=centre,
         radius=float(radius),
         centre_errors=np.sqrt(np.diag(errors)),
         radius_error=float(np.sqrt(covariance[-1, -1])),
-        distance=float(np.sqrt((off**2).sum(axis=1).mean())),
+        distance=distance,
         axes=axes,
         angle=angle,
+        warnings=doubts,
     )
 
 

@@ -16,12 +16,12 @@ from scipy.stats import chi2
 
 from ..arrays import Bools, Floats
 from .collocation import Collocation, Fit, Status
-from .discovery import History
 from .gaps import Gap, gaps, join
+from .history import History
 from .library import closure_mask, divides, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
-from .problem import Problem, fit_curves
+from .problem import OFFSET_PENALTY, Problem, fit_curves
 from .selection import subset_search
 from .state import State
 from .trajectories import Trajectory
@@ -138,8 +138,9 @@ def unpruned(
     d = problem.d
     x, slope = collocation.node_states(control)
     coefficients = np.zeros(problem.known.shape)
-    terms = problem.terms(x)[:, rows]
-    coefficients[rows] = np.linalg.lstsq(terms, slope, rcond=problem.noise.min())[0]
+    terms = problem.terms(x)
+    left = slope - terms @ problem.known
+    coefficients[rows] = np.linalg.lstsq(terms[:, rows], left, rcond=problem.noise.min())[0]
     active = rows[:, None] & problem.form.candidates
     coefficients[~active] = 0.0
     still, shared = np.zeros(d, dtype=bool), problem.form.shared
@@ -326,19 +327,19 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
 
 
 def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
-    """Move an axis off home where terms make up for its staying there, if the criterion falls."""
+    """Move axes off home where terms make up for their staying there, while the criterion falls."""
     for origin in _thinner(problem, fit.state):
         closed, law = _closed(problem, fit, FINAL_WEIGHT)
         away = fit.state.moving | (origin != fit.state.offset)
         start = _candidate(problem, closed, law, origin, away)
         trial = select(problem, start, FINAL_WEIGHT, "offset away", history)
         if trial.criterion < fit.criterion:
-            return trial
+            return leave_home(problem, trial, history)  # one axis at a time: the others next
     return fit
 
 
 def _thinner(problem: Problem, state: State) -> list[Floats]:
-    """Origins away from home at which a law itself, not refitted, has clearly fewer terms."""
+    """Origins away from home at which a law itself, not refitted, costs less."""
     exponents, found = problem.exponents, []
     home = problem.form.movable & ~state.moving
     frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), home)
@@ -350,7 +351,7 @@ def _thinner(problem: Problem, state: State) -> list[Floats]:
         matrix = shift_matrix(exponents, -step)
         left = np.abs(matrix @ state.coefficients)
         terms = (left > FAINT * (np.abs(matrix) @ np.abs(state.coefficients))).sum()
-        if terms + (step != 0).sum() < state.active.sum():
+        if terms + OFFSET_PENALTY * (step != 0).sum() < state.active.sum():
             found.append(state.offset + step)
     return found
 

@@ -36,6 +36,8 @@ LAPS = 1.6
 """Laps of a closed orbit that have to be seen."""
 SWEPT = 1.5
 """Ways along an arc, over its length: what turns back on it, or goes round, is bound to it."""
+COARSEST = np.pi / 2
+"""Angle between samples up to which they tell which way they went."""
 PIECES = 50
 """Averages of the angle that tell the way along an arc."""
 NEARLY = 0.3
@@ -50,6 +52,8 @@ CANDIDATES = 4
 """Periods that are tried, at most."""
 LEAST = 1e-300
 """Keeps a quotient finite where nothing is left."""
+IMITATED = 0.02
+"""What a cubic leaves of a sine, over the slope, that hardly tells them apart."""
 CANCELLED = 300.0
 """Terms of an equation, their sizes added, over their sum: from here on they cancel."""
 
@@ -80,16 +84,13 @@ def shapes(
         return
     names = [name for name, moving in zip(names, moves, strict=True) if moving]
     x, noise, terms = x[:, moves], noise[moves], terms[moves]
-    orbit = list(_closed(runs[0][0], x, noise, terms)) if len(runs) == 1 else []
-    yield from _flat_or_round(x, noise, names, plain=bool(orbit) and x.shape[1] == 2)
-    yield from orbit
+    yield from _flat_or_round(x, noise, names)
+    if len(runs) == 1:
+        yield from _closed(runs[0][0], x, noise, terms)
 
 
-def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str], plain: bool) -> Iterator[str]:
-    """What there is to say of a line, a plane, a circle or a sphere.
-
-    A circle that is a closed orbit of two coordinates is ``plain``: these may be place and speed.
-    """
+def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[str]:
+    """What there is to say of a line, a plane, a circle or a sphere."""
     d, scale = x.shape[1], x.std(axis=0)
     standard = (x - x.mean(axis=0)) / scale
     _, directions = np.linalg.eigh(standard.T @ standard)  # the narrowest first
@@ -99,7 +100,7 @@ def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str], plain: bool) 
     ]
     flat = across.index(False) if False in across else d - 1
     if (d - flat == 2 and d <= 3) or (d == 3 and not flat):
-        told = _round(x, noise, planar=d - flat == 2, whole=not plain)
+        told = _round(x, noise, planar=d - flat == 2)
         if told:
             yield told
             return
@@ -124,10 +125,11 @@ def _relation(normal: Floats, x: Floats, names: Sequence[str]) -> str:
     return f"{sides.removeprefix('+ 1 ')} = {0 if nil else constant:.4g}"
 
 
-def _round(x: Floats, noise: Floats, planar: bool, whole: bool) -> str:
+def _round(x: Floats, noise: Floats, planar: bool) -> str:
     """What there is to say of a motion on a circle or a sphere; nothing if it is on none.
 
-    A whole circle counts only if it may.
+    Of two coordinates that go round, one may be the speed of the other, or hunt it: only what turns
+    back on its arc is a bob.
     """
     try:
         where = on_circle(x) if planar else on_sphere(x)
@@ -140,7 +142,8 @@ def _round(x: Floats, noise: Floats, planar: bool, whole: bool) -> str:
     size = widths[-2 if planar else 0]
     if not _on((reach - where.radius)[:, None], float(np.sqrt((outward @ noise**2).mean())), size):
         return ""
-    return _told(where, planar) if not planar or _bound(where.angle, whole) else ""
+    bound = not planar or _bound(where.angle, whole=x.shape[1] > 2)
+    return _told(where, planar) if bound else ""
 
 
 def _told(where: Round, planar: bool) -> str:
@@ -156,7 +159,12 @@ def _told(where: Round, planar: bool) -> str:
 
 
 def _bound(angle: Floats, whole: bool) -> bool:
-    """Whether a motion along an arc turns back on it, or goes round, if that counts."""
+    """Whether a motion along an arc turns back on it, or goes round, if that counts.
+
+    If a step is a large part of a turn, the way between samples is not known.
+    """
+    if np.quantile(np.abs(np.diff(angle)), 0.9) > COARSEST:
+        return False
     pieces = [piece.mean() for piece in np.array_split(angle, min(PIECES, len(angle)))]
     length = float(np.ptp(pieces))
     return bool(np.abs(np.diff(pieces)).sum() > SWEPT * length or whole and length > np.pi)
@@ -260,9 +268,13 @@ def _series(t: Floats, x: Floats, period: float, harmonics: int) -> tuple[Comple
 
 
 def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
-    """The equations of a law whose terms cancel along a motion, seen from its middle."""
+    """The equations of a law whose terms cancel along a motion, seen from its middle.
+
+    Of a law that is no polynomial, and has no other frame, those of a line and a sine.
+    """
     if not law.is_polynomial:
-        return  # such a law has no other frame
+        yield from _line_and_sine(law, x)
+        return
     middle = x.mean(axis=0)
     central, away = law.shift(-middle), x - middle
     sums = central(away)
@@ -275,6 +287,26 @@ def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
                 "sum): something is constant on these data; look for it, or add runs from other "
                 "starts"
             )
+
+
+def _line_and_sine(law: PolynomialSystem, x: Floats) -> Iterator[str]:
+    """Equations with x and sin(x) which x and x^3 imitate: neither is simpler."""
+    single = law.exponents.sum(axis=1) == 1
+    slopes = law(x)
+    for i, name in enumerate(law.names):
+        sines = [k for k, f in enumerate(law.functions) if f.name == f"sin({name})"]
+        for k in sines:
+            line, sine = (single & (law.exponents[:, column] == 1) for column in (i, law.d + k))
+            value, odd = law.functions[k].value(x), np.stack([x[:, i], x[:, i] ** 3], axis=1)
+            left = value - odd @ np.linalg.lstsq(odd, value, rcond=None)[0]
+            for j in np.flatnonzero(law.support[line].any(axis=0) & law.support[sine].any(axis=0)):
+                part = law.coefficients[sine, j] * left
+                if (part**2).mean() < IMITATED**2 * (slopes[:, j] ** 2).mean():
+                    yield (
+                        f"{name} and sin({name}) in d{law.names[j]}/dt are nearly {name} and "
+                        f"{name}^3 on these data: the two cannot be told apart; add runs of a "
+                        "larger amplitude"
+                    )
 
 
 def _on(residual: Floats, noise: float, size: float) -> bool:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from tqdm import tqdm
@@ -22,7 +23,9 @@ from ..arrays import Floats
 from ..checks import check_integer
 from .candidates import Library, check_library
 from .collocation import Fit
-from .discovery import Discovery, History, conclude
+from .discovery import Discovery, conclude
+from .form import Form
+from .history import History
 from .order import SETTLED, UNLIKELY, accelerated, advised, better, check_order
 from .persistence import Path, Plateau, follow, typical
 from .precision import foreseen, with_precision
@@ -30,7 +33,13 @@ from .problem import Problem, fit_curves, pose
 from .process_noise import rebalanced, with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, search
 from .selection import inverse
-from .trajectories import Trajectory, check_systematic, check_trajectories
+from .trajectories import (
+    Trajectory,
+    check_sigma,
+    check_systematic,
+    check_trajectories,
+    coordinate_names,
+)
 
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
@@ -55,6 +64,8 @@ def discover(
     systematic: Floats | Sequence[Floats] | None = None,
     order: int | str = 1,
     library: Library | None = None,
+    sigma: float | Floats | Sequence[float | Floats] | None = None,
+    origin: str = "learn",
 ) -> Discovery:
     """Discover the law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -63,7 +74,8 @@ def discover(
     t : array_like, shape (n,), or list of (t, x)
         Increasing times, even or uneven; or several trajectories of one system.
     x : array_like, shape (n, d), optional
-        States with d of at least 1; a row with a NaN is missing. Omitted when ``t`` is a list.
+        States with d of at least 1; a row with a NaN is missing. Omitted when ``t`` is a list. The
+        columns of a data frame name the variables, if they are names.
     degree : int, optional
         Highest degree of the candidate terms: short for ``library=Library.polynomial(degree)``; 3
         by default.
@@ -80,8 +92,14 @@ def discover(
         become states ``vx, ...`` of the law, after the positions. ``"auto"`` looks for the second
         where the first is doubtful, and says in `Discovery.note` which was taken and why.
     library : Library, optional
-        The candidate terms, in place of ``degree``. With terms that are no polynomials the law
-        is sought in the frame of the data only, as no shift of its origin is exact.
+        The candidate terms, in place of ``degree``; `Library.where` says what is known of them.
+        With terms that are no polynomials the law is sought in the frame of the data only, as no
+        shift of its origin is exact.
+    sigma : float, or array_like of shape (d,) or (n, d), optional
+        Standard errors of the samples, if they are known: then noise is not estimated. For several
+        trajectories one for all, or a list with one for each.
+    origin : {"learn", "data"}
+        Whether the law's own origin is sought, or is that of the data: then no axis moves.
 
     Returns
     -------
@@ -93,7 +111,8 @@ def discover(
     ValueError
         If the input has the wrong shape, times that do not increase, infinite values, a
         coordinate that does not move, or fewer samples than unknowns; if ``degree`` and
-        ``library`` are given, or a library does not suit the data.
+        ``library`` are given, or a library does not suit the data; if a standard error is not
+        positive.
 
     Examples
     --------
@@ -101,35 +120,38 @@ def discover(
     >>> print(vl.discover(t, x).equations())
     """
     library, seed = check_library(degree, library), check_integer("seed", seed)
-    check_order(order)
+    check_order(order, origin, library)
     trajectories = check_trajectories(t, x)
+    names = coordinate_names(t, x)
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
+    errors = check_sigma(sigma, times, trajectories)
+    solved = partial(_solved, trajectories, shared, errors, seed, progress)
     if order == 2:
-        return _solved(trajectories, shared, library, 2, seed, progress)[0]
-    found, problem = _solved(trajectories, shared, library, 1, seed, progress)
+        return solved(Form.of(names, library, 2, origin))[0]
+    found, problem = solved(Form.of(names, library, 1, origin))
     if order == 1:
         return advised(found, problem.curves)
     if not found.warnings or not accelerated(problem.curves):
         return replace(found, note=UNLIKELY if found.warnings else SETTLED)
-    second, _ = _solved(trajectories, shared, library, 2, seed, progress)
+    second, _ = solved(Form.of(names, library, 2, origin))
     return better(found, second)
 
 
 def _solved(
     trajectories: list[Trajectory],
     shared: list[Floats],
-    library: Library,
-    order: int,
+    sigma: list[Floats] | None,
     seed: int,
     progress: bool,
+    form: Form,
 ) -> tuple[Discovery, Problem]:
-    """The law of an order, and the problem that it solves."""
+    """The law of a form, and the problem that it solves."""
     starts, probes = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     history = History()
-    problem = foreseen(pose(trajectories, shared, library, probes, order))
+    problem = foreseen(pose(trajectories, shared, form, probes, sigma))
     with tqdm(total=2, disable=not progress, desc="discover", leave=False) as bar:
         fit = polish(problem, search(problem, starts, history), history)
         bar.update()

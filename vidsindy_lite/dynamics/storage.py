@@ -12,7 +12,8 @@ from scipy.interpolate import BSpline
 
 from ..checks import check_output, check_path
 from .candidates import Library, restored
-from .discovery import Discovery, Step
+from .discovery import Discovery
+from .history import Step
 from .library import Function
 from .persistence import Plateau
 from .polynomials import PolynomialSystem

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
 from ..arrays import Floats
 from ..checks import check_array, check_times
+from .library import variable_names
 
 Trajectory = tuple[Floats, Floats]
 """Times (n,) and states (n, d) without missing rows."""
@@ -72,6 +74,72 @@ def check_trajectories(
             f"got shapes {[values.shape for _, values in trajectories]}"
         )
     return trajectories
+
+
+def coordinate_names(
+    t: Floats | Sequence[tuple[Floats, Floats]], x: Floats | None
+) -> tuple[str, ...]:
+    """Names of the coordinates: of the columns of data frames, if all are names; else x, y, ...
+
+    Raises
+    ------
+    ValueError
+        If the columns of several trajectories are not named alike.
+    """
+    frames = [x] if x is not None else [values for _, values in t]
+    columns = [list(getattr(frame, "columns", [])) for frame in frames]
+    if any(names != columns[0] for names in columns):
+        raise ValueError(f"x: columns must be named alike in all trajectories, got {columns}")
+    if columns[0] and all(isinstance(name, str) and name.isidentifier() for name in columns[0]):
+        return tuple(columns[0])
+    return variable_names(np.shape(frames[0])[1])
+
+
+def check_sigma(
+    sigma: float | Floats | Sequence[float | Floats] | None,
+    times: Sequence[Floats],
+    trajectories: Sequence[Trajectory],
+) -> list[Floats] | None:
+    """Standard errors of samples as `discover` takes them, at those that are not missing.
+
+    Parameters
+    ----------
+    sigma : float, or array_like of shape (d,) or (n, d), or list of such, or None
+        For all trajectories, or a list with one for each of several.
+    times : sequence of array_like, shape (n,)
+        Of all samples of each trajectory, missing or not.
+    trajectories : sequence of Trajectory
+
+    Returns
+    -------
+    list of ndarray, shape (m, d), or None
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, or a standard error of a sample is not finite and positive.
+    """
+    if sigma is None:
+        return None
+    several = len(trajectories) > 1 and isinstance(sigma, list | tuple)
+    given = cast("Sequence[Floats]", sigma if several else [sigma] * len(trajectories))
+    if len(given) != len(trajectories):
+        raise ValueError(
+            f"sigma: must be one per trajectory ({len(trajectories)}), got {len(given)}"
+        )
+    checked = []
+    for part, t, (seen, x) in zip(given, times, trajectories, strict=True):
+        errors, shape = check_array("sigma", part), (len(t), x.shape[1])
+        if errors.shape not in ((), shape[1:], shape):
+            raise ValueError(
+                f"sigma: must be a number, or have shape {shape[1:]} or {shape}, got {errors.shape}"
+            )
+        errors = np.broadcast_to(errors, shape)[np.searchsorted(t, seen)]
+        wrong = errors[~(np.isfinite(errors) & (errors > 0))]
+        if wrong.size:
+            raise ValueError(f"sigma: must be finite and positive where x is, got {wrong[0]:g}")
+        checked.append(errors)
+    return checked
 
 
 def check_systematic(

@@ -1,4 +1,4 @@
-"""The paper's experiments on synthetic videos, as typed trials; protocol of the README.
+"""The paper's experiments on synthetic videos, as typed trials; protocol of docs/results.md.
 
 A `Trial` takes the path that was recovered from a film (`films`), adds noise or hides rows, and
 gives what is left to one method::

@@ -10,6 +10,7 @@
                   camera's motion (aligning: by all pixels, where corners are few), candidates are
                   what differs (lingering: also what hardly leaves its place), linking joins,
                   refining measures
+  several     track_targets: the same for several targets, each where it is apart from the others
   detector        what looks like a target in a single frame: our network, or any YOLO-v8
   network     that network, in PyTorch; training trained it, on frames that are drawn here
   scenes      what a camera sees; scenery draws its backgrounds, rendering its frames
@@ -20,6 +21,7 @@ from .hints import Hint, load_hints
 from .rendering import render, render_labelled, render_restless, render_video
 from .scenery import BACKGROUNDS
 from .scenes import SHAPES, Scene
+from .several import track_targets
 from .track_files import TrackFile, read_tracks
 from .tracking import Track, check_detector, track
 from .video import (

@@ -62,10 +62,10 @@ def rate(seen: Sightings, rows: Ints, value: float) -> float:
     return float(value * extent / (extent + 2) / doubts)
 
 
-def plainest_paths(seen: Sightings) -> list[Rated]:
+def plainest_paths(seen: Sightings, most: int = _PATHS) -> list[Rated]:
     """Several paths that have nothing in common, the plainest first."""
     left, found, boxes = np.arange(len(seen.frame)), [], seen.box
-    for _ in range(_PATHS):
+    for _ in range(most):
         rows, value = best_path(seen.only(left))
         rows = left[rows]
         if len(rows) < _SHORTEST:
@@ -192,13 +192,15 @@ def _doubted(found: Followed) -> Followed:
     return found._replace(doubts=(*found.doubts, doubt))
 
 
-def _linked(found: list[list[Candidate]], film: "_Film") -> tuple[Sightings, list[Rated]]:
+def _linked(
+    found: list[list[Candidate]], film: "_Film", most: int = _PATHS
+) -> tuple[Sightings, list[Rated]]:
     """The candidates as a table, and the paths through them, the plainest first."""
     places = [
         carry(film.maps[i], np.array([c.centre for c in f])) for i, f in enumerate(found) if f
     ]
     seen = Sightings.of(found, places, float(np.hypot(*film.plate.size)))
-    return seen, plainest_paths(seen)
+    return seen, plainest_paths(seen, most)
 
 
 def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[list[Candidate]]:

@@ -97,6 +97,7 @@ def render(
     ----------
     track : array_like, shape (n, 2)
         Centroid of the target, (u right, v down) in pixels; a row of NaN is a frame without target.
+        Or (n, 2 k), side by side, of k targets that look alike; the later ones are in front.
     scene : Scene
     seed : int
         Draws the background, the random pose and the noise.
@@ -125,9 +126,10 @@ class LabelledFrame(NamedTuple):
     frame : ndarray, shape (height, width, 3), uint8
         Blue-green-red.
     extent : ndarray, shape (2,)
-        Width and height of the whole target in pixels; NaN in a frame without target.
+        Width and height of the whole target in pixels, of several the last one; NaN in a frame
+        without target.
     visible : float
-        Share of the target's area that can be seen.
+        Share of its area that can be seen.
     """
 
     frame: Image
@@ -167,8 +169,9 @@ def render_labelled(
 
 
 def _check_track(track: ArrayLike) -> Floats:
-    """At least one row of pixels, finite or NaN."""
-    track = check_rows("track", track, 2)
+    """At least one row of pixels, finite or NaN, of one or several targets."""
+    width = np.shape(track)[-1] if np.ndim(track) == 2 else 0
+    track = check_rows("track", track, max(width - width % 2, 2))
     if not len(track):
         raise ValueError("track: must have shape (n, 2) with n >= 1, got (0, 2)")
     return track
@@ -237,10 +240,13 @@ def draw_frames(
     outline = scene.outline()
     colour = np.array(COLOURS[scene.colour], np.float32)
     grains = _NORMAL * np.float32(255 * np.sqrt(scene.noise_variance))
-    poses = zip(track, shapes, *_poses(scene, len(track), motion), strict=True)
-    for centre, shape, angle, scale in poses:
+    targets = track.reshape(len(track), -1, 2)
+    poses = np.array([_poses(scene, len(track), motion) for _ in range(targets.shape[1])])
+    for centres, shape, pose in zip(targets, shapes, poses.transpose(2, 0, 1), strict=True):
         frame, extent, seen = background.copy(), np.full(2, np.nan), 0.0
-        if np.isfinite(centre).all():
+        for centre, (angle, scale) in zip(centres, pose, strict=True):
+            if not np.isfinite(centre).all():
+                continue
             turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
             polygon = centre + scale * outline @ turn @ shape.T
             extent = np.ptp(polygon, axis=0)

@@ -15,6 +15,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from ..checks import check_instance
 from .background import BackgroundModel, sample_frames, track_blobs, view_distances, whole_views
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
-from .moving import follow
+from .moving import Followed, follow
 from .refining import scatter
 from .steadying import carry
 from .video import read_video
@@ -67,6 +68,14 @@ class Track:
     warnings: tuple[str, ...] = ()
     maps: Floats | None = None
 
+    @classmethod
+    def of_motion(cls, found: Followed) -> Self:
+        """The track of something that was followed, with the camera's motion taken out."""
+        seen = np.isfinite(found.pixels[:, 0])
+        confidence = np.where(seen, np.exp(-found.errors / 3), 0.0)
+        moves = not np.array_equal(found.maps, np.broadcast_to(np.eye(3), found.maps.shape))
+        return cls(found.pixels, confidence, "motion", found.doubts, found.maps if moves else None)
+
     @property
     def in_frames(self) -> Floats:
         """The target in the pixels of each frame itself, (n, 2): to be drawn there."""
@@ -92,7 +101,7 @@ def track(
         * "background": for a camera at rest, the most exact. The target may turn and change its
           size, not its shape, and is whole in at least a quarter of the frames that show any of
           it. It must stay away from each place for at least a fifth of the frames: what never
-          moves away by about its own width is background.
+          moves away by about its own width is background here, not for "auto".
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
@@ -146,11 +155,7 @@ def _lost(found: Track) -> tuple[str, ...]:
 
 def _follow(path: str | os.PathLike, samples: Image, hint: Hint | None) -> Track:
     """The plainest motion, with the camera's taken out."""
-    found = follow(path, samples, hint)
-    seen = np.isfinite(found.pixels[:, 0])
-    confidence = np.where(seen, np.exp(-found.errors / 3), 0.0)
-    moves = not np.array_equal(found.maps, np.broadcast_to(np.eye(3), found.maps.shape))
-    return Track(found.pixels, confidence, "motion", found.doubts, found.maps if moves else None)
+    return Track.of_motion(follow(path, samples, hint))
 
 
 def _plausible(found: Track, hint: Hint | None) -> bool:

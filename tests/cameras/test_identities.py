@@ -1,0 +1,144 @@
+"""Who is who among several targets: orders that tracks have lost come back from geometry."""
+
+import numpy as np
+import pytest
+from helpers import room, trajectory, walk
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import vidsindy_lite as vl
+from vidsindy_lite.cameras import identify, side_by_side, stacked
+
+FRAMES = 240
+BLIND = 7  # frames around a meeting in which a view loses the targets
+
+
+def mixed(places, rng, meetings=5):
+    """Tracks (n, 2 k) of a view whose targets change places behind each of some gaps."""
+    n, k, _ = places.shape
+    track = places.copy()
+    for at in rng.integers(10, n - 10, meetings):
+        order = rng.permutation(k)
+        track[at:] = track[at:][:, order]
+        track[at - BLIND // 2 : at + BLIND // 2 + 1] = np.nan
+    return track.reshape(n, -1)
+
+
+def filmed(rig, paths, rng, noise=0.0):
+    """What the cameras see of the targets, each view in an order of its own."""
+    views = [np.stack([camera.project(x) for x in paths], axis=1) for camera in rig.cameras]
+    return [mixed(view + noise * rng.normal(size=view.shape), rng) for view in views], views
+
+
+def assert_told_apart(told, views, tolerance=1e-9):
+    """The same order in all views, that of the truth up to the names of the targets."""
+    first = np.nanargmax(np.isfinite(told[0]).all(axis=1))
+    k = views[0].shape[1]
+    places = told[0].reshape(len(told[0]), k, 2)
+    apart = np.linalg.norm(places[first][:, None] - views[0][first][None], axis=2)
+    order = apart.argmin(axis=1)
+    assert sorted(order) == list(range(k))
+    for track, view in zip(told, views, strict=True):
+        off = track.reshape(len(track), k, 2) - view[:, order]
+        assert np.nanmax(np.abs(off)) < tolerance
+        assert np.isfinite(off).all(axis=(1, 2)).mean() > 0.7
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([2, 3]))
+def test_orthographic_views_whose_cameras_are_not_learned_yet(seed, count):
+    rng = np.random.default_rng(seed)
+    paths = [trajectory(rng, FRAMES) for _ in range(count)]
+    middle = paths[0].mean(axis=0)
+    paths = [(x - x.mean(axis=0)) / np.ptp(x) + 0.2 * rng.normal(size=3) for x in paths]
+    rig = vl.Rig.around(np.concatenate(paths) + middle)
+    paths = [x + middle for x in paths]
+    tracks, views = filmed(rig, paths, rng)
+    told = identify(tracks, rig.uncalibrated(keep=0))
+    if not told.doubts:  # all views may be blind at once, just when two targets meet in space
+        assert_told_apart(told.tracks, views)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_perspective_views_with_noise(seed):
+    rng = np.random.default_rng(seed)
+    rig = room(rng)
+    paths = [walk(np.arange(FRAMES)), walk(np.arange(FRAMES) + 700 + 90 * seed)]
+    tracks, views = filmed(rig, paths, rng, noise=0.5)
+    told = identify(tracks, rig)
+    assert not told.doubts
+    assert_told_apart(told.tracks, views, tolerance=5.0)
+
+
+def test_a_meeting_that_one_view_alone_does_not_see_costs_its_frames_only():
+    rng = np.random.default_rng(3)
+    rig = room(rng)
+    paths = [walk(np.arange(FRAMES)), walk(np.arange(FRAMES) + 700)]
+    views = [np.hstack([camera.project(x) for x in paths]) for camera in rig.cameras]
+    views[1][100:] = np.roll(views[1][100:], 2, axis=1)
+    views[1][95:105] = np.nan
+    told = identify(views, rig)
+    assert not told.doubts
+    for i, camera in enumerate(rig.cameras):
+        expected = np.hstack([camera.project(x) for x in paths])
+        seen = np.isfinite(told.tracks[i]).all(axis=1)
+        assert seen.sum() == FRAMES - 10 * (i == 1)
+        np.testing.assert_allclose(told.tracks[i][seen], expected[seen])
+
+
+def test_behind_a_gap_in_all_views_a_target_goes_on_smoothly():
+    rng = np.random.default_rng(4)
+    rig = room(rng)
+    paths = [walk(np.arange(FRAMES)), walk(np.arange(FRAMES) + 700)]
+    views = [np.stack([camera.project(x) for x in paths], axis=1) for camera in rig.cameras]
+    tracks = [view.copy() for view in views]
+    for track in tracks:
+        track[120:] = track[120:, ::-1]
+        track[117:123] = np.nan
+    told = identify([track.reshape(FRAMES, -1) for track in tracks], rig)
+    assert not told.doubts
+    assert_told_apart(told.tracks, views)
+
+
+def test_targets_that_meet_in_space_unseen_are_doubted():
+    rig = room(np.random.default_rng(5))
+    t = np.linspace(-1, 1, FRAMES)
+    # Both fall onto a wall, unseen, and one comes back where the other might have.
+    paths = [np.outer(np.abs(t), side) for side in ([0.5, 0.2, 0.1], [0.5, -0.2, 0.1])]
+    tracks = [np.hstack([camera.project(x) for x in paths]) for camera in rig.cameras]
+    for track in tracks:
+        track[np.abs(t) < 0.1] = np.nan
+    told = identify(tracks, rig)
+    assert len(told.doubts) == 1
+    assert told.doubts[0].startswith("targets: who is who is not sure from frame")
+
+
+def test_views_that_never_show_all_targets_at_once_are_refused():
+    rng = np.random.default_rng(6)
+    rig = room(rng)
+    paths = [walk(np.arange(FRAMES)), walk(np.arange(FRAMES) + 700)]
+    tracks = [np.hstack([camera.project(x) for x in paths]) for camera in rig.cameras]
+    tracks[0][: FRAMES // 2] = np.nan
+    tracks[1][FRAMES // 2 :] = np.nan
+    with pytest.raises(ValueError, match="targets: all views must show all targets apart"):
+        identify(tracks, rig)
+
+
+def test_tracks_of_other_things_fit_no_rig():
+    rng = np.random.default_rng(7)
+    rig = room(rng)
+    tracks = [
+        np.hstack([camera.project(walk(np.arange(FRAMES) + s)) for s in rng.integers(0, 9999, 2)])
+        for camera in rig.cameras
+    ]
+    with pytest.raises(ValueError, match="targets: one order of the targets"):
+        identify(tracks, rig)
+
+
+@settings(deadline=None)
+@given(st.integers(1, 9), st.integers(1, 3), st.integers(1, 4))
+def test_side_by_side_is_the_inverse_of_stacked(n, width, count):
+    values = np.random.default_rng(n).normal(size=(n, width * count))
+    rows = stacked(values, width)
+    assert rows.shape == (n * count + count - 1, width)
+    np.testing.assert_array_equal(side_by_side(rows, count), values)

@@ -1,0 +1,95 @@
+"""Every claim names a check that is there, and one that names none is seen."""
+
+import pytest
+
+from vidsindy_lite.companion.claims import claims_of
+from vidsindy_lite.stamp import PACKAGE
+
+ROOT = PACKAGE.parent
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *NOTEBOOKS], ids=lambda page: page.stem)
+def test_every_claim_has_a_check(page):
+    assert len(claims_of(page)) >= 3
+
+
+CELLS = """\
+# %% [markdown]
+# # One
+#
+# * an item that claims nothing
+#
+# ## What we learned
+#
+# * One and one
+#   are two ([02](02_two.ipynb)).
+#   <!-- by: one + one == 2; figure sum; docs/page.md; 02: two > 1 -->
+#
+# **What the paper says and what we found.** Nothing.
+# <!-- by: tests/test_sum.py::test_one -->
+#
+# Next: two.
+#
+# ## Exercises
+#
+# * none
+
+# %%
+one = 1
+assert (
+    one + one == 2
+), "no"
+"""
+
+
+@pytest.fixture
+def page(tmp_path):
+    files = {
+        "notebooks/01_one.py": CELLS,
+        "notebooks/02_two.py": "# %%\nassert two > 1",
+        "figures/sum.json": "{}",
+        "docs/page.md": "",
+        "tests/test_sum.py": "def test_one(): ...",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path / "notebooks" / "01_one.py"
+
+
+def test_a_claim_is_listed_with_its_checks(page):
+    first, second = claims_of(page)
+    assert first.text == "One and one are two ([02](../notebooks/02_two.ipynb))."
+    assert first.checks == (
+        '`( one + one == 2 ), "no"`', "[sum](../figures/README.md#sum)", "[docs/page.md](page.md)",
+        "`two > 1` in 02",
+    )  # fmt: skip
+    assert second.text.endswith("what we found.** Nothing.")
+    assert second.checks == ("`tests/test_sum.py::test_one`",)
+
+
+def test_a_page_of_words_claims_what_is_marked(page):
+    readme = page.parent.parent / "README.md"
+    readme.write_text("# One\n\nIt adds up.\n<!-- by: figure sum -->\n\n* [two](docs/page.md)\n")
+    assert [claim.text for claim in claims_of(readme)] == ["It adds up."]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("#   <!-- by: one + one == 2; figure sum; docs/page.md; 02: two > 1 -->\n", ""),
+        ("by: one + one == 2", "by: one + one == 3"),
+        ("    one + one == 2\n", "    one + one == 3\n"),
+        ("figure sum", "figure product"),
+        ("docs/page.md", "docs/other.md"),
+        ("02: two > 1", "02: two > 2"),
+        ("::test_one", "::test_two"),
+        ("tests/test_sum", "tests/test_no"),
+    ],
+)
+def test_a_claim_without_a_check_is_seen(page, old, new):
+    assert old in CELLS
+    page.write_text(CELLS.replace(old, new, 1))
+    with pytest.raises(ValueError, match=r"01_one.py: no (check|assertion)"):
+        claims_of(page)

@@ -1,0 +1,193 @@
+"""What a user knows of a law beforehand: terms, the origin, the errors of samples, names."""
+
+import numpy as np
+import pytest
+
+import vidsindy_lite as vl
+from vidsindy_lite import Library, PolynomialSystem
+from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.problem import pose
+
+SPRING = PolynomialSystem.from_terms({"x": {"y": 2}, "y": {"x": -1, "y": -0.1}}, degree=2)
+T = np.linspace(0, 20, 200)
+X = SPRING.simulate(T, (1.0, 0.0))
+QUADRATIC = Library.polynomial(2)
+
+
+def noisy(sigma=0.05, seed=0, x=X):
+    return x + sigma * np.random.default_rng(seed).normal(size=x.shape)
+
+
+def form(library, order=1):
+    return Form.of(("x", "y"), library, order)
+
+
+# ---------------------------------------------------------------------------------- terms
+
+
+def test_terms_are_known_forbidden_or_alone_allowed():
+    library = QUADRATIC.where({"x": {"y": 2, "x^2": 0}, "y": {"x": None, "y": None, "...": 0}})
+    posed = form(library)
+    terms = posed.law(posed.known).terms
+    assert [terms[k] for k in np.flatnonzero(posed.candidates[:, 0])] == ["1", "x", "xy", "y^2"]
+    assert [terms[k] for k in np.flatnonzero(posed.candidates[:, 1])] == ["x", "y"]
+    assert posed.law(posed.known).text() == "dx/dt = 2 y\ndy/dt = 0"
+    assert not posed.movable.any()  # what is given is so in the frame of the data
+
+
+def test_of_second_order_the_accelerations_are_given():
+    posed = form(QUADRATIC.where({"vx": {"x": -4}}), order=2)
+    assert posed.law(posed.known).text() == "x'' = -4 x\ny'' = 0"
+    with pytest.raises(ValueError, match=r"library: must give terms of an equation of vx, vy, got"):
+        form(QUADRATIC.where({"x": {"vx": 1}}), order=2)
+
+
+def test_directions_of_a_vector_are_given_together():
+    def drag(vx, vy):
+        return -np.hypot(vx, vy) * vx, -np.hypot(vx, vy) * vy
+
+    library = Library.polynomial(0) + Library.terms({"drag": drag})
+    posed = form(library.where({"vx": {"drag_x": 0.1}}), order=2)
+    assert posed.law(posed.known).text() == "x'' = 0.1 drag_x\ny'' = 0.1 drag_y"
+    assert posed.candidates.sum() == 2  # the constants
+
+
+@pytest.mark.parametrize(
+    ("equations", "words"),
+    [
+        ({"z": {"x": 1}}, "library: must give terms of an equation of x, y, got 'z'"),
+        ({"x": {"z": 1}}, "library: 'z' is no term of the equation of x, which has 1, x, y, x"),
+        ({"y": {"x^3": 0}}, "library: 'x\\^3' is no term of the equation of y, which has 1, x"),
+        ({"x": {"...": 0}, "y": {"...": 0}}, "library: must leave a term to be found, got all"),
+        ({"x": {"y": np.nan}}, "coefficient of y: must be a finite number, got nan"),
+        ({"x": "y"}, "equations: must give variables what is known of their terms"),
+        ({}, "equations: must give variables what is known of their terms"),
+    ],
+)
+def test_what_cannot_be_given_is_named(equations, words):
+    with pytest.raises(ValueError, match=words):
+        form(QUADRATIC.where(equations))
+
+
+def test_what_is_given_is_written_and_read():
+    library = Library.polynomial(2).where({"y": {"x": 28}, "x": {"x": None, "...": 0}})
+    assert str(library) == "polynomial(2); y: x = 28; x: x = ?, ... = 0"
+    assert Library.parse(str(library)) == library
+    assert (library + Library.fourier(1)).given == library.given
+    more = library.where({"y": {"y": -1}})
+    assert dict(dict(more.given)["y"]) == {"x": 28, "y": -1}
+    for text in ("polynomial(2); x", "polynomial(2); x: y", "polynomial(2); x: y = much"):
+        with pytest.raises(ValueError, match="library: what is known must read as 'x: y = 10"):
+            Library.parse(text)
+
+
+def test_a_law_with_what_is_known_is_found_and_its_errors_are_smaller():
+    alone = vl.discover(T, noisy(), degree=2)
+    told = vl.discover(T, noisy(), library=QUADRATIC.where({"x": {"y": 2}, "y": {"y": -0.1}}))
+    assert (told.system.support == SPRING.support).all()
+    assert told.coefficients[2].tolist() == [2, -0.1]
+    assert told.standard_errors[2].tolist() == [0, 0]
+    assert told.standard_errors[1, 1] < alone.standard_errors[1, 1]
+    assert told.equations().startswith("dx/dt = 2 y\ndy/dt = - (")
+    with pytest.raises(ValueError, match="order: must be 1 or 2 where terms are given"):
+        vl.discover(T, X, order="auto", library=QUADRATIC.where({"x": {"y": 2}}))
+
+
+# --------------------------------------------------------------------------------- origin
+
+
+def test_with_the_origin_of_the_data_no_axis_moves():
+    shifted = noisy() + (5.0, 0.0)
+    assert vl.discover(T, shifted, degree=2).offset[0] == pytest.approx(5, abs=0.1)
+    found = vl.discover(T, shifted, degree=2, origin="data")
+    assert not found.offset.any()
+    assert (found.native.coefficients == found.coefficients).all()
+    assert (found.system.support == SPRING.shift((5, 0)).support).all()
+    with pytest.raises(ValueError, match="origin: must be one of learn, data, got 'here'"):
+        vl.discover(T, X, origin="here")
+
+
+# ---------------------------------------------------------------------------------- sigma
+
+
+def test_given_errors_are_scaled_and_relative():
+    sigma = np.where(T[:, None] < 10, 0.1, 0.4) * (1, 3)
+    problem = pose([(T, X)], [np.empty((*X.shape, 0))], form(QUADRATIC), np.random.default_rng(0),
+                   [sigma])  # fmt: skip
+    in_units = problem.noise * problem.units.scale / np.sqrt(problem.precision[0])
+    np.testing.assert_allclose(in_units, sigma, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["growing", "unequal"])
+def test_error_bars_of_given_errors_cover(kind):
+    allowed = {"x": {"y": None, "...": 0}, "y": {"x": None, "y": None, "...": 0}}
+    library, scores = QUADRATIC.where(allowed), []
+    for seed in range(10):
+        rng = np.random.default_rng([7, seed])
+        uneven = np.where(rng.random(X.shape) < 0.3, 0.15, 0.02)
+        sigma = 0.01 + 0.08 * np.abs(X) if kind == "growing" else uneven
+        x = X + sigma * rng.normal(size=X.shape)
+        found = vl.discover(T, x, library=library, sigma=sigma)
+        away = (found.coefficients - SPRING.coefficients)[SPRING.support]
+        scores += (away / found.standard_errors[SPRING.support]).tolist()
+    assert 0.6 < np.std(scores) < 1.5
+
+
+def test_given_errors_are_worth_more_than_none():
+    rng = np.random.default_rng(3)
+    sigma = np.where(rng.random(X.shape) < 0.3, 0.3, 0.01)
+    x = X + sigma * rng.normal(size=X.shape)
+    told, untold = (vl.discover(T, x, degree=2, sigma=s).standard_errors for s in (sigma, None))
+    assert told[1, 1] < 0.5 * untold[1, 1]
+
+
+@pytest.mark.parametrize(("factor", "words"), [(0.4, "times sigma"), (2.5, "sigma of x is")])
+def test_errors_that_contradict_the_data_are_doubted(factor, words):
+    found = vl.discover(T, noisy(0.05), degree=2, sigma=factor * 0.05)
+    assert any(words in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "words"),
+    [
+        (np.nan, "sigma: must be finite and positive where x is, got nan"),
+        (0, "sigma: must be finite and positive where x is, got 0"),
+        ([0.1, -0.1], "sigma: must be finite and positive where x is, got -0.1"),
+        ([0.1] * 3, r"sigma: must be a number, or have shape \(2,\) or \(200, 2\), got \(3,\)"),
+        ("small", "sigma: must be an array of real numbers, got 'small'"),
+    ],
+)
+def test_errors_that_are_none(sigma, words):
+    with pytest.raises(ValueError, match=words):
+        vl.discover(T, X, sigma=sigma)
+
+
+def test_errors_of_several_trajectories():
+    runs = [(T[:120], noisy()[:120]), (T, SPRING.simulate(T, (0.0, 0.5)) + 0.02 * X[::-1])]
+    with pytest.raises(ValueError, match=r"sigma: must be one per trajectory \(2\), got 3"):
+        vl.discover(runs, sigma=[0.1, 0.1, 0.1])
+    with pytest.raises(ValueError, match=r"or have shape \(2,\) or \(120, 2\), got \(200, 2\)"):
+        vl.discover(runs, sigma=np.ones((200, 2)))
+
+
+# ---------------------------------------------------------------------------------- names
+
+
+class Frame:
+    """What a data frame has: columns, and an array."""
+
+    def __init__(self, values, columns):
+        self.values, self.columns, self.shape = values, columns, values.shape
+
+    def __array__(self, dtype=None, copy=None):
+        return self.values
+
+
+def test_columns_name_the_variables():
+    found = vl.discover(T, Frame(X, ["hare", "lynx"]), degree=1)
+    assert found.system.names == ("hare", "lynx")
+    assert found.equations().startswith("dhare/dt = (2.0")
+    assert vl.discover(T, Frame(X, [0, 1]), degree=1).system.names == ("x", "y")
+    assert vl.discover(T, Frame(X, ["x / m", "y / m"]), degree=1).system.names == ("x", "y")
+    with pytest.raises(ValueError, match="x: columns must be named alike in all trajectories"):
+        vl.discover([(T, Frame(X, ["a", "b"])), (T, Frame(X, ["b", "a"]))])

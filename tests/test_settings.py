@@ -1,0 +1,44 @@
+"""Every notebook holds for other settings than its own, in two each, in its quick profile.
+
+Assertions of a notebook have to test what it says, not the numbers of its default. Two small ones
+run with all tests, the rest by `pytest -m thorough`.
+"""
+
+import pytest
+
+from vidsindy_lite.companion.execute import execute
+from vidsindy_lite.companion.run import find_notebooks
+from vidsindy_lite.stamp import PACKAGE
+
+NOTEBOOKS = {path.stem[:2]: path for path in find_notebooks(PACKAGE.parent)}
+SETTINGS = {
+    "00": [{"system": "SprottF"}, {"system": "WangSun", "seed": 1}],
+    "01": [{"system": "NoseHoover", "view": 2}, {"view": 3}],
+    "02": [{"seed": 1}, {"seed": 2}],
+    "03": [{"system": "WangSun", "seed": 1}, {"frames": 300, "seed": 2}],
+    "04": [{"level": 0.05}, {"seed": 1}],
+    "05": [{"seed": 10}, {"seed": 20}],
+    "06": [{"seed": 10}, {"seed": 20}],
+    "07": [{"seed": 10}, {"seed": 20}],
+    "08": [{"seed": 1}, {"seed": 2}],
+    "09": [{"seed": 1}, {"seed": 2}],
+    "10": [{"seed": 1}, {"seed": 2}],
+    "11": [{"seed": 10}, {"seed": 20}],
+    "12": [{"pixel_noise": 0.2}, {"seed": 1}],
+}
+QUICK = ("01", "03")
+CASES = [
+    pytest.param(number, one, marks=pytest.mark.slow if number in QUICK else pytest.mark.thorough)
+    for number, both in SETTINGS.items()
+    for one in both
+]
+
+
+def test_every_notebook_has_two():
+    assert {number: len(both) for number, both in SETTINGS.items()} == dict.fromkeys(NOTEBOOKS, 2)
+
+
+@pytest.mark.parametrize(("number", "settings"), CASES)
+def test_a_notebook_holds_for_other_settings(number, settings, tmp_path):
+    places = {"VIDSINDY_FIGURES": str(tmp_path / "figures"), "VIDSINDY_CACHE": str(tmp_path)}
+    execute(NOTEBOOKS[number], {"profile": "quick", **settings}, environment=places)

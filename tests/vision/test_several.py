@@ -1,0 +1,63 @@
+"""Several targets in one film: right wherever they are apart, silent where they meet."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.vision import Scene, render_video, track_targets
+
+FRAMES, SIZE = 160, 16.0
+
+
+def crossing(seed):
+    """Two tracks (n, 2) that meet several times, in an image of 320 x 240."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 2 * np.pi, FRAMES)[:, None]
+    middle, swing = np.array([160, 120]), np.array([110, 80])
+    return [
+        middle + swing * np.sin(t * rng.uniform(1.5, 3, 2) + rng.uniform(0, 2 * np.pi, 2))
+        for _ in range(2)
+    ]
+
+
+def filmed(folder, tracks, **scene):
+    look = {"image_size": (320, 240), "shape": "disc", "size": SIZE, "colour": "red"} | scene
+    drawn = Scene.random(np.random.default_rng(1), **look)
+    return render_video(folder / "film.mov", np.hstack(tracks), drawn)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_two_that_meet(tmp_path, noise):
+    truth = np.array(crossing(0))
+    found = track_targets(filmed(tmp_path, truth, noise_variance=noise), 2)
+    seen = np.array([one.pixels for one in found])
+    off = np.linalg.norm(seen[:, None] - truth[None], axis=3)  # (found, target, frame)
+    nearest = off.min(axis=1)
+    apart = np.linalg.norm(truth[0] - truth[1], axis=1)
+    assert (apart < SIZE).any()  # they do meet
+    assert np.nanmax(nearest) < 0.5
+    assert np.nanmedian(nearest) < 0.1
+    assert np.isnan(seen[:, apart < SIZE]).all()
+    assert np.isfinite(seen[:, apart > 3 * SIZE]).mean() > 0.97
+    both = np.isfinite(seen).all(axis=(0, 2))
+    assert (off[0].argmin(axis=0) != off[1].argmin(axis=0))[both].all()
+    assert not any(one.warnings for one in found)
+
+
+def test_one_target_is_not_two(tmp_path):
+    film = filmed(tmp_path, crossing(1)[:1])
+    with pytest.raises(ValueError, match="targets: film.mov must show 2 things that move, got 1"):
+        track_targets(film, 2)
+
+
+def test_a_third_thing_that_moves_is_told(tmp_path):
+    t = np.linspace(0, 2 * np.pi, FRAMES)[:, None]
+    third = np.array([160, 215]) + np.array([120, 8]) * np.sin(t * [1.1, 2.0] + [0.4, 1])
+    found = track_targets(filmed(tmp_path, [*crossing(0), third]), 2)
+    assert any("one thing more moves than there are targets" in one.warnings[0] for one in found
+               if one.warnings)  # fmt: skip
+
+
+@pytest.mark.parametrize("count", [0, 1.5, True])
+def test_a_number_that_is_none(count):
+    with pytest.raises(ValueError, match="count: must be an integer of at least 1"):
+        track_targets("film.mov", count)

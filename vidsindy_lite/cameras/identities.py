@@ -1,0 +1,245 @@
+"""Who is who among several targets: across views and behind each meeting, told by geometry.
+
+Two targets that meet in one image are apart in the others. So each view's tracks are cut into
+*runs*, in which none can be mistaken for another. Two runs of different views that share some time
+belong together in the one order in which their lines of sight meet in space, and so the runs of all
+views hang together, unless all views are blind at once: then the targets go on smoothly in space,
+where they hardly ever meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .calibrate import learn_cameras
+from .rig import Rig
+from .triangulate import reconstruct, residuals
+
+_SHORTEST = 4  # frames of a run, and of what two runs have in common
+_NEAR, _NOISE = 2.0, 2.0  # by how much closer, in times and pixels, a target is to where it goes
+_CLEAR = 2.0  # factor between the misfits of two orders, from which the better one is sure
+_AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
+
+
+class Identities(NamedTuple):
+    """Tracks (n, 2 k) of each view in which each pair of columns is one target; and doubts."""
+
+    tracks: list[Floats]
+    doubts: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """Frames in a row in which a view tells all targets apart, and their places (m, k, 2)."""
+
+    view: int
+    frames: Ints
+    places: Floats
+
+    def at(self, frames: Ints) -> Floats:
+        """The places in some of its frames."""
+        return self.places[frames - self.frames[0]]
+
+    def ordered(self, order: Sequence[int]) -> _Run:
+        """The same with the targets in another order."""
+        return replace(self, places=self.places[:, list(order)])
+
+
+def stacked(values: Floats, width: int) -> Floats:
+    """Columns side by side, (n, width k), one below the other, with a row of NaN in between."""
+    parts = np.split(values, values.shape[1] // width, axis=1)
+    between = np.full((1, width), np.nan)
+    return np.concatenate([row for part in parts for row in (part, between)][:-1])
+
+
+def side_by_side(rows: Floats, count: int) -> Floats:
+    """What `stacked` has put one below the other."""
+    n = (len(rows) + 1) // count - 1
+    return np.hstack([rows[i * (n + 1) : i * (n + 1) + n] for i in range(count)])
+
+
+def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
+    """Give each target its own columns in all views.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n, 2 k)
+        Pixels of k targets in each view at the same instants, in any order, which may change
+        wherever two of them meet or one is not seen.
+    rig : Rig
+        One camera per view, at least three; see `learn_cameras`.
+
+    Raises
+    ------
+    ValueError
+        If all views never see all targets apart at once, or no order of the targets in the views
+        fits the rig then better than the others.
+    """
+    views = [np.reshape(track, (len(track), -1, 2)) for track in tracks]
+    runs = [run for i, view in enumerate(views) for run in _runs(i, view)]
+    cameras = _cameras(views, runs, rig)
+    groups = _joined(runs, cameras)
+    together, doubts = groups[0], []
+    for group in groups[1:]:
+        order, sure = _on_from(together, group, cameras)
+        together = together + [run.ordered(order) for run in group]
+        if not sure:
+            doubts.append(_first(group))
+    told = [np.full_like(view, np.nan) for view in views]
+    for run in together:
+        told[run.view][run.frames] = run.places
+    flat = [view.reshape(len(view), -1) for view in told]
+    if not doubts:
+        return Identities(flat, ())
+    frames = ", ".join(map(str, doubts[:5]))
+    doubt = (
+        f"targets: who is who is not sure from frame {frames} on: before, no two views tell the "
+        "targets apart, and in space they meet, or are lost for too long"
+    )
+    return Identities(flat, (doubt,))
+
+
+def _runs(number: int, view: Floats) -> list[_Run]:
+    """The runs of a view (n, k, 2): until another target might as well be a target's next place."""
+    frames = np.flatnonzero(np.isfinite(view).all(axis=(1, 2)))
+    before = np.concatenate((view[:1], view[:-1]))
+    ahead = np.where(np.isfinite(before), 2 * view - before, view)[:-1]
+    miss = np.linalg.norm(ahead[:, :, None] - view[1:, None], axis=3)
+    own = np.einsum("nkk->nk", miss).max(axis=1)
+    miss[:, *np.diag_indices(view.shape[1])] = np.inf
+    mistaken = miss.min(axis=(1, 2), initial=np.inf) < _NEAR * own + _NOISE
+    ends = 1 + np.flatnonzero((np.diff(frames) > 1) | mistaken[frames[:-1]])
+    parts = [part for part in np.split(frames, ends) if len(part) >= _SHORTEST]
+    return [_Run(number, part, view[part]) for part in parts]
+
+
+def _cameras(views: Sequence[Floats], runs: Sequence[_Run], rig: Rig) -> Rig:
+    """The cameras, learned where all views tell all targets apart for longest."""
+    which = np.full((len(views[0]), len(views)), -1)
+    for number, run in enumerate(runs):
+        which[run.frames, run.view] = number
+    sets, counts = np.unique(which, axis=0, return_counts=True)
+    counts[(sets < 0).any(axis=1)] = 0
+    if not len(sets) or counts.max() < _SHORTEST:
+        raise ValueError(
+            "targets: all views must show all targets apart from each other at once, for some "
+            f"{_SHORTEST} frames, got no such frames"
+        )
+    common = np.flatnonzero((which == sets[counts.argmax()]).all(axis=1))
+    places = [view[common] for view in views]
+    orders = list(permutations(range(views[0].shape[1])))
+    tried = []
+    for order in product(orders[:1], *[orders] * (len(views) - 1)):
+        here = [place[:, list(o)] for place, o in zip(places, order, strict=True)]
+        try:
+            learned = learn_cameras(_rows(here), rig)
+        except ValueError:
+            continue
+        tried.append((_misfit(here, learned), learned))
+    tried.sort(key=lambda one: one[0])
+    if not tried or (len(tried) > 1 and not tried[0][0] * _CLEAR < tried[1][0]):
+        sizes = ", ".join(f"{size:.2g}" for size, _ in tried[:2]) or "none"
+        raise ValueError(
+            "targets: one order of the targets in the views must fit the rig far better than all "
+            f"others, got residuals of {sizes} px for the best"
+        )
+    return tried[0][1]
+
+
+def _rows(views: Sequence[Floats]) -> list[Floats]:
+    """All targets as one long track per view."""
+    return [stacked(view.reshape(len(view), -1), 2) for view in views]
+
+
+def _misfit(views: Sequence[Floats], cameras: Rig) -> float:
+    """Pixels by which the views typically miss each other."""
+    missed = np.concatenate(residuals(_rows(views), cameras))
+    return float(np.nanmedian(np.hypot(*missed.T)))
+
+
+def _joined(runs: Sequence[_Run], cameras: Rig) -> list[list[_Run]]:
+    """Runs in one order of the targets, in groups that nothing joins, in the order of time.
+
+    The surest pairs of runs are joined first.
+    """
+    links = []
+    for i, j in combinations(range(len(runs)), 2):
+        link = _link(runs[i], runs[j], cameras)
+        if link is not None:
+            links.append((*link, i, j))
+    groups = [[i] for i in range(len(runs))]  # of each run, all that are joined to it
+    # Of each run, which of its targets is the first one of its group, the second and so on.
+    orders = [list(range(run.places.shape[1])) for run in runs]
+    for _, order, i, j in sorted(links, key=lambda link: -link[0]):
+        if groups[i] is groups[j]:
+            continue
+        change = [orders[j].index(order[target]) for target in orders[i]]
+        for one in groups[j]:
+            orders[one] = [orders[one][target] for target in change]
+            groups[i].append(one)
+        for one in groups[i]:
+            groups[one] = groups[i]
+    unique = {id(group): group for group in groups if len(group) > 1}
+    found = [[runs[i].ordered(orders[i]) for i in group] for group in unique.values()]
+    return sorted(found, key=_first)
+
+
+def _first(runs: Sequence[_Run]) -> int:
+    return min(int(run.frames[0]) for run in runs)
+
+
+def _link(one: _Run, other: _Run, cameras: Rig) -> tuple[float, Sequence[int]] | None:
+    """How sure it is which order of another view's targets is that of a view, and which one."""
+    common = np.intersect1d(one.frames, other.frames, assume_unique=True)
+    if one.view == other.view or len(common) < _SHORTEST:
+        return None
+    pair = Rig((cameras.cameras[one.view], cameras.cameras[other.view]))
+    orders = list(permutations(range(one.places.shape[1])))
+    misfits = [_misfit([one.at(common), other.at(common)[:, list(o)]], pair) for o in orders]
+    if len(orders) == 1:
+        return 1.0, orders[0]
+    best, second = np.argsort(misfits)[:2]
+    sure = float(misfits[second] / max(misfits[best], 1e-9))
+    return (sure, orders[best]) if sure > _CLEAR else None
+
+
+def _on_from(
+    before: Sequence[_Run], after: Sequence[_Run], cameras: Rig
+) -> tuple[Sequence[int], bool]:
+    """In which order the targets go on behind a gap in all views, and whether that is sure."""
+    start = _first(after)
+    there, x = _in_space(before, cameras)
+    here, y = _in_space(after, cameras)
+    x, there = x[there < start][-_AHEAD:], there[there < start][-_AHEAD:]
+    y, here = y[:_AHEAD], here[:_AHEAD]
+    orders = list(permutations(range(y.shape[1])))
+    if min(len(x), len(y)) < _DEGREE or len(orders) == 1:
+        return orders[0], len(orders) == 1
+    frames = np.concatenate((there, here))
+    rough = [_roughness(frames, np.concatenate((x, y[:, list(order)]))) for order in orders]
+    best, second = np.argsort(rough)[:2]
+    return orders[best], bool(rough[best] * _CLEAR < rough[second])
+
+
+def _in_space(runs: Sequence[_Run], cameras: Rig) -> tuple[Ints, Floats]:
+    """The frames in which two views or more have runs, and the targets' places, (m, k, 3)."""
+    n, count = 1 + max(int(run.frames[-1]) for run in runs), runs[0].places.shape[1]
+    views = [np.full((n, count, 2), np.nan) for _ in cameras.cameras]
+    for run in runs:
+        views[run.view][run.frames] = run.places
+    x = side_by_side(reconstruct(_rows(views), cameras), count).reshape(n, count, 3)
+    frames = np.flatnonzero(np.isfinite(x).all(axis=(1, 2)))
+    return frames, x[frames]
+
+
+def _roughness(frames: Ints, x: Floats) -> float:
+    """How far the targets (m, k, 3) are from smooth ways through these frames."""
+    basis = np.vander((frames - frames.mean()) / np.ptp(frames), _DEGREE + 1)
+    flat = x.reshape(len(frames), -1)
+    return float(np.linalg.norm(flat - basis @ np.linalg.lstsq(basis, flat)[0]))

@@ -1,0 +1,93 @@
+"""The claims of the README and of the notebooks, each with the check behind it.
+
+After a claim stands a comment that no reader sees, ``<!-- by: CHECK; CHECK -->``. A check is a part
+of an assertion in the notebook's code; ``05: part`` is one in notebook 05; ``figure ID`` is a
+figure or table with its numbers; a path is a page of docs/, or a test as pytest names it.
+"""
+
+import ast
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import jupytext
+
+BY = re.compile(r"\s*<!-- by: (.*?) -->", re.DOTALL)
+# What a notebook claims: the items and the answers to the paper under these headings.
+CLAIMING = re.compile(r"^## What (?:we learned|the paper says).*?(?=^## Exercises)", re.M | re.S)
+ITEM = re.compile(r"\n\s*\n|\n(?=\* )")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What is said, and by which checks, both as Markdown for a page in docs/."""
+
+    text: str
+    checks: tuple[str, ...]
+
+
+def claims_of(page: Path) -> list[Claim]:
+    """The claims of a notebook's source half, or of a Markdown page, in order.
+
+    Parameters
+    ----------
+    page : path
+        In the repository: README.md, or notebooks/NN_name.py.
+
+    Raises
+    ------
+    ValueError
+        If a claim has no check, or names one that is not there.
+    """
+    if page.suffix == ".md":
+        items = [item for item in ITEM.split(page.read_text("utf-8")) if BY.search(item)]
+    else:
+        cells = [c.source for c in jupytext.read(page).cells if c.cell_type == "markdown"]
+        said = "".join(CLAIMING.findall("\n\n".join(cells)))
+        items = [item for item in ITEM.split(said) if item.startswith(("* ", "**What the paper"))]
+        items = [item for item in items if not item.rstrip().endswith("what we found.**")]
+    return [_claim(item, page) for item in items]
+
+
+def _claim(item: str, page: Path) -> Claim:
+    """One claim with its checks looked up."""
+    text = " ".join(BY.sub("", item).removeprefix("* ").split())
+    text = re.sub(r"\]\((?:notebooks/)?(?=\d\d_)", "](../notebooks/", text)  # as from docs/
+    if not (by := BY.search(item)):
+        raise ValueError(f"{page.name}: no check is named behind {text!r}")
+    return Claim(text, tuple(_check(" ".join(check.split()), page) for check in by[1].split("; ")))
+
+
+def _check(name: str, page: Path) -> str:
+    """A check as Markdown, if it is there."""
+    root = page.parent if page.suffix == ".md" else page.parent.parent
+    kind, _, rest = name.partition(" ")
+    path, _, test = name.partition("::")
+    if kind == "figure" and (root / "figures" / f"{rest}.json").exists():
+        return f"[{rest}](../figures/README.md#{rest.lower()})"
+    if test and (root / path).exists() and f"def {test}(" in (root / path).read_text("utf-8"):
+        return f"`{name}`"
+    if path.startswith("docs/") and (root / path).exists():
+        return f"[{path}]({Path(path).name})"
+    number = re.match(r"(\d\d): ", name)
+    (notebook,) = (root / "notebooks").glob(f"{number[1]}_*.py") if number else [page]
+    part = name.removeprefix(number[0]) if number else name
+    if notebook.suffix == ".py" and (found := _assertion(part, notebook)):
+        return f"`{found}`" + (f" in {number[1]}" if number else "")
+    raise ValueError(f"{page.name}: no assertion, figure, test or page is {name!r}")
+
+
+def _assertion(part: str, notebook: Path) -> str:
+    """The assertion of a notebook that holds a piece of code, in one line; empty if none does."""
+    for cell in jupytext.read(notebook).cells:
+        if cell.cell_type == "code":
+            for node in ast.walk(ast.parse(cell.source)):
+                source = ast.get_source_segment(cell.source, node) if _asserts(node) else ""
+                line = " ".join((source or "").split())
+                if part in line:
+                    return line.removeprefix("assert ")
+    return ""
+
+
+def _asserts(node: ast.AST) -> bool:
+    return isinstance(node, ast.Assert)

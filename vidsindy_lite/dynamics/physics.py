@@ -1,0 +1,396 @@
+"""What a law of motion says of a body: gravity and drag, or springs and periods; and its energy.
+
+Each number is a function of the law's coefficients, and their covariance is carried through to it
+to first order (the delta method).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import cumulative_simpson
+from scipy.interpolate import BSpline
+
+from ..arrays import Floats
+from ..checks import check_vector
+from .library import extended
+from .polynomials import PolynomialSystem
+
+POINTS = 1001
+"""Points of each fitted curve at which forces and energy are looked at."""
+STEP = 1e-3
+"""Step of a derivative in a coefficient, in its standard errors."""
+FAINT = 1e-6
+"""Share of the largest entry of a matrix below which an entry is rounding."""
+TWISTED = 0.05
+"""Curl of the forces, over their gradients, that errors of the coefficients do not make."""
+ALIKE = 3.0
+"""Standard errors between the drags along two directions that may be one."""
+KEPT = 1e-3
+"""Change of the energy, over the largest kinetic energy, that is none."""
+AROUND = 0.5
+"""How far outside the places that were seen a place of rest may be, over their range."""
+NEWTON = 20
+"""Most steps to a place of rest."""
+ROUNDING = 1e-12
+"""Step, over the extent of the motion, that is none."""
+NO_REST = "nothing holds it at a place near the motion: no spring constants and no periods"
+LEAST = 1e-300
+"""Keeps a quotient finite where no force is constant."""
+HEADLINES = ("g", "direction", "drag", "quadratic drag", "period")
+"""What is not read off the equations."""
+
+Complexes = NDArray[np.complex128]
+Rule = Callable[[PolynomialSystem], dict[str, Floats]]
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A number or a vector with a name.
+
+    Parameters
+    ----------
+    name : str
+    value, error : ndarray, shape () or (m,)
+        In units of the data, per unit mass; its standard error, if the law is the right one.
+    """
+
+    name: str
+    value: Floats
+    error: Floats
+
+    @classmethod
+    def of(cls, name: str, value: Floats, covariance: Floats) -> Quantity:
+        """With the errors of a covariance of its entries."""
+        variance = np.diag(np.atleast_2d(covariance))
+        error = np.sqrt(np.maximum(variance, 0.0)).reshape(np.shape(value))
+        return cls(name, np.asarray(value), error)
+
+    def __str__(self) -> str:
+        error = float(self.error.max())
+        digits = int(np.clip(1 - np.floor(np.log10(error)), 0, 12)) if error > 0 else 0
+        form = f".{digits}f" if error > 0 else ".4g"
+        numbers = ", ".join(f"{number + 0.0:{form}}" for number in np.atleast_1d(self.value))
+        text = f"({numbers})" if self.value.ndim else numbers
+        return f"{self.name} = {text}" + (f" ± {error:{form}}" if error > 0 else "")
+
+
+@dataclass(frozen=True, eq=False)
+class Physics:
+    """What a law of motion says of a body, as in ``found.physics()["g"].value``.
+
+    Parameters
+    ----------
+    quantities : tuple of Quantity
+        Of a body whose forces are the same everywhere: ``g``, its ``direction``, ``drag``, and
+        ``quadratic drag``. Of one with a place of ``rest``: ``spring constant``, ``damping``,
+        ``natural frequency`` (in radians) and ``period`` of small swings about it, of each
+        coordinate, as in ``period x``, or where coordinates pull at each other of each mode, as in
+        ``period 1``, the slowest first.
+    energy : tuple of ndarray, shape (n, 2)
+        Along each fitted curve, times, and the energy per unit mass over that at rest, or over that
+        of rest where the curve begins. Empty if the forces have no potential.
+    notes : tuple of str
+        How the energy changes; what cannot be said, and why.
+    """
+
+    quantities: tuple[Quantity, ...]
+    energy: tuple[Floats, ...]
+    notes: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Quantity:
+        for quantity in self.quantities:
+            if quantity.name == name:
+                return quantity
+        names = ", ".join(quantity.name for quantity in self.quantities) or "nothing"
+        raise KeyError(f"name: must be of what the law says ({names}), got {name!r}")
+
+    @property
+    def headline(self) -> str:
+        """In one line what is not read off the equations: gravity and drag, or periods."""
+        return "; ".join(str(q) for q in self.quantities if q.name.startswith(HEADLINES))
+
+    def __str__(self) -> str:
+        return "\n".join([*map(str, self.quantities), *self.notes])
+
+
+def physics_of(
+    law: PolynomialSystem,
+    covariance: Floats,
+    curves: Sequence[BSpline],
+    down: ArrayLike | None = None,
+) -> Physics:
+    """What a law says of a body.
+
+    Parameters
+    ----------
+    law : PolynomialSystem
+    covariance : ndarray, shape (l d, l d)
+        Of its coefficients, equation by equation.
+    curves : sequence of BSpline
+        The motion, velocities included.
+    down : array_like, shape (m,), optional
+        Direction of gravity.
+
+    Raises
+    ------
+    ValueError
+        If ``down`` is no direction.
+    """
+    m = law.d // law.order
+    if down is not None:
+        down = check_vector("down", down, m)
+        if not down.any():
+            raise ValueError("down: must be a direction, got zeros only")
+        down = down / np.linalg.norm(down)
+    if law.order == 1:
+        return Physics((), (), ("a law of first order holds no forces: order=2 looks for them",))
+    times = [np.linspace(curve.t[0], curve.t[-1], POINTS) for curve in curves]
+    paths = [curve(t) for curve, t in zip(curves, times, strict=True)]
+    body = _Body(law, covariance, np.concatenate(paths))
+    rest = None
+    if body.force(law, body.states)[1].any():
+        rest = body.rest()
+        said = [NO_REST] if rest is None else list(body.swing(rest))
+    else:
+        said = list(body.flight(down))
+    energy = body.energies(times, paths, rest)
+    return Physics(
+        quantities=tuple(entry for entry in said if isinstance(entry, Quantity)),
+        energy=tuple(energy),
+        notes=(*(entry for entry in said if isinstance(entry, str)), _balance(energy, paths)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """A law of motion and what is known of it.
+
+    Parameters
+    ----------
+    law : PolynomialSystem
+    covariance : ndarray, shape (l d, l d)
+    states : ndarray, shape (n, 2 m)
+        Places and velocities that were seen.
+    """
+
+    law: PolynomialSystem
+    covariance: Floats
+    states: Floats
+
+    @property
+    def m(self) -> int:
+        """How many coordinates the body has."""
+        return self.law.d // 2
+
+    @cached_property
+    def axes(self) -> list[str]:
+        """What tells the coordinates apart in names; nothing, if there is but one."""
+        return [f" {name}" for name in self.law.names[: self.m]] if self.m > 1 else [""]
+
+    @cached_property
+    def quadratic(self) -> list[tuple[int, int]]:
+        """The terms ``|v| v``, and along which coordinate."""
+        law, velocity = self.law, self.states[:, self.m :]
+        drag = np.linalg.norm(velocity, axis=1)[:, None] * velocity
+        values = extended(self.states, law.functions)[:, law.d :]
+        near = 1e-9 * np.abs(drag).max()
+        alone = law.exponents.sum(axis=1) == 1
+        return [
+            (row, j)
+            for k, column in enumerate(values.T)
+            for j in range(self.m)
+            if np.allclose(column, drag[:, j], rtol=1e-6, atol=near)
+            for row in np.flatnonzero(alone & (law.exponents[:, law.d + k] == 1)).tolist()
+        ]
+
+    def force(self, law: PolynomialSystem, states: Floats) -> tuple[Floats, Floats, Floats]:
+        """Acceleration without quadratic drag, and its derivatives in places and in velocities.
+
+        Of shapes (n, m), (n, m, m) and (n, m, m).
+        """
+        coefficients = law.coefficients.copy()
+        coefficients[[row for row, _ in self.quadratic]] = 0.0
+        calm, m = replace(law, coefficients=coefficients), self.m
+        slopes = calm.gradient(states)[:, m:]
+        return calm(states)[:, m:], slopes[:, :, :m], slopes[:, :, m:]
+
+    def at_rest(self, law: PolynomialSystem, place: Floats) -> tuple[Floats, Floats, Floats]:
+        """The same of a body at rest at a place, (m,): shapes (m,), (m, m), (m, m)."""
+        state = np.append(place, np.zeros(self.m))[None]
+        force, stiffness, damping = self.force(law, state)
+        return force[0], stiffness[0], damping[0]
+
+    def carried(self, rule: Rule) -> dict[str, tuple[Floats, Floats]]:
+        """What a rule makes of the law: values, each with the covariance of its entries."""
+        value, flat = rule(self.law), self.law.coefficients.T.ravel()
+        errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        free = np.flatnonzero(errors * flat)
+        rates = []
+        for k in free.tolist():
+            step = np.zeros(len(flat))
+            step[k] = max(STEP * errors[k], 1e-8 * abs(flat[k]))
+            above, below = (
+                rule(replace(self.law, coefficients=moved.reshape(self.law.d, -1).T))
+                for moved in (flat + step, flat - step)
+            )
+            rates.append({name: (above[name] - below[name]) / (2 * step[k]) for name in value})
+        covariance = self.covariance[np.ix_(free, free)]
+        found = {}
+        for name in value:
+            slope = np.array([rate[name] for rate in rates]).reshape(len(free), value[name].size)
+            found[name] = value[name], slope.T @ covariance @ slope
+        return found
+
+    def flight(self, down: Floats | None) -> Iterator[Quantity | str]:
+        """Gravity and drag of a body on which the same forces act everywhere."""
+        place = self.states[:, : self.m].mean(axis=0)
+        pull, _, slowed = self.at_rest(self.law, place)
+
+        def rule(law: PolynomialSystem) -> dict[str, Floats]:
+            pull, _, slowed = self.at_rest(law, place)
+            g = float(np.linalg.norm(pull) if down is None else pull @ down)
+            said = {"drag": -np.diag(slowed), "quadratic drag": np.zeros(self.m)}
+            for row, j in self.quadratic:
+                said["quadratic drag"][j] -= law.coefficients[row, self.m + j]
+            return {"g": np.array(g), "direction": pull / max(abs(g), LEAST)} | said
+
+        said = self.carried(rule)
+        if not pull.any():
+            yield "no constant force: no g"
+        else:
+            yield Quantity.of("g", *said["g"])
+            if down is None:
+                yield Quantity.of("direction", *said["direction"])
+        if _diagonal(slowed):
+            yield from self.drags("drag", *said["drag"])
+        else:
+            yield "a velocity turns another: no drag"
+        yield from self.drags("quadratic drag", *said["quadratic drag"])
+
+    def drags(self, name: str, values: Floats, covariance: Floats) -> Iterator[Quantity]:
+        """The drags along all coordinates, (m,): one, if they are alike within their errors."""
+        variances = np.diag(covariance)
+        if values.all():
+            weights = 1 / variances if variances.all() else np.ones(self.m)
+            weights /= weights.sum()
+            apart = np.eye(self.m) - weights
+            spread = np.sqrt(np.maximum(np.diag(apart @ covariance @ apart.T), 0.0))
+            if (np.abs(apart @ values) <= ALIKE * spread + FAINT * np.abs(values)).all():
+                yield Quantity.of(name, weights @ values, weights @ covariance @ weights)
+                return
+        for j in np.flatnonzero(values).tolist():
+            yield Quantity.of(name + self.axes[j], values[j], covariance[j, j])
+
+    def settled(self, law: PolynomialSystem, place: Floats) -> Floats:
+        """Where no force acts on a body at rest, by Newton steps from a place."""
+        extent = np.ptp(self.states[:, : self.m], axis=0)
+        for _ in range(NEWTON):
+            force, slope, _ = self.at_rest(law, place)
+            step = np.linalg.lstsq(slope, force, rcond=FAINT)[0]
+            place = place - step
+            if (np.abs(step) < ROUNDING * extent).all():
+                break
+        return np.where(np.abs(place) < ROUNDING * extent, 0.0, place)
+
+    def rest(self) -> Floats | None:
+        """Where, near the motion, forces pull the body back to; none if nowhere."""
+        places = self.states[:, : self.m]
+        low, high = places.min(axis=0), places.max(axis=0)
+        margin = AROUND * (high - low)
+        for start in (places.mean(axis=0), places[-1]):
+            place = self.settled(self.law, start)
+            held = np.linalg.eigvals(-self.at_rest(self.law, place)[1]).real
+            near = (place > low - margin) & (place < high + margin)
+            if near.all() and held.min() > FAINT * np.abs(held).max():
+                return place
+        return None
+
+    def swing(self, rest: Floats) -> Iterator[Quantity | str]:
+        """Springs, damping and periods about a place of rest."""
+        _, pull, slowed = self.at_rest(self.law, rest)
+        alone = _diagonal(pull) and _diagonal(slowed)
+        labels = self.axes if alone else [f" {k + 1}" for k in range(self.m)]
+        swings = _swings(-pull, -slowed, alone).imag > 0
+
+        def rule(law: PolynomialSystem) -> dict[str, Floats]:
+            place = self.settled(law, rest)
+            _, pull, slowed = self.at_rest(law, place)
+            said = {"rest": place}
+            rates = _swings(-pull, -slowed, alone)
+            for j, (label, rate) in enumerate(zip(labels, rates, strict=True)):
+                if alone:
+                    said[f"spring constant{label}"] = -pull[j, j]
+                if alone or swings[j]:
+                    said[f"damping{label}"] = -2 * rate.real
+                if swings[j]:
+                    said[f"natural frequency{label}"] = np.abs(rate)
+                    said[f"period{label}"] = 2 * np.pi / rate.imag
+            return said
+
+        yield from (Quantity.of(name, *values) for name, values in self.carried(rule).items())
+        for j in np.flatnonzero(~swings).tolist():
+            yield f"no period{labels[j]}: it creeps back to rest"
+
+    def energies(
+        self, times: Sequence[Floats], paths: Sequence[Floats], rest: Floats | None
+    ) -> list[Floats]:
+        """Times and energies along paths; none if the forces at rest have no potential."""
+
+        def still(places: Floats) -> tuple[Floats, Floats]:
+            states = np.hstack([places, np.zeros_like(places)])
+            return self.force(self.law, states)[:2]
+
+        _, slopes = still(self.states[:, : self.m])
+        twist = slopes - slopes.transpose(0, 2, 1)
+        if (twist**2).mean() > TWISTED**2 * (slopes**2).mean():
+            return []
+        found = []
+        for t, path in zip(times, paths, strict=True):
+            places, velocity = path[:, : self.m], path[:, self.m :]
+            power = (still(places)[0] * velocity).sum(axis=1)
+            stored = -cumulative_simpson(power, x=t, initial=0.0)
+            if rest is not None:
+                away = places[0] - rest
+                share = np.linspace(0, 1, POINTS)
+                pull = still(rest + share[:, None] * away)[0] @ away
+                stored -= cumulative_simpson(pull, x=share)[-1]
+            found.append(np.stack([t, stored + (velocity**2).sum(axis=1) / 2], axis=1))
+        return found
+
+
+def _swings(stiffness: Floats, damping: Floats, alone: bool) -> Complexes:
+    """Decay and rotation of each coordinate, if it is alone, or of each mode, as complex rates."""
+    m = len(stiffness)
+    if alone:
+        half = np.diag(damping) / 2
+        return -half + 1j * np.sqrt(np.maximum(np.diag(stiffness) - half**2, 0.0))
+    pair = np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -damping]])
+    rates = np.linalg.eigvals(pair)
+    return rates[np.argsort(np.where(rates.imag >= 0, np.abs(rates), np.inf))][:m]
+
+
+def _diagonal(matrix: Floats) -> bool:
+    """Whether nothing but rounding is beside the diagonal."""
+    beside = matrix - np.diag(np.diag(matrix))
+    return bool((np.abs(beside) <= FAINT * np.abs(matrix).max()).all())
+
+
+def _balance(energy: Sequence[Floats], paths: Sequence[Floats]) -> str:
+    """How the energy changes along paths."""
+    if not energy:
+        return "the forces have no potential: no energy"
+    most = max(float((path[:, path.shape[1] // 2 :] ** 2).sum(axis=1).max()) for path in paths) / 2
+    levels = [pair[:, 1] / most for pair in energy]
+    rise = max(float((level - np.minimum.accumulate(level)).max()) for level in levels)
+    fall = max(float(level[0] - level[-1]) for level in levels)
+    share = "of the largest kinetic energy"
+    if rise > KEPT:
+        return f"the energy rises by {100 * rise:.3g} % {share}: something drives the motion"
+    if fall > KEPT:
+        return f"the energy falls by {100 * fall:.3g} % {share}, and never rises"
+    return f"the energy is kept, to {100 * KEPT:g} % {share}"

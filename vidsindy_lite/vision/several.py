@@ -1,0 +1,130 @@
+"""Several targets in one film: each is followed wherever it is apart from the others.
+
+Where two meet in an image, nobody can say which is which afterwards: who is who, across meetings
+and views, is for the cameras to tell (`cameras.identify`). So a track is that of one target from
+one meeting to the next.
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..arrays import Bools
+from ..checks import check_integer
+from .background import sample_frames
+from .linking import Sightings
+from .moving import Rated, Ways, _candidates, _Film, _finished, _linked, _views, expected
+from .tracking import Track
+
+_MEETINGS = 8  # paths of a target that may follow each other
+_AS_PLAIN = 0.4  # worth of a candidate of a path, relative to those of the plainest
+_APART = 1.3  # sizes between two targets that do not touch
+_ROOM = 2.0  # pixels more
+_STRANGE = 0.2  # share of the frames in which one more thing moves, above which there is doubt
+
+
+def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
+    """Track so many moving targets of a video, each where it is apart from the others.
+
+    Parameters
+    ----------
+    path : path
+        A video in which nothing else moves as plainly.
+    count : int
+        How many targets there are.
+
+    Returns
+    -------
+    tuple of Track
+        NaN wherever two targets meet. Behind a meeting a track may be that of another target.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If the file is missing or no video, or if fewer things move.
+    """
+    check_integer("count", count, least=1)
+    samples = sample_frames(path)
+    film = _Film.of(path, samples)
+    found, lights = _candidates(path, film, None)
+    seen, paths = _linked(found, film, count * _MEETINGS)
+    lanes, strange = _lanes(seen, paths, count)
+    if len(lanes) < count:
+        raise ValueError(
+            f"targets: {Path(path).name} must show {count} things that move, got {len(lanes)}"
+        )
+    ways = [_joined([expected(seen, p.rows, film, len(found)) for p in lane]) for lane in lanes]
+    touching = _touching(ways)
+    doubts = _doubts(seen, strange, film.factor, len(found), Path(path).name)
+    tracks = []
+    for way, hidden in zip(ways, touching, strict=True):
+        way.centre[hidden] = np.nan
+        followed = _finished(_views(path, samples, film, way, lights), film.motion, doubts)
+        tracks.append(Track.of_motion(followed))
+        doubts = ()
+    return tuple(tracks)
+
+
+def _lanes(
+    seen: Sightings, paths: list[Rated], count: int
+) -> tuple[list[list[Rated]], list[Rated]]:
+    """The paths of each target, one after the other in time; and paths for which none is left."""
+    lanes: list[list[Rated]] = []
+    left = []
+    plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
+    for path in sorted(paths, key=lambda path: -len(path.rows)):
+        if path.rating / len(path.rows) < _AS_PLAIN * plainest:
+            continue
+        free = [lane for lane in lanes if not any(_overlap(seen, path, other) for other in lane)]
+        if free:
+            free[0].append(path)
+        elif len(lanes) < count:
+            lanes.append([path])
+        else:
+            left.append(path)
+    return lanes, left
+
+
+def _overlap(seen: Sightings, one: Rated, other: Rated) -> bool:
+    """Do two paths share any of the time from their first frames to their last?"""
+    (a, b), (c, d) = (seen.frame[path.rows[[0, -1]]] for path in (one, other))
+    return bool(a <= d and c <= b)
+
+
+def _joined(ways: list[Ways]) -> Ways:
+    """The ways of paths that follow each other as one."""
+    centre, box, colour = (field.copy() for field in ways[0])
+    for way in ways[1:]:
+        here = np.isfinite(way.centre[:, 0]) & np.isnan(centre[:, 0])
+        centre[here], box[here], colour[here] = way.centre[here], way.box[here], way.colour[here]
+    return Ways(centre, box, colour)
+
+
+def _touching(ways: list[Ways]) -> list[Bools]:
+    """In which frames each target touches another one, or hides it."""
+    found = [np.zeros(len(ways[0].centre), bool) for _ in ways]
+    for i, one in enumerate(ways):
+        for j, other in enumerate(ways[:i]):
+            apart = np.linalg.norm(one.centre - other.centre, axis=1)
+            sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
+            with np.errstate(invalid="ignore"):
+                met = apart < _APART * sizes + _ROOM
+            found[i] |= met
+            found[j] |= met
+    return found
+
+
+def _doubts(
+    seen: Sightings, strange: list[Rated], factor: int, frames: int, name: str
+) -> tuple[str, ...]:
+    """Does one thing more move than there are targets?"""
+    longest = max(strange, key=lambda path: len(path.rows), default=None)
+    if longest is None or len(longest.rows) < _STRANGE * frames:
+        return ()
+    row = longest.rows[len(longest.rows) // 2]
+    u, v = factor * seen.centre[row]
+    return (
+        f"{name}: one thing more moves than there are targets, e.g. in frame {seen.frame[row]} at "
+        f"({u:.0f}, {v:.0f})",
+    )
