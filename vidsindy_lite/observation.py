@@ -142,7 +142,7 @@ def observe(
     targets : int
         How many targets there are. Several are followed wherever they are apart, and told from each
         other by geometry: in three or more views of a measured rig that start together, or whose
-        lags are given.
+        lags are given. The first is furthest left where the first view first tells them apart.
     progress : bool
         Show progress bars.
 
@@ -191,6 +191,7 @@ def observe_tracks(
     *,
     lags: Sequence[float] | None = None,
     names: Sequence[str] | None = None,
+    progress: bool = False,
 ) -> Observation:
     """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
 
@@ -206,6 +207,8 @@ def observe_tracks(
         the times of each track by its own clock, if rates differ or frames are missing.
     names : sequence of str, optional
         What messages call the tracks.
+    progress : bool
+        Show progress bars.
 
     Returns
     -------
@@ -221,7 +224,7 @@ def observe_tracks(
     clock = Clock.of_tracks(t, raw)
     names = names or [f"tracks[{i}]" for i in range(len(raw))]
     given = _check_lags(lags, clock, names)
-    return _observed(raw, rig, clock, given, names)
+    return _observed(raw, rig, clock, given, names, progress=progress)
 
 
 def _observed(
@@ -250,13 +253,16 @@ def _observed(
     told = best
     if lags is not None:
         told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
+    x = reconstruct(tracks, learned)
+    learning = systematic_errors(raw, rig, learned, told)
+    learning[:, np.isnan(x).any(axis=1)] = np.nan
     return Observation(
         tracks=tracks,
         rig=learned,
         lags=told,
         t=clock.times,
-        x=reconstruct(tracks, learned),
-        systematic=_shared_errors(raw, tracks, rig, learned, told, clock.times),
+        x=x,
+        systematic=_shared_errors(learning, tracks, learned, clock.times),
         warnings=(
             *_rig_warnings(tracks, rig, learned, names, used, best),
             *learned.warnings,
@@ -309,21 +315,18 @@ def _smoothed(t: Floats, values: Floats) -> Floats:
     return clean
 
 
-def _shared_errors(
-    raw: Sequence[Floats], tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: Lags, t: Floats
-) -> Floats:
+def _shared_errors(learning: Floats, tracks: Sequence[Floats], learned: Rig, t: Floats) -> Floats:
     """Errors of the path that all frames share, (k, n, 3), as those of the motion alone.
 
-    A mode that holds the noise of each frame would explain that very noise: in a fit, its size
-    would grow beyond all measure, and bend the path with it.
+    Those of learning, (l, n, 3), are NaN where there is no path. A mode that holds the noise of
+    each frame would explain that very noise: in a fit, its size would grow beyond all measure, and
+    bend the path with it.
     """
     trails = trailing_errors(tracks, learned, [_smoothed(t, track) for track in tracks])
-    learning = systematic_errors(raw, rig, learned, lags)
     if not len(learning):
         return trails
     flat = np.moveaxis(learning, 1, 0).reshape(len(t), -1)
-    flat[~np.isfinite(reconstruct(tracks, learned)).all(axis=1)] = np.nan
-    steady = np.nan_to_num(_smoothed(t, flat)).reshape(len(t), len(learning), -1)
+    steady = np.nan_to_num(_smoothed(t, flat)).reshape(len(t), len(learning), 3)
     return np.concatenate((np.moveaxis(steady, 0, 1), trails))
 
 

@@ -145,7 +145,8 @@ def discover_from_tracks(
     how = _checked(degree, library, order, origin, seed) | {"progress": progress}
     read = _read(tracks)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
-    seen = observe_tracks(pixels, rig, _times(read, t, fps), lags=lags, names=names)
+    times = _times(read, t, fps)
+    seen = observe_tracks(pixels, rig, times, lags=lags, names=names, progress=progress)
     doubts = [warning for track in read for warning in track.warnings]
     seen = replace(seen, warnings=(*seen.warnings, *doubts, *_contradicted(read, fps)))
     return _with_law(seen, names, how)
@@ -226,16 +227,18 @@ def _times(
 
 def _contradicted(read: Sequence[TrackFile], fps: float | None) -> list[str]:
     """Which files state other frames in a unit of time than the given ones."""
+    if fps is None:
+        return []
     stated = [
         (track.name, 1 / np.median(np.diff(track.t)))
         for track in read
-        if fps is not None and track.t is not None and len(track.t) > 1
+        if track.t is not None and len(track.t) > 1
     ]
     return [
         f"fps: {fps:g} frames in a unit of time are taken as given, though {name} states {rate:.4g}"
         for name, rate in stated
-        if fps is not None and abs(rate / fps - 1) > _OTHER_CLOCK
-    ]  # fmt: skip
+        if abs(rate / fps - 1) > _OTHER_CLOCK
+    ]
 
 
 def _with_law(

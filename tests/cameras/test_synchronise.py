@@ -276,13 +276,38 @@ def test_a_target_that_hardly_moves_tells_no_lag():
 
 
 def test_a_slope_that_is_noise_tells_nothing(motion, monkeypatch):
-    # If a quarter of each squared slope is motion, the errors are twice those of motion alone.
+    # If half of each squared slope is motion, it tells half as much of the noise that it collects.
     tracks, errors = filmed(motion, (60,) * 3, (0, 0, 0)), {}
-    for share in (1, 0.25):
+    for share in (1, 0.5):
         monkeypatch.setattr(synchrony, "_shares", lambda _, share=share: np.full(2, share))
         errors[share] = learn_lags(tracks, motion[1]).errors
     assert (errors[1][1:] > 0).all()
-    np.testing.assert_allclose(errors[0.25], 2 * errors[1], rtol=1e-9)
+    np.testing.assert_allclose(errors[0.5], 2 * errors[1], rtol=1e-9)
+
+
+def test_noise_of_the_tracks_is_no_reason_to_look_for_other_lags(motion, monkeypatch):
+    """However large; what follows the motion is, however small."""
+    tracks = filmed(motion, (250,) * 3, (0, 0, 0), noise=1.5)
+    searched = []
+    monkeypatch.setattr(synchrony, "_searched", lambda *_: searched.append(1) or (False, []))
+    found = learn_lags(tracks, motion[1])
+    assert found.residual > 1
+    assert found.agree
+    assert found.frames.tolist() == [0, 0, 0]
+    assert not searched
+    first, second, third = motion[1].cameras
+    turned = replace(second, normal=second.normal + 0.02 * second.rows[0])
+    quiet = filmed(motion, (250,) * 3, (0, 0, 0))
+    learn_lags(quiet, vl.Rig([first, turned, third]))
+    assert searched
+
+
+def test_promising_lags_are_not_neighbours(motion):
+    """From one of them the search comes to the best within a few frames."""
+    tracks = filmed(motion, (250,) * 3, (0, 9, -14), noise=2.0)
+    curves = [Curve(track, np.arange(250.0)) for track in tracks]
+    for lags in promising_lags(curves, np.ones(3), Unknowns.of(motion[1].uncalibrated()))[1:]:
+        assert np.diff(np.sort(lags)).min(initial=4) >= 4
 
 
 def test_two_views_are_compared_only_where_they_have_enough_in_common(motion):
@@ -400,6 +425,21 @@ def test_the_drift_of_a_clock_is_found():
     np.testing.assert_allclose(found.rates, (1, 1 + 2e-4, 1), rtol=0, atol=6e-5)
     assert found.rates[2] == 1  # what is not clear is not changed
     np.testing.assert_allclose(found.frames, (0, 12.4, -3.3), atol=0.15)
+
+
+def test_slopes_that_are_noise_make_errors_larger(motion, monkeypatch):
+    """Of drifts as of lags: half of the information is half as much slope for the same noise."""
+    tracks = filmed(motion, (250,) * 3, (0, 0, 0))
+    kept = []
+    told = synchrony._covariance
+    monkeypatch.setattr(synchrony, "_covariance", lambda fit: kept.append(fit) or told(fit))
+    learn_lags(tracks, motion[1])
+    free = next(fit for fit in kept if np.isinf(fit.fit.errors).sum() == 4)  # two lags, two drifts
+    monkeypatch.setattr(synchrony, "_shares", lambda _: np.ones(2))
+    best = told(free)
+    monkeypatch.setattr(synchrony, "_shares", lambda _: np.array([0.5, 1.0]))
+    errors = np.sqrt(np.diag(told(free)) / np.diag(best))
+    np.testing.assert_allclose(errors, [2, 1, 2, 1], rtol=1e-12)
 
 
 @pytest.mark.slow

@@ -261,13 +261,17 @@ class Camera(ABC):
         twin._set(scale=float(abs(turned)), angle=float(np.angle(turned)))
         return twin
 
-    def placed(self, offset: Floats) -> Self:
-        """The same camera at the point of this in-plane offset that is closest to the origin."""
+    def moved(self, **values: object) -> Self:
+        """The same camera with values that need no check: a search builds very many."""
         twin = copy(self)
-        twin._set(position=frozen(offset @ self.rows))
-        for name in ("offset", "matrix"):
+        twin._set(**values)
+        for name in ("rows", "offset", "matrix") if "normal" in values else ("offset", "matrix"):
             twin.__dict__.pop(name, None)
         return twin
+
+    def placed(self, offset: Floats) -> Self:
+        """The same camera at the point of this in-plane offset that is closest to the origin."""
+        return self.moved(position=frozen(offset @ self.rows))
 
 
 def turn(angle: float) -> Floats:

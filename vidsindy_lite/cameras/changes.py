@@ -10,13 +10,13 @@ inverse of its distance; zero is infinitely far).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats
-from .camera import Camera
+from .camera import Camera, frozen
 from .models import OrthographicCamera, PerspectiveCamera
 
 PARTS = {
@@ -83,20 +83,21 @@ def changed(camera: Camera, change: Floats) -> Camera:
     part = {name: change[place] for name, place in PARTS.items()}
     values: dict[str, Any] = {}
     if part["normal"].any():
-        values["normal"] = camera.normal + part["normal"] @ camera.rows
+        normal = camera.normal + part["normal"] @ camera.rows
+        values["normal"] = frozen(normal / np.linalg.norm(normal))
     if part["position"].any() and camera.position is not None:
         axes = np.vstack((camera.rows, camera.normal))
-        values["position"] = camera.position + part["position"] @ axes
+        values["position"] = frozen(camera.position + part["position"] @ axes)
     if part["principal point"].any():
-        values["principal_point"] = np.add(camera.centre, part["principal point"])
+        values["principal_point"] = frozen(camera.centre + part["principal point"])
     if part["distortion"].any() and isinstance(camera, PerspectiveCamera):
         before = np.zeros(5) if camera.distortion is None else camera.distortion
-        values["distortion"] = before + np.append(part["distortion"], 0.0)
+        values["distortion"] = frozen(before + np.append(part["distortion"], 0.0))
     if part["readout"].any():
         values["readout"] = float(np.clip(camera.readout + part["readout"][0], -1, 1))
     if part["nearness"].any() and isinstance(camera, NearCamera):
         values["nearness"] = camera.nearness + part["nearness"][0]
-    moved = replace(camera, **values) if values else camera
+    moved = camera.moved(**values) if values else camera
     if part["angle"].any() or part["scale"].any():
         scale, angle = camera.calibration
         grown = np.clip(part["scale"][0], -_LARGEST, _LARGEST)

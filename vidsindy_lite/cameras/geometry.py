@@ -40,8 +40,12 @@ def rodrigues(axis: ArrayLike, angle: float) -> Floats:
     ValueError
         If the axis is not a finite non-zero vector of shape (3,), or the angle is not finite.
     """
-    x, y, z = unit_vector("axis", axis)
-    angle = check_number("angle", angle)
+    return _rotation(unit_vector("axis", axis), check_number("angle", angle))
+
+
+def _rotation(axis: Floats | tuple[float, ...], angle: float) -> Floats:
+    """`rodrigues` of a unit vector."""
+    x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     # 1 - cos(a) = 2 sin(a/2)^2 keeps its digits at small angles.
     return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
@@ -71,9 +75,9 @@ def rotation_to_z(normal: ArrayLike) -> Floats:
     """
     a, b, c = unit_vector("normal", normal)
     horizontal = np.hypot(a, b)
-    axis = (b, -a, 0.0) if horizontal > 0 else (1.0, 0.0, 0.0)
+    axis = (b / horizontal, -a / horizontal, 0.0) if horizontal > 0 else (1.0, 0.0, 0.0)
     # arctan2 is accurate at every angle; arccos(c) loses half its digits near 0 and pi.
-    return rodrigues(axis, np.arctan2(horizontal, c))
+    return _rotation(axis, np.arctan2(horizontal, c))
 
 
 def plane_projection(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:

@@ -23,6 +23,7 @@ _OVERLAP = 0.5  # share of the shorter of two videos that both must show
 _INSTANTS = 300  # at which two views are compared
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
 _PROMISING = 4  # lags of each camera, with and without a shift
+_NEAR = 4.0  # frames
 _TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
 _ROUNDS = 5  # of leaving the others out
 _BETTER_PART = 0.7  # of all equations, in which there is no outlier
@@ -102,14 +103,23 @@ def _pair_lags(
             [pair_missed(second, placed, lines, theirs, shift) for shift in (False, True)]
         )
     choices = [_dips(lags, part)[:_PROMISING] for part in np.concatenate(missed, axis=1)]
-    return list(dict.fromkeys(np.concatenate(choices).tolist())) or [0.0]
+    return _apart(np.concatenate(choices)).tolist() or [0.0]
 
 
 def _dips(lags: Floats, missed: Floats) -> Floats:
-    """The lags of all minima, the lowest first."""
+    """The lags of the minima, the lowest first."""
     padded = np.concatenate(([np.inf], missed, [np.inf]))
     dips = np.flatnonzero((missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed))
-    return lags[dips[np.argsort(missed[dips])]]
+    return _apart(lags[dips[np.argsort(missed[dips])]])
+
+
+def _apart(lags: Floats) -> Floats:
+    """Those that no earlier one is close to: a search goes to the best within a few frames."""
+    kept: list[float] = []
+    for lag in lags:
+        if all(abs(lag - other) >= _NEAR for other in kept):
+            kept.append(lag)
+    return np.array(kept)
 
 
 def pair_missed(

@@ -42,6 +42,7 @@ from .alignment import (
 )
 from .calibrate import check_learnable
 from .camera import Camera
+from .causes import GROSS
 from .changes import PARTS, known_to
 from .covariance import long_run_covariance
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
@@ -71,8 +72,9 @@ _SHOWN = 3  # of the lags that fit equally well
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 _BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
-_CLEAR = 5.0  # standard errors by which a clock must drift, ...
+_CLEAR = 4.0  # standard errors by which a clock must drift, ...
 _ENOUGH = 0.05  # ... and frames over the whole video
+_LEAST = 1e-6  # share of a slope that is motion
 _USED = 0.5  # weight of an instant that holds no outlier
 _TIMES = _LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
 
@@ -164,11 +166,12 @@ class _Videos:
     @property
     def step(self) -> int:
         """Frames from one to the next of those in which all cameras are compared."""
-        return max(1, len(self.curves[0].clock) // _INSTANTS)
+        return -(-len(self.curves[0].clock) // _INSTANTS)
 
-    def footage(self, lags: Floats, step: int = 1) -> Footage:
-        """Every so many instants."""
-        return Footage(self.curves, self.curves[0].clock[::step], lags, self.rates)
+    def footage(self, lags: Floats, rough: bool = False) -> Footage:
+        """All instants, or some."""
+        instants = self.curves[0].clock[:: self.step if rough else 1]
+        return Footage(self.curves, instants, lags, self.rates)
 
     def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
         """Those that the closed form finds; None if it finds none."""
@@ -177,10 +180,10 @@ class _Videos:
             return None
         return rough_cameras(Views.of(tracks), self.unknowns)
 
-    def errors(self, step: int = 1, loose: bool = False) -> Floats:
+    def errors(self, rough: bool = False, loose: bool = False) -> Floats:
         """What is known of cameras, and of all lags but the first one's nothing."""
         errors = np.array([known_to(camera) for camera in self.unknowns.cameras])
-        if step > 1:  # which are too few to tell where the target was between two
+        if rough and self.step > 1:  # which are too few to tell where the target was between two
             errors[:, PARTS["readout"]] = 0.0
         errors[1:, PARTS["lag"]] = np.inf
         if loose:
@@ -190,15 +193,15 @@ class _Videos:
             errors[ways & (errors == 0)] = _LOOSE
         return errors
 
-    def fitted(self, lags: Floats, step: int = 1, loose: bool = False) -> _Fitted | None:
-        """The best lags near given ones; None if nothing fits."""
+    def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> _Fitted | None:
+        """The best lags near given ones, or better ones than these; None if nothing fits."""
         self.bar.update()
-        footage = self.footage(lags, step)
+        footage = self.footage(lags, rough)
         cameras = self.cameras(footage)
         if cameras is None:
             return None
-        errors = self.errors(step, loose)
-        return _Fitted.of(footage, cameras, errors, most=None if step == 1 else _ROUGH_STEPS)
+        errors = self.errors(rough, loose)
+        return _Fitted.of(footage, cameras, errors, most=_ROUGH_STEPS if rough else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,12 +253,18 @@ class _Fitted:
         return max(_trimmed(part, _BETTER_PART) for part in self.missed)
 
     @property
-    def persists(self) -> bool:
-        """Whether residuals are like those of the next frame, as tracking errors are not."""
+    def agrees(self) -> bool:
+        """Whether residuals are small, and not like those of the next frame.
+
+        Noise of the tracks, however large, is no reason to look for other lags.
+        """
         missed = self.fit.misses[self.used]
         now, then = missed[:-1], missed[1:]
         both = np.isfinite(now) & np.isfinite(then)
-        return bool(np.sum((now * then)[both]) > _PERSISTENT * np.sum((now**2)[both]))
+        square = max(float(np.sum((now**2)[both])), 1e-300)
+        alike = max(float(np.sum((now * then)[both])) / square, 0.0)
+        misfit = self.score * np.sqrt(alike / _PERSISTENT)
+        return bool(alike <= _PERSISTENT and misfit <= DISAGREEMENT and self.score <= GROSS)
 
     def near(self, lags: Floats) -> bool:
         """Whether its lags are those."""
@@ -280,8 +289,7 @@ def _trimmed(residual: Floats, share: float = _TRIMMED) -> float:
 def _learned(videos: _Videos, first: Floats) -> Lags:
     """`learn_lags` of what was checked."""
     begun = videos.fitted(first)
-    fits = begun is not None and begun.score <= DISAGREEMENT and not begun.persists
-    if begun is not None and fits and (begun.near(first) or not _shares(begun).all()):
+    if begun is not None and begun.agrees and (begun.near(first) or not _shares(begun).all()):
         return _told(videos, _drifted(begun), first)
     loose, sampled = _searched(videos, first)
     if not sampled:
@@ -312,7 +320,7 @@ def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[_Fitted]]:
     if not exact or exact[0].score <= FINE:
         return False, exact
     if exact[0].score <= DISAGREEMENT:
-        other = videos.fitted(exact[0].lags, videos.step, True)
+        other = videos.fitted(exact[0].lags, rough=True, loose=True)
         if other is None or other.score * _BETTER >= exact[0].score:
             return False, exact
     # Where the rig is wrong, its best lags may be wrong as well: so all are tried again.
@@ -335,7 +343,7 @@ def _climbed(
     def fits(lags: Floats) -> float:
         key = tuple((lags - lags[0]).tolist())
         if key not in tried:
-            tried[key] = videos.fitted(np.array(key), videos.step, loose)
+            tried[key] = videos.fitted(np.array(key), True, loose)
         found = tried[key]
         return np.inf if found is None else found.score
 
@@ -394,17 +402,18 @@ def _covariance(found: _Fitted) -> Floats:
     white, robust = fit.noise**2 * bread, long_run_covariance(scores) * len(scores)
     more = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(white), 1e-300), 1))
     covariance = white * np.outer(more, more)
-    parts = np.argwhere(fit.errors > 0)[:, 1]
+    cameras, parts = np.argwhere(fit.errors > 0).T
     order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
-    return covariance[np.ix_(order, order)]
+    # Slopes that are noise add to the information, but mend nothing.
+    share = np.append(1.0, np.maximum(_shares(found), _LEAST))[cameras[order]]
+    return covariance[np.ix_(order, order)] / np.outer(share, share)
 
 
 def _told(videos: _Videos, found: _Fitted, first: Floats) -> Lags:
     """What a fit tells of the lags, or that it tells nothing."""
     fit, lags = found.fit, found.lags.copy()
     count = len(lags) - 1
-    share = _shares(found)
-    if not share.all():
+    if not _shares(found).all():
         return _untold(videos, first, found.score <= DISAGREEMENT)
     covariance, rate_errors = _covariance(found), np.zeros(len(lags))
     drifting = fit.errors[:, _DRIFT] > 0
@@ -413,7 +422,6 @@ def _told(videos: _Videos, found: _Fitted, first: Floats) -> Lags:
     moved = np.hstack((np.eye(count), -np.eye(count)[:, drifting[1:]] * fit.footage.middle
                        / fit.footage.span))  # fmt: skip
     information = np.linalg.pinv(moved @ covariance @ moved.T, hermitian=True)
-    information *= np.sqrt(np.outer(share, share))
     errors = np.sqrt(np.concatenate(([0.0], np.diag(np.linalg.pinv(information, hermitian=True)))))
     # Schwarz's criterion: a fraction is one more unknown per video.
     rounded = np.rint(lags) + 0.0  # and not -0

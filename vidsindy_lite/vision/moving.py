@@ -232,13 +232,13 @@ class _Film(NamedTuple):
     sure: bool
 
     @classmethod
-    def of(cls, path: str | os.PathLike, samples: Image) -> "_Film":
-        """From its sampled frames, and from all of them if its camera moves."""
+    def of(cls, path: str | os.PathLike, samples: Image, rests: bool = False) -> "_Film":
+        """From its sampled frames, and from all of them if its camera may move."""
         frames = video_info(path).frames
         sampled = np.unique(np.linspace(0, frames - 1, SAMPLES).round().astype(int))[: len(samples)]
         factor = reduction((samples.shape[2], samples.shape[1]))
         small = np.array([reduce(sample, factor) for sample in samples])
-        motion, sure = _camera(path, small, sampled, factor)
+        motion, sure = (at_rest(frames), True) if rests else _camera(path, small, sampled, factor)
         sampled = np.minimum(sampled, len(motion.maps) - 1)
         larger = enlarged(factor)
         maps = np.linalg.inv(larger) @ motion.maps @ larger
