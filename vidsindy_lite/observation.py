@@ -142,7 +142,7 @@ def observe(
     targets : int
         How many targets there are. Several are followed wherever they are apart, and told from each
         other by geometry: in three or more views of a measured rig that start together, or whose
-        lags are given.
+        lags are given. The first is furthest left where the first view first tells them apart.
     progress : bool
         Show progress bars.
 
@@ -418,8 +418,8 @@ def _check_found(tracks: Sequence[Floats], names: Sequence[str]) -> None:
     for pixels, name in zip(tracks, names, strict=True):
         if not np.isfinite(pixels).any():
             raise Refused(
-                f"paths: {name} must show one moving target, got none in any frame: what never "
-                "moves away from a place by about its own width is taken for background",
+                f"paths: {name} must show one moving target, got none in any frame: what "
+                "moves by less than a tenth of its own width is taken for background",
                 "track",
                 tracks,
             )

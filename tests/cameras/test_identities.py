@@ -38,6 +38,7 @@ def assert_told_apart(told, views, tolerance=1e-9):
     apart = np.linalg.norm(places[first][:, None] - views[0][first][None], axis=2)
     order = apart.argmin(axis=1)
     assert sorted(order) == list(range(k))
+    assert (np.diff(places[first][:, 0]) > 0).all()  # numbered from left to right
     for track, view in zip(told, views, strict=True):
         off = track.reshape(len(track), k, 2) - view[:, order]
         assert np.nanmax(np.abs(off)) < tolerance

@@ -25,10 +25,12 @@ def filmed(folder, tracks, **scene):
     return render_video(folder / "film.mov", np.hstack(tracks), drawn)
 
 
+@pytest.mark.parametrize("background", ["plain", "wood"])
 @pytest.mark.parametrize("noise", [0.0, 0.002])
-def test_two_that_meet(tmp_path, noise):
+def test_two_that_meet(tmp_path, noise, background):
     truth = np.array(crossing(0))
-    found = track_targets(filmed(tmp_path, truth, noise_variance=noise), 2)
+    look = {"noise_variance": noise, "background": background}
+    found = track_targets(filmed(tmp_path, truth, **look), 2)
     seen = np.array([one.pixels for one in found])
     off = np.linalg.norm(seen[:, None] - truth[None], axis=3)  # (found, target, frame)
     nearest = off.min(axis=1)

@@ -24,6 +24,7 @@ from .triangulate import reconstruct, residuals
 _SHORTEST = 4  # frames of a run, and of what two runs have in common
 _NEAR, _NOISE = 2.0, 2.0  # by how much closer, in times and pixels, a target is to where it goes
 _CLEAR = 2.0  # factor between the misfits of two orders, from which the better one is sure
+_FEW = 0.05  # share of the frames
 _AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
 
 
@@ -65,7 +66,7 @@ def side_by_side(rows: Floats, count: int) -> Floats:
 
 
 def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
-    """Give each target its own columns in all views.
+    """Give each target its own columns in all views, from left to right as the first view begins.
 
     Parameters
     ----------
@@ -88,11 +89,15 @@ def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
     together, doubts = groups[0], []
     for group in groups[1:]:
         order, sure = _on_from(together, group, cameras)
+        if not sure and len(_in_space(group, cameras)[0]) < _FEW * len(views[0]):
+            continue  # a few frames that are left out do no harm
         together = together + [run.ordered(order) for run in group]
         if not sure:
             doubts.append(_first(group))
+    start = min((run for run in together if run.view == 0), key=lambda run: run.frames[0])
+    numbered = np.argsort(start.places[0, :, 0]).tolist()
     told = [np.full_like(view, np.nan) for view in views]
-    for run in together:
+    for run in (one.ordered(numbered) for one in together):
         told[run.view][run.frames] = run.places
     flat = [view.reshape(len(view), -1) for view in told]
     if not doubts:

@@ -239,6 +239,8 @@ class BackgroundModel:
         self.size = np.array(self.background.shape[1::-1])
         self.coarse_background = _reduce(self.background)
         changes = [_reduce(sample) - self.coarse_background for sample in samples]
+        displaced = camera_motion(self.coarse_background, changes, self.coarse_floor)
+        self.camera_rests = bool(displaced.max(initial=0.0) <= _SHAKY)
         self.unrest = _unrest(self.coarse_background, changes, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         self.blur = 1.2 if self.noise > _QUIET else 0.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Bools
 from ..checks import check_integer
-from .background import sample_frames
+from .background import BackgroundModel, sample_frames
 from .linking import Sightings
 from .moving import Rated, Ways, _candidates, _Film, _finished, _linked, _views, expected
 from .tracking import Track
@@ -46,7 +46,8 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     """
     check_integer("count", count, least=1)
     samples = sample_frames(path)
-    film = _Film.of(path, samples)
+    # Before a plain background, all that could tell of a camera's motion may be the targets.
+    film = _Film.of(path, samples, BackgroundModel(samples).camera_rests)
     found, lights = _candidates(path, film, None)
     seen, paths = _linked(found, film, count * _MEETINGS)
     lanes, strange = _lanes(seen, paths, count)
