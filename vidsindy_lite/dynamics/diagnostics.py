@@ -14,9 +14,9 @@ from scipy.stats import chi2
 from ..arrays import Floats
 from .beyond import beyond_the_library
 from .collocation import CLEANEST, Fit, Linearisation, Status
-from .errors import residual_noise
+from .errors import effective_noise, residual_noise, rough
 from .library import shift_matrix
-from .persistence import Path
+from .persistence import SMOOTH, Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
 from .selection import closest_rival, minimiser, subset_search
@@ -149,7 +149,10 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
     residual = residual_noise(fit)
-    ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
+    # A curve without a law follows errors that last: no misfit if rough, but large ones hide terms.
+    harmless = rough(fit) & (effective_noise(fit) < SMOOTH)
+    doubtful = (residual > RESOLVED) & ~harmless
+    ratio = np.where(doubtful, residual / problem.noise, 0.0)
     j = int(ratio.argmax())
     told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
     if not ratio[j] < MISFIT:
