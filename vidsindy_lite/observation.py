@@ -418,8 +418,8 @@ def _check_found(tracks: Sequence[Floats], names: Sequence[str]) -> None:
     for pixels, name in zip(tracks, names, strict=True):
         if not np.isfinite(pixels).any():
             raise Refused(
-                f"paths: {name} must show one moving target, got none in any frame: what never "
-                "moves away from a place by about its own width is taken for background",
+                f"paths: {name} must show one moving target, got none in any frame: what "
+                "moves by less than a tenth of its own width is taken for background",
                 "track",
                 tracks,
             )

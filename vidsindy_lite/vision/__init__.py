@@ -8,7 +8,8 @@
   background      what differs from a background at rest (the most exact)
   moving          what moves most plainly, if camera and background are not: steadying takes out the
                   camera's motion (aligning: by all pixels, where corners are few), candidates are
-                  what differs, linking joins, refining measures
+                  what differs (lingering: also what hardly leaves its place), linking joins,
+                  refining measures
   several     track_targets: the same for several targets, each where it is apart from the others
   detector        what looks like a target in a single frame: our network, or any YOLO-v8
   network     that network, in PyTorch; training trained it, on frames that are drawn here

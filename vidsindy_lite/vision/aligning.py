@@ -23,6 +23,7 @@ _FAIR = 4.0  # times what a usual block tells, that one block may tell at most
 _FAINT = 0.3  # grey levels; a deviation without any noise
 _BOUND = 30.0  # grey levels of a difference
 _BETTER = 0.97  # share of it that remains if a motion explains it; the noise falls a little, too
+_EQUAL = 0.05  # grey levels of a difference that are none
 _BLOCKS = 12  # into which each side is cut: errors within one may be the same
 
 
@@ -96,7 +97,7 @@ def parts_unlike(change: Floats32, known: Bools) -> Floats:
 
 def more_alike(moved: Floats, still: Floats) -> bool:
     """Do most parts differ less if the camera is taken to move than if it is not?"""
-    ratios = np.median(moved / np.maximum(still, 1e-3), axis=(1, 2))
+    ratios = np.median((moved + _EQUAL) / (still + _EQUAL), axis=(1, 2))
     return bool(ratios.min() < _BETTER)
 
 

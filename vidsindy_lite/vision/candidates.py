@@ -101,6 +101,27 @@ class Plate:
         self.image, count = _masked_median(list(samples[known]), moves, (width, height))
         self.valid = np.where(count >= _FEWEST, 255, 0).astype(np.uint8)
 
+    def samples(
+        self, samples: Image, maps: Floats, known: Bools, window: tuple[slice, slice]
+    ) -> tuple[Image, Bools]:
+        """The samples in a window of the plate, (m, h, w, 3), and where they show it."""
+        if not self.moves:
+            views = samples[:, *window]
+            return views, np.ones(views.shape[:3], bool)
+        height, width = self.image.shape[:2]
+        top, bottom, _ = window[0].indices(height)
+        left, right, _ = window[1].indices(width)
+        to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, 1.0]]) @ self.shift
+        size = right - left, bottom - top
+        views = np.zeros((int(known.sum()), size[1], size[0], 3), np.uint8)
+        shown = np.zeros(views.shape[:3], bool)
+        full = np.full(samples.shape[1:3], 255, np.uint8)
+        for k, (sample, here) in enumerate(zip(samples[known], maps[known], strict=True)):
+            move = to_window @ here
+            views[k] = cv2.warpPerspective(sample, move, size)
+            shown[k] = cv2.warpPerspective(full, move, size, flags=cv2.INTER_NEAREST) > 0
+        return views, shown
+
     def seen_from(self, here: Floats, corner: Floats, size: tuple[int, int]) -> tuple[Image, Bools]:
         """The background in a window of the frame that the map carries; where it is known."""
         left, top = (int(x) for x in corner)
@@ -147,20 +168,24 @@ def _masked_median(
     return result, count
 
 
+def tolerance(plate: Plate, noise: float) -> Floats32:
+    """Grey levels by which reduced frames may differ from each place of their plate."""
+    grey = cv2.cvtColor(plate.image, cv2.COLOR_BGR2GRAY)
+    slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
+    least = np.float32(np.clip(5 * noise, _LEAST, _COARSE))
+    bound = least + np.float32(_EDGE[plate.moves]) * slope.astype(np.float32)
+    if plate.moves:
+        bound[plate.valid == 0] = 1e3
+    return np.asarray(bound, np.float32)
+
+
 class Difference:
     """What differs from the plate, in reduced frames one at a time."""
 
     def __init__(self, plate: Plate, noise: float) -> None:
         self.plate = plate
-        grey = cv2.cvtColor(plate.image, cv2.COLOR_BGR2GRAY)
-        kernel = np.ones((3, 3), np.uint8)
-        slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, kernel).astype(np.float32)
-        self.tolerance = (
-            np.float32(np.clip(5 * noise, _LEAST, _COARSE)) + _EDGE[plate.moves] * slope
-        )
-        if plate.moves:
-            self.tolerance[plate.valid == 0] = 1e3
-        self.often = np.zeros(grey.shape, np.float32)
+        self.tolerance = tolerance(plate, noise)
+        self.often = np.zeros(plate.valid.shape, np.float32)
         self.lights: list[Floats32] = []
 
     def candidates(self, frame: Image, here: Floats) -> list[Candidate]:

@@ -14,8 +14,9 @@ import numpy as np
 from ..arrays import Floats, Floats32, Image, Ints
 from .aligning import more_alike, parts_unlike
 from .background import SAMPLES, camera_motion, light
-from .candidates import Candidate, Difference, Plate, enlarged, reduce, reduction
+from .candidates import Candidate, Difference, Plate, enlarged, reduce, reduction, tolerance
 from .hints import Hint
+from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
 from .refining import Lens, View, fitting, scatter
 from .steadying import CameraMotion, Steadying, at_rest, carry, stands_still
@@ -26,6 +27,7 @@ _SHORTEST = 5  # frames of a path
 _AS_PLAIN = 0.5  # rating of another path, relative to the best, above which there is doubt
 _BEYOND = 3  # frames by which a path is carried on at its ends
 _PLAIN = 0.2  # quality of the candidates of a path that is worth anything
+_SWINGS = 0.1  # of its size, by which what lingers in its place moves at least
 _SCARCE = 0.05  # share of the frames in which a target must be seen
 _SWAYS = 0.5  # pixels of a camera's displacement that are more than doubtful
 _TREMBLES = 0.3  # pixels by which a track scatters that are more than noise
@@ -161,8 +163,8 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     doubts: tuple[str, ...] = ()
     if hint is not None and hint.box is not None:
         paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
-    elif hint is None and paths and _travels(seen, paths[0].rows):
-        doubts = _rivals(seen, paths, film.factor)
+    elif hint is None and paths and _travels(seen, paths[0].rows, film.places):
+        doubts = _rivals(seen, paths, film)
         # What the target looks like is known by now, which tells it from what it meets.
         seen, paths = _linked(_learned(found, seen, paths[0].rows), film)
         paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
@@ -225,6 +227,7 @@ class _Film(NamedTuple):
     plate: Plate
     noise: float
     sampled: Ints
+    places: list[Place]
     sways: float
     sure: bool
 
@@ -239,10 +242,13 @@ class _Film(NamedTuple):
         sampled = np.minimum(sampled, len(motion.maps) - 1)
         larger = enlarged(factor)
         maps = np.linalg.inv(larger) @ motion.maps @ larger
-        plate = Plate(small, maps[sampled], np.isfinite(motion.errors[sampled]))
+        known = np.isfinite(motion.errors[sampled])
+        plate = Plate(small, maps[sampled], known)
         noise = _noise(small, maps[sampled], plate)
+        places = lingering(plate, small, maps[sampled], known, tolerance(plate, noise))
+        uncover(plate, small, maps[sampled], known, places)
         sways = 0.0 if motion.moves else _sways(small, plate, noise)
-        return cls(factor, motion, maps, plate, noise, sampled, factor * sways, sure)
+        return cls(factor, motion, maps, plate, noise, sampled, places, factor * sways, sure)
 
 
 def _candidates(
@@ -268,6 +274,7 @@ def _views(
     maps = film.motion.maps[film.sampled]
     plate = Plate(samples, maps, known)
     lens = Lens(plate, _noise(samples, maps, plate))
+    uncover(plate, samples, maps, known, film.places, film.factor)
     views = []
     for i, (frame, here) in enumerate(zip(read_video(path), film.motion.maps, strict=False)):
         view = None
@@ -329,20 +336,22 @@ def _alike(colour: Floats, told: Floats) -> float:
     return float(np.exp(-((np.linalg.norm(shade * colour - told) / _COLOUR) ** 2)))
 
 
-def _travels(seen: Sightings, rows: Ints) -> bool:
-    """Does a path leave its place, and is it worth its candidates?"""
+def _travels(seen: Sightings, rows: Ints, places: list[Place]) -> bool:
+    """Does a path leave its place, or turn in one that is known, and is it worth its candidates?"""
     extent = float(np.linalg.norm(np.ptp(seen.centre[rows], axis=0)))
-    return bool(extent > np.median(seen.size[rows]) and np.median(seen.quality[rows]) > _PLAIN)
+    lingers = any(place.holds(np.median(seen.centre[rows], axis=0)) for place in places)
+    least = (_SWINGS if lingers else 1.0) * np.median(seen.size[rows])
+    return bool(extent > least and np.median(seen.quality[rows]) > _PLAIN)
 
 
-def _rivals(seen: Sightings, paths: list[Rated], factor: int) -> tuple[str, ...]:
+def _rivals(seen: Sightings, paths: list[Rated], film: "_Film") -> tuple[str, ...]:
     """What else moves about as plainly."""
-    best = paths[0].rating
-    others = [p for p in paths[1:] if p.rating > _AS_PLAIN * best and _travels(seen, p.rows)]
+    plain = [p for p in paths[1:] if p.rating > _AS_PLAIN * paths[0].rating]
+    others = [p for p in plain if _travels(seen, p.rows, film.places)]
     if not others:
         return ()
     row = others[0].rows[len(others[0].rows) // 2]
-    u, v = factor * seen.centre[row]
+    u, v = film.factor * seen.centre[row]
     return (
         f"something else moves about as plainly, e.g. in frame {seen.frame[row]} at "
         f"({u:.0f}, {v:.0f}): if that is the target, say so, target=Hint(frame=, box=)",

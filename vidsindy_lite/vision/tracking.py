@@ -101,7 +101,7 @@ def track(
         * "background": for a camera at rest, the most exact. The target may turn and change its
           size, not its shape, and is whole in at least a quarter of the frames that show any of
           it. It must stay away from each place for at least a fifth of the frames: what never
-          moves away by about its own width is background.
+          moves away by about its own width is background here, not for "auto".
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
@@ -161,6 +161,8 @@ def _follow(path: str | os.PathLike, samples: Image, hint: Hint | None) -> Track
 def _plausible(found: Track, hint: Hint | None) -> bool:
     """Is it a smooth motion, and that of what the hint says?"""
     at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
+    if not len(at):
+        return False
     if hint is None:
         rough = scatter(at, found.pixels[at])
         return not np.isfinite(rough) or rough < _ROUGH
