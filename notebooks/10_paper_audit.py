@@ -480,7 +480,7 @@ note("Table 1", "WangSun, own method: one false positive", "Table S2 shows none"
      "in the authors' favour")
 note("Sec. 4.3", "false positives are all small constants", "constants indeed",
      ", ".join(f"{name} {value:g}" for name, terms in false.items() for value in terms.values()),
-     "they are what a misplaced origin leaves (see below)")  # fmt: skip
+     "what leaves them is open: a misplaced origin could")  # fmt: skip
 
 # %% [markdown]
 # ## Two clocks: a factor of ten
