@@ -436,8 +436,7 @@ def search(algebra, shift):
 algebra, fit = unpruned(t, x)
 c, S, support, solution = search(algebra, -fit.offset)
 is_true = flat_support(truth)
-assert np.abs(c[is_true]).min() < np.abs(c[~is_true]).max()
-assert (support == is_true).all()
+print("the search leaves the true terms:", (support == is_true).all())
 
 
 # %%
@@ -451,7 +450,6 @@ def scores(S, coefficients):
 z, z_after = scores(S, c), np.zeros(len(c))
 z_after[support] = scores(S[np.ix_(support, support)], solution[support])
 bar = np.sqrt(penalty[1])
-assert z[is_true].min() < bar < z_after[is_true].min()
 
 # %%
 panels = {
@@ -460,14 +458,33 @@ panels = {
     "... after the search": (z_after, bar),
 }
 fig = plots.plot_ranks(panels, is_true)
-caption = "By size, true and false terms mix; by size over error, the weakest true one is below its penalty."
+caption = "All terms by size, by size over error, and after the search, the true ones marked."
 numbers = {name: values for name, (values, _) in panels.items()} | {"true": is_true}
 save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
-# *Left: in the order of magnitude, false terms stand above true ones. Middle: in units of the standard
-# error the weakest true term is no better than noise, because collinear columns share what they explain.
-# Right: after the search, with the impostors gone, each true term is far above its penalty (dashed).*
+# *Left: in the order of magnitude, true and false terms mix. Middle: in units of the standard error the
+# weakest true terms are below the penalty (dashed), because collinear columns share what they explain.
+# Right: after the search, with the impostors gone, the true terms stand out.*
+#
+# That is one draw of the noise. Here are more, and in how many of them each of this is so:
+
+# %%
+def draw(stream):
+    algebra, fit = unpruned(t, add_noise(clean, level, np.random.default_rng(stream)))
+    c, S, support, solution = search(algebra, -fit.offset)
+    size, after = np.abs(c), scores(S[np.ix_(support, support)], solution[support])
+    return {
+        "a false term is larger than a true one": size[is_true].min() < size[~is_true].max(),
+        "a true term is below its penalty": scores(S, c)[is_true].min() < bar,
+        "the search leaves the true terms, all above": (support == is_true).all() and after.min() > bar,
+    }
+
+
+draws = [draw(stream) for stream in np.random.SeedSequence(seed).spawn(8)]
+shares = {said: np.mean([one[said] for one in draws]) for said in draws[0]}
+print("\n".join(f"{said}: {share:.0%}" for said, share in shares.items()))
+assert min(shares.values()) >= 0.5
 
 # %% [markdown]
 # How sure is the search? `closest_rival` is the single change that costs least, in the units of the loss: squared
@@ -820,7 +837,7 @@ save_table("solver_pendulum", rows, caption=caption)
 #   <!-- by: np.abs(row - column).max() == 11; figure solver_step; np.allclose(schur, information; np.abs(best - offset[:2]).max() <= 1; covered > 0.85 -->
 # * Terms have to be weighed against each other, all others refitted. Size alone tells little, significance in
 #   an unpruned fit not enough.
-#   <!-- by: np.abs(c[is_true]).min() < np.abs(c[~is_true]).max(); z[is_true].min() < bar < z_after[is_true].min(); (support == is_true).all() -->
+#   <!-- by: min(shares.values()) >= 0.5 -->
 # * Errors that are smooth look like terms. Those that stay while more error is tolerated are the law.
 #   <!-- by: score(persistent.native, native).exact; figure solver_path -->
 # * Estimates are as close as the Cramér-Rao bound allows, and the error bars say so.
@@ -838,9 +855,9 @@ save_table("solver_pendulum", rows, caption=caption)
 #   exactly.
 #   <!-- by: np.abs(unmet(nodes)).max() -->
 # * *STRidge with an adaptive hard threshold, then "a small value to prune"*: both are magnitudes. In the
-#   reference frame true coefficients of Lorenz are 1 beside 270, false ones lie between, and no threshold
+#   reference frame true coefficients of Lorenz are 1 beside 270, false ones often lie between, and no threshold
 #   serves all seven systems.
-#   <!-- by: np.abs(c[is_true]).min() < np.abs(c[~is_true]).max(); one_for_all < len(searched) -->
+#   <!-- by: min(shares.values()) >= 0.5; one_for_all < len(searched) -->
 # * *Gradient descent*: with a fixed weight of the law it stops at a compromise. Gauss-Newton needs tens of steps in
 #   place of thousands, and ends where the law holds.
 #   <!-- by: last["ours"] < 1e-6 * last["paper's"]; figure solver_history -->

@@ -119,11 +119,6 @@ def oscillation(step, count, noise):
     return told(vl.discover, t, add_noise(x, noise, np.random.default_rng(0)), degree=1)
 
 
-def swinging(studio):
-    t = np.linspace(0, 20, 200)
-    return told(vl.discover, t, np.cos(t)[:, None])
-
-
 def undecided(studio):
     """A weak damping that may be in either of the two equations."""
     law = vl.PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1, "y": -0.03}}, degree=2)
@@ -197,7 +192,6 @@ TROUBLES = {
     ),
     "lags: must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
     "the curve misses the data": lambda studio: pendulum(degree=1),
-    "a law of motion, x'' = f(x, x'), may fit better": swinging,
     "another law fits almost as well": undecided,
     "is settled by how large an error is tolerated": contested,
     "a sample lies far from those before and after it": jumping,

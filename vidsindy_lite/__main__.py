@@ -366,8 +366,8 @@ COMMANDS = {
             "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)", type=_library
         ),
         "--order": _choice(
-            "1", ("1", "2", "auto"),
-            "1 for x' = f(x) (default), 2 for laws of motion, x'' = f(x, x'), auto for the one to "
+            "auto", ("1", "2", "auto"),
+            "1 for x' = f(x), 2 for laws of motion, x'' = f(x, x'), auto (default) for the one to "
             "be trusted"
         ),
         "--origin": _choice(

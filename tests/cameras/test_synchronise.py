@@ -22,6 +22,7 @@ from vidsindy_lite.cameras import (
 from vidsindy_lite.cameras import synchronise as synchrony
 from vidsindy_lite.cameras.alignment import Curve
 from vidsindy_lite.cameras.pairs import pair_missed, promising_lags
+from vidsindy_lite.cameras.timing import Timing
 from vidsindy_lite.cameras.triangulate import epipolar_lines
 from vidsindy_lite.cameras.unknowns import Unknowns
 
@@ -279,7 +280,8 @@ def test_a_slope_that_is_noise_tells_nothing(motion, monkeypatch):
     # If half of each squared slope is motion, it tells half as much of the noise that it collects.
     tracks, errors = filmed(motion, (60,) * 3, (0, 0, 0)), {}
     for share in (1, 0.5):
-        monkeypatch.setattr(synchrony, "_shares", lambda _, share=share: np.full(2, share))
+        shares = np.full(2, share)
+        monkeypatch.setattr(Timing, "shares", shares)
         errors[share] = learn_lags(tracks, motion[1]).errors
     assert (errors[1][1:] > 0).all()
     np.testing.assert_allclose(errors[0.5], 2 * errors[1], rtol=1e-9)
@@ -431,13 +433,13 @@ def test_slopes_that_are_noise_make_errors_larger(motion, monkeypatch):
     """Of drifts as of lags: half of the information is half as much slope for the same noise."""
     tracks = filmed(motion, (250,) * 3, (0, 0, 0))
     kept = []
-    told = synchrony._covariance
-    monkeypatch.setattr(synchrony, "_covariance", lambda fit: kept.append(fit) or told(fit))
+    told = Timing.covariance.fget
+    monkeypatch.setattr(Timing, "covariance", property(lambda fit: kept.append(fit) or told(fit)))
     learn_lags(tracks, motion[1])
     free = next(fit for fit in kept if np.isinf(fit.fit.errors).sum() == 4)  # two lags, two drifts
-    monkeypatch.setattr(synchrony, "_shares", lambda _: np.ones(2))
+    monkeypatch.setattr(Timing, "shares", np.ones(2))
     best = told(free)
-    monkeypatch.setattr(synchrony, "_shares", lambda _: np.array([0.5, 1.0]))
+    monkeypatch.setattr(Timing, "shares", np.array([0.5, 1.0]))
     errors = np.sqrt(np.diag(told(free)) / np.diag(best))
     np.testing.assert_allclose(errors, [2, 1, 2, 1], rtol=1e-12)
 
@@ -465,7 +467,9 @@ def test_lags_fit_equally_well_up_to_a_ratio(motion, monkeypatch):
     class Found:
         def __init__(self, lag, score):
             self.lags, self.score = np.array([0.0, lag, 0.0]), score
-            self.persists = False
+
+        def drifted(self):
+            return self
 
         def near(self, lags):
             return abs(self.lags - lags).max() < 1
@@ -484,7 +488,6 @@ def test_lags_fit_equally_well_up_to_a_ratio(motion, monkeypatch):
         monkeypatch.setattr(
             synchrony, "_searched", lambda *_, every=every: (False, list(every.values()))
         )
-        monkeypatch.setattr(synchrony, "_drifted", lambda found: found)
         monkeypatch.setattr(
             synchrony, "_told", lambda _, f, __: Lags(f.lags, np.ones(3), np.zeros(3), f.score)
         )

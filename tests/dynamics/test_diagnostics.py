@@ -188,3 +188,12 @@ def test_the_same_law_around_another_origin_is_no_rival(noise):
     t, x = truth.trajectory(1000)
     found = discover(t, corruption.add_noise(x, noise, np.random.default_rng(1)))
     assert found.status == "ok"
+
+
+@pytest.mark.parametrize(("level", "status"), [(0.01, "ok"), (0.05, "suspect")])
+def test_rough_errors_are_a_misfit_only_if_they_may_hide_terms(level, status):
+    truth = SYSTEMS["Lorenz"].shift((5, 5, 5))
+    t, x = truth.trajectory(800)
+    found = discover(t, corruption.add_correlated_noise(x, level, np.random.default_rng(2)))
+    assert found.status == status, found.warnings
+    assert all("times the noise estimated beforehand" in warning for warning in found.warnings)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from vidsindy_lite.dynamics.errors import inflation, prediction_gain
+from vidsindy_lite.dynamics.errors import inflation, prediction_gain, rough, time_inflation
 
 
 def lasting(n, correlation, rng):
@@ -59,7 +59,11 @@ def fit_with(residual, precision=1.0):
     """A fit that leaves these errors."""
     n, d = residual.shape
     precision = np.broadcast_to(precision, residual.shape)
-    data = SimpleNamespace(data_residual=lambda _: (residual.copy(), None), precision=precision)
+    data = SimpleNamespace(
+        data_residual=lambda _: (residual.copy(), None),
+        precision=precision,
+        counts=(residual != 0).sum(axis=0),
+    )
     state = SimpleNamespace(control_points=None, moving=np.zeros(d, dtype=bool))
     return SimpleNamespace(collocation=data, state=state)
 
@@ -88,3 +92,28 @@ def test_what_uneven_errors_foretell_is_counted_in_their_own_sizes():
     weighed = prediction_gain(fit_with(error, size**-2.0))[0]
     assert weighed == pytest.approx(3800 * np.log(1 - 0.9**2), rel=0.2)
     assert prediction_gain(fit_with(error))[0] > 0.2 * weighed  # the large ones hide the others
+
+
+def test_errors_are_rough_if_the_last_alone_foretells_them():
+    rng = np.random.default_rng(8)
+    white, slow = rng.standard_normal(1500), lasting(1500, 0.9, rng)
+    averaged = np.convolve(rng.standard_normal(1508), np.ones(9) / 3, "valid")
+    missed = np.sin(np.arange(1500) / 7 + np.sin(np.arange(1500) / 31)) + 0.3 * white
+    errors = np.stack([slow, white, averaged, missed, np.zeros(1500)], axis=1)
+    assert rough(fit_with(errors)).tolist() == [True, False, False, False, False]
+    assert rough(fit_with(errors[:, [0, 4]])).tolist() == [True, True]  # the second was not seen
+
+
+def test_errors_of_time_are_along_the_path():
+    rng, t = np.random.default_rng(9), np.linspace(0, 60, 2000)
+    slopes = np.stack([np.cos(t), -2 * np.sin(2 * t), 3 * np.cos(t + 1)], axis=1)
+    grid = SimpleNamespace(splines=lambda _: [lambda times, order: slopes])
+
+    def inflated(errors):
+        fit = fit_with(errors)
+        fit.collocation.grid, fit.collocation.segments = grid, [SimpleNamespace(t=t)]
+        fit.state.free = lambda: np.zeros(4)
+        return time_inflation(fit)
+
+    assert inflated(slopes * rng.standard_normal((2000, 1))) == pytest.approx(np.sqrt(3), rel=0.02)
+    assert inflated(rng.standard_normal((2000, 3))) == 1.0

@@ -8,7 +8,7 @@ from vidsindy_lite.dynamics import persistence, search
 from vidsindy_lite.dynamics.persistence import LARGEST, Plateau
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, score
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, corruption, score
 
 DUFFING = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5}}, degree=3)
 
@@ -115,3 +115,15 @@ def test_errors_that_last_widen_the_error_bars(swing):
     assert score(nine, DUFFING).exact
     live = one.system.support
     assert (nine.standard_errors[live] > 2 * one.standard_errors[live]).all()
+
+
+@pytest.mark.parametrize(("flow", "seed"), [("RayleighBenard", 0), ("SprottF", 3)])
+def test_times_that_are_not_exact_do_not_become_terms(flow, seed, monkeypatch):
+    truth = SYSTEMS[flow].shift(REFERENCE_OFFSET)
+    t, x = truth.trajectory(600)
+    x = corruption.jitter(x, 0.3, np.random.default_rng(seed))
+    found = discover(t, x)
+    assert score(found, truth).exact
+    assert found.status == "ok", found.warnings
+    monkeypatch.setattr(persistence, "time_inflation", lambda fit: 1.0)
+    assert not score(discover(t, x), truth).exact

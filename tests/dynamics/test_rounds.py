@@ -94,6 +94,25 @@ def test_what_is_not_round_is_refused(fit, x, rule):
         fit(x)
 
 
+def test_errors_that_all_positions_share_are_passed_on():
+    x, centre = bob(SWING), np.array([1.0, 2.0, 3.0])
+    aside = np.cross(np.cross(DOWN, ASIDE), x - centre)  # a turn about the axis
+    causes = np.stack([0.01 * (x - centre), 0.002 * aside, np.full_like(x, 0.03)])
+    causes[:, 7] = x[7] = np.nan
+    plain, circle = vl.on_circle(x, zero=DOWN), vl.on_circle(x, zero=DOWN, systematic=causes)
+    assert plain.systematic is None
+    assert circle.systematic.shape == (3, 400, 1)
+    assert circle.radius_error == pytest.approx(0.012, rel=1e-6)
+    assert circle.centre_errors == pytest.approx([0.03] * 3, rel=1e-4)
+    seen = np.isfinite(circle.angle)
+    assert circle.systematic[0, seen] == pytest.approx(0, abs=1e-9)
+    assert np.abs(circle.systematic[1, seen]) == pytest.approx(0.002, rel=1e-4)
+    with pytest.raises(ValueError, match=r"systematic: must be finite, of shape \(k, 400, 3\)"):
+        vl.on_circle(x, systematic=causes[:, :9])
+    ball = vl.on_sphere(bob(np.stack([SWING, SWING])[0]) + np.sin(TIMES)[:, None] * [-0.8, 0.6, 0])
+    assert ball.systematic is None
+
+
 def test_what_is_on_no_circle_is_said_in_short():
     rng = np.random.default_rng(0)
     fine = vl.on_circle(bob(SWING) + 0.01 * rng.standard_normal((400, 3)))

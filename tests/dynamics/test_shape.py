@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.shape import cancelling, shapes
+from vidsindy_lite.dynamics.shape import cancelling, shapes, tied
 from vidsindy_lite.study import SYSTEMS
 
 TIMES = np.linspace(0, 12, 600)
@@ -129,6 +129,30 @@ def test_a_line_and_a_sine_may_be_a_cubic(amplitude, doubted):
     assert ("cannot be told apart" in warning) == doubted
     plain = PolynomialSystem.from_terms({"x": {"vx": 1}, "vx": {"sin(x)": -9.4}}, library=library)
     assert list(cancelling(plain, x)) == []
+
+
+@pytest.mark.parametrize(("throws", "doubted"), [(2, True), (3, False)])
+def test_two_throws_in_space_are_not_enough(throws, doubted):
+    starts = [(4, 1, 8), (-2, 5, 6), (1, -4, 9)][:throws]
+    t = np.linspace(0, 1.5, 60)
+    paths = [
+        solved(lambda _, s: [*s[3:], *(np.array([0, 0, -9.81]) - 0.3 * s[3:])], [0, 0, 1, *v], t)
+        for v in starts
+    ]
+    names = ("x", "y", "z", "vx", "vy", "vz")
+    assert bool(list(tied(names, np.concatenate(paths)))) == doubted
+
+
+def test_a_spring_that_is_alike_in_all_directions_is_not_told_from_a_flow():
+    t = np.linspace(0, 12, 300)
+    for stiff, doubted in (((4, 4), True), ((4, 7), False)):
+        k = np.array(stiff)
+        x = solved(lambda _, s, k=k: [*s[2:], *(-k * s[:2] - 0.1 * s[2:])], [1, 0, 0, 1.5], t)
+        assert bool(list(tied(("x", "y", "vx", "vy"), x))) == doubted
+        warnings = discover(t, x[:, :2], order=2, degree=2).warnings
+        assert any("places and velocities" in warning for warning in warnings) == doubted
+    assert list(tied(("x", "y"), x[:, :2])) == []
+    assert list(tied(("x", "vx"), np.stack([t, np.ones_like(t)], axis=1)))
 
 
 def test_terms_that_cancel_are_told():

@@ -28,8 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
-from ..arrays import Bools, Floats
-from .adjust import Adjustment, adjust
+from ..arrays import Floats
 from .alignment import (
     Curve,
     Footage,
@@ -42,20 +41,16 @@ from .alignment import (
 )
 from .calibrate import check_learnable
 from .camera import Camera
-from .causes import GROSS
 from .changes import PARTS, known_to
-from .covariance import long_run_covariance
 from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
 from .pairs import promising_lags, rough_cameras
 from .rig import Rig
 from .shutter import steadied
+from .timing import DISAGREEMENT, Timing, trimmed
 from .triangulate import Views, check_seen, residuals, residuals_of_views
 from .unknowns import Unknowns
 from .unmeasured import posed
 
-DISAGREEMENT = 1.0
-"""Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
-less than half of that."""
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
 ALIKE = 2.0
@@ -65,18 +60,9 @@ FINE = 0.05
 
 _INSTANTS = 300  # at which all cameras are compared in the second step
 _ROUGH_STEPS = 8  # of the second step
-_TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
-_BETTER_PART = 0.7  # of all frames, in which no view is an outlier
-_APART = 1.0  # frames; lags closer than that are one and the same
 _SHOWN = 3  # of the lags that fit equally well
-_PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 _BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
-_CLEAR = 4.0  # standard errors by which a clock must drift, ...
-_ENOUGH = 0.05  # ... and frames over the whole video
-_LEAST = 1e-6  # share of a slope that is motion
-_USED = 0.5  # weight of an instant that holds no outlier
-_TIMES = _LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
 
 
 def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
@@ -94,7 +80,7 @@ def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
     list of float
         Pixels; zero for a camera that takes part in no point.
     """
-    return [_trimmed(part) for part in residuals(tracks, rig)]
+    return [trimmed(part) for part in residuals(tracks, rig)]
 
 
 def learn_lags(
@@ -193,7 +179,7 @@ class _Videos:
             errors[ways & (errors == 0)] = _LOOSE
         return errors
 
-    def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> _Fitted | None:
+    def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> Timing | None:
         """The best lags near given ones, or better ones than these; None if nothing fits."""
         self.bar.update()
         footage = self.footage(lags, rough)
@@ -201,86 +187,7 @@ class _Videos:
         if cameras is None:
             return None
         errors = self.errors(rough, loose)
-        return _Fitted.of(footage, cameras, errors, most=_ROUGH_STEPS if rough else None)
-
-
-@dataclass(frozen=True, eq=False)
-class _Fitted:
-    """What was fitted, and to what."""
-
-    footage: Footage
-    cameras: tuple[Camera, ...]
-    fit: Adjustment
-
-    @classmethod
-    def of(
-        cls,
-        footage: Footage,
-        cameras: tuple[Camera, ...],
-        errors: Floats,
-        *,
-        begin: Floats | None = None,
-        most: int | None = None,
-    ) -> _Fitted | None:
-        """None if the views have too little in common."""
-        fit = adjust(footage, cameras, errors, begin=begin, most=most)
-        told = np.isfinite(fit.misses).any(axis=1).sum()
-        return cls(footage, cameras, fit) if 3 * told > np.isinf(errors[:, _TIMES]).sum() else None
-
-    @property
-    def lags(self) -> Floats:
-        """In frames."""
-        return self.fit.footage.lags
-
-    @property
-    def used(self) -> Bools:
-        """Instants that hold no outlier."""
-        return self.fit.weights > _USED
-
-    @property
-    def missed(self) -> Floats:
-        """Residuals, (m, n, 2)."""
-        return np.stack(np.split(self.fit.misses, len(self.cameras), axis=1))
-
-    @property
-    def residual(self) -> float:
-        """The worst camera's, pixels."""
-        return max(map(_trimmed, self.missed))
-
-    @property
-    def score(self) -> float:
-        """The same, if errors are normal but for some outliers: from the better part of them."""
-        return max(_trimmed(part, _BETTER_PART) for part in self.missed)
-
-    @property
-    def agrees(self) -> bool:
-        """Whether residuals are small, and not like those of the next frame.
-
-        Noise of the tracks, however large, is no reason to look for other lags.
-        """
-        missed = self.fit.misses[self.used]
-        now, then = missed[:-1], missed[1:]
-        both = np.isfinite(now) & np.isfinite(then)
-        square = max(float(np.sum((now**2)[both])), 1e-300)
-        alike = max(float(np.sum((now * then)[both])) / square, 0.0)
-        misfit = self.score * np.sqrt(alike / _PERSISTENT)
-        return bool(alike <= _PERSISTENT and misfit <= DISAGREEMENT and self.score <= GROSS)
-
-    def near(self, lags: Floats) -> bool:
-        """Whether its lags are those."""
-        return bool(np.abs(self.lags - lags).max() < _APART)
-
-
-def _trimmed(residual: Floats, share: float = _TRIMMED) -> float:
-    """Length of the residuals, (n, 2), that one frame in ten exceeds.
-
-    From another share of them if they are normal: their lengths are then Rayleigh's.
-    """
-    seen = residual[np.isfinite(residual).all(axis=1)]
-    if not len(seen):
-        return 0.0
-    ratio = np.sqrt(np.log(1 - _TRIMMED) / np.log(1 - share))
-    return float(ratio * np.quantile(np.hypot(*seen.T), share))
+        return Timing.of(footage, cameras, errors, most=_ROUGH_STEPS if rough else None)
 
 
 # ------------------------------------------------------------------------------------- the search
@@ -289,8 +196,8 @@ def _trimmed(residual: Floats, share: float = _TRIMMED) -> float:
 def _learned(videos: _Videos, first: Floats) -> Lags:
     """`learn_lags` of what was checked."""
     begun = videos.fitted(first)
-    if begun is not None and begun.agrees and (begun.near(first) or not _shares(begun).all()):
-        return _told(videos, _drifted(begun), first)
+    if begun is not None and begun.agrees and (begun.near(first) or not begun.shares.all()):
+        return _told(videos, begun.drifted(), first)
     loose, sampled = _searched(videos, first)
     if not sampled:
         return _untold(videos, first, False)
@@ -305,7 +212,7 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
     if len(alike) > 1 and found[0].score > DISAGREEMENT:
         return _untold(videos, first, False)
     best = min(alike, key=lambda f: (not f.near(first), np.abs(f.lags).sum()))
-    told = _told(videos, _drifted(best), first)
+    told = _told(videos, best.drifted(), first)
     if len(alike) > 1 and not best.near(first):
         choices = [best, *(f for f in alike if f is not best)][:_SHOWN]
         warning = ambiguous_lags([list_lags(f.lags) for f in choices])
@@ -313,7 +220,7 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
     return told
 
 
-def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[_Fitted]]:
+def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Timing]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
     promising = promising_lags(videos.curves, videos.rates, videos.unknowns)
     exact = _climbed(videos, promising, first, False)
@@ -332,13 +239,13 @@ def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[_Fitted]]:
 
 def _climbed(
     videos: _Videos, promising: list[list[float]], first: Floats, loose: bool
-) -> list[_Fitted]:
+) -> list[Timing]:
     """Fits to some instants from the most promising lags and all that differ from the best in one.
 
     The best are tried in all combinations with the others' until none is better.
     """
     count = len(promising)
-    tried: dict[tuple[float, ...], _Fitted | None] = {}
+    tried: dict[tuple[float, ...], Timing | None] = {}
 
     def fits(lags: Floats) -> float:
         key = tuple((lags - lags[0]).tolist())
@@ -360,63 +267,26 @@ def _climbed(
     return _different(found)
 
 
-def _different(found: list[_Fitted]) -> list[_Fitted]:
+def _different(found: list[Timing]) -> list[Timing]:
     """The first of all that have the same lags."""
-    kept: list[_Fitted] = []
+    kept: list[Timing] = []
     for one in found:
         if not any(one.near(other.lags) for other in kept):
             kept.append(one)
     return kept
 
 
-# --------------------------------------------------------------------- drifts, errors, what is told
+# --------------------------------------------------------------------- errors, and what is told
 
 
-def _drifted(found: _Fitted) -> _Fitted:
-    """The same with the drifts of clocks that are clear and large enough to matter, if any are."""
-    errors, change = found.fit.errors.copy(), found.fit.change
-    errors[1:, _DRIFT] = np.inf
-    free = _Fitted.of(found.footage, found.cameras, errors, begin=change)
-    if free is None:
-        return found
-    drift, off = free.fit.change[:, _DRIFT], np.zeros(len(errors))
-    off[1:] = np.sqrt(np.diag(_covariance(free)))[len(off) - 1 :]
-    clear = np.abs(drift) > np.maximum(_CLEAR * off, _ENOUGH)
-    if not clear.any():
-        return found
-    errors[~clear, _DRIFT] = 0.0
-    begin = np.where(errors > 0, free.fit.change, 0.0)
-    return _Fitted.of(found.footage, found.cameras, errors, begin=begin) or found
-
-
-def _covariance(found: _Fitted) -> Floats:
-    """Of lags and drifts, if that of cameras is known as well as the tracks tell it.
-
-    Residuals may depend on those of the frames beside: the larger of both variances counts.
-    """
-    fit = found.fit
-    missed, slopes = fit.weighed
-    square = np.einsum("nik,nil->kl", slopes, slopes) + fit.noise**2 * np.diag(fit.prior)
-    bread = np.linalg.pinv(square, hermitian=True)
-    scores = np.einsum("nik,ni->nk", slopes, missed) @ bread
-    white, robust = fit.noise**2 * bread, long_run_covariance(scores) * len(scores)
-    more = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(white), 1e-300), 1))
-    covariance = white * np.outer(more, more)
-    cameras, parts = np.argwhere(fit.errors > 0).T
-    order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
-    # Slopes that are noise add to the information, but mend nothing.
-    share = np.append(1.0, np.maximum(_shares(found), _LEAST))[cameras[order]]
-    return covariance[np.ix_(order, order)] / np.outer(share, share)
-
-
-def _told(videos: _Videos, found: _Fitted, first: Floats) -> Lags:
+def _told(videos: _Videos, found: Timing, first: Floats) -> Lags:
     """What a fit tells of the lags, or that it tells nothing."""
     fit, lags = found.fit, found.lags.copy()
     count = len(lags) - 1
-    if not _shares(found).all():
+    if not found.shares.all():
         return _untold(videos, first, found.score <= DISAGREEMENT)
-    covariance, rate_errors = _covariance(found), np.zeros(len(lags))
-    drifting = fit.errors[:, _DRIFT] > 0
+    covariance, rate_errors = found.covariance, np.zeros(len(lags))
+    drifting = fit.errors[:, PARTS["drift"].start] > 0
     rate_errors[drifting] = np.sqrt(np.diag(covariance)[count:]) / fit.footage.span
     # Lags are those of the first instant, those of the fit of the middle.
     moved = np.hstack((np.eye(count), -np.eye(count)[:, drifting[1:]] * fit.footage.middle
@@ -437,27 +307,6 @@ def _told(videos: _Videos, found: _Fitted, first: Floats) -> Lags:
     )
 
 
-def _shares(found: _Fitted) -> Floats:
-    """Share of each lag's squared slope that is motion and not noise, between 0 and 1.
-
-    Interpolated noise has a slope, too: with a variance of half of the noise's, as it is taken
-    between two frames that are two apart.
-    """
-    fit, used = found.fit, found.used
-    slopes = fit.slopes[used].reshape(-1, fit.slopes.shape[-1])
-    parts = np.argwhere(fit.errors > 0)[:, 1]
-    lags, others = slopes[:, parts == _LAG], slopes[:, ~np.isin(parts, _TIMES)]
-    lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
-    # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
-    seen = np.isfinite(found.missed[:, used, 0])
-    views = np.maximum(seen.sum(axis=0), 2)
-    freedom = np.maximum((seen * (2 - 3 / views)).sum(axis=1)[1:], 1e-9)
-    speeds = fit.footage.rates[1:]
-    chance = 0.5 * fit.noise**2 * speeds**2 * (freedom + 2 * np.sqrt(2 * freedom))
-    total = np.sum(lags**2, axis=0)
-    return np.clip((total - chance) / np.maximum(total, 1e-300), 0, 1)
-
-
 def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     """Lags of which the tracks tell nothing, as all agree or none; the first one is the clock."""
     errors = np.where(np.arange(len(lags)) > 0, np.inf, 0.0)
@@ -465,7 +314,7 @@ def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     cameras = videos.cameras(footage)
     if cameras is not None:
         missed = residuals_of_views(Views.of(footage.aligned), cameras)
-        residual = max(map(_trimmed, missed))
+        residual = max(map(trimmed, missed))
     warnings = [blurred_lag(i + 1, lags[i]) for i in range(1, len(lags))]
     if not agree:
         warnings = [no_lags(list_lags(lags), residual)]

@@ -14,13 +14,13 @@ from scipy.stats import chi2
 from ..arrays import Floats
 from .beyond import beyond_the_library
 from .collocation import CLEANEST, Fit, Linearisation, Status
-from .errors import residual_noise
+from .errors import effective_noise, residual_noise, rough
 from .library import shift_matrix
-from .persistence import Path
+from .persistence import SMOOTH, Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
 from .selection import closest_rival, minimiser, subset_search
-from .shape import cancelling, shapes
+from .shape import cancelling, shapes, tied
 from .state import State
 from .trajectories import Trajectory, typical_step
 
@@ -144,11 +144,15 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     yield from shapes(problem.measured, noise, problem.form.names[:measured], terms)
     x, _ = fit.collocation.node_states(fit.state.control_points)
     yield from cancelling(problem.law(fit.state), x - fit.state.offset)
+    yield from tied(problem.form.names, x)
 
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
     residual = residual_noise(fit)
-    ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
+    # A curve without a law follows errors that last: no misfit if rough, but large ones hide terms.
+    harmless = rough(fit) & (effective_noise(fit) < SMOOTH)
+    doubtful = (residual > RESOLVED) & ~harmless
+    ratio = np.where(doubtful, residual / problem.noise, 0.0)
     j = int(ratio.argmax())
     told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
     if not ratio[j] < MISFIT:

@@ -93,7 +93,7 @@ class Discovery:
         would be if it alone were added, all else fitted again; NaN for what is in the law or no
         candidate. See `intervals` of the module ``absent`` for the formula.
     note : str
-        Which order the law has and why, where that was left open.
+        Which order the law has and why, where both were looked for.
     """
 
     system: PolynomialSystem

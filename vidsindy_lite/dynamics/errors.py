@@ -13,6 +13,10 @@ CHANCE = 4.0
 """Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent."""
 ORDER = 40
 """Most errors that foretell the next."""
+LEAST = 1e-300
+"""Keeps a quotient finite where nothing moves or is left."""
+LIKELY = 10.0
+"""Gain of the criterion from which on more errors than the last foretell the next."""
 
 
 def residual_noise(fit: Fit) -> Floats:
@@ -53,6 +57,25 @@ def effective_noise(fit: Fit) -> Floats:
     return np.maximum(_spread(fit) * lasting, CLEANEST)
 
 
+def time_inflation(fit: Fit) -> float:
+    """Size of the errors along the path over what it were if no coordinate knew of another.
+
+    At least 1, and 1 where it may be chance. A time that is not exact moves all coordinates along
+    the path, together: at most the root of their number.
+    """
+    collocation = fit.collocation
+    residual, _ = collocation.data_residual(fit.state.control_points)
+    splines = collocation.grid.splines(fit.state.control_points)
+    pairs = zip(splines, collocation.segments, strict=True)
+    slopes = np.concatenate([spline(segment.t, 1) for spline, segment in pairs])
+    seen = collocation.counts > 0
+    scale = (np.sqrt(collocation.precision) / residual_noise(fit))[:, seen]
+    residual, slopes = residual[:, seen] * scale, slopes[:, seen] * scale
+    along = (residual * slopes).sum(axis=1) ** 2 / np.maximum((slopes**2).sum(axis=1), LEAST)
+    ratio = float(along.sum() / np.maximum((residual**2).mean(axis=1).sum(), LEAST))
+    return float(np.sqrt(ratio)) if ratio > 1 + CHANCE * np.sqrt(2 / len(residual)) else 1.0
+
+
 def inflation(pieces: Sequence[Floats]) -> Floats:
     """Variance of a mean of errors over what it were if they were independent, at least 1, (d,).
 
@@ -85,21 +108,40 @@ def prediction_gain(fit: Fit) -> Floats:
     Minus twice the log likelihood of an autoregressive model of the residual over that of white
     noise (Levinson's recursion; its order by the Bayesian information criterion).
     """
+    return _autoregressions(fit).min(axis=0)
+
+
+def rough(fit: Fit) -> Bools:
+    """Which errors depend on the one before and on no others, (d,).
+
+    An autoregression of first order is nowhere smooth, as the drift of a sensor. What a law misses,
+    or a filter leaves, is smooth: the errors before the last foretell it, too. Of a coordinate that
+    was never observed, what is true of all others.
+    """
+    gains, seen = _autoregressions(fit), fit.collocation.counts > 0
+    first = gains[1] if len(gains) > 1 else gains[0]
+    alone = (first < -LIKELY) & (first < gains.min(axis=0) + LIKELY)
+    return np.where(seen, alone, alone[seen].all())
+
+
+def _autoregressions(fit: Fit) -> Floats:
+    """Gain of predicting each error by those before it, for every number of these, (orders, d)."""
     residual, _ = fit.collocation.data_residual(fit.state.control_points)
     residual *= np.sqrt(fit.collocation.precision)
     n = len(residual)
     lags = range(min(ORDER, n // 10) + 1)
     covariances = np.stack([(residual[k:] * residual[: n - k]).sum(axis=0) for k in lags])
-    return np.array([_levinson(covariance, n) for covariance in covariances.T])
+    return np.stack([_levinson(covariance, n) for covariance in covariances.T], axis=1)
 
 
-def _levinson(covariance: Floats, n: int) -> float:
+def _levinson(covariance: Floats, n: int) -> Floats:
+    gains = np.zeros(len(covariance))
     if not covariance[0] > 0:
-        return 0.0  # of what was never observed
-    best, variance, weights = 0.0, covariance[0], np.zeros(0)
+        return gains  # of what was never observed
+    variance, weights = covariance[0], np.zeros(0)
     for order in range(1, len(covariance)):
         reflection = (covariance[order] - weights @ covariance[order - 1 : 0 : -1]) / variance
         weights = np.append(weights - reflection * weights[::-1], reflection)
         variance *= 1 - reflection**2
-        best = min(best, n * np.log(variance / covariance[0]) + order * np.log(n))
-    return best
+        gains[order] = n * np.log(variance / covariance[0]) + order * np.log(n)
+    return gains

@@ -26,11 +26,9 @@ a body. Clean flows of first order leave .26 to .64, springs and throws up to .0
 AMBIGUOUS = 0.5
 """Share of the slopes' squares that no cubic law of first order explains, above which a place is
 passed with several velocities. Flows of first order leave up to .15, with noise of 40 %."""
-ADVICE = (
-    "a law of motion, x'' = f(x, x'), may fit better: if these are positions of a body, try order=2"
-)
-SETTLED = "order 1: there is no reason to doubt its law"
-UNLIKELY = "order 1: nothing speaks for accelerations that follow positions and velocities"
+PASSED = 0.005
+"""The same share, below which every place is passed with one velocity, so that nothing speaks for
+a second order. Flows of first order outside the library leave up to .002, throws .02."""
 MISFIT = 1.5
 """Errors that one law leaves over those of another, from which on it misses the data."""
 DENSITY = 10
@@ -41,15 +39,14 @@ def check_order(order: object, origin: str, library: Library) -> None:
     """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
     if order not in (1, 2, "auto"):
         raise ValueError(f"order: must be 1, 2 or 'auto', got {order!r}")
-    if order == "auto" and library.given:
-        raise ValueError("order: must be 1 or 2 where terms are given of its equations, got 'auto'")
     check_choice("origin", origin, ("learn", "data"))
 
 
 def accelerated(curves: Sequence[BSpline]) -> bool:
     """Whether smoothed curves look like those of a law of second order.
 
-    Either the slope is no function of the place, or the second derivative is nearly linear in both.
+    The slope is no function of the place; or hardly one, and the second derivative is nearly linear
+    in both.
     """
     places, slopes, bends = [], [], []
     for curve in curves:
@@ -61,7 +58,8 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     x, v, a = (np.concatenate(parts) for parts in (places, slopes, bends))
     linear = np.hstack([np.ones((len(x), 1)), x, v])
     cubic = monomials(x, monomial_exponents(x.shape[1], 3))
-    return unexplained(linear, a) < LINEAR or unexplained(cubic, v) > AMBIGUOUS
+    several = unexplained(cubic, v)
+    return several > AMBIGUOUS or (several > PASSED and unexplained(linear, a) < LINEAR)
 
 
 def unexplained(terms: Floats, values: Floats) -> float:
@@ -73,13 +71,6 @@ def unexplained(terms: Floats, values: Floats) -> float:
         return np.nan
     left = values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0]
     return float((left**2).sum() / (values**2).sum())
-
-
-def advised(found: Discovery, curves: Sequence[BSpline]) -> Discovery:
-    """A law of order 1; if it is doubtful and one of order 2 may hold, with that advice."""
-    if found.warnings and accelerated(curves):
-        return replace(found, warnings=(*found.warnings, ADVICE))
-    return found
 
 
 def better(first: Discovery, second: Discovery) -> Discovery:

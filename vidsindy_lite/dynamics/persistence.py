@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats
 from .collocation import Fit, Linearisation
-from .errors import effective_noise, residual_noise
+from .errors import effective_noise, residual_noise, time_inflation
 from .problem import Problem
 from .selection import minimiser, subset_search
 from .state import State
@@ -151,7 +151,7 @@ def follow(problem: Problem, fit: Fit) -> Path:
                 low_here = low
             paths[j].append(Plateau(j, low_here, high, terms))
     smooth = bool((lasting > LASTING * single).any() or (single <= NOISELESS).all())
-    level = max(lowest, typical(lasting), SMOOTH if smooth else 0.0)
+    level = max(lowest, time_inflation(fit) * typical(lasting), SMOOTH if smooth else 0.0)
     return Path(fit, model, own, level, tuple(map(tuple, paths)))
 
 

@@ -5,7 +5,8 @@ A bob on a string has three coordinates and fewer freedoms: its angles, and thes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,6 +44,8 @@ class Round:
         longitude and latitude about the first axis.
     warnings : tuple of str
         Why the motion may be on no circle or sphere; empty if nothing was found.
+    systematic : ndarray, shape (k, n, 1) or (k, n, 2), optional
+        What the errors that all positions share make of the angle, for ``discover``.
     """
 
     centre: Floats
@@ -53,6 +56,7 @@ class Round:
     axes: Floats
     angle: Floats
     warnings: tuple[str, ...]
+    systematic: Floats | None = None
 
     def __str__(self) -> str:
         shape = "circle" if len(self.axes) == 2 else "sphere"
@@ -71,7 +75,9 @@ class Round:
     __repr__ = __str__
 
 
-def on_circle(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
+def on_circle(
+    x: ArrayLike, zero: ArrayLike | None = None, systematic: ArrayLike | None = None
+) -> Round:
     """Fit a circle to a motion, in the plane or in space, and give its angle.
 
     Parameters
@@ -81,6 +87,9 @@ def on_circle(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
     zero : array_like, shape (2,) or (3,), optional
         Direction from the centre in which the angle is zero, such as downwards; by default the
         mean direction of the motion.
+    systematic : array_like, shape (k, n, d), optional
+        Errors that all positions share, as `discover` takes them: they count in the errors of the
+        circle, and `Round.systematic` passes them on.
 
     Returns
     -------
@@ -90,15 +99,20 @@ def on_circle(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
     Raises
     ------
     ValueError
-        If ``x`` has another shape or too few rows, lies on a line, or ``zero`` is no direction in
-        the plane of the circle.
+        If ``x`` or ``systematic`` has another shape or too few rows, lies on a line, or ``zero`` is
+        no direction in the plane of the circle.
 
     Examples
     --------
-    >>> swing = vl.on_circle(seen.x, zero=(0, 0, -1))
+    >>> swing = vl.on_circle(seen.x, zero=(0, 0, -1), systematic=seen.systematic)
     >>> print(swing.radius, swing.radius_error)
     """
-    x, seen = _positions(x, (2, 3))
+    return _with_shared(_circle, _positions(x, (2, 3)), zero, systematic)
+
+
+def _circle(x: Floats, zero: ArrayLike | None) -> Round:
+    """The circle of checked positions."""
+    seen = _seen(x)
     middle, main = _principal(x[seen])
     flat = (x[seen] - middle) @ main[:2].T
     planar, covariance = _fitted(flat)
@@ -116,7 +130,9 @@ def on_circle(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
     return _round(centre, planar[2], errors, covariance, off, axes, angle)
 
 
-def on_sphere(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
+def on_sphere(
+    x: ArrayLike, zero: ArrayLike | None = None, systematic: ArrayLike | None = None
+) -> Round:
     """Fit a sphere to a motion in space, and give its two angles.
 
     Parameters
@@ -126,6 +142,8 @@ def on_sphere(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
     zero : array_like, shape (3,), optional
         Direction from the centre in which both angles are zero, such as downwards; by default the
         mean direction of the motion.
+    systematic : array_like, shape (k, n, 3), optional
+        See `on_circle`.
 
     Returns
     -------
@@ -136,9 +154,14 @@ def on_sphere(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
     Raises
     ------
     ValueError
-        If ``x`` has another shape or too few rows, or lies in a plane.
+        If ``x`` or ``systematic`` has another shape or too few rows, or lies in a plane.
     """
-    x, seen = _positions(x, (3,))
+    return _with_shared(_sphere, _positions(x, (3,)), zero, systematic)
+
+
+def _sphere(x: Floats, zero: ArrayLike | None) -> Round:
+    """The sphere of checked positions."""
+    seen = _seen(x)
     ball, covariance = _fitted(x[seen])
     away = x[seen] - ball[:3]
     off = np.linalg.norm(away, axis=1)[:, None] - ball[3]
@@ -148,6 +171,39 @@ def on_sphere(x: ArrayLike, zero: ArrayLike | None = None) -> Round:
     angle[seen, 0] = np.unwrap(np.arctan2(b, a))
     angle[seen, 1] = np.arctan2(c, np.hypot(a, b))
     return _round(ball[:3], ball[3], covariance[:3, :3], covariance, off, axes, angle)
+
+
+def _with_shared(
+    fit: Callable[[Floats, ArrayLike | None], Round],
+    x: Floats,
+    zero: ArrayLike | None,
+    systematic: ArrayLike | None,
+) -> Round:
+    """What is fitted to positions, and what each error that they share makes of it."""
+    found = fit(x, zero)
+    if systematic is None:
+        return found
+    errors = check_array("systematic", systematic)
+    if (
+        errors.ndim != 3
+        or errors.shape[1:] != x.shape
+        or not np.isfinite(errors[:, _seen(x)]).all()
+    ):
+        raise ValueError(
+            f"systematic: must be finite, of shape (k, {len(x)}, {x.shape[1]}), got {errors.shape}"
+        )
+    moved = [fit(x + error, found.axes[0] if zero is None else zero) for error in errors]
+    turned = np.array([other.angle - found.angle for other in moved]).reshape(
+        len(moved), len(x), -1
+    )
+    centres = np.array([other.centre - found.centre for other in moved]).reshape(-1, x.shape[1])
+    radii = np.array([other.radius - found.radius for other in moved])
+    return replace(
+        found,
+        centre_errors=np.sqrt(found.centre_errors**2 + (centres**2).sum(axis=0)),
+        radius_error=float(np.sqrt(found.radius_error**2 + (radii**2).sum())),
+        systematic=turned - 2 * np.pi * np.round(turned / (2 * np.pi)),
+    )
 
 
 def _round(
@@ -175,16 +231,21 @@ def _round(
     )
 
 
-def _positions(x: ArrayLike, dimensions: tuple[int, ...]) -> tuple[Floats, Bools]:
-    """Checked positions, and which rows were seen."""
+def _seen(x: Floats) -> Bools:
+    """Which rows of positions were seen."""
+    return np.asarray(np.isfinite(x).all(axis=1))
+
+
+def _positions(x: ArrayLike, dimensions: tuple[int, ...]) -> Floats:
+    """Checked positions."""
     x = check_array("x", x)
     if x.ndim != 2 or x.shape[1] not in dimensions:
         wanted = " or ".join(f"(n, {d})" for d in dimensions)
         raise ValueError(f"x: must have shape {wanted}, got {x.shape}")
-    seen = np.asarray(np.isfinite(x).all(axis=1))
-    if seen.sum() < x.shape[1] + 3:
-        raise ValueError(f"x: must hold at least {x.shape[1] + 3} positions, got {seen.sum()}")
-    return x, seen
+    seen = _seen(x).sum()
+    if seen < x.shape[1] + 3:
+        raise ValueError(f"x: must hold at least {x.shape[1] + 3} positions, got {seen}")
+    return x
 
 
 def _principal(x: Floats) -> tuple[Floats, Floats]:

@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from ..arrays import Floats, Ints
 from .library import monomials
-from .polynomials import PolynomialSystem
+from .polynomials import PolynomialSystem, velocity_names
 from .rounds import Round, on_circle, on_sphere
 from .trajectories import Trajectory
 
@@ -287,6 +287,23 @@ def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
                 "sum): something is constant on these data; look for it, or add runs from other "
                 "starts"
             )
+
+
+def tied(names: Sequence[str], x: Floats) -> Iterator[str]:
+    """What to say if along a motion, (n, d), velocities follow from places or from each other.
+
+    So it is with a spring that is equally stiff in all directions, and two throws in space.
+    """
+    m = len(names) // 2
+    if tuple(names[m:]) != velocity_names(names[:m]):
+        return
+    with np.errstate(divide="ignore", invalid="ignore"):  # a velocity that is constant is tied
+        together = np.nan_to_num(np.corrcoef(x.T))
+    if np.linalg.eigvalsh(together)[0] < CLOSE**2:
+        yield (
+            "places and velocities depend on each other on these data (one of them is linear in "
+            "the others): many laws fit alike; add runs from other starts"
+        )
 
 
 def _line_and_sine(law: PolynomialSystem, x: Floats) -> Iterator[str]:

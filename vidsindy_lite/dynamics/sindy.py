@@ -71,7 +71,7 @@ class SplineSINDy:
         names = tuple(f"x{i}" for i in range(d)) if feature_names is None else tuple(feature_names)
         if len(names) != d:
             raise ValueError(f"feature_names: must name {d} variables, got {names}")
-        found = discover(runs, degree=self.degree, seed=self.seed)
+        found = discover(runs, degree=self.degree, seed=self.seed, order=1)
         self._law = PolynomialSystem(names, found.system.exponents, found.coefficients)
         self.discovery: Discovery = found
         return self

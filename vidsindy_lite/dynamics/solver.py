@@ -26,7 +26,7 @@ from .collocation import Fit
 from .discovery import Discovery, conclude
 from .form import Form
 from .history import History
-from .order import SETTLED, UNLIKELY, accelerated, advised, better, check_order
+from .order import accelerated, better, check_order
 from .persistence import Path, Plateau, follow, typical
 from .precision import foreseen, with_precision
 from .problem import Problem, fit_curves, pose
@@ -62,7 +62,7 @@ def discover(
     seed: int = 0,
     progress: bool = False,
     systematic: Floats | Sequence[Floats] | None = None,
-    order: int | str = 1,
+    order: int | str = "auto",
     library: Library | None = None,
     sigma: float | Floats | Sequence[float | Floats] | None = None,
     origin: str = "learn",
@@ -90,7 +90,8 @@ def discover(
     order : {1, 2, "auto"}
         1 for ``x' = f(x)``; 2 for ``x'' = f(x, x')``, where ``x`` are positions alone: velocities
         become states ``vx, ...`` of the law, after the positions. ``"auto"`` looks for the second
-        where the first is doubtful, and says in `Discovery.note` which was taken and why.
+        where the first is doubtful and the motion is that of a body, and says in `Discovery.note`
+        which was taken and why. Where terms are given of the equations, it is 1.
     library : Library, optional
         The candidate terms, in place of ``degree``; `Library.where` says what is known of them.
         With terms that are no polynomials the law is sought in the frame of the data only, as no
@@ -130,11 +131,12 @@ def discover(
     if order == 2:
         return solved(Form.of(names, library, 2, origin))[0]
     found, problem = solved(Form.of(names, library, 1, origin))
-    if order == 1:
-        return advised(found, problem.curves)
-    if not found.warnings or not accelerated(problem.curves):
-        return replace(found, note=UNLIKELY if found.warnings else SETTLED)
-    second, _ = solved(Form.of(names, library, 2, origin))
+    if order == 1 or library.given or not found.warnings or not accelerated(problem.curves):
+        return found
+    try:
+        second, _ = solved(Form.of(names, library, 2, origin))
+    except ValueError:  # too few samples for a law of so many terms, or its names are taken
+        return found
     return better(found, second)
 
 
