@@ -19,7 +19,8 @@ from .candidates import Plate
 _SEEN = 2  # samples that must differ in a place
 _MARGIN = 4  # pixels around a thing that show how its surroundings continue
 _LEAST, _LARGEST = 12, 0.3  # pixels, and share of the image, of a thing with its rim
-_COMPACT = 0.15  # by which whole views are more compact than what differs at their rims
+_COMPACT = 0.8  # views of one thing are at least, and by
+_MORE = 0.15  # more than what differs at its rim
 _BESIDE = 2  # samples of a pixel that show the ground at least
 
 
@@ -65,7 +66,7 @@ def lingering(
         near = ndimage.binary_dilation(whole, iterations=_MARGIN // 2) & seen
         before = _compactness(near & (_apart(views[:, *window], then) > bound))
         after = _compactness(near & (_apart(views[:, *window], ground) > bound))
-        if after > before + _COMPACT:
+        if after > max(_COMPACT, before + _MORE):
             found.append(place._replace(corner=low - plate.shift[:2, 2].astype(int)))
     return found
 
