@@ -288,10 +288,11 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 #   tracks that are half a pixel off, with error bars that hold.
 #   <!-- by: (found.system.support == law.support).all(); (off[searched] < 4 * errors[searched]).all() -->
 # * $g$, drag, springs and periods come as named numbers with error bars, and the energy along the path is a check.
+#   <!-- by: abs(g.value - 9.81) < 4 * g.error; abs(drag.value - 0.4) < 4 * drag.error; abs(period.value; "never rises" in springs.notes[-1] -->
 # * A first-order law of the same data is wrong, and says so.
 #   <!-- by: first.status == "suspect" -->
 # * Throws in several directions settle gravity and drag; one throw does not, and is not believed.
-#   <!-- by: (fallen.system.support == flight.support).all(); abs(g - 9.81) < 4 * error; once.status == "suspect" -->
+#   <!-- by: (fallen.system.support == flight.support).all(); abs(g.value - 9.81) < 4 * g.error; once.status == "suspect" -->
 # * Kicks of the motion are no errors of the measurement: they are found, counted, and stay out of the law.
 #   <!-- by: set(names) == {"x", "vx", "x^3"}; abs(kicked.model_error[1] / gust - 1) < 0.4 -->
 # * A law that is no polynomial is found when its terms are among the candidates, and then holds at other amplitudes, too.
