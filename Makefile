@@ -41,7 +41,7 @@ test: $(READY)
 	$(BIN)/python -m pytest $(SPREAD)
 
 test-fast: $(READY)
-	$(BIN)/python -m pytest $(SPREAD) -m "not notebooks and not slow"
+	$(BIN)/python -m pytest $(SPREAD) -m "not notebooks and not slow and not thorough"
 
 bench: $(READY)
 	$(BIN)/python -m pytest -s -o python_files="bench_*.py" tests/benchmarks
