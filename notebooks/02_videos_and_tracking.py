@@ -535,18 +535,17 @@ angle = np.linspace(0, 20, frames)
 for radius in (5, 10):
     circle = 256 + radius * np.column_stack([np.cos(angle), np.sin(angle)])
     off = errors_of(scene, seed, circle)
-    seen = np.isfinite(off)
-    print(f"radius {radius} px: seen in {seen.mean():.0%} of the frames")
-    assert not seen.any() or np.sqrt(np.mean(off[seen] ** 2)) < 0.1
-assert seen.all()
+    print(f"radius {radius} px: seen in {np.isfinite(off).mean():.0%} of the frames, off by "
+          f"{np.sqrt(np.nanmean(off**2)):.3f} px (rms)")  # fmt: skip
+    assert np.nanmax(off) < {5: 0.5, 10: 0.05}[radius]
 
 # %% [markdown]
 # <details><summary>Solution</summary>
 #
-# A target of 18 px never leaves its place on the smaller circle: the median
-# takes its middle for background, and what differs from that are slivers, which end
-# where the background has the colour of the target. Rather than to guess where that ends, `track` gives no position
-# at all. On the larger circle every frame is as exact as ever.
+# A target of 18 px never leaves its place on the smaller circle: the median takes its middle for
+# background, and what differs from that are slivers. `track` notices, puts the ground that is seen around the
+# place beneath it, and follows what then differs; as that ground is a guess, it is off by some hundredths of a pixel,
+# or tenths. On the larger circle every frame is as exact as ever.
 # </details>
 #
 # **3.** (Prove.) The centroid of a disc is exact if its coverage of every pixel is. Why, and what does
