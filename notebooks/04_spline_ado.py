@@ -764,12 +764,16 @@ for (setting, value, _), result in zip(tasks, attempts, strict=True):
     grouped[setting, value].append(result)
 
 # %%
+def law_within(setting, value):  # else how many terms are wrong hangs on the last digit
+    return setting != "degree" or value >= 2
+
+
 rows = [
     {
         "setting": setting.replace("_", " "), "value": value,
         "exact": sum(r["verdict"].startswith("exact") for r in results), "of": len(results),
-        "false (median)": np.median([r["false"] for r in results]),
-        "missing (median)": np.median([r["missing"] for r in results]),
+        **{f"{kind} (median)": np.median([r[kind] for r in results]) if law_within(setting, value) else ""
+           for kind in ("false", "missing")},
         "suspect": sum(r["verdict"].endswith("suspect") for r in results),
         "wrong without warning": sum(r["verdict"] == "wrong, ok" for r in results),
     }
