@@ -56,7 +56,8 @@ def fitted(duffing, dropped=None):
     state = State(curve, np.where(active, law.coefficients, 0.0), active, origin, still)
     fit = collocation.solve(state, tolerance=1e-4, max_steps=100)
     margins = np.full(law.coefficients.size, np.inf)
-    return problem, fit, follow(problem, fit), problem.law(fit.state), margins
+    path = follow(problem, fit)
+    return problem, fit, path.model, path, problem.law(fit.state), margins
 
 
 def told(duffing, dropped=None):
@@ -72,26 +73,26 @@ def test_a_missing_term_is_noticed(duffing):
 
 
 def test_a_narrow_decision_in_the_frame_of_the_data_is_told(duffing):
-    problem, fit, path, law, _ = fitted(duffing)
+    problem, fit, model, path, law, _ = fitted(duffing)
     margins = np.full(law.coefficients.size, 100.0)
-    assert diagnose(problem, fit, path, law, margins) == ()
+    assert diagnose(problem, fit, model, path, law, margins) == ()
     margins[[law.terms.index("1"), len(law.terms) + law.terms.index("x^3")]] = 3.0, 1.5
-    (warning,) = diagnose(problem, fit, path, law, margins)
+    (warning,) = diagnose(problem, fit, model, path, law, margins)
     assert "with 1 in dx/dt, without x^3 in dy/dt (criterion +1.5)" in warning
 
 
 def test_a_coordinate_that_lost_its_law_is_told(duffing):
-    problem, fit, path, _, _ = fitted(duffing)
+    problem, fit, model, path, _, _ = fitted(duffing)
     law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
-    told = diagnose(problem, fit, path, law, np.full(law.coefficients.size, 100.0))
+    told = diagnose(problem, fit, model, path, law, np.full(law.coefficients.size, 100.0))
     assert any("no term was found for dy/dt" in warning for warning in told)
 
 
 def test_a_law_in_the_data_that_is_not_the_native_one_is_told(duffing):
-    problem, fit, path, law, margins = fitted(duffing)
-    assert diagnose(problem, fit, path, law, margins) == ()
+    problem, fit, model, path, law, margins = fitted(duffing)
+    assert diagnose(problem, fit, model, path, law, margins) == ()
     other = replace(law, coefficients=law.coefficients * [1.0, 1.5])
-    (warning,) = diagnose(problem, fit, path, other, margins)
+    (warning,) = diagnose(problem, fit, model, path, other, margins)
     assert "the law in the frame of the data is not that in its own frame" in warning
 
 
@@ -152,21 +153,21 @@ def test_noise_and_gaps_are_no_outliers(law):
     [(Status.MAX_STEPS, "use cleaner samples"), (Status.STALLED, "may be indistinguishable")],
 )
 def test_a_fit_that_did_not_converge_is_named_with_advice(duffing, status, words):
-    problem, fit, path, law, margins = fitted(duffing)
+    problem, fit, model, path, law, margins = fitted(duffing)
     assert fit.status is Status.CONVERGED
-    (warning,) = diagnose(problem, replace(fit, status=status), path, law, margins)
+    (warning,) = diagnose(problem, replace(fit, status=status), model, path, law, margins)
     assert warning.startswith(f"the last fit did not converge ({status.value})")
     assert words in warning
 
 
 def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
-    problem, fit, path, law, margins = fitted(duffing)
+    problem, fit, model, path, law, margins = fitted(duffing)
     rows = range(len(law.terms))
     other = np.isin(rows, [law.terms.index("x"), law.terms.index("x^2")])
     (own,) = path.of(fit.state.active)[1:]
     rival = Plateau(1, own.low / 2, own.high, other)
     plateaus = (path.plateaus[0], (rival, own))
-    (warning,) = diagnose(problem, fit, replace(path, plateaus=plateaus), law, margins)
+    (warning,) = diagnose(problem, fit, model, replace(path, plateaus=plateaus), law, margins)
     assert "dy/dt is settled by how large an error is tolerated" in warning
     assert "with x^2, without x^3" in warning
 

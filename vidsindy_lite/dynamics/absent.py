@@ -12,15 +12,18 @@ from scipy.interpolate import BSpline
 
 from ..arrays import Floats
 from .beyond import newcomers
-from .collocation import Fit
+from .collocation import Linearisation
 from .polynomials import PolynomialSystem
 from .problem import Problem
+from .state import State
 
 HALF_WIDTH = 1.96
 """Of a 95 % interval, in standard errors."""
 
 
-def intervals(problem: Problem, fit: Fit, tolerated: Floats) -> Floats:
+def intervals(
+    problem: Problem, state: State, model: Linearisation, tolerated: Floats
+) -> Floats:
     """Between which values each absent candidate term would be if it alone joined the law.
 
     With the information ``S`` and the gradient ``g`` of the last fit, of which the curve is
@@ -31,8 +34,10 @@ def intervals(problem: Problem, fit: Fit, tolerated: Floats) -> Floats:
     Parameters
     ----------
     problem : Problem
-    fit : Fit
-        The last one.
+    state : State
+        Of the last fit.
+    model : Linearisation
+        Around it, of all candidates.
     tolerated : ndarray, shape (d,)
         Errors at which the terms of each equation were chosen, over those of the fit.
 
@@ -42,10 +47,10 @@ def intervals(problem: Problem, fit: Fit, tolerated: Floats) -> Floats:
         95 % intervals in the law's own frame and the units of the data; NaN for what is in the law
         or no candidate, infinite where the data cannot tell a term from those of the law.
     """
-    state, (l, d) = fit.state, fit.state.coefficients.shape
+    l, d = state.coefficients.shape
     own = np.flatnonzero(state.free())
     others = np.setdiff1d(problem.form.searched, own)
-    model = fit.collocation.linearise(state, np.concatenate([own, others]))
+    model = model.of(np.concatenate([own, others]))
     estimate, variance = newcomers(model.information, model.gradient, len(own))
     spread = HALF_WIDTH * np.sqrt(variance) * tolerated[others // l]
     flat = np.full((l * d, 2), np.nan)

@@ -80,6 +80,17 @@ class Linearisation:
     curve_step: Floats
     curve_response: Floats
 
+    def of(self, columns: Ints) -> Linearisation:
+        """The same for some of the columns: the others stay as they are."""
+        places = np.searchsorted(self.columns, columns)
+        return replace(
+            self,
+            columns=columns,
+            information=self.information[np.ix_(places, places)],
+            gradient=self.gradient[places],
+            curve_response=self.curve_response[:, :, places],
+        )
+
     def newton(self, damping: float = 0.0) -> tuple[Floats, float]:
         """The best step in the columns, and by how much it promises to lower the objective."""
         if not len(self.columns):

@@ -63,7 +63,12 @@ ADVICE = {
 
 
 def diagnose(
-    problem: Problem, fit: Fit, path: Path, law: PolynomialSystem, margins: Floats
+    problem: Problem,
+    fit: Fit,
+    model: Linearisation,
+    path: Path,
+    law: PolynomialSystem,
+    margins: Floats,
 ) -> tuple[str, ...]:
     """Reasons not to trust a law.
 
@@ -73,6 +78,8 @@ def diagnose(
         The data, and the noise as it was estimated before any law was known.
     fit : Fit
         The final fit, its noise re-estimated from the residual.
+    model : Linearisation
+        Around it, of all candidates.
     path : Path
         On which its terms were chosen.
     law : PolynomialSystem
@@ -89,7 +96,7 @@ def diagnose(
         *_unfinished(fit),
         *_unmet(problem, fit),
         *_another_in_the_data(problem, fit, law),
-        *_selection(problem, fit, path, law),
+        *_selection(problem, fit, model, path, law),
         *_sampling(problem),
         *_standstill(law),
         *_narrow(law, margins),
@@ -201,7 +208,9 @@ def _another_in_the_data(problem: Problem, fit: Fit, law: PolynomialSystem) -> I
         )
 
 
-def _selection(problem: Problem, fit: Fit, path: Path, law: PolynomialSystem) -> Iterator[str]:
+def _selection(
+    problem: Problem, fit: Fit, model: Linearisation, path: Path, law: PolynomialSystem
+) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), fit.state, path)
     if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
         return  # what is left is the error of the splines, not noise: it settles nothing
@@ -210,7 +219,7 @@ def _selection(problem: Problem, fit: Fit, path: Path, law: PolynomialSystem) ->
     if tolerant:
         return  # weaker errors than those tolerated say nothing about the law
     # The offset stays where it is: with it free, the same law in another frame would count.
-    model = fit.collocation.linearise(fit.state, problem.form.searched)
+    model = model.of(problem.form.searched)
     yield from _left_over(model, fit.state)
     yield from _near_tie(problem, fit.state, model)
     yield from _nearer_home(problem, fit, law)

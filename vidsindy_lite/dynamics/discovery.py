@@ -14,7 +14,7 @@ from ..arrays import Floats, Ints
 from ..checks import check_array
 from .absent import intervals, unseen
 from .candidates import Library
-from .collocation import Fit
+from .collocation import Fit, Linearisation
 from .diagnostics import diagnose
 from .errors import residual_noise
 from .history import History, Step
@@ -303,7 +303,8 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     """
     units, state, collocation = problem.units, fit.state, fit.collocation
     form, exponents, (l, d) = problem.form, problem.exponents, state.coefficients.shape
-    covariance = _covariance(units, fit)
+    model = path.model if path.fit is fit else problem.model(fit)
+    covariance = _covariance(units, fit, model)
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
@@ -327,10 +328,10 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
             seen, (problem.noise if problem.kicked else residual_noise(fit)) * units.scale, np.nan
         ),
         model_error=_kicks(problem, fit),
-        warnings=diagnose(problem, fit, path, law, margins),
+        warnings=diagnose(problem, fit, model, path, law, margins),
         path=path.plateaus,
         history=tuple(history.steps),
-        absent=intervals(problem, fit, tolerated),
+        absent=intervals(problem, fit.state, model, tolerated),
         curves=tuple(
             BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
             for s in collocation.grid.splines(state.control_points)
@@ -345,13 +346,12 @@ def _kicks(problem: Problem, fit: Fit) -> Floats:
     return problem.process_noise * units.scale * np.sqrt(span / units.time)
 
 
-def _covariance(units: Units, fit: Fit) -> Floats:
+def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:
     """Covariance of coefficients and offset in units of the data; zero where nothing is free."""
     columns = np.flatnonzero(fit.state.free())
     size = len(fit.state.flat())
     covariance = np.zeros((size, size))
-    information = fit.collocation.linearise(fit.state, columns).information
-    covariance[np.ix_(columns, columns)] = inverse(information)
+    covariance[np.ix_(columns, columns)] = inverse(model.of(columns).information)
     factors = units.factors(fit.collocation.exponents)
     unit = np.concatenate([factors.T.ravel(), units.scale])
     for entry, first in fit.state.followers():

@@ -73,7 +73,7 @@ class Path:
     fit : Fit
         Around which the laws are found.
     model : Linearisation
-        Its quadratic model in all terms.
+        Its quadratic model: `Problem.model`.
     own : float
         The errors that the fit was weighted with; those of the law, where kicks are larger.
     level : float
@@ -125,8 +125,8 @@ def follow(problem: Problem, fit: Fit) -> Path:
     fit : Fit
         Around which.
     """
-    columns, terms_end = problem.columns(fit.state), len(problem.form.searched)
-    model = fit.collocation.linearise(fit.state, columns)
+    model, terms_end = problem.model(fit), len(problem.form.searched)
+    columns = model.columns
     prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
     own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))

@@ -16,7 +16,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
-from .collocation import CLEANEST, Collocation, Fit
+from .collocation import CLEANEST, Collocation, Fit, Linearisation
 from .errors import effective_noise, residual_noise, spread_to_unseen
 from .form import Form
 from .library import Function, extended, law_variables, monomials
@@ -163,6 +163,10 @@ class Problem:
         """Entries of `State.flat` that may differ from zero: candidates and moving axes."""
         size = self.form.candidates.size
         return np.concatenate([self.form.searched, size + np.flatnonzero(state.moving)])
+
+    def model(self, fit: Fit) -> Linearisation:
+        """The quadratic model around a fit, in all candidates and moving axes."""
+        return fit.collocation.linearise(fit.state, self.columns(fit.state))
 
     @property
     def home(self) -> Floats:
