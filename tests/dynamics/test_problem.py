@@ -11,7 +11,7 @@ from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.errors import residual_noise
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
-from vidsindy_lite.dynamics.search import _candidate, _closed, _variants
+from vidsindy_lite.dynamics.search import _as_shifted, _candidate, _closed, _variants
 from vidsindy_lite.dynamics.state import State
 
 
@@ -105,12 +105,14 @@ def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
     fit = fit_of(problem, (False, False))
     linear = np.repeat(problem.exponents.sum(axis=1) <= 1, 2).reshape(-1, 2)
     state = replace(fit.state, active=linear, coefficients=0.1 * linear, offset=np.zeros(2))
-    closed, law = _closed(problem, replace(fit, state=state), 1e2)
+    closed = _closed(problem, replace(fit, state=state), 1e2)
+    law = _as_shifted(problem, closed)
     origin = np.where(moving, (0.3, -0.2), problem.home)
     candidate = _candidate(problem, closed, law, origin, np.array(moving))
 
-    coefficients, information = law.at(origin)
-    estimate, penalties = coefficients.T.ravel(), np.tile(problem.penalties, 2)
+    coefficients, information, gradient = law.at(origin)
+    step, penalties = np.linalg.solve(information, gradient), np.tile(problem.penalties, 2)
+    estimate = coefficients.T.ravel() + step
     costs = {}
     for support in product([False, True], repeat=6):
         out = np.zeros(12, dtype=bool)
@@ -122,7 +124,8 @@ def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
     out = np.array(min(costs, key=costs.__getitem__))
     assert (candidate.state.active.T.ravel() == linear.T.ravel() & ~out).all()
     price = sum(moving) * OFFSET_PENALTY * problem.penalties[0]
-    expected = closed.collocation.objective(closed.state) + costs[tuple(out)] + price
+    fitted = closed.collocation.objective(closed.state) - gradient @ step
+    expected = fitted + costs[tuple(out)] + price
     assert candidate.criterion == pytest.approx(expected, rel=1e-9)
     assert (candidate.state.moving == moving).all()
     np.testing.assert_array_equal(candidate.state.offset, origin)

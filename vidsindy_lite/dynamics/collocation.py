@@ -29,6 +29,9 @@ CLEANEST = 1e-5
 NEARLY = 1e-2
 """Fall of the objective promised by the next step, below which a fit that ran out of steps has
 converged all the same: a tenth of a standard error, squared."""
+FAITHFUL = 1e-2
+"""A step whose fall missed what it promised by so little was the last: of a miss ``m`` of a promise
+``p``, third order in the step, the next step would promise some ``9 m^2 / p``."""
 STRONGEST_DAMPING = 1e2
 """Relative Levenberg-Marquardt damping at which a fit that still finds no lower point stops."""
 
@@ -410,7 +413,10 @@ class Collocation:
                 if damping > STRONGEST_DAMPING:
                     return Fit(state, self, Status.STALLED)
                 continue
+            miss = abs(value - trial_value - promise)
             state, value = trial, trial_value
+            if fraction == 1.0 and damping == 0.0 and miss**2 < FAITHFUL * tolerance * promise:
+                return Fit(state, self, Status.CONVERGED)
             damping = damping / 10 if damping > 1e-8 else 0.0
         near = damping == 0.0 and promise < NEARLY
         return Fit(state, self, Status.CONVERGED if near else Status.MAX_STEPS)

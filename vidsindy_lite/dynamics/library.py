@@ -162,15 +162,15 @@ def monomial_gradients(x: Floats, exponents: Ints) -> Floats:
     return np.stack(gradients, axis=-1)
 
 
-def shift_matrix(exponents: Ints, offset: Floats) -> Floats:
-    """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l).
+def shift_matrix(exponents: Ints, offset: Floats, rows: Ints | slice = slice(None)) -> Floats:
+    """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l), or some rows of it.
 
     The library has to be closed: with every monomial it holds all its divisors. An offset (d,)
     leaves the functions as they are.
     """
     still = np.zeros(exponents.shape[1] - len(offset))
     factors, lowered = _binomials(exponents.tobytes(), *exponents.shape)
-    return (factors * (-np.append(offset, still)) ** lowered).prod(axis=-1)
+    return (factors[rows] * (-np.append(offset, still)) ** lowered[rows]).prod(axis=-1)
 
 
 @lru_cache(maxsize=64)

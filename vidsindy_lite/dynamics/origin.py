@@ -34,12 +34,15 @@ class ShiftedLaw:
         Its information matrix, equation by equation.
     movable : ndarray of bool, shape (d,), optional
         Along which axes its origin is sought; all by default.
+    gradient : ndarray, shape (l d,), optional
+        What still pulls at the coefficients (see `subset_search`); nothing by default.
     """
 
     exponents: Ints
     coefficients: Floats
     information: Floats
     movable: Bools | None = None
+    gradient: Floats | None = None
 
     @property
     def d(self) -> int:
@@ -62,11 +65,17 @@ class ShiftedLaw:
     def _generators(self) -> Floats:
         return shift_generators(self.exponents)
 
-    def at(self, origin: Floats) -> tuple[Floats, Floats]:
-        """Coefficients (l, d) and information (l d, l d) in monomials of ``x - origin``."""
+    @cached_property
+    def _with_rates(self) -> Floats:
+        """The coefficients and their rates along the movable axes, which shifts carry alike."""
+        return np.stack([self.coefficients, *(self._generators[self.axes] @ self.coefficients)])
+
+    def at(self, origin: Floats) -> tuple[Floats, Floats, Floats]:
+        """Coefficients (l, d), information and gradient in monomials of ``x - origin``."""
         forth = shift_matrix(self.exponents, -origin)
         back = np.kron(np.eye(self.d), shift_matrix(self.exponents, origin))
-        return forth @ self.coefficients, back.T @ self.information @ back
+        pull = np.zeros(len(back)) if self.gradient is None else back.T @ self.gradient
+        return forth @ self.coefficients, back.T @ self.information @ back, pull
 
     def vanish(self, origin: Floats, entries: Ints) -> Floats:
         """Move an origin as little as possible so that the given coefficients vanish.
@@ -79,10 +88,11 @@ class ShiftedLaw:
             Equation and term of each coefficient.
         """
         equations, terms = entries.T
+        here = self._with_rates[:, :, equations]
         for _ in range(6):
-            estimate = shift_matrix(self.exponents, -origin) @ self.coefficients
-            rates = (self._generators[self.axes] @ estimate)[:, terms, equations].T
-            step, *_ = np.linalg.lstsq(rates, -estimate[terms, equations], rcond=1e-6)
+            shift = shift_matrix(self.exponents, -origin, terms)
+            estimate, *rates = np.einsum("kl,alk->ak", shift, here)
+            step, *_ = np.linalg.lstsq(np.transpose(rates), -estimate, rcond=1e-6)
             origin = origin.copy()
             origin[self.axes] += step
             if not np.abs(origin).max() < 1e6:

@@ -184,7 +184,10 @@ def _in_sparse_frames(
 ) -> list[Fit]:
     """Supports in the frames where the law is sparsest, by the quadratic model."""
     fit = select(problem, fit, weight, "subset search, centred frame", history)
-    closed, law = _closed(problem, fit, weight)
+    closed = _closed(problem, fit, weight)
+    # A law exact in another frame has no firm minimum here: some steps are near enough.
+    closed = closed.collocation.solve(closed.state, tolerance=0.1, max_steps=8)
+    law = _as_shifted(problem, closed)
     x, movable = fit.collocation.grid.x, problem.form.movable
     low, high = (
         np.where(movable, extreme.reduce(x), problem.home) for extreme in (np.fmin, np.fmax)
@@ -207,8 +210,8 @@ def _variants(origin: Floats, home: Floats) -> list[tuple[Floats, Bools]]:
     return [(np.where(mask, origin, home), np.array(mask)) for mask in masks]
 
 
-def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]:
-    """The law in the centred frame, all terms of its shift closure fitted."""
+def _closed(problem: Problem, fit: Fit, weight: float) -> Fit:
+    """The law in the centred frame, with all terms of its shift closure: these are 0 as yet."""
     d, exponents = problem.d, problem.exponents
     state = replace(
         fit.state,
@@ -217,30 +220,28 @@ def _closed(problem: Problem, fit: Fit, weight: float) -> tuple[Fit, ShiftedLaw]
         offset=np.zeros(d),
         moving=np.zeros(d, dtype=bool),
     )
-    collocation = problem.weighted(fit.collocation, weight)
-    # A law exact in another frame has no firm minimum here: some steps are near enough.
-    closed = collocation.solve(state, tolerance=0.1, max_steps=8)
-    return closed, _as_shifted(problem, closed)
+    return replace(fit, state=state, collocation=problem.weighted(fit.collocation, weight))
 
 
 def _as_shifted(problem: Problem, fit: Fit) -> ShiftedLaw:
     """The law of a fit, whose terms are closed under shifts, with its information."""
     state, columns = fit.state, np.flatnonzero(fit.state.free())
     information = np.diag(np.where(state.free()[: -problem.d], 0.0, 1e30))
-    information[np.ix_(columns, columns)] = fit.collocation.linearise(state, columns).information
+    model, gradient = fit.collocation.linearise(state, columns), np.zeros(len(information))
+    information[np.ix_(columns, columns)], gradient[columns] = model.information, model.gradient
     movable = problem.form.movable
-    return ShiftedLaw(problem.exponents, state.coefficients, information, movable)
+    return ShiftedLaw(problem.exponents, state.coefficients, information, movable, gradient)
 
 
 def _candidate(
     problem: Problem, closed: Fit, law: ShiftedLaw, origin: Floats, moving: Bools
 ) -> Fit:
     """The cheapest support at an origin, by the quadratic model around the closed law."""
-    coefficients, information = law.at(origin)
+    coefficients, information, gradient = law.at(origin)
     columns = np.flatnonzero(closed.state.free())
     _, solution, value = subset_search(
         information[np.ix_(columns, columns)],
-        np.zeros(len(columns)),
+        gradient[columns],
         coefficients.T.ravel()[columns],
         problem.prices[columns],
         np.ones(len(columns), dtype=bool),
@@ -315,7 +316,8 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
     state = fit.state
     if not state.moving.any():
         return fit
-    closed, law = _closed(problem, fit, FINAL_WEIGHT)
+    closed = _closed(problem, fit, FINAL_WEIGHT)
+    law = _as_shifted(problem, closed)
     variants = _variants(state.offset, problem.home)
     priced = [_candidate(problem, closed, law, *variant) for variant in variants]
     closest = min(priced, key=lambda candidate: candidate.criterion)
@@ -329,7 +331,8 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
 def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
     """Move axes off home where terms make up for their staying there, while the criterion falls."""
     for origin in _thinner(problem, fit.state):
-        closed, law = _closed(problem, fit, FINAL_WEIGHT)
+        closed = _closed(problem, fit, FINAL_WEIGHT)
+        law = _as_shifted(problem, closed)
         away = fit.state.moving | (origin != fit.state.offset)
         start = _candidate(problem, closed, law, origin, away)
         trial = select(problem, start, FINAL_WEIGHT, "offset away", history)
