@@ -122,6 +122,14 @@ def test_a_fit_stops_when_nothing_more_is_promised(problem, state):
     assert problem.solve(solved, tolerance=1e-3, max_steps=1).status is Status.CONVERGED
 
 
+@pytest.mark.parametrize("tolerance", [1.0, 1e-2, 1e-4])
+def test_what_is_left_after_the_last_step_is_less_than_was_tolerated(problem, state, tolerance):
+    fit = problem.solve(state, tolerance=tolerance, max_steps=200)
+    _, promise = problem.linearise(fit.state, np.flatnonzero(fit.state.free())).newton()
+    assert fit.status is Status.CONVERGED
+    assert promise < tolerance
+
+
 def test_a_fit_says_how_it_ended(problem, state):
     assert problem.solve(state, max_steps=1).status is Status.MAX_STEPS
     done = problem.solve(state, tolerance=1e-9, max_steps=200)

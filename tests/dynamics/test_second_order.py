@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
 from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.collocation import Status
 from vidsindy_lite.dynamics.discovery import History
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.library import shift_matrix
@@ -204,10 +205,20 @@ def test_all_axes_leave_home_one_after_the_other():
     control = fit_curves(collocation, problem.curves)
     state = State(control, 0.0 * active, active, problem.home, np.zeros(4, dtype=bool))
     at_home = select(problem, collocation.solve(state), FINAL_WEIGHT, "at home", History())
+    unfinished = replace(at_home, status=Status.MAX_STEPS)
+    assert leave_home(problem, unfinished, History()) is unfinished  # its terms tell nothing
     fit = leave_home(problem, at_home, History())
     assert at_home.state.active.sum() == 10
     assert fit.state.active.sum() == 6
     assert problem.units.point(fit.state.offset)[:2] == pytest.approx(rest, abs=1e-4)
+
+
+def test_of_noise_alone_no_second_order_is_asked():
+    x = np.random.default_rng(0).normal(size=(200, 2))
+    found = discover(np.linspace(0, 20, 200), x, degree=1)
+    assert found.system.order == 1
+    assert found.note == ""
+    assert found.warnings
 
 
 def test_an_order_that_is_none():

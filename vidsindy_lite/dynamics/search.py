@@ -330,6 +330,8 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
 
 def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
     """Move axes off home where terms make up for their staying there, while the criterion falls."""
+    if fit.status is not Status.CONVERGED:
+        return fit  # no law whose terms could tell
     for origin in _thinner(problem, fit.state):
         closed = _closed(problem, fit, FINAL_WEIGHT)
         law = _as_shifted(problem, closed)

@@ -22,7 +22,7 @@ from tqdm import tqdm
 from ..arrays import Floats
 from ..checks import check_integer
 from .candidates import Library, check_library
-from .collocation import Fit
+from .collocation import Fit, Status
 from .discovery import Discovery, conclude
 from .form import Form
 from .history import History
@@ -47,6 +47,8 @@ EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
 RICHEST = 2.0
 """Most terms of a law that refines another, over the terms of that."""
+DROWNED = 0.5
+"""Errors, relative to the spread of the data, beyond which no smoothed curve shows accelerations."""
 MOST_HALVINGS = 4
 """Most halvings of the knot spans."""
 MOST_WEIGHINGS = 2
@@ -131,7 +133,9 @@ def discover(
     if order == 2:
         return solved(Form.of(names, library, 2, origin))[0]
     found, problem = solved(Form.of(names, library, 1, origin))
-    if order == 1 or library.given or not found.warnings or not accelerated(problem.curves):
+    settled = order == 1 or library.given or not found.warnings
+    drowned = problem.noise.max() > DROWNED
+    if settled or drowned or not accelerated(problem.curves):
         return found
     try:
         second, _ = solved(Form.of(names, library, 2, origin))
@@ -182,7 +186,7 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
     fit = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
     columns = np.flatnonzero(fit.state.free())
-    for _ in range(MOST_HALVINGS):
+    for _ in range(MOST_HALVINGS if fit.status is Status.CONVERGED else 0):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
         finer = problem.collocation(segments, problem.errors(fit))
