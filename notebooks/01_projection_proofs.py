@@ -332,14 +332,14 @@ def walked(degrees):
 figures, seen = {}, {}
 for degrees in range(0, 360, 30):
     pair = walked(degrees)
-    seen[degrees] = [one.project(x) for one in pair]
+    seen[degrees] = [one.project(x[:500]) for one in pair]
     upright, rolled = (np.linalg.norm(image - half, axis=1) for image in seen[degrees])
     assert np.allclose(upright, rolled, atol=1e-6)  # the same image, turned
     fig = figures[f"{degrees} degrees"] = plots.plot_tracks(seen[degrees], pair)
     for axes, title in zip(fig.axes, ("angle turned back", "angle as it was"), strict=True):
         axes.set_title(title)
 caption = "The image of a camera that walks around: upright (left), and rolling with the axes of the plane (right)."
-save_slider("projection_walk", figures, caption=caption, numbers={f"{k} degrees": v for k, v in seen.items()})
+save_slider("projection_walk", figures, caption=caption, numbers={"degrees": list(seen), "first": seen[0]})
 
 # %% [markdown]
 # *Move the slider: a camera walks around the target. Left with its angle turned back, right without.*
