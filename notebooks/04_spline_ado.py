@@ -39,7 +39,6 @@ level: float = 0.1  # standard deviation of the noise over that of each coordina
 seed: int = 0  # of all noise
 
 # %%
-import textwrap
 from dataclasses import replace
 from time import perf_counter
 from timeit import repeat as timed
@@ -778,7 +777,7 @@ def tolerating(s):
         at = next(plateau for plateau in path if s <= plateau.high)
         held = [term for term, kept in zip(persistent.native.terms, at.terms, strict=True) if kept]
         axes.axvline(s, color="C0")
-        axes.set_xlabel(textwrap.fill(", ".join(held), 28))
+        axes.set_xlabel(", ".join(held) if len(held) < 7 else f"{len(held)} terms")
     return fig
 
 
