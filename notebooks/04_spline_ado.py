@@ -51,7 +51,7 @@ from scipy.optimize import approx_fprime
 from tqdm import tqdm
 
 from vidsindy_lite import discover, dynamics
-from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+from vidsindy_lite.companion.artifacts import save_figure, save_slider, save_table, versions
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,
@@ -769,6 +769,25 @@ save_figure("solver_path", fig, caption=caption, numbers=dict(zip("xyz", numbers
 # *Small errors tolerated: a dense law, another one at every step. Then one that stays (orange): the true terms,
 # in the frame of the origin that was found. In the frame of the data a small constant may remain: a smooth error
 # leaves a bias in coefficients that ought to cancel there, and no error bar knows of it.*
+
+# %%
+def tolerating(s):
+    fig = persistent.plot_path()
+    for axes, path in zip(fig.axes, persistent.path, strict=True):
+        at = next(plateau for plateau in path if s <= plateau.high)
+        held = [term for term, kept in zip(persistent.native.terms, at.terms, strict=True) if kept]
+        axes.axvline(s, color="C0")
+        axes.set_xlabel(", ".join(held) if len(held) < 7 else f"{len(held)} terms")
+    return fig
+
+
+tolerated = np.geomspace(persistent.path[0][0].low, 0.9, 12)
+figures = {f"{100 * s:.2g} % tolerated": tolerating(s) for s in tolerated}
+caption = "The law that is cheapest while an error is tolerated, equation by equation."
+save_slider("solver_path_slider", figures, caption=caption, numbers={"tolerated": tolerated})
+
+# %% [markdown]
+# *Move the slider: the terms of each law stand below it.*
 
 # %% [markdown]
 # ## The offset: the origin in which the law is sparsest
