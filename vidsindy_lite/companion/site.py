@@ -126,6 +126,7 @@ def _described(executed: Path) -> nbformat.NotebookNode:
             cell.metadata["mystnb"] = {"image": {"alt": said}}
     title, _, rest = notebook.cells[0].source.partition("\n")
     long = f"{seconds:.0f} seconds" if seconds < 120 else f"{seconds / 60:.0f} minutes"
-    takes = f"*About {reading_minutes(executed)} minutes to read, {long} to run.*"
+    running = f", {long} to run" if seconds else ""
+    takes = f"*About {reading_minutes(executed)} minutes to read{running}.*"
     notebook.cells[0].source = f"{title}\n\n{takes}\n{rest}"
     return notebook
