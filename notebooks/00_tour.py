@@ -26,6 +26,9 @@
 # * a second frame of reference, which nobody told the program, in which the law is sparse;
 # * what the law is good for: a forecast, and how far ahead it holds.
 #
+# **Afterwards you can** go from three video files to a law and its forecast, and say what each step on the way
+# contributes.
+#
 # **What you need**: nothing but curiosity. The later notebooks take one step each.
 #
 # **Covers** the framework of the paper (Fig. 1), on one system.

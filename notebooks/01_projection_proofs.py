@@ -25,6 +25,9 @@
 # * the in-plane offset as two *signed* distances;
 # * four places where the paper's text does not compute, each shown by a number.
 #
+# **Afterwards you can** project a point on the view plane of any camera, and prove that the plane's position along
+# its normal does not matter.
+#
 # **What you need**: vectors, matrices, the cross product. Nothing is random here.
 #
 # **Covers** Eq. (1)-(2) and the appendices "Detail of Projection", "Plane Projection Proof" and

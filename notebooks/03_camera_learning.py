@@ -26,6 +26,9 @@
 # * exact pixels give exact cameras; whole pixels give the path to about 0.2 px;
 # * lost views, and tracks that cannot calibrate anything.
 #
+# **Afterwards you can** calibrate cameras by the motion that they see, and read in the residuals whether to trust
+# them.
+#
 # **What you need**: the camera equation of the [first notebook](01_projection_proofs.ipynb). The tracks
 # are computed here, not taken from videos, so that the true answer is known.
 #

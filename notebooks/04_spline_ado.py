@@ -27,6 +27,9 @@
 # * each algorithm by hand, in some ten lines, beside the package's: splines, gaps, STRidge, the alternation, the search;
 # * error bars, the bound that none can beat, and how and when all of it fails.
 #
+# **Afterwards you can** write down each algorithm between a noisy path and its law, and say what its error bars and
+# warnings are worth.
+#
 # **What you need**: least squares. The trajectory is computed here, in the paper's reference frame, and
 # made noisy, so that the true law is known.
 #

@@ -26,6 +26,8 @@
 # * PySINDy, E-SINDy, WeakSINDy and Model-A on the same trajectories, in five trials;
 # * all of it from whole pixels, which is the paper's regime, and from sub-pixel tracks, which is an upper bound.
 #
+# **Afterwards you can** read the paper's main tables, and compare methods on equal terms.
+#
 # **What you need**: the [tour](00_tour.ipynb); how the law is found is the subject of
 # [notebook 04](04_spline_ado.ipynb).
 #

@@ -27,6 +27,8 @@
 # * whether error bars hold under noise, and whether a wrong law is flagged;
 # * how little of all this is due to videos and cameras.
 #
+# **Afterwards you can** tell how much noise and how many gaps a law survives, and what limits it.
+#
 # **What you need**: [notebook 05](05_discovery.ipynb), of which this is the sequel.
 #
 # **Covers** Fig. 3, Figs. S4-S10, Table 2.

@@ -26,6 +26,8 @@
 # * the reconstructed path with its gaps;
 # * the equations, term by term with standard errors, in five trials.
 #
+# **Afterwards you can** follow a target that vanishes, and see what its gaps cost the law.
+#
 # **What you need**: the [tour](00_tour.ipynb); how the target is tracked is the subject of
 # [notebook 02](02_videos_and_tracking.ipynb).
 #

@@ -24,7 +24,8 @@ LONGEST = 15  # lines of a code cell
 
 # What a notebook says at its opening and its close, in this order.
 SECTIONS = (
-    r"\*\*What you will see\*\*", r"\*\*What you need\*\*", r"\*\*Covers\*\*",
+    r"\*\*What you will see\*\*", r"\*\*Afterwards you can\*\*", r"\*\*What you need\*\*",
+    r"\*\*Covers\*\*",
     r"^## What we learned", r"What the paper says,? and what we found", r"^## Exercises",
     r"^## Run time and versions",
 )  # fmt: skip
@@ -361,7 +362,7 @@ def test_import_gate_accepts_four_places(pair):
 
 STORY = """\
 # # A tiny notebook
-# **What you will see** **What you need** **Covers**
+# **What you will see** **Afterwards you can** **What you need** **Covers**
 
 # %%
 assert True
@@ -389,6 +390,7 @@ def test_story_gate_accepts_a_whole_story(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new"),
     [
+        ("**Afterwards you can**", ""),
         ("**Covers**", ""),
         ("## What we learned", ""),
         ("**What the paper says and what we found.**", ""),

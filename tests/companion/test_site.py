@@ -94,6 +94,12 @@ def test_formulas_and_figures_are_drawn(site, browser):
 
 
 @pytest.mark.slow
+def test_a_notebook_says_how_long_it_takes(site):
+    page = (site / "notebooks" / "03_camera_learning.html").read_text("utf-8")
+    assert re.search(r"</h1>\s*<p><em>About \d+ minutes to read, \d+ seconds to run.</em>", page)
+
+
+@pytest.mark.slow
 def test_pages_hold_the_sliders_of_their_notebooks(site):
     for executed in (ROOT / "notebooks").glob("*.ipynb"):
         page = (site / "notebooks" / f"{executed.stem}.html").read_text("utf-8")
@@ -158,6 +164,19 @@ def test_pages_lead_to_each_other_and_words_to_pages(site, browser):
     while not (found := links(browser, "#search-results li a")) and time.monotonic() < deadline:
         time.sleep(0.2)
     assert any("03_camera_learning.html" in link for link in found)
+
+
+@pytest.mark.slow
+@needs_browser
+def test_arrow_keys_go_from_slide_to_slide(site, browser):
+    seen = browser.open(site / "docs" / "slides.html")
+    assert min(seen["images"], seen["formulas"]) > 10
+    at = """[...document.querySelectorAll(".content section section")].findLastIndex(
+        slide => slide.getBoundingClientRect().top < 2)"""
+    for key, expected in (("ArrowRight", 0), ("ArrowRight", 1), ("ArrowLeft", 0)):
+        browser.command("Input.dispatchKeyEvent", type="rawKeyDown", key=key)
+        answer = browser.command("Runtime.evaluate", expression=at, returnByValue=True)
+        assert answer["result"]["value"] == expected
 
 
 def links(browser, selector):
@@ -231,6 +250,7 @@ def test_what_is_left_of_an_interrupted_site_may_be_replaced(tmp_path, monkeypat
         (tmp_path / "root" / folder).mkdir(parents=True)
     for name in ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md"):
         (tmp_path / "root" / name).write_text("# One\n")
+    (tmp_path / "root" / "docs" / "teaching.md").write_text("# No plan\n")
     monkeypatch.setattr("vidsindy_lite.companion.site.Sphinx", Interrupted)
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
