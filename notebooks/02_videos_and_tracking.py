@@ -27,6 +27,9 @@
 # * a learned detector, for backgrounds that move;
 # * a path in space with gaps where two of three cameras lost sight of the target.
 #
+# **Afterwards you can** judge a track: where it is exact, where the target is hidden, and which detector a film asks
+# for.
+#
 # **What you need**: the idea of the [first notebook](01_projection_proofs.ipynb), that a camera sees a
 # flat, scaled image of the motion.
 #

@@ -26,6 +26,9 @@
 # * exact pixels give exact cameras; whole pixels give the path to about 0.2 px;
 # * lost views, and tracks that cannot calibrate anything.
 #
+# **Afterwards you can** calibrate cameras by the motion that they see, and read in the residuals whether to trust
+# them.
+#
 # **What you need**: the camera equation of the [first notebook](01_projection_proofs.ipynb). The tracks
 # are computed here, not taken from videos, so that the true answer is known.
 #
@@ -35,6 +38,7 @@
 profile: str = "full"  # full or quick
 system: str = "Lorenz"  # one of vidsindy_lite.study.SYSTEMS
 frames: int = 500  # video frames per camera
+pixel_noise: float = 2.0  # of the noisy tracks, px
 seed: int = 0  # of all pixel noise
 
 # %%
@@ -47,7 +51,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from vidsindy_lite import Rig, cameras, learn_cameras, reconstruct, residuals
-from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+from vidsindy_lite.companion.artifacts import save_figure, save_slider, save_table, versions
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -80,7 +84,7 @@ save_figure("cameras_rig", fig, caption=caption, numbers={"t": t, "x": x})
 # *Three cameras around a target: each view plane holds a different flat image of the same path (black).*
 
 # %%
-fig = plots.plot_tracks(tracks, truth)
+fig = plots.plot_tracks(tracks, truth.cameras)
 caption = "What is given: one pixel track per camera, v pointing down."
 numbers = {f"camera {i}": track for i, track in enumerate(tracks, start=1)}
 save_figure("cameras_tracks", fig, caption=caption, numbers=numbers)
@@ -175,7 +179,7 @@ assert np.linalg.matrix_rank(eq_4) == len(stack) - np.linalg.matrix_rank(stack) 
 # %%
 rng = np.random.default_rng(seed)
 rounded = [np.round(track) for track in tracks]
-noisy = [track + 2 * rng.normal(size=track.shape) for track in tracks]
+noisy = [track + pixel_noise * rng.normal(size=track.shape) for track in tracks]
 cameras.learn_cameras_lbfgs(tracks, start)  # so that importing PyTorch is not timed
 
 
@@ -190,7 +194,7 @@ def row(pixels, observed, method):
 
 
 # %%
-cases = {"exact": tracks, "rounded": rounded, "2 px noise": noisy}
+cases = {"exact": tracks, "rounded": rounded, f"{pixel_noise:g} px noise": noisy}
 methods = {
     "paper": cameras.learn_cameras_eq4,
     "gradient": cameras.learn_cameras_lbfgs,
@@ -219,14 +223,14 @@ def errors_of(method, noise, number):
 
 
 names = {"paper": "Eq. (4)", "joint": "joint fit"}
-errors = {name: errors_of(method, 2.0, trials) for method, name in names.items()}
+errors = {name: errors_of(method, pixel_noise, trials) for method, name in names.items()}
 spread = {name: error.std(axis=0).max(axis=0) for name, error in errors.items()}
 assert (spread["joint fit"] < spread["Eq. (4)"]).all()
 
 # %%
 fig = plots.plot_calibration_errors(errors)
 caption = (
-    "Errors of the learned cameras in repeated trials with 2 px noise: the joint fit is closer."
+    f"Errors of the learned cameras in repeated trials with {pixel_noise:g} px noise: the joint fit is closer."
 )
 save_figure("cameras_trials", fig, caption=caption, numbers=errors)
 
@@ -290,12 +294,32 @@ save_figure(
 # below, is about 0.2 px rms.*
 
 # %% [markdown]
+# And with more noise in the pixels? Cameras and path are learned anew for each level, with the same draw times the level.
+
+# %%
+draws = [np.random.default_rng(seed + i).normal(size=track.shape) for i, track in enumerate(tracks)]
+part, figures, off = slice(0, 150), {}, {}
+for level in (0, 0.25, 0.5, 1, 2, 4, 8):
+    observed = [track + level * draw for track, draw in zip(tracks, draws, strict=True)]
+    path = reconstruct(observed, learn_cameras(observed, start))
+    off[level] = np.sqrt(np.mean((path - x) ** 2)) / pixel
+    fig = plots.plot_reconstruction(t[part], x[part], path[part], pixel)
+    fig.axes[1].set_ylim(-20, 20)
+    figures[f"noise of {level} px"] = fig
+assert all(off[level] < level for level in off if level)
+caption = "Path in space (above) and its error (below) as the noise of the pixels grows."
+save_slider("cameras_noise_slider", figures, caption=caption, numbers={"noise": list(off), "rmse": list(off.values())})
+
+# %% [markdown]
+# *Move the slider: noise in the pixels comes through in space, weakened a little, as three views share it.*
+
+# %% [markdown]
 # The truth is not known with real videos, but the **residuals** are: by how many pixels the
 # reconstructed point misses each track. Three of the six numbers of a frame are used up by the point, so
 # noise of $\sigma$ leaves $\sigma/\sqrt2$.
 
 # %%
-for name, observed, sigma in (("rounded", rounded, 12**-0.5), ("2 px noise", noisy, 2.0)):
+for name, observed, sigma in (("rounded", rounded, 12**-0.5), ("noisy", noisy, pixel_noise)):
     missed = np.hstack(residuals(observed, learn_cameras(observed, start)))
     print(f"{name}: rms {np.sqrt(np.mean(missed**2)):.3f} px, expected {sigma / 2**0.5:.3f} px")
     assert np.isclose(np.sqrt(np.mean(missed**2)), sigma / 2**0.5, rtol=0.1)

@@ -27,6 +27,8 @@
 # * perspective cameras behind the same methods, learned from one calibrated camera;
 # * that the image of a ball is not centred on the image of its centre, and what whole pixels cost.
 #
+# **Afterwards you can** tell from residuals that a camera model is wrong, and how many millimetres that costs.
+#
 # **What you need**: the camera equation and its learning, [notebook 03](03_camera_learning.ipynb).
 #
 # **Covers** Appendix "Lab Experiment on Trajectory Extraction". The paper's footage is **not public**,

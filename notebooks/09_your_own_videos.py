@@ -26,6 +26,8 @@
 # * what to do about a camera whose position cannot be trusted;
 # * two targets at once, and which of them drives the other.
 #
+# **Afterwards you can** get a law from films of your own, and check all that has to hold before you believe it.
+#
 # **What you need**: the [tour](00_tour.ipynb); how cameras are learned is the subject of
 # [notebook 03](03_camera_learning.ipynb).
 #

@@ -27,6 +27,8 @@
 # * where the largest errors come from: two are clocks, one is a ruler;
 # * the list of all findings, with what each of them means for the results.
 #
+# **Afterwards you can** recompute a paper's claims from its own formulas and tables.
+#
 # **What you need**: the geometry of [notebook 01](01_projection_proofs.ipynb), the cameras of
 # [notebook 03](03_camera_learning.ipynb). The paper's numbers are data in `vidsindy_lite/published.py`.
 #

@@ -25,6 +25,8 @@
 # * eight chaotic flows with drift, outliers, coarse steps, correlated noise, kicks;
 # * for each: how often the law is exact, how often it is wrong and nothing said so, how long it takes.
 #
+# **Afterwards you can** say on which data which method finds the law, and which of them warns when it does not.
+#
 # **What you need**: [notebook 06](06_robustness_and_ablation.ipynb), of which this is the sequel outside the
 # paper's protocol.
 #

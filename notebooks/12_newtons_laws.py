@@ -27,6 +27,8 @@
 # * a motion that is kicked at random, and how strong the kicks are;
 # * a pendulum at a large amplitude, whose law is no polynomial.
 #
+# **Afterwards you can** find a law of motion from positions alone: gravity, drag, springs, and when to doubt them.
+#
 # **What you need**: the objective of [notebook 04](04_spline_ado.ipynb), the cameras of
 # [notebook 08](08_lab_experiment.ipynb).
 #

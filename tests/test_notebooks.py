@@ -24,7 +24,8 @@ LONGEST = 15  # lines of a code cell
 
 # What a notebook says at its opening and its close, in this order.
 SECTIONS = (
-    r"\*\*What you will see\*\*", r"\*\*What you need\*\*", r"\*\*Covers\*\*",
+    r"\*\*What you will see\*\*", r"\*\*Afterwards you can\*\*", r"\*\*What you need\*\*",
+    r"\*\*Covers\*\*",
     r"^## What we learned", r"What the paper says,? and what we found", r"^## Exercises",
     r"^## Run time and versions",
 )  # fmt: skip
@@ -161,9 +162,11 @@ def output_problems(path):
             text = output.get("text", "") + output.get("data", {}).get("text/plain", "")
             if found := VOLATILE.search(text):
                 problems.append(f"cell {index} prints an address or a path: {found[0]}")
-        pictures = [o for o in cell.get("outputs", []) if "image/png" in o.get("data", {})]
-        if re.search(r"^save_figure\(", cell.source, re.MULTILINE) and not pictures:
-            problems.append(f"cell {index} saves a figure that nobody sees")
+        shown = [output.get("data", {}) for output in cell.get("outputs", [])]
+        sliders = [data for data in shown if "data:image/png" in data.get("text/html", "")]
+        for call, seen in (("figure", [d for d in shown if "image/png" in d]), ("slider", sliders)):
+            if re.search(rf"^save_{call}\(", cell.source, re.MULTILINE) and not seen:
+                problems.append(f"cell {index} saves a {call} that nobody sees")
     return problems
 
 
@@ -359,7 +362,7 @@ def test_import_gate_accepts_four_places(pair):
 
 STORY = """\
 # # A tiny notebook
-# **What you will see** **What you need** **Covers**
+# **What you will see** **Afterwards you can** **What you need** **Covers**
 
 # %%
 assert True
@@ -387,6 +390,7 @@ def test_story_gate_accepts_a_whole_story(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new"),
     [
+        ("**Afterwards you can**", ""),
         ("**Covers**", ""),
         ("## What we learned", ""),
         ("**What the paper says and what we found.**", ""),
@@ -420,9 +424,10 @@ def test_output_gate_fails_on_a_large_notebook(pair):
     assert "at most 600000" in output_problems(pair)[0]
 
 
-def test_output_gate_fails_on_a_figure_that_is_not_shown(pair):
-    edit(pair.with_suffix(".ipynb"), '"x + 1"', "\"save_figure('waves', figure)\"")
-    assert output_problems(pair) == ["cell 3 saves a figure that nobody sees"]
+@pytest.mark.parametrize("kind", ["figure", "slider"])
+def test_output_gate_fails_on_a_figure_that_is_not_shown(pair, kind):
+    edit(pair.with_suffix(".ipynb"), '"x + 1"', f"\"save_{kind}('waves', figure)\"")
+    assert output_problems(pair) == [f"cell 3 saves a {kind} that nobody sees"]
 
 
 def test_orphan_gate_fails_on_an_executed_half_alone(pair):

@@ -42,6 +42,14 @@ class VideoDiscovery(Observation):
     discovery: Discovery
 
     @property
+    def path(self) -> Floats:
+        """The path that obeys the law, in the shape of ``x`` and with a fraction of its noise.
+
+        In gaps, too, that the law bridges; NaN elsewhere.
+        """
+        return self.discovery.curve(self.t)[:, : self.x.shape[1]]
+
+    @property
     def driven(self) -> str:
         """Which of several targets drive which others, and by what terms; empty for one target."""
         return _driven(self.discovery.system) if self.targets > 1 else ""

@@ -6,12 +6,9 @@ from helpers import trajectory
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras import Lags, uncertainty
-from vidsindy_lite.cameras.uncertainty import (
-    long_run_covariance,
-    systematic_errors,
-    trailing_errors,
-)
+from vidsindy_lite.cameras import Lags
+from vidsindy_lite.cameras.covariance import fitted_factor, long_run_covariance
+from vidsindy_lite.cameras.uncertainty import systematic_errors, trailing_errors
 from vidsindy_lite.cameras.unknowns import Unknowns
 
 NOISE = 0.05  # pixels
@@ -25,9 +22,9 @@ def dependent(rng, n, memory):
     return series
 
 
-def learned_rig(rng, memory, frames=250):
+def learned_rig(rng, memory, frames=250, path=trajectory):
     """A random rig learned from noisy tracks: errors of its parameters, and the path's modes."""
-    x = trajectory(rng, frames)
+    x = path(rng, frames)
     truth = vl.Rig.around(x)
     rig = truth.uncalibrated()
     tracks = [c.project(x) + NOISE * dependent(rng, frames, memory) for c in truth.cameras]
@@ -52,6 +49,24 @@ def test_errors_of_cameras_are_as_large_as_stated(memory):
     spread = np.sqrt(np.mean(np.square(pulls)))
     assert 0.8 < spread < 1.3  # with independent errors taken for granted: 2 at the second
     assert np.abs(pulls).max() < 5
+
+
+def throw(rng, frames):
+    """A ball in a vertical plane, up and down again."""
+    t, azimuth = np.linspace(0, 2, frames)[:, None], rng.uniform(0, 2 * np.pi)
+    velocity = np.array([2 * np.cos(azimuth), 2 * np.sin(azimuth), rng.uniform(8, 10)])
+    return t * velocity - [0, 0, 4.9] * t**2
+
+
+def test_errors_of_cameras_that_saw_one_short_throw_are_not_understated():
+    """In 60 frames, chance alone makes the scores of residuals look like less than their noise."""
+    pulls = []
+    for seed in np.random.SeedSequence(6).spawn(60):
+        _, modes, x, learned = learned_rig(np.random.default_rng(seed), 0.0, 60, throw)
+        turned = vl.reconstruct([c.project(x) for c in vl.Rig.around(x).cameras], learned) - x
+        sizes, *_ = np.linalg.lstsq(modes.reshape(len(modes), -1).T, turned.ravel())
+        pulls.append(sizes)
+    assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < 1.1
 
 
 def test_known_cameras_share_no_errors():
@@ -244,14 +259,14 @@ def test_covariance_of_independent_residuals_is_that_of_least_squares():
     rng = np.random.default_rng(3)
     slope = rng.normal(size=(4000, 3, 2))
     missed = 0.2 * rng.normal(size=(4000, 3))
-    factor = uncertainty._sandwich(missed, slope, np.zeros(2), 0.2)
+    factor = fitted_factor(missed, slope, np.zeros(2), 0.2)
     flat = slope.reshape(-1, 2)
     expected = 0.2**2 * np.linalg.inv(flat.T @ flat)
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     assert np.abs(factor @ factor.T - expected).max() < 0.15 * size.max()
     # Every residual three times in a row: three times the variance for as many numbers.
     thrice = np.repeat(missed, 3, 0), np.repeat(slope, 3, 0)
-    tripled = uncertainty._sandwich(*thrice, np.zeros(2), 0.2)
+    tripled = fitted_factor(*thrice, np.zeros(2), 0.2)
     grown = np.trace(tripled @ tripled.T) / np.trace(factor @ factor.T)
     assert 0.6 < grown < 1.1  # and a third if they were taken as independent
 

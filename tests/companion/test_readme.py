@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.cameras import Rig
-from vidsindy_lite.companion.readme import HEADLINES, PARTS, fill, written_pages
+from vidsindy_lite.companion.readme import HEADLINES, PARTS, fill, reading_minutes, written_pages
 from vidsindy_lite.stamp import PACKAGE
 
 ROOT = PACKAGE.parent
@@ -21,6 +21,14 @@ NUMBER = re.compile(r"\d+\.\d*")
 
 def blocks(language, page=GUIDE):
     return re.findall(rf"^```{language}\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+
+
+def test_minutes_to_read_are_those_of_words_and_lines(tmp_path):
+    notebook = tmp_path / "a.py"
+    notebook.write_text(f"# %% [markdown]\n# {'word ' * 800}\n\n# %%\n" + "x = 1\n" * 60)
+    assert reading_minutes(notebook) == 10  # 4 for the words, 5 for the lines
+    notebook.write_text("# %% [markdown]\n# word\n")
+    assert reading_minutes(notebook) == 5
 
 
 def test_the_readme_fits_one_screen():

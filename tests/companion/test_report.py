@@ -199,8 +199,8 @@ InteractiveShell.instance()
 from vidsindy_lite.companion import report
 t = np.linspace(0, 1, 20)
 x = np.column_stack((t, t**2, t**3))
-law = SimpleNamespace(curve=lambda t: x)
-figures = report._figures(SimpleNamespace(t=t, x=x, targets=1, discovery=law), [])
+found = SimpleNamespace(t=t, x=x, path=x, targets=1)
+figures = report._figures(found, [])
 assert len(next(figures)[1]) > 1000
 figures.close()
 print("interactive:", matplotlib.is_interactive())

@@ -17,7 +17,7 @@ from .alignment import Footage
 from .camera import Camera
 from .causes import GROSS
 from .changes import PARTS
-from .covariance import long_run_covariance
+from .covariance import fitted_factor
 
 DISAGREEMENT = 1.0
 """Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
@@ -123,18 +123,10 @@ class Timing:
 
     @property
     def covariance(self) -> Floats:
-        """Of lags and drifts, if that of cameras is known as well as the tracks tell it.
-
-        Residuals may depend on those of the frames beside: the larger of both variances counts.
-        """
+        """Of lags and drifts, if that of cameras is known as well as the tracks tell it."""
         fit = self.fit
-        missed, slopes = fit.weighed
-        square = np.einsum("nik,nil->kl", slopes, slopes) + fit.noise**2 * np.diag(fit.prior)
-        bread = np.linalg.pinv(square, hermitian=True)
-        scores = np.einsum("nik,ni->nk", slopes, missed) @ bread
-        white, robust = fit.noise**2 * bread, long_run_covariance(scores) * len(scores)
-        more = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(white), 1e-300), 1))
-        covariance = white * np.outer(more, more)
+        factor = fitted_factor(*fit.weighed, fit.prior, fit.noise)
+        covariance = factor @ factor.T
         cameras, parts = np.argwhere(fit.errors > 0).T
         order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
         # Slopes that are noise add to the information, but mend nothing.

@@ -5,16 +5,8 @@ frame, but shared by all frames, so that it does not average out. A law fitted t
 small terms that the true one has not. `discover` takes such errors into account if it is told them.
 
 The covariance of what was learned does not rest on independent errors of the tracks, which
-compression makes similar from frame to frame. With the slopes J of the reprojection residuals r in
-the parameters it is the "sandwich"
-
-    H^-1 M H^-1,   H = sum_n J_n' J_n,   M = sum_nm w(n - m) (J_n' r_n) (J_m' r_m)'
-
-with weights w that fall linearly to zero over as many frames as the residuals depend on each other
-(Newey and West 1987, Econometrica 55; their number after Andrews 1991, Econometrica 59). What was
-measured with an error adds sigma^2 / error^2 to H and sigma^4 / error^2 to M, sigma being the noise
-of the residuals: so a direction that the tracks tell nothing of, such as a turn of the whole rig,
-is as uncertain as the measurements leave it.
+compression makes similar from frame to frame (`covariance`). A direction that the tracks tell
+nothing of, such as a turn of the whole rig, is as uncertain as the measurements leave it.
 
 The tracks themselves may share an error, too: see `trailing_errors`.
 """
@@ -30,7 +22,7 @@ from ..arrays import Floats
 from .adjust import linearised
 from .alignment import Curve, Footage, Lags, check_clocks
 from .changes import PARTS, known_to
-from .covariance import long_run_covariance
+from .covariance import fitted_factor
 from .rig import Rig
 from .triangulate import (
     check_calibrated,
@@ -71,7 +63,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     curves = tuple(map(Curve, tracks, clocks))
     footage = Footage(curves, clocks[0], lags.frames, lags.rates)
     near = linearised(footage, learned.cameras, errors)
-    factor = _sandwich(*near.weighed, near.prior, near.noise)
+    factor = fitted_factor(*near.weighed, near.prior, near.noise)
     modes = np.einsum("ik,nji->knj", factor, near.path_slopes)
     if not near.prior.any():
         return modes
@@ -134,18 +126,3 @@ def trailing_errors(
         moved = replace(views, tracks=(*views.tracks[:i], track - trail, *views.tracks[i + 1 :]))
         modes.append(points_of_views(moved, rig.cameras) - x)
     return np.nan_to_num(np.array(modes))
-
-
-def _sandwich(missed: Floats, slope: Floats, prior: Floats, noise: float) -> Floats:
-    """A factor F of the covariance F F' of the parameters, from residuals (n, m) and slopes.
-
-    `prior` is the information of measurements on the parameters, (k,).
-    """
-    information = np.einsum("nmk,nml->kl", slope, slope) + noise**2 * np.diag(prior)
-    size = np.sqrt(np.diag(information))  # of each parameter: units of pixels, metres and radians
-    bread = np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size)
-    scores = np.einsum("nmk,nm->nk", slope, missed) @ bread
-    measured = noise**4 * bread @ np.diag(prior) @ bread
-    # Not Cholesky's: exact tracks leave a covariance of zero but for rounding.
-    values, vectors = np.linalg.eigh(long_run_covariance(scores) * len(scores) + measured)
-    return vectors * np.sqrt(np.maximum(values, 0.0))

@@ -41,8 +41,7 @@ def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes
     import av
 
     instants = range(0, len(found.t), -(-len(found.t) // _FRAMES))
-    curve = found.discovery.curve(found.t)
-    views = [_view(found, Path(path), i, instants, curve) for i, path in enumerate(paths)]
+    views = [_view(found, Path(path), i, instants) for i, path in enumerate(paths)]
     file = io.BytesIO()
     with av.open(file, "w", format="webm") as container:
         options = {"deadline": "realtime", "cpu-used": "8", "crf": "36", "b": "0"}
@@ -57,13 +56,11 @@ def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes
     return file.getvalue()
 
 
-def _view(
-    found: VideoDiscovery, path: Path, i: int, instants: range, curve: Floats
-) -> Iterator[Image]:
+def _view(found: VideoDiscovery, path: Path, i: int, instants: range) -> Iterator[Image]:
     """What one camera saw at these instants, with what it would see of the law; small."""
     camera = found.rig.cameras[i]
-    paths = np.split(curve[:, : found.x.shape[1]], found.targets, axis=1)
-    pixels = np.stack([camera.project(x) for x in paths])
+    targets = np.split(found.path, found.targets, axis=1)
+    pixels = np.stack([camera.project(x) for x in targets])
     spread = float(np.sqrt(np.nanmean((found.tracks[i] - np.hstack(list(pixels))) ** 2)))
     width, height = camera.image_size
     scale = _HEIGHT / height

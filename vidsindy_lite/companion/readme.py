@@ -9,6 +9,7 @@ import math
 import re
 from pathlib import Path
 
+import jupytext
 import pandas as pd
 
 from ..stamp import write_file
@@ -20,6 +21,9 @@ from .records import read_records
 from .registry import load_run_times
 
 PART = re.compile(r"(?<=^<!-- )(?!end )(\w+) -->\n.*?(?=<!-- end -->$)", re.DOTALL | re.MULTILINE)
+
+
+WORDS, LINES = 200, 12  # of prose, of code, that one reads in a minute
 
 
 def written_pages(root: Path) -> list[Path]:
@@ -64,7 +68,8 @@ def fill(text: str, root: Path) -> str:
     parts = macros(
         "readme.md",
         titles=_titles(Path(root)),
-        headlines=_headlines(figures),
+        minutes=lambda name: reading_minutes(Path(root) / "notebooks" / f"{name}.py"),
+        headlines=headlines(figures),
         times=load_run_times(figures),
         frame=lambda table_id: pd.DataFrame(load_table(table_id, figures).rows, dtype=object),
         numbers=numbers,
@@ -79,13 +84,21 @@ def _claiming(root: Path) -> list[Path]:
     return [root / "README.md", *sorted((root / "notebooks").glob("*.py"))]
 
 
+def reading_minutes(notebook: Path) -> int:
+    """Minutes that it takes to study a notebook, from its words and lines of code; in fives."""
+    cells = jupytext.read(notebook).cells
+    words = sum(len(cell.source.split()) for cell in cells if cell.cell_type == "markdown")
+    lines = sum(len(cell.source.splitlines()) for cell in cells if cell.cell_type == "code")
+    return 5 * math.ceil((words / WORDS + lines / LINES) / 5)
+
+
 def _titles(root: Path) -> dict[str, str]:
     """The first heading of each notebook."""
     sources = {path.stem: path.read_text("utf-8") for path in (root / "notebooks").glob("*.py")}
     return {name: re.findall(r"^# # (.*)", sources[name], re.M)[0] for name in sorted(sources)}
 
 
-def _headlines(figures: Path) -> dict[str, str]:
+def headlines(figures: Path) -> dict[str, str]:
     """By notebook; a notebook without one of these tables has none."""
     tables = [record for record in read_records(figures).values() if record["id"] in HEADLINES]
     return {

@@ -17,8 +17,11 @@ from sphinx.application import Sphinx
 
 from ..stamp import PACKAGE, repository_root
 from .manifest import clear, sign
+from .readme import reading_minutes
 from .records import read_records
+from .registry import load_run_times
 from .run import find_notebooks
+from .slides import slides
 
 SETTINGS = {
     "project": PACKAGE.name,
@@ -98,6 +101,7 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
         for path in find_notebooks(root):
             executed = path.with_suffix(".ipynb")
             nbformat.write(_described(executed), pages / "notebooks" / executed.name)
+        (pages / "docs" / "slides.md").write_text(slides(root), "utf-8")
         for name in ("LICENSE", "CITATION.cff", "CHANGELOG.md"):
             shutil.copy(root / name, pages)
         parts = root / "README.md", Path(__file__).parent / "contents.md"
@@ -111,12 +115,18 @@ def build_site(output: str | os.PathLike, root: str | os.PathLike | None = None)
 
 
 def _described(executed: Path) -> nbformat.NotebookNode:
-    """A notebook whose pictures have the captions of their figures as alternative text."""
-    records = read_records(executed.parent.parent / "figures")
+    """A notebook that says how long it takes, and its pictures in words: their captions."""
+    figures = executed.parent.parent / "figures"
+    records, seconds = read_records(figures), load_run_times(figures).get(executed.stem, 0.0)
     captions = {name: record["caption"] for name, record in records.items()}
     notebook = nbformat.read(executed, as_version=4)
     for cell in notebook.cells:
         named = re.findall(r'"(\w+)"', cell.source) if cell.cell_type == "code" else []
         if said := " ".join(captions[name] for name in named if name in captions):
             cell.metadata["mystnb"] = {"image": {"alt": said}}
+    title, _, rest = notebook.cells[0].source.partition("\n")
+    long = f"{seconds:.0f} seconds" if seconds < 120 else f"{seconds / 60:.0f} minutes"
+    running = f", {long} to run" if seconds else ""
+    takes = f"*About {reading_minutes(executed)} minutes to read{running}.*"
+    notebook.cells[0].source = f"{title}\n\n{takes}\n{rest}"
     return notebook
