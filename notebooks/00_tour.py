@@ -50,6 +50,7 @@
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
 system: str = "Lorenz"  # one of vidsindy_lite.study.SYSTEMS
+camera: int = 1  # which of the three is calibrated
 seed: int = 0  # of the scenes in the videos
 
 # %%
@@ -69,14 +70,14 @@ frames = {"full": 1500, "quick": 400}[profile]
 # ## All of it
 #
 # `film` writes three video files. `uncalibrated` forgets the scale and the in-plane angle of the second
-# and the third camera (`keep=0` keeps those of the first: Python counts from 0), and `discover_from_videos`
+# and the third camera (it keeps those of `camera`, and Python counts from 0), and `discover_from_videos`
 # does the rest. The law is printed in its *native* frame, whose origin is the one in which it has the
 # fewest terms; how that origin is found comes below.
 
 # %%
 folder = TemporaryDirectory()
 shot = film(system, folder.name, frames, seed)
-found = discover_from_videos(shot.paths, shot.rig.uncalibrated(keep=0), shot.t)
+found = discover_from_videos(shot.paths, shot.rig.uncalibrated(keep=camera - 1), shot.t)
 law = found.discovery
 print(law.equations("native"))
 
@@ -136,7 +137,7 @@ rows = [
     for title, true, learned in zip(titles, shot.rig.cameras, found.rig.cameras, strict=True)
 ]  # fmt: skip
 assert all(abs(row["scale, learned"] / row["scale, true"] - 1) < 1e-3 for row in rows)
-caption = "Scale in scene units per pixel. Camera 1 was given, the others were learned."
+caption = f"Scale in scene units per pixel. Camera {camera} was given, the others were learned."
 save_table("tour_cameras", rows, caption=caption)
 
 # %%

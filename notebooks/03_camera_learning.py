@@ -38,6 +38,7 @@
 profile: str = "full"  # full or quick
 system: str = "Lorenz"  # one of vidsindy_lite.study.SYSTEMS
 frames: int = 500  # video frames per camera
+pixel_noise: float = 2.0  # of the noisy tracks, px
 seed: int = 0  # of all pixel noise
 
 # %%
@@ -178,7 +179,7 @@ assert np.linalg.matrix_rank(eq_4) == len(stack) - np.linalg.matrix_rank(stack) 
 # %%
 rng = np.random.default_rng(seed)
 rounded = [np.round(track) for track in tracks]
-noisy = [track + 2 * rng.normal(size=track.shape) for track in tracks]
+noisy = [track + pixel_noise * rng.normal(size=track.shape) for track in tracks]
 cameras.learn_cameras_lbfgs(tracks, start)  # so that importing PyTorch is not timed
 
 
@@ -193,7 +194,7 @@ def row(pixels, observed, method):
 
 
 # %%
-cases = {"exact": tracks, "rounded": rounded, "2 px noise": noisy}
+cases = {"exact": tracks, "rounded": rounded, f"{pixel_noise:g} px noise": noisy}
 methods = {
     "paper": cameras.learn_cameras_eq4,
     "gradient": cameras.learn_cameras_lbfgs,
@@ -222,14 +223,14 @@ def errors_of(method, noise, number):
 
 
 names = {"paper": "Eq. (4)", "joint": "joint fit"}
-errors = {name: errors_of(method, 2.0, trials) for method, name in names.items()}
+errors = {name: errors_of(method, pixel_noise, trials) for method, name in names.items()}
 spread = {name: error.std(axis=0).max(axis=0) for name, error in errors.items()}
 assert (spread["joint fit"] < spread["Eq. (4)"]).all()
 
 # %%
 fig = plots.plot_calibration_errors(errors)
 caption = (
-    "Errors of the learned cameras in repeated trials with 2 px noise: the joint fit is closer."
+    f"Errors of the learned cameras in repeated trials with {pixel_noise:g} px noise: the joint fit is closer."
 )
 save_figure("cameras_trials", fig, caption=caption, numbers=errors)
 
@@ -318,7 +319,7 @@ save_slider("cameras_noise_slider", figures, caption=caption, numbers={"noise": 
 # noise of $\sigma$ leaves $\sigma/\sqrt2$.
 
 # %%
-for name, observed, sigma in (("rounded", rounded, 12**-0.5), ("2 px noise", noisy, 2.0)):
+for name, observed, sigma in (("rounded", rounded, 12**-0.5), ("noisy", noisy, pixel_noise)):
     missed = np.hstack(residuals(observed, learn_cameras(observed, start)))
     print(f"{name}: rms {np.sqrt(np.mean(missed**2)):.3f} px, expected {sigma / 2**0.5:.3f} px")
     assert np.isclose(np.sqrt(np.mean(missed**2)), sigma / 2**0.5, rtol=0.1)

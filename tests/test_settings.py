@@ -12,10 +12,10 @@ from vidsindy_lite.stamp import PACKAGE
 
 NOTEBOOKS = {path.stem[:2]: path for path in find_notebooks(PACKAGE.parent)}
 SETTINGS = {
-    "00": [{"system": "SprottF"}, {"system": "WangSun", "seed": 1}],
+    "00": [{"system": "SprottF", "camera": 3}, {"system": "WangSun", "seed": 1}],
     "01": [{"system": "NoseHoover", "view": 2}, {"view": 3}],
     "02": [{"seed": 1}, {"seed": 2}],
-    "03": [{"system": "WangSun", "seed": 1}, {"frames": 300, "seed": 2}],
+    "03": [{"system": "WangSun", "seed": 1}, {"frames": 300, "pixel_noise": 1.0, "seed": 2}],
     "04": [{"level": 0.05}, {"seed": 1}],
     "05": [{"seed": 10}, {"seed": 20}],
     "06": [{"seed": 10}, {"seed": 20}],
