@@ -264,7 +264,7 @@ def _observed(
         x=x,
         systematic=_shared_errors(learning, tracks, learned, clock.times),
         warnings=(
-            *_rig_warnings(tracks, rig, learned, names, used, best),
+            *_rig_warnings(missed, tracks, rig, learned, names, used, best),
             *learned.warnings,
             *doubts,
             *told.warnings,
@@ -441,6 +441,7 @@ def _apart(lags: Floats, learned: Lags, limit: float) -> bool:
 
 
 def _rig_warnings(
+    missed: Sequence[float],
     tracks: Sequence[Floats],
     given: Rig,
     learned: Rig,
@@ -450,9 +451,9 @@ def _rig_warnings(
 ) -> list[str]:
     """Do the cameras agree on the target to within what tracking can be blamed for?
 
-    The tracks are those at the lags, `best` are the lags that the tracks themselves tell.
+    They miss it by `missed` pixels. The tracks are those at the lags, `best` are the lags that the
+    tracks themselves tell.
     """
-    missed = disagreement(tracks, learned)
     wrong_lag = _apart(lags, best, _OTHER_LAG)
     if wrong_lag and max(missed) <= DISAGREEMENT:
         return [

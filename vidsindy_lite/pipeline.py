@@ -153,10 +153,10 @@ def discover_from_tracks(
     how = _checked(degree, library, order, origin, seed) | {"progress": progress}
     read = _read(tracks)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
-    times = _times(read, t, fps)
+    times, doubts = _times(read, t, fps)
     seen = observe_tracks(pixels, rig, times, lags=lags, names=names, progress=progress)
-    doubts = [warning for track in read for warning in track.warnings]
-    seen = replace(seen, warnings=(*seen.warnings, *doubts, *_contradicted(read, fps)))
+    doubts = [*(warning for track in read for warning in track.warnings), *doubts]
+    seen = replace(seen, warnings=(*seen.warnings, *doubts))
     return _with_law(seen, names, how)
 
 
@@ -178,17 +178,14 @@ def _checked(
 
 def _driven(law: PolynomialSystem) -> str:
     """Which of several targets, of three coordinates each, drive which others by what terms."""
-    names = law.names[: law.d // 2] if law.order == 2 else law.names
-    of = {name: i // 3 + 1 for i, name in enumerate(names)}
-    of |= {name: of[names[i]] for i, name in enumerate(law.names[len(names) :])}
-    target = np.array([of[name] for name in law.names])
+    target = np.arange(law.d) % (law.d // law.order) // 3 + 1  # of places, and of velocities
     by: dict[tuple[int, int], list[str]] = {}
     for j, side in law.sides().items():
         for row in np.flatnonzero(law.support[:, j]):
             for other in set(target[law.exponents[row, : law.d] > 0]) - {target[j]}:
                 pair = int(other), int(target[j])
                 by.setdefault(pair, []).append(f"{law.terms[row]} in {side}")
-    free = [str(i) for i in sorted(set(of.values())) if all(i != driven for _, driven in by)]
+    free = [str(i) for i in np.unique(target) if all(i != driven for _, driven in by)]
     said = [f"{i} drives {j} by {', '.join(terms)}" for (i, j), terms in sorted(by.items())]
     alone = f"{' and '.join(free)} {'moves' if len(free) == 1 else 'move'} independently"
     return "; ".join([alone] * bool(free) + said)
@@ -217,26 +214,24 @@ def _later(pixels: Floats, frames: int) -> Floats:
 
 def _times(
     read: Sequence[TrackFile], t: ArrayLike | Sequence[ArrayLike] | None, fps: float | None
-) -> ArrayLike | Sequence[ArrayLike]:
-    """The times that are given, or those that files state."""
+) -> tuple[ArrayLike | Sequence[ArrayLike], list[str]]:
+    """The times that are given, or those that files state; and which files contradict them."""
     if t is not None and fps is not None:
         raise ValueError(f"fps: must not be given with t, got {fps}")
     if t is not None:
-        return t
+        return t, []
     if fps is not None:
         rate = check_positive("fps", fps)
-        return [np.arange(len(track.pixels)) / rate for track in read]
+        return [np.arange(len(track.pixels)) / rate for track in read], _contradicted(read, rate)
     stated = [track.t for track in read if track.t is not None]
     if len(stated) < len(read):
         silent = next(track.name for track in read if track.t is None)
         raise ValueError(f"t: must be given, or fps, as {silent} states no times")
-    return stated
+    return stated, []
 
 
-def _contradicted(read: Sequence[TrackFile], fps: float | None) -> list[str]:
+def _contradicted(read: Sequence[TrackFile], fps: float) -> list[str]:
     """Which files state other frames in a unit of time than the given ones."""
-    if fps is None:
-        return []
     stated = [
         (track.name, 1 / np.median(np.diff(track.t)))
         for track in read

@@ -9,7 +9,6 @@ from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
 from vidsindy_lite.cameras.covariance import fitted_factor, long_run_covariance
 from vidsindy_lite.cameras.uncertainty import systematic_errors, trailing_errors
-from vidsindy_lite.cameras.unknowns import Unknowns
 
 NOISE = 0.05  # pixels
 
@@ -23,7 +22,7 @@ def dependent(rng, n, memory):
 
 
 def learned_rig(rng, memory, frames=250, path=trajectory):
-    """A random rig learned from noisy tracks: errors of its parameters, and the path's modes."""
+    """A random rig learned from noisy tracks: the path's modes, the path, and the rig."""
     x = path(rng, frames)
     truth = vl.Rig.around(x)
     rig = truth.uncalibrated()
@@ -31,16 +30,14 @@ def learned_rig(rng, memory, frames=250, path=trajectory):
     learned = vl.learn_cameras(tracks, rig)
     still = Lags(np.zeros(3), np.ones(3), np.zeros(3), 0.0)
     modes = systematic_errors(tracks, rig, learned, still)
-    unknowns = Unknowns.of(rig)
-    errors = unknowns.read(learned.cameras) - unknowns.read(truth.cameras)
-    return errors, modes, x, learned
+    return modes, x, learned
 
 
 @pytest.mark.parametrize("memory", [0.0, pytest.param(0.6, marks=pytest.mark.slow)])
 def test_errors_of_cameras_are_as_large_as_stated(memory):
     pulls = []
     for seed in np.random.SeedSequence(5).spawn(15):
-        errors, modes, x, learned = learned_rig(np.random.default_rng(seed), memory)
+        modes, x, learned = learned_rig(np.random.default_rng(seed), memory)
         # What the cameras' errors do to the path, in units of what they may do.
         turned = vl.reconstruct([c.project(x) for c in vl.Rig.around(x).cameras], learned) - x
         sizes, *_ = np.linalg.lstsq(modes.reshape(len(modes), -1).T, turned.ravel())
@@ -62,7 +59,7 @@ def test_errors_of_cameras_that_saw_one_short_throw_are_not_understated():
     """In 60 frames, chance alone makes the scores of residuals look like less than their noise."""
     pulls = []
     for seed in np.random.SeedSequence(6).spawn(60):
-        _, modes, x, learned = learned_rig(np.random.default_rng(seed), 0.0, 60, throw)
+        modes, x, learned = learned_rig(np.random.default_rng(seed), 0.0, 60, throw)
         turned = vl.reconstruct([c.project(x) for c in vl.Rig.around(x).cameras], learned) - x
         sizes, *_ = np.linalg.lstsq(modes.reshape(len(modes), -1).T, turned.ravel())
         pulls.append(sizes)

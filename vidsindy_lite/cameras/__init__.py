@@ -8,7 +8,7 @@
     lens          what a lens does to the image: distortion
     rig           the cameras that watch one scene, and their file
     calibrations  rigs from files of other tools, and back
-    unknowns      what is unknown of a rig: as one vector, and linear equations for it
+    unknowns      what is unknown of a rig, and linear equations for it
  1. synchronise   tracks -> when each camera started (`Lags`)
     timing        one fit of cameras and lags, and what it tells of the lags
     clocks        when the frames of each video were taken
@@ -39,8 +39,8 @@ from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z,
 from .camera import Camera
 from .models import OrthographicCamera, PerspectiveCamera
 from .rig import Rig, rig_template
-from .synchronise import disagreement, learn_lags
+from .synchronise import learn_lags
 from .timing import DISAGREEMENT
-from .triangulate import reconstruct, residuals
+from .triangulate import disagreement, reconstruct, residuals
 from .uncertainty import systematic_errors, trailing_errors
 from .unmeasured import posed

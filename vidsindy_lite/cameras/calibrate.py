@@ -28,8 +28,7 @@ from .triangulate import (
     check_calibrated,
     check_seen,
     check_views,
-    epipolar_design,
-    epipolar_lines,
+    epipolar_equations,
     intersect,
     points_of_views,
 )
@@ -100,10 +99,10 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
         return replace(_closest(footage, rig.cameras, errors), note=rig.note)
     if all_orthographic(rig.cameras):
         equations, decided = agreement(views, unknowns)
-        start = unknowns.vector(*solve(equations.design, equations.target, unknowns))
+        start = unknowns.filled(*solve(equations.design, equations.target, unknowns))
         agreeing = np.isin(np.arange(views.frames), equations.frames)
         used = None if unknowns.measured else agreeing
-        learned = _closest(footage, unknowns.filled(start), errors, used)
+        learned = _closest(footage, start, errors, used)
         doubts = () if decided else (undecided_outliers(),)
     else:
         learned = _closest(footage, _spread(views, unknowns), errors)
@@ -223,11 +222,5 @@ def _spread(views: Views, unknowns: Unknowns) -> tuple[Camera, ...]:
 
 def _from_known(views: Views, unknowns: Unknowns, index: int) -> complex:
     """s exp(i theta) of one unknown camera from all known ones."""
-    camera, track = unknowns.cameras[index], views.tracks[index]
-    equations = [
-        epipolar_design(epipolar_lines(known, other, camera), camera, track)
-        for known, other in zip(unknowns.cameras, views.tracks, strict=True)
-        if known.is_calibrated
-    ]
-    design, target = map(np.concatenate, zip(*equations, strict=True))
+    design, target = epipolar_equations(unknowns.cameras, views.tracks, index)
     return solve(design, target, replace(unknowns, uncalibrated=np.array([index])))[0][0]

@@ -27,7 +27,7 @@ from .changes import PARTS, SIZE, NearCamera, known_to
 from .covariance import bandwidth, long_run_covariance
 from .models import OrthographicCamera
 from .rig import Rig
-from .triangulate import check_views, points_of_views, residuals
+from .triangulate import TRIMMED, check_views, disagreement, points_of_views, residuals, trimmed
 
 GROSS = 4.0
 """Pixels; real calibrations of real tracks leave up to half of that."""
@@ -36,7 +36,6 @@ _CHANCE = 1e-6  # of a T that large without a cause
 _MATTERS = 0.02  # pixels rms; real tracks are no better than that
 _TRIED = 5  # of the causes that stand out most
 _DEGENERATE = 1e-3  # share of a slope that nothing else explains; less tells nothing
-_TRIMMED = 0.9  # share of the frames that must agree; the others may hold anything
 _SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
 _ROUNDING = 1e-9  # pixels
 
@@ -66,7 +65,7 @@ class Explanation:
     @property
     def left(self) -> float:
         """`disagreement` of the worst camera of these, pixels."""
-        return _apart(np.split(self.found.misses, len(self.found.cameras), axis=1))
+        return max(map(trimmed, np.split(self.found.misses, len(self.found.cameras), axis=1)))
 
     def text(self, names: Sequence[str]) -> str:
         """What would explain the residuals best, with its value."""
@@ -107,7 +106,7 @@ def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation |
     seen = np.isfinite(points).all(axis=1)
     if not seen.any():
         return None
-    far = smooth(tracks, learned) and _apart(residuals(tracks, learned)) > GROSS
+    far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
     start = [_near(camera, points[seen].mean(axis=0)) for camera in learned.cameras]
     causes = [c for c in _causes(start) if (c.mask(len(start)) & (errors == 0)).any()]
     footage = Footage.of(tracks)
@@ -133,15 +132,9 @@ def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
     """Whether residuals follow the motion, which noise of the tracks does not."""
     missed = np.hstack(residuals(tracks, learned))
     both = np.isfinite(missed[1:]) & np.isfinite(missed[:-1])
-    limit = np.nanquantile(np.abs(missed), _TRIMMED) if both.any() else 0.0
+    limit = np.nanquantile(np.abs(missed), TRIMMED) if both.any() else 0.0
     before, after = (np.clip(part[both], -limit, limit) for part in (missed[:-1], missed[1:]))
     return bool(before @ after > _SMOOTH * np.sqrt((before @ before) * (after @ after)))
-
-
-def _apart(missed: Sequence[Floats]) -> float:
-    """Length of the worst camera's residuals that one frame in ten exceeds, pixels."""
-    sizes = [np.hypot(*part[np.isfinite(part).all(axis=1)].T) for part in missed]
-    return max((float(np.quantile(size, _TRIMMED)) for size in sizes if len(size)), default=0.0)
 
 
 def _causes(cameras: Sequence[Camera]) -> list[Cause]:

@@ -16,7 +16,7 @@ from ..arrays import Floats
 from .alignment import Curve
 from .camera import Camera
 from .models import all_orthographic
-from .triangulate import Views, epipolar_design, epipolar_lines, epipolar_rows
+from .triangulate import TRIMMED, Views, epipolar_equations, epipolar_lines, epipolar_rows
 from .unknowns import Unknowns, agreement, calibrated
 
 _OVERLAP = 0.5  # share of the shorter of two videos that both must show
@@ -24,7 +24,6 @@ _INSTANTS = 300  # at which two views are compared
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
 _PROMISING = 4  # lags of each camera, with and without a shift
 _NEAR = 4.0  # frames
-_TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
 _ROUNDS = 5  # of leaving the others out
 _BETTER_PART = 0.7  # of all equations, in which there is no outlier
 
@@ -47,7 +46,7 @@ def rough_cameras(views: Views, unknowns: Unknowns) -> tuple[Camera, ...] | None
         turned = solution[: 2 * len(turns)].view(complex)
         widths = np.array([cameras[i].image_size[0] for i in unknowns.unplaced])
         offsets = solution[2 * len(turns) :].reshape(-1, 2) * widths[:, None] / 2
-        return unknowns.filled(unknowns.vector(turned, offsets)) if turned.all() else None
+        return unknowns.filled(turned, offsets) if turned.all() else None
     for i in turns:
         one = _turned(views, cameras, int(i))
         if one == 0:
@@ -58,21 +57,16 @@ def rough_cameras(views: Views, unknowns: Unknowns) -> tuple[Camera, ...] | None
 
 def _turned(views: Views, cameras: Sequence[Camera], i: int) -> complex:
     """s exp(i theta) of a camera from those that are calibrated; zero if there is no telling."""
-    parts = [
-        epipolar_design(epipolar_lines(known, other, cameras[i]), cameras[i], views.tracks[i])
-        for known, other in zip(cameras, views.tracks, strict=True)
-        if known.is_calibrated
-    ]
-    design, target = map(np.concatenate, zip(*parts, strict=True))
+    design, target = epipolar_equations(cameras, views.tracks, i)
     fits = np.ones(len(target), bool)
-    solution = np.zeros(2)
+    turned = 0j
     for _ in range(_ROUNDS):
         if fits.sum() <= 4:
             break
         solution = np.linalg.lstsq(design[fits], target[fits])[0]
         missed = np.abs(design @ solution - target)
-        fits = missed <= np.quantile(missed, _BETTER_PART)
-    return complex(*solution)
+        fits, turned = missed <= np.quantile(missed, _BETTER_PART), complex(*solution)
+    return turned
 
 
 def promising_lags(curves: Sequence[Curve], rates: Floats, unknowns: Unknowns) -> list[list[float]]:
@@ -154,7 +148,7 @@ def pair_missed(
         )
         missed = np.where(seen, np.abs(np.einsum("kni,ki->kn", design, solution) - target), np.nan)
         enough = fits.sum(axis=1) > 2 * unknown
-        limit = np.nanquantile(np.where(enough[:, None], missed, 0), _TRIMMED, axis=1)
+        limit = np.nanquantile(np.where(enough[:, None], missed, 0), TRIMMED, axis=1)
         fits = seen & (missed <= limit[:, None])
     total = np.sum(np.where(fits, missed, 0) ** 2, axis=1)
     return np.where(enough, np.sqrt(total / np.maximum(fits.sum(axis=1), 1)), np.inf)

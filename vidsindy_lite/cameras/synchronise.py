@@ -46,8 +46,8 @@ from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
 from .pairs import promising_lags, rough_cameras
 from .rig import Rig
 from .shutter import steadied
-from .timing import DISAGREEMENT, Timing, trimmed
-from .triangulate import Views, check_seen, residuals, residuals_of_views
+from .timing import DISAGREEMENT, Timing
+from .triangulate import Views, check_seen, residuals_of_views, trimmed
 from .unknowns import Unknowns
 from .unmeasured import posed
 
@@ -63,24 +63,6 @@ _ROUGH_STEPS = 8  # of the second step
 _SHOWN = 3  # of the lags that fit equally well
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 _BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
-
-
-def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
-    """Residual in pixels that one frame in ten exceeds, per camera.
-
-    That tenth may hold anything: a few outliers of the tracker do not accuse the rig.
-
-    Parameters
-    ----------
-    tracks, rig
-        See `residuals`.
-
-    Returns
-    -------
-    list of float
-        Pixels; zero for a camera that takes part in no point.
-    """
-    return [trimmed(part) for part in residuals(tracks, rig)]
 
 
 def learn_lags(

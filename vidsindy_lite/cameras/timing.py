@@ -18,12 +18,12 @@ from .camera import Camera
 from .causes import GROSS
 from .changes import PARTS
 from .covariance import fitted_factor
+from .triangulate import trimmed
 
 DISAGREEMENT = 1.0
 """Pixels by which a good rig misses at most one frame in ten; even whole-pixel tracks are missed by
 less than half of that."""
 
-_TRIMMED = 0.9  # share of the instants that must agree; the others may hold anything
 _BETTER_PART = 0.7  # of all frames, in which no view is an outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
@@ -148,15 +148,3 @@ class Timing:
         errors[~clear, _DRIFT] = 0.0
         begin = np.where(errors > 0, free.fit.change, 0.0)
         return Timing.of(self.footage, self.cameras, errors, begin=begin) or self
-
-
-def trimmed(residual: Floats, share: float = _TRIMMED) -> float:
-    """Length of the residuals, (n, 2), that one frame in ten exceeds.
-
-    From another share of them if they are normal: their lengths are then Rayleigh's.
-    """
-    seen = residual[np.isfinite(residual).all(axis=1)]
-    if not len(seen):
-        return 0.0
-    ratio = np.sqrt(np.log(1 - _TRIMMED) / np.log(1 - share))
-    return float(ratio * np.quantile(np.hypot(*seen.T), share))

@@ -27,6 +27,8 @@ from .models import all_orthographic, independent
 from .rig import Rig
 from .shutter import steadied
 
+TRIMMED = 0.9
+"""Share of the instants that must agree; the others may hold anything."""
 _STEPS = 30  # of Gauss and Newton; from the linear solution four or five are usual
 _SETTLED = 1e-11  # pixels
 
@@ -116,6 +118,36 @@ def residuals(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
     """
     check_calibrated("rig", rig)
     return residuals_of_views(check_views(tracks, rig), rig.cameras)
+
+
+def disagreement(tracks: Sequence[Floats], rig: Rig) -> list[float]:
+    """Residual in pixels that one frame in ten exceeds, per camera.
+
+    That tenth may hold anything: a few outliers of the tracker do not accuse the rig.
+
+    Parameters
+    ----------
+    tracks, rig
+        See `residuals`.
+
+    Returns
+    -------
+    list of float
+        Pixels; zero for a camera that takes part in no point.
+    """
+    return [trimmed(part) for part in residuals(tracks, rig)]
+
+
+def trimmed(residual: Floats, share: float = TRIMMED) -> float:
+    """Length of the residuals, (n, 2), that one frame in ten exceeds.
+
+    From another share of them if they are normal: their lengths are then Rayleigh's.
+    """
+    seen = residual[np.isfinite(residual).all(axis=1)]
+    if not len(seen):
+        return 0.0
+    ratio = np.sqrt(np.log(1 - TRIMMED) / np.log(1 - share))
+    return float(ratio * np.quantile(np.hypot(*seen.T), share))
 
 
 def check_seen(tracks: Sequence[Floats], rig: Rig) -> list[Floats]:
@@ -281,6 +313,19 @@ def epipolar_design(
     design, target = epipolar_rows(lines, camera, pixels)
     common = np.isfinite(design).all(axis=1) & np.isfinite(target)
     return design[common], target[common]
+
+
+def epipolar_equations(
+    cameras: Sequence[Camera], tracks: Sequence[Floats], i: int
+) -> tuple[Floats, Floats]:
+    """`epipolar_design` of a camera that is not calibrated, with all that are."""
+    parts = [
+        epipolar_design(epipolar_lines(known, track, cameras[i]), cameras[i], tracks[i])
+        for known, track in zip(cameras, tracks, strict=True)
+        if known.is_calibrated
+    ]
+    design, target = map(np.concatenate, zip(*parts, strict=True))
+    return design, target
 
 
 def epipolar_rows(

@@ -1,8 +1,4 @@
-"""What is unknown of the cameras of a rig: as one vector, and linear equations for it.
-
-The vector is what a search varies or an error moves. It holds log s + i theta of each camera that
-is not calibrated, then the in-plane offset of each without a position, over the width of what the
-calibrated cameras see: all of order one.
+"""What is unknown of the cameras of a rig, and linear equations for it.
 
 The equations say that orthographic views agree on one point. The stacked in-plane coordinates of
 the views of a frame equal [R^-_1; R^-_2; ...] x. Columns Q with Q^T [R^-_1; ...] = 0 take the
@@ -39,27 +35,24 @@ _TELLING, _FEW = 1.45, 8.0
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Which cameras of a rig are not calibrated and which not placed, as indices, and their units.
+    """Which cameras of a rig are not calibrated and which not placed, as indices.
 
-    `scale` is the mean scale of the calibrated cameras, `width` the mean width of what they see.
+    `scale` is the mean scale of the calibrated cameras.
     """
 
     cameras: tuple[Camera, ...]
     uncalibrated: Ints
     unplaced: Ints
     scale: float
-    width: float
 
     @classmethod
     def of(cls, rig: Rig) -> Unknowns:
         """Of a rig with at least one calibrated camera."""
-        known = [(c, c.calibration[0]) for c in rig.cameras if c.is_calibrated]
         return cls(
             rig.cameras,
             np.flatnonzero([not camera.is_calibrated for camera in rig.cameras]),
             np.flatnonzero([not camera.is_placed for camera in rig.cameras]),
-            float(np.mean([scale for _, scale in known])),
-            float(np.mean([scale * camera.image_size[0] for camera, scale in known])),
+            float(np.mean([c.calibration[0] for c in rig.cameras if c.is_calibrated])),
         )
 
     @property
@@ -72,24 +65,12 @@ class Unknowns:
         """Whether something that is given has an error."""
         return any(any(camera.errors.values()) for camera in self.cameras)
 
-    def vector(self, turned: Complex, offsets: Floats) -> Floats:
-        """The vector of s exp(i theta), (u,), and offsets, (v, 2)."""
-        return np.concatenate((np.log(turned).view(float), (offsets / self.width).ravel()))
-
-    def read(self, learned: Sequence[Camera]) -> Floats:
-        """The vector of cameras of which nothing is unknown."""
-        pairs = [learned[i].calibration for i in self.uncalibrated]
-        turned = np.array([scale * np.exp(1j * angle) for scale, angle in pairs], complex)
-        offsets = np.array([learned[i].offset for i in self.unplaced])
-        return self.vector(turned, offsets.reshape(-1, 2))
-
-    def filled(self, vector: Floats) -> tuple[Camera, ...]:
-        """The cameras with all that is unknown taken from a vector."""
-        logs, offsets = np.split(vector, [2 * self.uncalibrated.size])
+    def filled(self, turned: Complex, offsets: Floats) -> tuple[Camera, ...]:
+        """The cameras with s exp(i theta), (u,), and offsets, (v, 2), where they are unknown."""
         cameras = list(self.cameras)
-        for i, offset in zip(self.unplaced, offsets.reshape(-1, 2) * self.width, strict=True):
+        for i, offset in zip(self.unplaced, offsets, strict=True):
             cameras[i] = cameras[i].placed(offset)
-        return calibrated(cameras, self.uncalibrated, np.exp(logs.copy().view(complex)))
+        return calibrated(cameras, self.uncalibrated, turned)
 
 
 def calibrated(

@@ -27,6 +27,7 @@ from ..arrays import Floats
 from .adjust import Adjustment, adjust
 from .alignment import Footage
 from .camera import Camera
+from .causes import GROSS
 from .changes import PARTS, known_to
 from .models import PerspectiveCamera
 from .rig import Rig
@@ -34,7 +35,6 @@ from .triangulate import check_views, points_of_views
 
 _FEWEST = 8  # frames in common of a pair
 _MISS = 4.0  # pixels that a pair may miss: its focal lengths are rough
-_GROSS = 4.0  # pixels; more is no rig
 _UNKNOWN = 45.0  # degrees
 _STEPS = 30
 
@@ -72,7 +72,7 @@ def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True) -> Rig:
         fit = adjust(footage, cameras, errors, most=_STEPS)
         if np.isfinite(fit.misses).any() and (best is None or fit.noise < best.noise):
             best = fit
-    if best is None or best.noise > _GROSS:
+    if best is None or best.noise > GROSS:
         left = "no start" if best is None else f"views that are {best.noise:.1f} pixels apart"
         raise ValueError(
             "rig: the tracks must tell where the cameras stand, as nothing of it is measured, got "
