@@ -36,12 +36,14 @@ system: str = "Lorenz"  # one of vidsindy_lite.study.SYSTEMS
 view: int = 1  # which of the three cameras
 
 # %%
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from vidsindy_lite import Rig, cameras
-from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+from vidsindy_lite.companion.artifacts import save_figure, save_slider, save_table, versions
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -310,6 +312,37 @@ on_plane = cameras.plane_projection(x, camera.normal, -camera.normal @ camera.po
 assert np.allclose(camera.project(on_plane), pixels, atol=1e-9)
 assert np.allclose(camera.plane_coordinates(pixels), seen, atol=1e-9)
 print("pixels from", pixels.min(axis=0).round(1), "to", pixels.max(axis=0).round(1))
+
+# %% [markdown]
+# Walk around the scene with this camera. In the left image, $\vartheta$ turns back by as much as the camera walks on,
+# which keeps z up. In the right one it stays: as $\mathbf R$ turns the axes of the plane along, the image rolls.
+
+# %%
+middle, half = (x.min(axis=0) + x.max(axis=0)) / 2, (np.array(camera.image_size) - 1) / 2
+
+
+def walked(degrees):
+    turn = cameras.rodrigues(e_z, np.deg2rad(degrees))
+    place = middle + turn @ (camera.position - middle)
+    rolling = replace(camera, position=place, normal=turn @ camera.normal, scale=1.2 * camera.scale)
+    return replace(rolling, angle=camera.angle - np.deg2rad(degrees)), rolling
+
+
+# %%
+figures, seen = {}, {}
+for degrees in range(0, 360, 30):
+    pair = walked(degrees)
+    seen[degrees] = [one.project(x[:500]) for one in pair]
+    upright, rolled = (np.linalg.norm(image - half, axis=1) for image in seen[degrees])
+    assert np.allclose(upright, rolled, atol=1e-6)  # the same image, turned
+    fig = figures[f"{degrees} degrees"] = plots.plot_tracks(seen[degrees], pair)
+    for axes, title in zip(fig.axes, ("angle turned back", "angle as it was"), strict=True):
+        axes.set_title(title)
+caption = "The image of a camera that walks around: upright (left), and rolling with the axes of the plane (right)."
+save_slider("projection_walk", figures, caption=caption, numbers={"degrees": list(seen), "first": seen[0]})
+
+# %% [markdown]
+# *Move the slider: a camera walks around the target. Left with its angle turned back, right without.*
 
 # %% [markdown]
 # ## What we learned

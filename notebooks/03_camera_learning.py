@@ -47,7 +47,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from vidsindy_lite import Rig, cameras, learn_cameras, reconstruct, residuals
-from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+from vidsindy_lite.companion.artifacts import save_figure, save_slider, save_table, versions
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -80,7 +80,7 @@ save_figure("cameras_rig", fig, caption=caption, numbers={"t": t, "x": x})
 # *Three cameras around a target: each view plane holds a different flat image of the same path (black).*
 
 # %%
-fig = plots.plot_tracks(tracks, truth)
+fig = plots.plot_tracks(tracks, truth.cameras)
 caption = "What is given: one pixel track per camera, v pointing down."
 numbers = {f"camera {i}": track for i, track in enumerate(tracks, start=1)}
 save_figure("cameras_tracks", fig, caption=caption, numbers=numbers)
@@ -288,6 +288,26 @@ save_figure(
 # %% [markdown]
 # *From whole pixels and one calibrated camera, the path (colours) lies on the truth (grey); the error,
 # below, is about 0.2 px rms.*
+
+# %% [markdown]
+# And with more noise in the pixels? Cameras and path are learned anew for each level, with the same draw times the level.
+
+# %%
+draws = [np.random.default_rng(seed + i).normal(size=track.shape) for i, track in enumerate(tracks)]
+part, figures, off = slice(0, 150), {}, {}
+for level in (0, 0.25, 0.5, 1, 2, 4, 8):
+    observed = [track + level * draw for track, draw in zip(tracks, draws, strict=True)]
+    path = reconstruct(observed, learn_cameras(observed, start))
+    off[level] = np.sqrt(np.mean((path - x) ** 2)) / pixel
+    fig = plots.plot_reconstruction(t[part], x[part], path[part], pixel)
+    fig.axes[1].set_ylim(-20, 20)
+    figures[f"noise of {level} px"] = fig
+assert all(off[level] < level for level in off if level)
+caption = "Path in space (above) and its error (below) as the noise of the pixels grows."
+save_slider("cameras_noise_slider", figures, caption=caption, numbers={"noise": list(off), "rmse": list(off.values())})
+
+# %% [markdown]
+# *Move the slider: noise in the pixels comes through in space, weakened a little, as three views share it.*
 
 # %% [markdown]
 # The truth is not known with real videos, but the **residuals** are: by how many pixels the

@@ -43,7 +43,7 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vidsindy_lite import dynamics
+from vidsindy_lite import discover, dynamics
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     ABLATION,
@@ -52,12 +52,15 @@ from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,
     FilmTask,
+    Trial,
+    add_noise,
     by_condition,
     grid,
     plots,
     rate,
     run_film,
     run_trial,
+    score,
     significant,
     summary,
     sweep,
@@ -119,6 +122,33 @@ assert all(row["error / noise of 10 %"] < 0.02 for row in rows)
 # What tracking and cameras leave behind is a small fraction of the noise that follows. From here
 # on, the errors are those of the regression; the last section checks this again by its results.
 #
+# ## One trial
+#
+# Noise is one line, gaps are two: here are both by hand, beside the package's, with the laws found.
+
+# %%
+one, rng = films_of["SprottF"][0], np.random.default_rng(seed)
+noisy = one.x + 0.1 * one.x.std(axis=0) * rng.normal(size=one.x.shape)
+assert np.allclose(noisy, add_noise(one.x, 0.1, np.random.default_rng(seed)))
+gappy = one.x.copy()
+for start in np.linspace(0, len(gappy), 7).astype(int)[1:-1]:  # five gaps of 4 % of the record
+    gappy[start : start + len(gappy) // 25] = np.nan
+for name, x in (("noise of 10 %", noisy), ("20 % hidden", gappy)):
+    law = discover(one.t, x, systematic=one.systematic, order=1)
+    print(f"{name}: {score(law, one.truth)}\n{law.equations()}\n")
+    assert score(law, one.truth).exact
+
+# %% [markdown]
+# A `Trial` draws its own, `run_trial` does the rest. It is no more than this:
+
+# %%
+trial = Trial("SprottF", "noise", 0.1, seed, frames=frames)
+law = discover(one.t, trial.corrupt(one.x), systematic=one.systematic, order=1)
+by_package = run_trial(trial)
+assert np.allclose(by_package.law.coefficients, law.system.coefficients, rtol=1e-6)
+assert by_package.status == law.status
+
+# %% [markdown]
 # ## All trials
 #
 # Ours and PySINDy see everything. The results are a table with one row a trial; its clean trials stand

@@ -161,9 +161,11 @@ def output_problems(path):
             text = output.get("text", "") + output.get("data", {}).get("text/plain", "")
             if found := VOLATILE.search(text):
                 problems.append(f"cell {index} prints an address or a path: {found[0]}")
-        pictures = [o for o in cell.get("outputs", []) if "image/png" in o.get("data", {})]
-        if re.search(r"^save_figure\(", cell.source, re.MULTILINE) and not pictures:
-            problems.append(f"cell {index} saves a figure that nobody sees")
+        shown = [output.get("data", {}) for output in cell.get("outputs", [])]
+        sliders = [data for data in shown if "data:image/png" in data.get("text/html", "")]
+        for call, seen in (("figure", [d for d in shown if "image/png" in d]), ("slider", sliders)):
+            if re.search(rf"^save_{call}\(", cell.source, re.MULTILINE) and not seen:
+                problems.append(f"cell {index} saves a {call} that nobody sees")
     return problems
 
 
@@ -420,9 +422,10 @@ def test_output_gate_fails_on_a_large_notebook(pair):
     assert "at most 600000" in output_problems(pair)[0]
 
 
-def test_output_gate_fails_on_a_figure_that_is_not_shown(pair):
-    edit(pair.with_suffix(".ipynb"), '"x + 1"', "\"save_figure('waves', figure)\"")
-    assert output_problems(pair) == ["cell 3 saves a figure that nobody sees"]
+@pytest.mark.parametrize("kind", ["figure", "slider"])
+def test_output_gate_fails_on_a_figure_that_is_not_shown(pair, kind):
+    edit(pair.with_suffix(".ipynb"), '"x + 1"', f"\"save_{kind}('waves', figure)\"")
+    assert output_problems(pair) == [f"cell 3 saves a {kind} that nobody sees"]
 
 
 def test_orphan_gate_fails_on_an_executed_half_alone(pair):

@@ -1,6 +1,9 @@
 """Figures, tables and their registry: round trips, the same bytes twice, and a check that fails."""
 
+import base64
+import io
 import json
+import re
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -8,7 +11,13 @@ import pytest
 from PIL import Image
 
 from vidsindy_lite.companion import registry
-from vidsindy_lite.companion.artifacts import load_table, save_animation, save_figure, save_table
+from vidsindy_lite.companion.artifacts import (
+    load_table,
+    save_animation,
+    save_figure,
+    save_slider,
+    save_table,
+)
 from vidsindy_lite.companion.records import RUN_TIMES
 from vidsindy_lite.companion.registry import check_folder, load_run_times
 
@@ -113,6 +122,29 @@ def test_a_small_thing_keeps_its_colour_in_an_animation(folder):
             image.seek(step)
             shown = np.asarray(image.convert("RGB"))[51, 5 * step + 1]
             assert np.abs(shown - [255.0, 120, 0]).max() < 30
+
+
+def test_slider_registers_the_first_frame_and_shows_all_in_one_picture(folder):
+    def saved():
+        figures = {}
+        for level in ("0 px", "<1 px>", "it's 2"):
+            figures[level], axes = plt.subplots(figsize=(2, 1))
+            axes.plot([0, len(figures)])
+        shown = save_slider("noise", figures, caption='A "noisy" line.', numbers={"n": [0, 1, 2]})
+        assert not any(plt.fignum_exists(figure.number) for figure in figures.values())
+        return shown.data
+
+    html = saved()
+    first = contents(folder)
+    assert set(first) == {"noise.png", "noise.svg", "noise.json"}
+    (strip,) = re.findall(
+        r'<img alt="A &#34;noisy&#34; line." src="data:image/png;base64,(.*?)"', html
+    )
+    with Image.open(io.BytesIO(base64.b64decode(strip))) as image:
+        assert image.size == (200, 300)
+    assert (html.count('type="range"'), html.count('max="2"'), html.count("http")) == (1, 1, 0)
+    assert saved() == html
+    assert contents(folder) == first
 
 
 def test_table_round_trip(folder):

@@ -5,9 +5,11 @@ import io
 import re
 import time
 
+import matplotlib.pyplot as plt
 import pytest
 from browser import CHROMIUM, Browser
 
+from vidsindy_lite.companion.artifacts import save_slider
 from vidsindy_lite.companion.manifest import clear, sign
 from vidsindy_lite.companion.site import build_site
 from vidsindy_lite.stamp import PACKAGE, write_file
@@ -86,8 +88,39 @@ def test_every_page_can_be_read(site, browser, width):
 def test_formulas_and_figures_are_drawn(site, browser):
     seen = browser.open(site / "notebooks" / "03_camera_learning.html")
     assert seen["formulas"] > 10
-    assert seen["images"] == 5
+    executed = (ROOT / "notebooks" / "03_camera_learning.ipynb").read_text("utf-8")
+    assert seen["images"] == executed.count('"image/png":') + executed.count("<img ") >= 5
     assert r"\mathbf" not in seen["text"]
+
+
+@pytest.mark.slow
+def test_pages_hold_the_sliders_of_their_notebooks(site):
+    for executed in (ROOT / "notebooks").glob("*.ipynb"):
+        page = (site / "notebooks" / f"{executed.stem}.html").read_text("utf-8")
+        assert page.count('type="range"') == executed.read_text("utf-8").count(r"type=\"range\"")
+
+
+@needs_browser
+def test_a_slider_moves_its_frames_and_says_where_it_is(browser, tmp_path, monkeypatch):
+    monkeypatch.setenv("VIDSINDY_FIGURES", str(tmp_path))
+    figures = {f"{level} px": plt.figure(figsize=(5, 2)) for level in (0, 1, 2, 4)}
+    slider = save_slider("noise", figures, caption="Noise.", numbers={})
+    (tmp_path / "page.html").write_text(GOOD.format(slider.data))
+    assert page_problems(browser, tmp_path / "page.html", PHONE) == []
+    code = """(() => {
+        const input = document.querySelector("input"), image = document.querySelector("img");
+        const top = () => Math.round(image.getBoundingClientRect().top
+            - image.parentElement.getBoundingClientRect().top);
+        input.value = 2;
+        input.dispatchEvent(new Event("input"));
+        const frame = image.parentElement.getBoundingClientRect().height;
+        return [document.querySelector("output").value, top() / frame];
+    })()"""
+    said, moved = browser.command("Runtime.evaluate", expression=code, returnByValue=True)[
+        "result"
+    ]["value"]
+    assert said == "2 px"
+    assert moved == pytest.approx(-2, abs=0.02)
 
 
 @pytest.mark.slow

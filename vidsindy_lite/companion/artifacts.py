@@ -18,6 +18,7 @@ VIDSINDY_NOTEBOOK and VIDSINDY_STAMP. Without it, a cell that somebody runs by h
 build/interactive/figures: only the runner writes the committed ones.
 """
 
+import base64
 import io
 import os
 import platform
@@ -31,6 +32,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from IPython.display import HTML
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -42,6 +44,7 @@ INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
 LARGEST_SVG = 120_000  # bytes
 PICTURE = 83  # milliseconds that one of an animation stays
+SLIDER_DPI = 100  # dots per inch of its frames
 SECONDS = "seconds"  # the column of a table that holds wall times
 
 
@@ -236,6 +239,46 @@ def save_animation(
     file = io.BytesIO()
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
     _write(record, {f"{animation_id}.gif": file.getvalue()})
+
+
+def save_slider(
+    slider_id: str, figures: Mapping[str, Figure], *, caption: str, numbers: Mapping[str, object]
+) -> HTML:
+    """Register the first of some figures, close all, and show them behind a slider.
+
+    The frames are drawn before, one below the other in a single picture, and the slider moves it:
+    so it works in JupyterLab as on a page without a kernel or a network.
+
+    Parameters
+    ----------
+    slider_id : str
+        As of `save_figure`.
+    figures : mapping of str to matplotlib Figure
+        All of one size, by what stands beside the slider.
+    caption, numbers
+        As of `save_figure`.
+
+    Returns
+    -------
+    IPython.display.HTML
+        For the last expression of a cell.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `save_figure` does.
+    """
+    save_figure(slider_id, next(iter(figures.values())), caption=caption, numbers=numbers)
+    frames = []
+    for figure in figures.values():
+        with plt.rc_context({"savefig.dpi": SLIDER_DPI}):
+            frames.append(Image.open(io.BytesIO(_saved(figure, "png", slider_id, {}))))
+        plt.close(figure)
+    (width, height), strip = frames[0].size, io.BytesIO()
+    Image.fromarray(np.concatenate([np.asarray(frame) for frame in frames])).save(strip, "PNG")
+    coded = base64.b64encode(with_palette(strip.getvalue())).decode()
+    shown = {"labels": list(figures), "caption": caption, "strip": coded}
+    return HTML(page("slider.html", width=width, height=height, **shown))
 
 
 def save_table(table_id: str, rows: Iterable[Mapping[str, object]], *, caption: str) -> Table:

@@ -19,6 +19,7 @@ from .library import shift_matrix
 from .persistence import SMOOTH, Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
+from .search import away
 from .selection import closest_rival, minimiser, subset_search
 from .shape import cancelling, shapes, tied
 from .state import State
@@ -213,7 +214,7 @@ def _selection(problem: Problem, fit: Fit, path: Path, law: PolynomialSystem) ->
     model = fit.collocation.linearise(fit.state, problem.form.searched)
     yield from _left_over(model, fit.state)
     yield from _near_tie(problem, fit.state, model)
-    yield from _nearer_home(problem, fit, law)
+    yield from _elsewhere(problem, fit, law)
 
 
 def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]:
@@ -272,26 +273,41 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[
     )
 
 
-def _nearer_home(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
-    """Would another law, with one axis less away from home, fit almost as well?"""
+def _elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
+    """Would another law fit almost as well, one axis nearer home or one away from it?"""
     state, exponents = fit.state, problem.exponents
-    own = problem.penalties @ state.active.sum(axis=1) + problem.axis_penalty
-    for axis in np.flatnonzero(state.moving).tolist():
-        home = np.arange(problem.d) == axis
-        origin = np.where(home, problem.home, state.offset)
-        moved = shift_matrix(exponents, state.offset - origin) @ state.coefficients
-        there = replace(state, coefficients=moved, offset=origin, moving=state.moving & ~home)
+    own = _price(problem, state)
+    for axis, there in _neighbours(problem, state):
         for value, rival in _cheapest_two(problem, fit, there):
             matrix = shift_matrix(exponents, rival.offset - problem.home)
             parts = np.abs(matrix) @ np.abs(rival.coefficients)
             terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
-            if value - own < NEAR_TIE and (terms != law.support).any():
+            cost = value + problem.axis_penalty * there.moving.sum() - own
+            if cost < NEAR_TIE and (terms != law.support).any():
+                where = "another origin" if there.moving[axis] else "the origin of the data"
                 yield (
                     f"the data hardly tell where the law's origin is in {problem.form.names[axis]}:"
-                    " other terms around the origin of the data fit almost as well (criterion "
-                    f"{value - own:+.1f}); use a longer or cleaner trajectory"
+                    f" other terms around {where} fit almost as well (criterion {cost:+.1f}); use a"
+                    " longer or cleaner trajectory"
                 )
                 break
+
+
+def _price(problem: Problem, state: State) -> float:
+    """Of the terms and axes of a law."""
+    terms = problem.penalties @ state.active.sum(axis=1)
+    return float(terms + problem.axis_penalty * state.moving.sum())
+
+
+def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
+    """The same law with an axis at home that is not, or away from where it is, and which."""
+    for axis in np.flatnonzero(state.moving).tolist():
+        home = np.arange(problem.d) == axis
+        origin = np.where(home, problem.home, state.offset)
+        moved = shift_matrix(problem.exponents, state.offset - origin) @ state.coefficients
+        yield axis, replace(state, coefficients=moved, offset=origin, moving=state.moving & ~home)
+    for there in away(problem, state):
+        yield int(np.argmax(there.moving & ~state.moving)), there
 
 
 def _cheapest_two(problem: Problem, fit: Fit, there: State) -> Iterator[tuple[float, State]]:

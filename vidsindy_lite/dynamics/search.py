@@ -21,7 +21,7 @@ from .history import History
 from .library import closure_mask, divides, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
-from .problem import OFFSET_PENALTY, Problem, fit_curves
+from .problem import Problem, fit_curves
 from .selection import subset_search
 from .state import State
 from .trajectories import Trajectory
@@ -38,6 +38,8 @@ NEEDLESS_START = 0.1
 """Chance that a second start, from terms of all degrees, is made though the first left nothing."""
 FAINT = 0.02
 """What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
+ROUNDING = 1e-9
+"""Moves of an origin, in units of the spread of the data, that are none."""
 ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
 """A search is made on so many samples and turns of the motion, if they are no more than that share
 of the data."""
@@ -328,32 +330,34 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
 
 def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
     """Move axes off home where terms make up for their staying there, while the criterion falls."""
-    for origin in _thinner(problem, fit.state):
-        closed, law = _closed(problem, fit, FINAL_WEIGHT)
-        away = fit.state.moving | (origin != fit.state.offset)
-        start = _candidate(problem, closed, law, origin, away)
-        trial = select(problem, start, FINAL_WEIGHT, "offset away", history)
-        if trial.criterion < fit.criterion:
+    for there in away(problem, fit.state)[:REFINED]:
+        trial = select(problem, replace(fit, state=there), FINAL_WEIGHT, "offset away", history)
+        if trial.criterion < fit.criterion - 1e-6:
             return leave_home(problem, trial, history)  # one axis at a time: the others next
     return fit
 
 
-def _thinner(problem: Problem, state: State) -> list[Floats]:
-    """Origins away from home at which a law itself, not refitted, costs less."""
-    exponents, found = problem.exponents, []
-    home = problem.form.movable & ~state.moving
+def away(problem: Problem, state: State) -> list[State]:
+    """The same law around origins at which a term of it vanishes, the shortest law first.
+
+    Terms that a move brings in are the data's to decide on, while the origin moves.
+    """
+    exponents, home = problem.exponents, problem.form.movable & ~state.moving
     frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), home)
     below = divides(exponents, home) & ~np.eye(len(exponents), dtype=bool)
+    found: list[State] = []
     for entry in np.argwhere((state.active & (below @ state.active)).T):
         step = frames.vanish(np.zeros(problem.d), entry[None])
-        if not np.isfinite(step).all():
+        origin, moved = state.offset + step, np.abs(step) > ROUNDING
+        known = any(np.allclose(origin, other.offset) for other in found)
+        if known or not moved.any() or not np.isfinite(origin).all():
             continue
         matrix = shift_matrix(exponents, -step)
-        left = np.abs(matrix @ state.coefficients)
-        terms = (left > FAINT * (np.abs(matrix) @ np.abs(state.coefficients))).sum()
-        if terms + OFFSET_PENALTY * (step != 0).sum() < state.active.sum():
-            found.append(state.offset + step)
-    return found
+        there = matrix @ state.coefficients
+        left = np.abs(there) > FAINT * (np.abs(matrix) @ np.abs(state.coefficients))
+        around = replace(state, coefficients=there, offset=origin, moving=state.moving | moved)
+        found.append(around.of_terms(left & problem.form.candidates))
+    return sorted(found, key=lambda state: int(state.active.sum() + state.moving.sum()))
 
 
 def bridge(problem: Problem, fit: Fit, history: History) -> Fit:

@@ -31,7 +31,7 @@ from .persistence import Path, Plateau, follow, typical
 from .precision import foreseen, with_precision
 from .problem import Problem, fit_curves, pose
 from .process_noise import rebalanced, with_process_noise
-from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, search
+from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, leave_home, search
 from .selection import inverse
 from .trajectories import (
     Trajectory,
@@ -240,7 +240,10 @@ def _refitted(
     for weight in SEARCH_WEIGHTS:
         collocation = problem.weighted(collocation, weight)
         state = collocation.solve(state, tolerance=1.0, max_steps=10).state
-    fit = at_own_noise(problem, collocation.solve(state, EXACT))
+    fit = collocation.solve(state, EXACT)
+    priced = replace(fit, criterion=problem.criterion(collocation, fit.state))
+    # Terms that come in may be those of a shift.
+    fit = at_own_noise(problem, leave_home(problem, priced, history))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     largest = max(plateau.low for plateau in changed)
     return fit if typical(problem.errors(fit)) <= CONSISTENT * largest else None

@@ -115,16 +115,16 @@ def plot_rig(rig: Rig, x: Floats) -> Figure:
     return figure
 
 
-def plot_tracks(tracks: Sequence[Floats], rig: Rig) -> Figure:
+def plot_tracks(tracks: Sequence[Floats], cameras: Sequence[Camera]) -> Figure:
     """The pixel track of each camera in the frame of its image.
 
     Parameters
     ----------
     tracks : sequence of ndarray, shape (n, 2)
-    rig : Rig
+    cameras : sequence of Camera
     """
     figure, panels = plt.subplots(1, len(tracks), figsize=(3.2 * len(tracks), 3.6))
-    for i, (axes, track, camera) in enumerate(zip(panels, tracks, rig.cameras, strict=True)):
+    for i, (axes, track, camera) in enumerate(zip(panels, tracks, cameras, strict=True)):
         width, height = camera.image_size
         axes.plot(*track.T, color=f"C{i}", lw=0.8)
         axes.set(title=f"camera {i + 1}", xlabel="u (px)", aspect="equal")
