@@ -201,7 +201,13 @@ class Steadying:
             return found
         direct = align(self.key.levels, relief.levels, self.last)
         both = [one for one in (found, direct) if one is not None and one.error < _VAGUE]
-        return min(both, key=lambda one: one.error, default=None)
+        return min(both, key=lambda one: self._step(one.map), default=None)
+
+    def _step(self, here: Floats) -> float:
+        """By how much a map differs from that of the frame before, where two are as good."""
+        assert self.key is not None
+        step = here @ np.linalg.inv(self.last)
+        return float(displacement(step[None], self.key.fine.shape[::-1])[0])
 
     def _shared(self, here: Floats) -> float:
         """Share of the key frame that is still in view."""
