@@ -10,6 +10,7 @@ from scipy.linalg import expm
 import vidsindy_lite as vl
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion.report import write_refusal, write_report
+from vidsindy_lite.observation import _check_found
 from vidsindy_lite.pipeline import _driven
 from vidsindy_lite.refusal import Refused
 
@@ -127,7 +128,20 @@ def test_what_several_targets_need(films, changed, message):
         vl.observe(paths, rig, **({"targets": 2} | changed))
 
 
+def test_a_film_that_shows_fewer_is_refused_with_all_tracks():
+    both = np.arange(40.0).reshape(10, 4)
+    one = both.copy()
+    one[:, 2:] = np.nan
+    with pytest.raises(Refused, match="b.mov must show 2 moving targets, got 1 in any") as refused:
+        _check_found([both, one], ["a.mov", "b.mov"], 2)
+    assert refused.value.step == "track"
+    assert len(refused.value.tracks) == 2
+    with pytest.raises(Refused, match="b.mov must show one moving target, got none in any"):
+        _check_found([both[:, :2], one[:, 2:]], ["a.mov", "b.mov"], 1)
+    _check_found([both, both], ["a.mov", "b.mov"], 2)
+
+
 def test_two_views_cannot_tell_targets_apart(films):
     paths, rig, _ = films
-    with pytest.raises(ValueError, match="targets: 2 need three cameras of known places"):
+    with pytest.raises(ValueError, match="targets: 2 need three .* got 2 of known ones"):
         vl.observe(paths[:2], replace(rig, cameras=rig.cameras[:2]), targets=2)

@@ -178,7 +178,7 @@ def observe(
         for (path, shot), hint in zip(videos, told, strict=True)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
-    _check_found(tracks, names)
+    _check_found(tracks, names, targets)
     doubts = [warning for found in seen for track in found for warning in track.warnings]
     conclude = _observed if targets == 1 else _several_observed
     return conclude(tracks, rig, clock, given, names, doubts, progress)
@@ -369,9 +369,16 @@ def _check_several(
 ) -> None:
     """That several targets can be told apart."""
     if len(rig.cameras) < 3 or not rig.is_measured:
-        raise ValueError(f"targets: {targets} need three cameras of known places and directions")
+        known = "known" if rig.is_measured else "unknown"
+        raise ValueError(
+            f"targets: {targets} need three cameras of known places and directions, got "
+            f"{len(rig.cameras)} of {known} ones"
+        )
     if detector != "auto" or any(hints or ()):
-        raise ValueError(f"targets: {targets} are found by detector='auto' alone, without hints")
+        raise ValueError(
+            f"targets: {targets} are found by detector='auto' alone, without hints, got "
+            f"detector={detector!r:.60}, hints={hints!r:.60}"
+        )
 
 
 def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
@@ -413,12 +420,14 @@ def _track_one(
     return found
 
 
-def _check_found(tracks: Sequence[Floats], names: Sequence[str]) -> None:
-    """That each video shows a target: all are tracked first, so that all can be looked at."""
+def _check_found(tracks: Sequence[Floats], names: Sequence[str], targets: int) -> None:
+    """That each video shows its targets: all are tracked first, so that all can be looked at."""
+    wanted = "one moving target" if targets == 1 else f"{targets} moving targets"
     for pixels, name in zip(tracks, names, strict=True):
-        if not np.isfinite(pixels).any():
+        found = int(np.isfinite(pixels).any(axis=0).sum()) // 2
+        if found < targets:
             raise Refused(
-                f"paths: {name} must show one moving target, got none in any frame: what "
+                f"paths: {name} must show {wanted}, got {found or 'none'} in any frame: what "
                 "moves by less than a tenth of its own width is taken for background",
                 "track",
                 tracks,

@@ -6,7 +6,7 @@ import pytest
 from footage import Phone, write_phone
 
 from vidsindy_lite import track
-from vidsindy_lite.vision.aligning import align, explains, more_alike, parts_unlike, pyramid
+from vidsindy_lite.vision.aligning import align, pyramid
 
 SIZE = 320, 240
 
@@ -19,7 +19,7 @@ def sight(seed, here=None, noise=2.0, contrast=20, light=1.0):
     move = np.array([[1, 0, -30], [0, 1, -30], [0, 0, 1.0]])
     here = np.eye(3) if here is None else here
     rng = np.random.default_rng([seed, int(1e6 * abs(here).sum())])
-    view = light * cv2.warpAffine(scene, (here @ move)[:2], SIZE, flags=cv2.INTER_CUBIC)
+    view = light * cv2.warpAffine(scene, (here @ move)[:2], SIZE, flags=cv2.INTER_LINEAR)
     view = view[..., None] + rng.normal(0, noise, (*SIZE[::-1], 3))
     return np.clip(view, 0, 255).astype(np.uint8)
 
@@ -43,9 +43,8 @@ def test_shift_turn_and_scale_of_clouds(move, light):
     found = align(before, after, np.eye(3))
     points = np.array([[40, 40, 1], [280, 40, 1], [160, 120, 1], [280, 200, 1.0]])
     miss = np.linalg.norm((points @ (found.map - move).T)[:, :2], axis=1)
-    assert miss.max() < 0.4
-    assert miss.mean() <= 8 * found.error < 2
-    assert move[0, 2] == 0 or explains(before, after, found.map)
+    assert miss.max() < 0.1
+    assert miss.mean() <= 8 * found.error < 0.5
 
 
 def test_what_moves_on_its_own_is_left_aside():
@@ -57,22 +56,42 @@ def test_what_moves_on_its_own_is_left_aside():
     assert np.linalg.norm(found.map[:2, 2] - move[:2, 2]) < 0.5
 
 
+@pytest.mark.parametrize("light", [0.85, 1.0, 1.15])
+def test_a_dark_post_in_another_light_shifts_nothing(light):
+    move = similar(4.3, -2.6)
+    views = [sight(2).astype(np.float32), sight(2, move).astype(np.float32)]
+    for view, here in zip(views, (np.eye(3), move), strict=True):
+        post = np.zeros(SIZE[::-1], np.float32)
+        post[:, 150:168] = 1
+        post = cv2.warpAffine(post, here[:2], SIZE)[..., None]
+        view[:] = view * (1 - post) + 30 * post
+    before, after = sight(2), sight(2, move)
+    before[:], after[:] = views[0], np.clip(light * views[1], 0, 255)
+    found = align(pyramid(before), pyramid(after), np.eye(3))
+    assert np.linalg.norm(found.map[:2, 2] - move[:2, 2]) < 0.15
+
+
+@pytest.mark.parametrize("things", [0, 3])
+def test_noise_and_a_few_things_tell_nothing(things):
+    rng = np.random.default_rng(3)
+    views = []
+    for _ in range(2):
+        wall = 120 + np.linspace(0, 20, SIZE[0])[None, :, None] + np.zeros((SIZE[1], 1, 3))
+        for u, v in rng.integers(20, 200, (things, 2)):
+            wall[v : v + 12, u : u + 12] = 40
+        views.append(np.clip(wall + rng.normal(0, 3, wall.shape), 0, 255).astype(np.uint8))
+    assert align(*map(pyramid, views), np.eye(3)).error > 3
+
+
+def test_a_camera_held_before_a_plain_wall_is_doubted(tmp_path):
+    phone = Phone("plain", 20, camera="held", flicker=0.03, image_size=(320, 240), frames=40)
+    write_phone(tmp_path / "clip.mp4", phone, 3)
+    found = track(tmp_path / "clip.mp4")
+    assert any("too plain to tell whether the camera moves" in doubt for doubt in found.warnings)
+
+
 def test_a_plain_wall_tells_no_motion(tmp_path):
     phone = Phone("plain", 30, person=True, image_size=(320, 240), frames=40)
     write_phone(tmp_path / "clip.mp4", phone, 3)
     found = track(tmp_path / "clip.mp4")
     assert found.maps is None
-
-
-def test_parts_are_compared_where_they_are_shown():
-    change = np.zeros((48, 96), np.float32)
-    change[:, 48:] = 100
-    known = np.ones((48, 96), bool)
-    known[:, 48:72] = False
-    parts = parts_unlike(change, known)
-    assert parts.shape == (2, 12, 12)
-    np.testing.assert_allclose(parts[:, :, :6], 0)
-    np.testing.assert_allclose(parts[:, :, 9:], 30)
-    still = np.ones((2, 12, 12))
-    assert more_alike(0.9 * still, still)
-    assert not more_alike(0.99 * still, still)

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ..arrays import Bools, Floats, Floats32, Image
+from ..arrays import Floats, Floats32, Image
 
+_RIM = 2  # pixels of each level that depend on what lies beyond the image
 _LEVELS = 4  # of the pyramid, the first of half the size
 _ITERATIONS = 6
 _CLOSE = 0.01  # pixels of a level of a step that is no longer worth another
@@ -20,10 +21,8 @@ _OUTSIDE = -1e4  # grey level of what a view does not show
 _LOOSE, _FIRM = 40.0, 3.0  # grey levels, and deviations, from which on a pixel is left aside
 _STEP, _TURN = 8.0, 0.03  # pixels and radians by which the guess may be wrong
 _FAIR = 4.0  # times what a usual block tells, that one block may tell at most
+_WIDELY = 0.1  # share of the blocks that must tell: what few of them tell may move on its own
 _FAINT = 0.3  # grey levels; a deviation without any noise
-_BOUND = 30.0  # grey levels of a difference
-_BETTER = 0.97  # share of it that remains if a motion explains it; the noise falls a little, too
-_EQUAL = 0.05  # grey levels of a difference that are none
 _BLOCKS = 12  # into which each side is cut: errors within one may be the same
 
 
@@ -39,7 +38,8 @@ def pyramid(small: Image) -> list[Floats32]:
     levels = [cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)]
     while len(levels) <= _LEVELS and min(levels[-1].shape) >= 32:
         levels.append(np.asarray(cv2.pyrDown(levels[-1]), np.float32))
-    return levels[1:]
+    # So soft that linear interpolation neither shifts nor softens them (OpenCV's cubic one shifts).
+    return [np.asarray(cv2.GaussianBlur(level, (0, 0), 1), np.float32) for level in levels[1:]]
 
 
 def align(before: list[Floats32], after: list[Floats32], guess: Floats) -> Aligned | None:
@@ -63,71 +63,33 @@ def align(before: list[Floats32], after: list[Floats32], guess: Floats) -> Align
     return fitted and Aligned(found, 2 * fitted.error)
 
 
-def explains(before: list[Floats32], after: list[Floats32], here: Floats) -> bool:
-    """Does a map make most parts of two views more alike than they are without it?"""
-    return more_alike(unlike(before, after, here), unlike(before, after, np.eye(3)))
-
-
-def unlike(before: list[Floats32], after: list[Floats32], here: Floats) -> Floats:
-    """Grey levels by which the parts of two views differ, see `parts_unlike`, laid by a map."""
-    key, view = before[0], after[0]
-    half = np.diag([0.5, 0.5, 1.0])
-    moved = cv2.warpPerspective(
-        view, half @ here @ np.linalg.inv(half), key.shape[::-1],
-        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderValue=_OUTSIDE,
-    )  # fmt: skip
-    brighter = np.median(view) / max(float(np.median(key)), 1.0)
-    return parts_unlike(np.asarray(moved) - brighter * key, np.asarray(moved) >= 0)
-
-
-def parts_unlike(change: Floats32, known: Bools) -> Floats:
-    """Grey levels by which two images differ in each of their parts, those of a target bounded.
-
-    Of single pixels, which show what is sharp, and of means of 4 x 4, which show what is faint.
-    """
-    off, size = change * known, (_BLOCKS, _BLOCKS)
-    shown = cv2.resize(known.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    coarse = cv2.resize(off, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
-    parts = [
-        cv2.resize(np.minimum(np.abs(np.asarray(x)), _BOUND), size, interpolation=cv2.INTER_AREA)
-        for x in (off, coarse)
-    ]
-    return np.array(parts) / np.maximum(shown, 0.1)
-
-
-def more_alike(moved: Floats, still: Floats) -> bool:
-    """Do most parts differ less if the camera is taken to move than if it is not?"""
-    ratios = np.median((moved + _EQUAL) / (still + _EQUAL), axis=(1, 2))
-    return bool(ratios.min() < _BETTER)
-
-
 def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float) -> Aligned | None:
     """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
     height, width = key.shape
     v, u = np.mgrid[:height, :width].astype(np.float32)
     middle = np.array([[1, 0, -(width - 1) / 2], [0, 1, -(height - 1) / 2], [0, 0, 1.0]])
     u, v = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
-    gv, gu = np.gradient(key)
-    slopes = np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, key, np.ones_like(key)], axis=-1)
-    power = cv2.resize(np.asarray(gu**2 + gv**2), (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA)
+    slopes = _slopes(key, u, v)
+    steep = slopes.reshape(-1, 6)
+    power = _by_blocks(slopes[..., 0] ** 2 + slopes[..., 1] ** 2)
     fair = np.minimum(1, _FAIR * np.median(power) / np.maximum(power, 1e-9))
     share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
     sure = np.array([_STEP, _STEP, _TURN, _TURN, 1, 100]) * [scale, scale, 1, 1, 1, 1]
     prior = np.diag(1 / sure**2)
+    gain, offset = 1.0, 0.0
+    inner = np.zeros_like(view)
+    inner[_RIM:-_RIM, _RIM:-_RIM] = 1
     for step in range(_ITERATIONS):
-        shown = cv2.warpAffine(
-            view, here[:2], (width, height), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            borderValue=_OUTSIDE,
-        )  # fmt: skip
-        known = shown >= 0
+        shown, known = _moved(view, here[:2]), _moved(inner, here[:2]) * inner > 0.99
         if known.mean() < 0.3:
             return None
-        miss = shown - key
-        miss -= np.median(miss[known])
+        miss = shown - gain * key - offset
+        if step == 0:
+            offset = float(np.median(miss[known]))
+            miss -= offset
         spread = max(1.4826 * float(np.median(np.abs(miss[known]))), _FAINT)
         bound = max(_FIRM * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
-        steep = slopes.reshape(-1, 6)
         heavy = steep * weight.reshape(-1, 1)
         normal = heavy.T @ steep + spread**2 * prior
         delta = np.linalg.solve(normal, heavy.T @ miss.ravel())
@@ -136,23 +98,59 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
         )
         change = np.linalg.inv(middle) @ shift @ middle
         here = here @ np.linalg.inv(change)
+        gain, offset = gain + delta[4], offset + delta[5]
         if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < _CLOSE:
             break
     miss = miss - (slopes @ delta).astype(np.float32)
-    return Aligned(here, _error(slopes, weight * miss, normal, (u, v)))
+    seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32), u, v)
+    # Noise has slopes, too, but not the same in both views.
+    value, direction = np.linalg.eigh(_symmetric(heavy.T @ seen.reshape(-1, 6)))
+    information = (direction * np.maximum(value, 0)) @ direction.T / spread**2 + prior
+    telling = _by_blocks(weight * np.einsum("ijk,ijk->ij", seen[..., :2], slopes[..., :2]))
+    telling = np.maximum(telling, 0)
+    if telling.mean() ** 2 <= _WIDELY * (telling**2).mean():
+        return Aligned(here, np.inf)
+    return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
+
+
+def _symmetric(matrix: Floats) -> Floats:
+    return (matrix + matrix.T) / 2
+
+
+def _by_blocks(values: Floats32) -> Floats32:
+    """The means (12, 12) of an image over its blocks."""
+    blocks = cv2.resize(values, (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA)
+    return np.asarray(blocks, np.float32)
+
+
+def _slopes(view: Floats32, u: Floats32, v: Floats32) -> Floats32:
+    """By what each pixel changes with shift, turn, scale and light, (h, w, 6)."""
+    gv, gu = np.gradient(view)
+    by = [gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)]
+    return np.stack(by, axis=-1)
+
+
+def _moved(view: Floats32, here: Floats) -> Floats32:
+    """A view laid on the other by a map (2, 3)."""
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return np.asarray(cv2.warpAffine(view, here, view.shape[::-1], flags=flags), np.float32)
 
 
 def _error(
-    slopes: Floats32, miss: Floats32, normal: Floats, at: tuple[Floats32, Floats32]
+    slopes: Floats32, pull: Floats32, information: Floats, at: tuple[Floats32, Floats32]
 ) -> float:
-    """Standard error of the places of a map, if errors within a block may be the same."""
-    height, width = (side // _BLOCKS for side in miss.shape)
+    """Standard error of the places of a map, if errors within a block may be the same.
+
+    `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
+    """
+    height, width = (side // _BLOCKS for side in pull.shape)
     if not height or not width:
         return np.inf
     cut = np.s_[: height * _BLOCKS, : width * _BLOCKS]
-    pull = (slopes * miss[..., None])[cut].reshape(_BLOCKS, height, _BLOCKS, width, 6)
-    sums = pull.sum(axis=(1, 3)).reshape(-1, 6)
-    inverse = np.linalg.inv(normal)
-    variance = np.diag(inverse @ (sums.T @ sums) @ inverse)
+    pulls = (slopes * pull[..., None])[cut].reshape(_BLOCKS, height, _BLOCKS, width, 6)
+    sums = pulls.sum(axis=(1, 3)).reshape(-1, 6)
+    covariance = np.linalg.inv(information)
+    blockwise = covariance @ (sums.T @ sums) @ covariance
+    variance = np.maximum(np.diag(blockwise), np.diag(covariance))
     far = float(np.mean(at[0] ** 2 + at[1] ** 2))
     return float(np.sqrt((variance[0] + variance[1] + far * (variance[2] + variance[3])) / 2))

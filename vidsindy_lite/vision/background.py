@@ -85,37 +85,48 @@ def _median(frames: Image) -> Image:
 
 def _reduce(image: Image) -> Floats32:
     """Means over squares of 4 x 4 pixels, as floats."""
+    return _reduced(image).astype(np.float32)
+
+
+def _reduced(image: Image) -> Image:
+    """Means over squares of 4 x 4 pixels, rounded."""
     height, width = image.shape[:2]
     size = (-(-width // _COARSE), -(-height // _COARSE))
-    return cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _remove_ghosts(background: Image, samples: Image, floor: float) -> None:
+def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: float) -> None:
     """Correct in place a background that contains the target where it stayed for long.
 
     Where many samples differ from the background, they show the same place with or without the
-    target. Of the two, the one that continues its surroundings is the background.
+    target. Of the two, the one that continues its surroundings is the background. `coarse` are the
+    samples, reduced: what continues what needs no more.
     """
-    change = np.array([_reduce(s) - _reduce(background) for s in samples])
-    differs = np.linalg.norm(change, axis=-1) > floor
+    reduced = _reduced(background)
+    ground = reduced.astype(np.float32)
+    differs = np.array([np.linalg.norm(one - ground, axis=-1) > floor for one in coarse])
     often = (differs.mean(axis=0) > _OFTEN).astype(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(often)
     for k in range(1, count):
+        if stats[k, cv2.CC_STAT_AREA] > _TOO_LARGE * often.size:
+            continue
         group = differs[:, labels == k].mean(axis=1) > 0.5
         if group.all() or not group.any():
             continue
         left, top, width, height = stats[k, :4]
         right, bottom = left + width + _BORDER, top + height + _BORDER
         left, top = max(left - _BORDER, 0), max(top - _BORDER, 0)
-        place = (labels[top:bottom, left:right] == k).astype(np.uint8)
-        place = np.asarray(cv2.dilate(place, np.ones((3, 3), np.uint8)))
+        window = np.s_[top:bottom, left:right]
+        place = np.asarray(cv2.dilate((labels[window] == k).astype(np.uint8), np.ones((3, 3))))
+        inside = place > 0
+        around = cv2.inpaint(reduced[window], place, 3, cv2.INPAINT_TELEA)
+        looks = [np.median(coarse[:, *window][g], axis=0)[inside] for g in (group, ~group)]
+        off = [np.abs(look - around[inside]).sum() for look in looks]
         window = np.s_[_COARSE * top : _COARSE * bottom, _COARSE * left : _COARSE * right]
         view = background[window]
-        mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]]
-        inside = mask > 0
-        expected = cv2.inpaint(view, mask, 3, cv2.INPAINT_TELEA)[inside].astype(float)
-        looks = [_median(samples[:, *window][g])[inside] for g in (group, ~group)]
-        view[inside] = min(looks, key=lambda look: np.abs(look - expected).sum())
+        mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]] > 0
+        better = group if off[0] < off[1] else ~group
+        view[mask] = _median(samples[:, *window][better])[mask]
 
 
 def _others(changes: list[Floats32], floor: float) -> float:
@@ -183,10 +194,11 @@ def light(frame: Floats32, background: Floats32, known: Bools) -> Floats32:
 # --------------------------------------------------------------------------------------- the model
 
 
-def _unrest(background: Floats32, changes: list[Floats32], floor: float) -> tuple[str, ...]:
+def _unrest(
+    background: Floats32, changes: list[Floats32], displaced: Floats, floor: float
+) -> tuple[str, ...]:
     """Why a background model is not the right one: what is not at rest in the samples."""
     doubts = []
-    displaced = camera_motion(background, changes, floor)
     if displaced.size and displaced.max() > _SHAKY:
         doubts.append(
             f"the camera moves, by up to {displaced.max():.1f} px in the sampled frames; "
@@ -235,21 +247,21 @@ class BackgroundModel:
         deviation = [cv2.absdiff(np.ascontiguousarray(s[::3, ::3]), calm) for s in samples]
         self.noise = 1.4826 * float(np.median(deviation))
         self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
-        _remove_ghosts(self.background, samples, self.coarse_floor)
+        coarse = np.array([_reduced(sample) for sample in samples])
+        _remove_ghosts(self.background, samples, coarse, self.coarse_floor)
         self.size = np.array(self.background.shape[1::-1])
         self.coarse_background = _reduce(self.background)
-        changes = [_reduce(sample) - self.coarse_background for sample in samples]
+        changes = [one - self.coarse_background for one in coarse]
         displaced = camera_motion(self.coarse_background, changes, self.coarse_floor)
         self.camera_rests = bool(displaced.max(initial=0.0) <= _SHAKY)
-        self.unrest = _unrest(self.coarse_background, changes, self.coarse_floor)
+        self.unrest = _unrest(self.coarse_background, changes, displaced, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
         self.blur = 1.2 if self.noise > _QUIET else 0.0
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
         self.floor = max(5 * remaining, 12.0)
         self.contrast: Floats32 | None = None
-        self._learn_target(samples)
 
-    def _learn_target(self, samples: Image) -> None:
+    def learn_target(self, samples: Image) -> None:
         """Colour and area of the target: the medians over the sampled frames."""
         looks = [self._look(frame, *near) for frame in samples if (near := self.search(frame))]
         seen = [look for look in looks if look]

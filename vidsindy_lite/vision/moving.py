@@ -12,14 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .aligning import more_alike, parts_unlike
-from .background import SAMPLES, camera_motion, light
+from .background import SAMPLES, light
 from .candidates import Candidate, Difference, Plate, enlarged, reduce, reduction, tolerance
 from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
 from .refining import Lens, View, fitting, scatter
-from .steadying import CameraMotion, Steadying, at_rest, carry, stands_still
+from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
 from .video import read_frame, read_video, video_info
 
 _PATHS = 5  # paths among which the target's is chosen
@@ -29,11 +28,12 @@ _BEYOND = 3  # frames by which a path is carried on at its ends
 _PLAIN = 0.2  # quality of the candidates of a path that is worth anything
 _SWINGS = 0.1  # of its size, by which what lingers in its place moves at least
 _SCARCE = 0.05  # share of the frames in which a target must be seen
-_SWAYS = 0.5  # pixels of a camera's displacement that are more than doubtful
-_TREMBLES = 0.3  # pixels by which a track scatters that are more than noise
-_LOOSE = 1.0  # pixels to which a camera's motion should be known
+_TOLD_OFTEN = 0.5  # share of the frames that tell of the camera's motion, if it is known
+_LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
 _COLOUR = 70.0  # grey levels between colours that are not alike
 _TOLD = 100.0  # quality of the candidate that a user points at
+_PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
+_DENSE = 640  # pixels in a row of which the noise is known well
 _LARGE = 0.01  # share of the image that a target hardly fills
 
 
@@ -96,25 +96,15 @@ class Followed(NamedTuple):
 def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
     """Of a pixel, in grey levels: of the quieter samples, which differ from the plate by that."""
     found = []
+    step = max(3, samples.shape[2] // _DENSE)
+    few = np.s_[::step, ::step]
     for sample, here in zip(samples, maps, strict=True):
         then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1])
-        a, b = sample[::3, ::3].astype(np.float32), then[::3, ::3].astype(np.float32)
-        known = known[::3, ::3]
+        a, b = sample[few].astype(np.float32), then[few].astype(np.float32)
+        known = known[few]
         if known.any():
             found.append(1.4826 * np.median(np.abs(a - b * light(a, b, known))[known]))
     return float(np.median(found)) if found else 0.0
-
-
-def _sways(samples: Image, plate: Plate, noise: float) -> float:
-    """Pixels by which a camera that is taken to be at rest typically seems to be displaced."""
-    then = plate.image.astype(np.float32)
-    known = plate.valid > 0
-    changes = []
-    for sample in samples:
-        now = sample.astype(np.float32)
-        changes.append((now / light(now, then, known) - then)[::2, ::2])
-    displaced = camera_motion(then[::2, ::2], changes, max(6 * noise, 8.0))
-    return float(0.5 * np.quantile(displaced, 0.9))
 
 
 def _camera(
@@ -122,34 +112,23 @@ def _camera(
 ) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
-    It is read from all frames, unless the sampled ones tell that the camera is at rest, and must
-    explain better than that how the samples differ: maps that are not needed only add their errors.
+    It is read from all frames, unless the sampled ones tell that the camera is at rest. Maps that
+    say no more than their errors only add these.
     """
-    rest = at_rest(video_info(path).frames)
-    if stands_still(small):
-        return rest, True
+    info = video_info(path)
+    still = stands_still(small)
+    if still is not False:
+        return at_rest(info.frames), still is True
     steadying = Steadying(factor)
     for frame in read_video(path):
         steadying.add(reduce(frame, factor))
     motion = steadying.motion()
-    sampled = np.minimum(sampled, len(motion.maps) - 1)
-    larger = enlarged(factor)
-    maps = np.linalg.inv(larger) @ motion.maps[sampled] @ larger
-    known = np.isfinite(motion.errors[sampled])
-    moved, still = (_unlike(small[known], m[known]) for m in (maps, rest.maps[sampled]))
-    return (motion, True) if more_alike(moved, still) else (rest, False)
-
-
-def _unlike(samples: Image, maps: Floats) -> Floats:
-    """Grey levels by which samples differ from their plate, in each part of the image."""
-    plate = Plate(samples, maps, np.ones(len(samples), bool))
-    found = []
-    for sample, here in zip(samples, maps, strict=True):
-        then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1])
-        a, b = sample.astype(np.float32), then.astype(np.float32)
-        change = ((a - b * light(a, b, known)) * known[..., None]).mean(axis=2)
-        found.append(parts_unlike(change, known))
-    return np.mean(found, axis=0)
+    told = motion.errors[1:] < factor * _LOOSE
+    if told.mean() < _TOLD_OFTEN:
+        return at_rest(info.frames), False
+    sure = displacement(motion.maps[1:], info.size) / np.maximum(motion.errors[1:], 1e-3)
+    plainly = np.quantile(sure, _PUSHED) > PLAINLY
+    return (motion if plainly else at_rest(info.frames)), True
 
 
 def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) -> Followed:
@@ -157,43 +136,30 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
 
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
-    film = _Film.of(path, samples)
-    found, lights = _candidates(path, film, hint)
-    seen, paths = _linked(found, film)
+    film = Film.of(path, samples)
+    found, lights = sighted(path, film, hint)
+    seen, paths = linked(found, film)
     doubts: tuple[str, ...] = ()
     if hint is not None and hint.box is not None:
         paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
     elif hint is None and paths and _travels(seen, paths[0].rows, film.places):
         doubts = _rivals(seen, paths, film)
         # What the target looks like is known by now, which tells it from what it meets.
-        seen, paths = _linked(_learned(found, seen, paths[0].rows), film)
+        seen, paths = linked(_learned(found, seen, paths[0].rows), film)
         paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
     elif hint is None:
         paths = []
     if not paths:
         return nothing(film.motion, len(found))
-    if film.sways > _SWAYS:
-        doubts += ("the camera seems to move, but not clearly enough to be followed: its motion is "
-                   "part of the track",)  # fmt: skip
+    if not film.sure:
+        doubts += ("the background is too plain to tell whether the camera moves: if so, its "
+                   "motion is part of the track",)  # fmt: skip
     ways = expected(seen, paths[0].rows, film, len(found))
-    followed = _finished(_views(path, samples, film, ways, lights), film.motion, doubts)
-    return followed if film.sure else _doubted(followed)
+    return finished(viewed(path, samples, film, ways, lights), film.motion, doubts)
 
 
-def _doubted(found: Followed) -> Followed:
-    """A track whose camera may tremble before too plain a background: does the target, too?"""
-    seen = np.isfinite(found.pixels[:, 0])
-    if not seen.any() or np.median(found.errors[seen]) < _TREMBLES:
-        return found
-    doubt = (
-        f"the track is rough, by {np.median(found.errors[seen]):.1f} px, and the background too "
-        "plain to tell whether the camera trembles: if so, that is part of the track"
-    )
-    return found._replace(doubts=(*found.doubts, doubt))
-
-
-def _linked(
-    found: list[list[Candidate]], film: "_Film", most: int = _PATHS
+def linked(
+    found: list[list[Candidate]], film: "Film", most: int = _PATHS
 ) -> tuple[Sightings, list[Rated]]:
     """The candidates as a table, and the paths through them, the plainest first."""
     places = [
@@ -214,11 +180,10 @@ def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[
     return alike
 
 
-class _Film(NamedTuple):
+class Film(NamedTuple):
     """What is known of a film before its target: `maps` and `plate` are of reduced frames.
 
-    `sways` is by how many pixels a camera taken to be at rest may be displaced, and `sure` whether
-    it is known to be at rest, or to move as `motion` says.
+    `sure` is whether its camera is known to be at rest, or to move as `motion` says.
     """
 
     factor: int
@@ -228,11 +193,10 @@ class _Film(NamedTuple):
     noise: float
     sampled: Ints
     places: list[Place]
-    sways: float
     sure: bool
 
     @classmethod
-    def of(cls, path: str | os.PathLike, samples: Image, rests: bool = False) -> "_Film":
+    def of(cls, path: str | os.PathLike, samples: Image, rests: bool = False) -> "Film":
         """From its sampled frames, and from all of them if its camera may move."""
         frames = video_info(path).frames
         sampled = np.unique(np.linspace(0, frames - 1, SAMPLES).round().astype(int))[: len(samples)]
@@ -247,12 +211,11 @@ class _Film(NamedTuple):
         noise = _noise(small, maps[sampled], plate)
         places = lingering(plate, small, maps[sampled], known, tolerance(plate, noise))
         uncover(plate, small, maps[sampled], known, places)
-        sways = 0.0 if motion.moves else _sways(small, plate, noise)
-        return cls(factor, motion, maps, plate, noise, sampled, places, factor * sways, sure)
+        return cls(factor, motion, maps, plate, noise, sampled, places, sure)
 
 
-def _candidates(
-    path: str | os.PathLike, film: _Film, hint: Hint | None
+def sighted(
+    path: str | os.PathLike, film: Film, hint: Hint | None
 ) -> tuple[list[list[Candidate]], list[Floats32]]:
     """What may be the target in each frame, and how bright the frame is."""
     difference = Difference(film.plate, film.noise)
@@ -266,8 +229,8 @@ def _candidates(
     return kept, difference.lights
 
 
-def _views(
-    path: str | os.PathLike, samples: Image, film: _Film, ways: "Ways", lights: list[Floats32]
+def viewed(
+    path: str | os.PathLike, samples: Image, film: Film, ways: "Ways", lights: list[Floats32]
 ) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
     known = np.isfinite(film.motion.errors[film.sampled])
@@ -344,7 +307,7 @@ def _travels(seen: Sightings, rows: Ints, places: list[Place]) -> bool:
     return bool(extent > least and np.median(seen.quality[rows]) > _PLAIN)
 
 
-def _rivals(seen: Sightings, paths: list[Rated], film: "_Film") -> tuple[str, ...]:
+def _rivals(seen: Sightings, paths: list[Rated], film: "Film") -> tuple[str, ...]:
     """What else moves about as plainly."""
     plain = [p for p in paths[1:] if p.rating > _AS_PLAIN * paths[0].rating]
     others = [p for p in plain if _travels(seen, p.rows, film.places)]
@@ -366,7 +329,7 @@ class Ways(NamedTuple):
     colour: Floats
 
 
-def expected(seen: Sightings, rows: Ints, film: _Film, n: int) -> Ways:
+def expected(seen: Sightings, rows: Ints, film: Film, n: int) -> Ways:
     """Where a path leads in all frames from its first to its last, and a little beyond."""
     at, place = seen.frame[rows], seen.centre[rows]
     frames = np.arange(max(at[0] - _BEYOND, 0), min(at[-1] + _BEYOND, n - 1) + 1)
@@ -387,7 +350,7 @@ def expected(seen: Sightings, rows: Ints, film: _Film, n: int) -> Ways:
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
 
-def _finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]) -> Followed:
+def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]) -> Followed:
     """The views of the whole target as a track."""
     n = len(views)
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)

@@ -14,7 +14,7 @@ from ..arrays import Bools
 from ..checks import check_integer
 from .background import BackgroundModel, sample_frames
 from .linking import Sightings
-from .moving import Rated, Ways, _candidates, _Film, _finished, _linked, _views, expected
+from .moving import Film, Rated, Ways, expected, finished, linked, nothing, sighted, viewed
 from .tracking import Track
 
 _MEETINGS = 8  # paths of a target that may follow each other
@@ -37,34 +37,32 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     Returns
     -------
     tuple of Track
-        NaN wherever two targets meet. Behind a meeting a track may be that of another target.
+        NaN wherever two targets meet. Behind a meeting a track may be that of another target. If
+        fewer things move, the last tracks are NaN throughout.
 
     Raises
     ------
     FileNotFoundError, ValueError
-        If the file is missing or no video, or if fewer things move.
+        If the file is missing or no video.
     """
     check_integer("count", count, least=1)
     samples = sample_frames(path)
     # Before a plain background, all that could tell of a camera's motion may be the targets.
-    film = _Film.of(path, samples, BackgroundModel(samples).camera_rests)
-    found, lights = _candidates(path, film, None)
-    seen, paths = _linked(found, film, count * _MEETINGS)
+    film = Film.of(path, samples, BackgroundModel(samples).camera_rests)
+    found, lights = sighted(path, film, None)
+    seen, paths = linked(found, film, count * _MEETINGS)
     lanes, strange = _lanes(seen, paths, count)
-    if len(lanes) < count:
-        raise ValueError(
-            f"targets: {Path(path).name} must show {count} things that move, got {len(lanes)}"
-        )
     ways = [_joined([expected(seen, p.rows, film, len(found)) for p in lane]) for lane in lanes]
     touching = _touching(ways)
     doubts = _doubts(seen, strange, film.factor, len(found), Path(path).name)
     tracks = []
     for way, hidden in zip(ways, touching, strict=True):
         way.centre[hidden] = np.nan
-        followed = _finished(_views(path, samples, film, way, lights), film.motion, doubts)
+        followed = finished(viewed(path, samples, film, way, lights), film.motion, doubts)
         tracks.append(Track.of_motion(followed))
         doubts = ()
-    return tuple(tracks)
+    missing = Track.of_motion(nothing(film.motion, len(found)))
+    return (*tracks, *[missing] * (count - len(tracks)))
 
 
 def _lanes(

@@ -8,7 +8,7 @@ pixels tell the motion (`aligning`). A new key frame is taken when little is lef
 A camera is at rest unless its frames say otherwise: a map that is not needed only adds its errors.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .aligning import Aligned, align, explains, pyramid, unlike
+from .aligning import Aligned, align, pyramid
 
 _PARTS = 12  # parts into which each side of the image is cut; one corner is followed in each
 _WIDTH = 21  # reduced pixels: what is smoother than this is light
@@ -24,6 +24,8 @@ _CONTRAST, _DARK = 250.0, 20.0  # of the relief; grey levels below which all is 
 _FLAT = 2.0  # smallest eigenvalue of the gradient's covariance in a corner, grey levels squared
 _EXACT = 1.0  # reduced pixels by which a corner may miss its place
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
+_VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
+PLAINLY = 10.0  # standard errors of a displacement that is one
 _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
 _SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
 _TELLING = 10  # corners that must share a motion, if it is to be the camera's
@@ -102,19 +104,24 @@ def _follow(before: Image, after: Image, points: Floats, guess: Floats) -> tuple
     return ends, (np.asarray(found)[:, 0] > 0) & within
 
 
-def stands_still(samples: Iterable[Image]) -> bool:
+def stands_still(samples: Iterable[Image]) -> bool | None:
     """Does no pair of reduced samples, successive or far apart, show that the camera moves?
 
-    It moves if clearly more corners share a motion than stay where they are.
+    It moves if clearly more corners share a motion than stay where they are. None if most pairs
+    are too plain to tell.
     """
     reliefs = [_Relief.of(sample) for sample in samples]
     pairs = list(zip(reliefs, reliefs[1:], strict=False))
     middle = reliefs[len(reliefs) // 2]
-    far = [(reliefs[0], middle), (middle, reliefs[-1])]
-    return not any(_moved(before, after) for before, after in far + pairs)
+    found = []
+    for before, after in [(reliefs[0], middle), (middle, reliefs[-1]), *pairs]:
+        found.append(_moved(before, after))
+        if found[-1]:
+            return False
+    return True if 2 * found.count(None) < len(found) else None
 
 
-def _moved(before: _Relief, after: _Relief) -> bool:
+def _moved(before: _Relief, after: _Relief) -> bool | None:
     points = _corners(before.fine)
     ends, found = _follow(before.fine, after.fine, points, points)
     a, b = points[found], ends[found]
@@ -128,10 +135,20 @@ def _moved(before: _Relief, after: _Relief) -> bool:
     return bool(still.sum() < 0.7 * share.sum())
 
 
-def _drifted(before: _Relief, after: _Relief) -> bool:
-    """Do all pixels tell of a motion, where there are no corners to do so?"""
+def _drifted(before: _Relief, after: _Relief) -> bool | None:
+    """Do all pixels tell of a motion, where corners are few? None if these are mute, too."""
     found = align(before.levels, after.levels, np.eye(3))
-    return found is not None and explains(before.levels, after.levels, found.map)
+    if found is None or found.error > _VAGUE:
+        return None
+    moved = displacement(found.map[None], before.fine.shape[::-1])[0]
+    return bool(moved > PLAINLY / 2 * found.error)
+
+
+def displacement(maps: Floats, size: Sequence[int]) -> Floats:
+    """Pixels by which maps (n, 3, 3) move an image (width, height), rms of its parts."""
+    grid = np.array([[u, v] for u in (0.2, 0.5, 0.8) for v in (0.2, 0.5, 0.8)])
+    points = grid * np.array(size)
+    return np.array([np.sqrt(np.mean(np.sum((carry(h, points) - points) ** 2, 1))) for h in maps])
 
 
 def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
@@ -183,14 +200,14 @@ class Steadying:
         if found is not None and count >= _MANY:
             return found
         direct = align(self.key.levels, relief.levels, self.last)
-        both = [one for one in (found, direct) if one is not None]
-        return min(both, key=lambda one: self._unlike(relief, one.map)) if both else None
+        both = [one for one in (found, direct) if one is not None and one.error < _VAGUE]
+        return min(both, key=lambda one: self._step(one.map), default=None)
 
-    def _unlike(self, relief: _Relief, here: Floats) -> float:
-        """Grey levels by which most parts of the key frame differ from another, by a map."""
+    def _step(self, here: Floats) -> float:
+        """By how much a map differs from that of the frame before, where two are as good."""
         assert self.key is not None
-        parts = unlike(self.key.levels, relief.levels, here)
-        return float(np.median(parts[0]))
+        step = here @ np.linalg.inv(self.last)
+        return float(displacement(step[None], self.key.fine.shape[::-1])[0])
 
     def _shared(self, here: Floats) -> float:
         """Share of the key frame that is still in view."""
@@ -204,18 +221,25 @@ class Steadying:
         """The next frame."""
         relief = _Relief.of(small)
         if self.key is None:
-            self._start(relief, np.eye(3), 0.0)
+            self.before = relief, np.eye(3), 0.0
+            self._start(*self.before)
+            self.maps.append(np.eye(3))
+            self.errors.append(0.0)
+            return
         located = self._locate(relief)
-        if located is None:  # nothing in common with the key frame
-            self.maps.append(self.maps[-1] if self.maps else np.eye(3))
-            self.errors.append(0.0 if len(self.maps) == 1 else np.inf)
-            self._start(relief, self.maps[-1], np.inf if len(self.maps) > 1 else 0.0)
+        if located is None:  # little in common with the key frame: more with the last one known
+            self._start(*self.before)
+            located = self._locate(relief)
+        if located is None:
+            self.maps.append(self.maps[-1])
+            self.errors.append(np.inf)
             return
         self.last = located.map
         self.maps.append(self.base @ np.linalg.inv(self.last))
         self.errors.append(float(np.hypot(self.drift, located.error)))
+        self.before = relief, self.maps[-1], self.errors[-1]
         if self._shared(self.last) < _LEFT:
-            self._start(relief, self.maps[-1], self.errors[-1])
+            self._start(*self.before)
 
     def motion(self) -> CameraMotion:
         """The motion so far, in pixels of the frames."""

@@ -138,6 +138,7 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     if detector == "auto" and model.unrest:
         del model  # its images are large
         return _follow(path, samples, target)
+    model.learn_target(samples)
     found, blurred = _track_blobs(path, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return _follow(path, samples, target)
