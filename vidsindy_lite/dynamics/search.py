@@ -45,6 +45,8 @@ ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
 of the data."""
 LONGEST_SEARCH = 10
 """Most rounds of a subset search."""
+HOPELESS = 10.0
+"""Objective that a step from elsewhere leaves, over that of a law, from which on none is near."""
 CONSISTENT = 1.5
 """Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
 LONGEST_CLIMB = 4
@@ -334,7 +336,12 @@ def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
     """Move axes off home where terms make up for their staying there, while the criterion falls."""
     if fit.status is not Status.CONVERGED:
         return fit  # no law whose terms could tell
+    weighted = problem.weighted(fit.collocation, FINAL_WEIGHT)
+    limit = HOPELESS * weighted.objective(fit.state)
     for there in away(problem, fit.state)[:REFINED]:
+        _, promise = weighted.linearise(there, np.flatnonzero(there.free())).newton()
+        if not weighted.objective(there) - promise < limit:
+            continue  # a term that vanishes nearly is not one that vanishes
         trial = select(problem, replace(fit, state=there), FINAL_WEIGHT, "offset away", history)
         if trial.criterion < fit.criterion - 1e-6:
             return leave_home(problem, trial, history)  # one axis at a time: the others next
