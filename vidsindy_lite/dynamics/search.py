@@ -45,8 +45,6 @@ ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
 of the data."""
 LONGEST_SEARCH = 10
 """Most rounds of a subset search."""
-HOPELESS = 10.0
-"""Objective that a step from elsewhere leaves, over that of a law, from which on none is near."""
 CONSISTENT = 1.5
 """Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
 LONGEST_CLIMB = 4
@@ -334,15 +332,18 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
 
 def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
     """Move axes off home where terms make up for their staying there, while the criterion falls."""
-    if fit.status is not Status.CONVERGED:
-        return fit  # no law whose terms could tell
-    weighted = problem.weighted(fit.collocation, FINAL_WEIGHT)
-    limit = HOPELESS * weighted.objective(fit.state)
-    for there in away(problem, fit.state)[:REFINED]:
-        _, promise = weighted.linearise(there, np.flatnonzero(there.free())).newton()
-        if not weighted.objective(there) - promise < limit:
-            continue  # a term that vanishes nearly is not one that vanishes
-        trial = select(problem, replace(fit, state=there), FINAL_WEIGHT, "offset away", history)
+    elsewhere = away(problem, fit.state)
+    if fit.status is not Status.CONVERGED or not elsewhere:
+        return fit  # what has not converged is no law whose terms could tell
+    closed = _closed(problem, fit, FINAL_WEIGHT)
+    law = _as_shifted(problem, closed)
+    starts = [
+        _candidate(problem, closed, law, there.offset, there.moving) for there in elsewhere
+    ]
+    for start in sorted(starts, key=lambda candidate: candidate.criterion)[:REFINED]:
+        if not start.criterion < fit.criterion + problem.penalties.max():
+            break
+        trial = select(problem, start, FINAL_WEIGHT, "offset away", history)
         if trial.criterion < fit.criterion - 1e-6:
             return leave_home(problem, trial, history)  # one axis at a time: the others next
     return fit
