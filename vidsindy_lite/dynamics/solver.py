@@ -186,7 +186,7 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
     fit = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
     columns = np.flatnonzero(fit.state.free())
-    for _ in range(MOST_HALVINGS if fit.status is Status.CONVERGED else 0):
+    for _ in range(0 if fit.status is Status.MAX_STEPS else MOST_HALVINGS):
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
         finer = problem.collocation(segments, problem.errors(fit))
