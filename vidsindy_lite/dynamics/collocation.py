@@ -250,6 +250,7 @@ class Collocation:
             return np.full_like(slope, np.inf)
         return slope - monomials(z, exponents) @ law
 
+    @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
         squares = self.grid.node_weights @ self.physics_residual(state) ** 2
