@@ -25,8 +25,8 @@ def test_exact_equations_from_video_files(shot):
     assert study.score(found.discovery, shot.truth).exact
     assert study.score(found.discovery, shot.truth).l2 < 5e-3
     assert all(camera.is_calibrated for camera in found.rig.cameras)
-    assert found.x.shape == found.path.shape == (200, 3)
-    off = [np.sqrt(np.mean((x - shot.x) ** 2)) for x in (found.path, found.x)]
+    assert found.x.shape == found.fitted.shape == (200, 3)
+    off = [np.sqrt(np.mean((x - shot.x) ** 2)) for x in (found.fitted, found.x)]
     assert off[0] < 0.5 * off[1]
     assert [track.shape for track in found.tracks] == [(200, 2)] * 3
     assert not any("rig" in warning for warning in found.warnings)

@@ -42,7 +42,7 @@ class VideoDiscovery(Observation):
     discovery: Discovery
 
     @property
-    def path(self) -> Floats:
+    def fitted(self) -> Floats:
         """The path that obeys the law, in the shape of ``x`` and with a fraction of its noise.
 
         In gaps, too, that the law bridges; NaN elsewhere.

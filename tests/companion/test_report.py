@@ -199,7 +199,7 @@ InteractiveShell.instance()
 from vidsindy_lite.companion import report
 t = np.linspace(0, 1, 20)
 x = np.column_stack((t, t**2, t**3))
-found = SimpleNamespace(t=t, x=x, path=x, targets=1)
+found = SimpleNamespace(t=t, x=x, fitted=x, targets=1)
 figures = report._figures(found, [])
 assert len(next(figures)[1]) > 1000
 figures.close()

@@ -320,7 +320,7 @@ def _figures(
         # Several targets are drawn as one that begins again.
         t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
         x = stacked(found.x, 3)
-        yield "path", _encoded(plot_path(t, x, stacked(found.path, 3)))
+        yield "path", _encoded(plot_path(t, x, stacked(found.fitted, 3)))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
             yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
