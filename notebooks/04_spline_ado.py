@@ -550,7 +550,7 @@ def flat_support(law):
 
 
 def search(algebra, shift):
-    coefficients, S = algebra.at(shift)
+    coefficients, S, _ = algebra.at(shift)
     c = coefficients.T.ravel()
     support, solution, _ = dynamics.subset_search(S, 0 * c, c, penalty, np.ones(len(c), dtype=bool))
     return c, S, support, solution
