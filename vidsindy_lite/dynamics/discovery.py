@@ -183,9 +183,14 @@ class Discovery:
         Parameters
         ----------
         x0 : array_like, shape (d,)
-            Where to start.
+            Where to start; of a law with inputs without the time, its last variable.
         t : array_like, shape (n,)
             Increasing times.
+
+        Raises
+        ------
+        ValueError
+            If the state has another shape, or an input of the law is not known at a time.
         """
         x = self.system.simulate(t, x0)
         lost = np.isnan(x).any(axis=1)

@@ -149,6 +149,8 @@ def physics_of(
         down = down / np.linalg.norm(down)
     if law.order == 1:
         return Physics((), (), ("a law of first order holds no forces: order=2 looks for them",))
+    if law.timed:
+        return Physics((), (), ("a force changes with the time: no energy and no place of rest",))
     times = [np.linspace(curve.t[0], curve.t[-1], POINTS) for curve in curves]
     paths = [curve(t) for curve, t in zip(curves, times, strict=True)]
     body = _Body(law, covariance, np.concatenate(paths))
