@@ -288,11 +288,13 @@ def _elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[st
     own = _price(problem, state)
     for axis, there in _neighbours(problem, state):
         for value, rival in _cheapest_two(problem, fit, there):
+            cost = value + problem.axis_penalty * there.moving.sum() - own
+            if not cost < NEAR_TIE:
+                break  # the next costs more
             matrix = shift_matrix(exponents, rival.offset - problem.home)
             parts = np.abs(matrix) @ np.abs(rival.coefficients)
             terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
-            cost = value + problem.axis_penalty * there.moving.sum() - own
-            if cost < NEAR_TIE and (terms != law.support).any():
+            if (terms != law.support).any():
                 where = "another origin" if there.moving[axis] else "the origin of the data"
                 yield (
                     f"the data hardly tell where the law's origin is in {problem.form.names[axis]}:"
