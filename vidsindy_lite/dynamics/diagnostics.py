@@ -333,7 +333,8 @@ def _cheapest_two(
     """
     columns, size = problem.columns(there), state.coefficients.size
     back = shift_matrix(problem.exponents, there.offset - state.offset)
-    rates = -shift_generators(problem.exponents)[there.moving] @ there.coefficients
+    axes = np.flatnonzero(there.moving)
+    rates = -shift_generators(problem.exponents)[axes] @ there.coefficients
     changes = np.vstack([np.eye(size), rates.transpose(0, 2, 1).reshape(-1, size)])
     changes = changes[np.append(problem.form.searched, np.arange(size, len(changes)))]
     changes = (changes @ np.kron(np.eye(problem.d), back.T))[:, model.columns]
