@@ -343,9 +343,7 @@ def _cheapest_two(
     quadratic = changes @ model.information @ changes.T, changes @ pull, present
     risen = float(-step @ (model.gradient + pull))
     prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
-    support, solution, value = subset_search(
-        *quadratic, prices, (present != 0) | (columns >= size)
-    )
+    support, solution, value = subset_search(*quadratic, prices, (present != 0) | (columns >= size))
     flat = there.flat()
     flat[columns] = solution
     yield risen + value, there.moved(there.control_points, flat)

@@ -343,9 +343,7 @@ class PolynomialSystem:
             for j, side in self.sides().items()
         )
 
-    def _right(
-        self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str
-    ) -> str:
+    def _right(self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str) -> str:
         """The right-hand side of an equation, given how terms, fractions and products are written.
 
         Terms without their slopes.
