@@ -32,6 +32,15 @@ from .library import (
     shift_matrix,
 )
 
+SMALLEST, LARGEST = -5, 6
+"""Numbers of fewer and of more digits are printed with a power of ten."""
+
+
+def power_of_ten(largest: float) -> int:
+    """What numbers up to one are divided by where they are printed; 0 for those of few digits."""
+    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
+    return 0 if SMALLEST <= power < LARGEST else power
+
 
 @dataclass(frozen=True, eq=False)
 class PolynomialSystem:
