@@ -225,7 +225,7 @@ def _round(
     if radius_error > STRAIGHT * radius:
         doubts.append(
             f"the motion may be on no {shape}: it hardly bends, so that the radius is known to "
-            f"{100 * radius_error / radius:.2g} % alone"
+            f"{100 * radius_error / radius:.0f} % alone"
         )
     return Round(
         centre=centre,
