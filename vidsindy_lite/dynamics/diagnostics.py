@@ -152,7 +152,8 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     yield from shapes(problem.measured, noise, problem.form.names[:measured], terms)
     x, _ = fit.collocation.node_states(fit.state.control_points)
     yield from cancelling(problem.law(fit.state), x - fit.state.offset)
-    yield from tied(problem.form.names, x)
+    states = problem.form.states
+    yield from tied(problem.form.names[:states], x[:, :states])
 
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
@@ -332,7 +333,8 @@ def _cheapest_two(
     """
     columns, size = problem.columns(there), state.coefficients.size
     back = shift_matrix(problem.exponents, there.offset - state.offset)
-    rates = -shift_generators(problem.exponents)[there.moving] @ there.coefficients
+    axes = np.flatnonzero(there.moving)
+    rates = -shift_generators(problem.exponents)[axes] @ there.coefficients
     changes = np.vstack([np.eye(size), rates.transpose(0, 2, 1).reshape(-1, size)])
     changes = changes[np.append(problem.form.searched, np.arange(size, len(changes)))]
     changes = (changes @ np.kron(np.eye(problem.d), back.T))[:, model.columns]
@@ -379,7 +381,7 @@ def _sampling(problem: Problem) -> Iterator[str]:
     runs, form = problem.trajectories, problem.form
     turns = sum(t[-1] - t[0] for t, _ in runs) / (2 * np.pi)
     # On a line nothing turns; and a body need not turn, if it is seen from several starts.
-    bound = len(form.names) > 1 and (form.movable.all() or len(runs) == 1)
+    bound = form.states > 1 and (form.movable.all() or len(runs) == 1)
     if turns < TURNS and bound:
         yield (
             f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "
