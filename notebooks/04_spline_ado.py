@@ -532,6 +532,7 @@ def continued(t, x):
         yield alpha, problem, state
 
 
+# %%
 def unpruned(t, x):
     *_, (_, problem, state) = continued(t, x)
     information = problem.linearise(state, everything).information
