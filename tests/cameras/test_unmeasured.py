@@ -7,7 +7,7 @@ import pytest
 from helpers import aligned_error, room, walk
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import posed
+from vidsindy_lite.cameras import learn_cameras_eq4, posed
 from vidsindy_lite.observation import observe_tracks
 
 FRAMES = 400
@@ -196,5 +196,7 @@ def test_what_is_no_rig_of_lenses():
         vl.Rig([flat, vl.OrthographicCamera(normal=(1, 0, 0))], distance=2.0)
     with pytest.raises(ValueError, match="distance: must be positive"):
         vl.Rig([lens] * 3, distance=0.0)
+    with pytest.raises(ValueError, match=r"Eq. \(4\) needs all positions, got none"):
+        learn_cameras_eq4([walk(np.arange(20))[:, :2]] * 3, vl.Rig([lens] * 3))
     with pytest.raises(ValueError, match="camera: position must be known"):
         lens.project(np.zeros((1, 3)))

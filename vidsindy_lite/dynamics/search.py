@@ -337,9 +337,7 @@ def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
         return fit  # what has not converged is no law whose terms could tell
     closed = _closed(problem, fit, FINAL_WEIGHT)
     law = _as_shifted(problem, closed)
-    starts = [
-        _candidate(problem, closed, law, there.offset, there.moving) for there in elsewhere
-    ]
+    starts = [_candidate(problem, closed, law, there.offset, there.moving) for there in elsewhere]
     for start in sorted(starts, key=lambda candidate: candidate.criterion)[:REFINED]:
         if not start.criterion < fit.criterion + problem.penalties.max():
             break
