@@ -158,8 +158,8 @@ assert by_package.status == law.status
 
 # %%
 levels = {
-    "noise": (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5) if full else (0, 0.1),
-    "blocks": (0.1, 0.2, 0.3, 0.4, 0.5) if full else (0.2,),
+    "noise": (0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5) if full else (0, 0.1),
+    "blocks": (0.1, 0.2, 0.5) if full else (0.2,),
     "fibers": (0.1, 0.2, 0.3) if full else (0.2,),
 }
 both = ("ours", "PySINDy")

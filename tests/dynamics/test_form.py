@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
@@ -91,31 +89,6 @@ def test_a_law_with_what_is_known_is_found_and_its_errors_are_smaller():
     assert told.standard_errors[2].tolist() == [0, 0]
     assert told.standard_errors[1, 1] < alone.standard_errors[1, 1]
     assert told.equations().startswith("dx/dt = 2 y\ndy/dt = - (")
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.05])
-def test_a_force_that_is_measured_is_a_function_of_a_clock(noise):
-    t = np.linspace(0, 40, 800)
-
-    def force(s):
-        return 0.5 * np.cos(1.2 * s) + 0.3 * np.sin(0.37 * s + 1)
-
-    forced = solve_ivp(
-        lambda s, x: [x[1], -0.3 * x[1] + x[0] - x[0] ** 3 + force(s)],
-        (0, 40), (0.5, 0.0), t_eval=t, rtol=1e-10, atol=1e-12,
-    ).y.T  # fmt: skip
-    u = CubicSpline(t, force(t))
-    library = Library.polynomial(3) + Library.terms({"u": lambda z: u(z)})
-    library = library.where({"z": {"1": 1, "...": 0}})
-    x = np.column_stack([noisy(noise * forced.std(axis=0), x=forced), t])
-    found = vl.discover(t, x, library=library)
-    truth = {"x": {"y"}, "y": {"x", "y", "x^3", "u"}, "z": {"1"}}
-    assert found.status == "ok"
-    law = found.system
-    for column, terms in zip(law.support.T, truth.values(), strict=True):
-        assert {law.terms[k] for k in np.flatnonzero(column)} == set(terms)
-    ahead = found.simulate((0.5, 0.0, 0.0), t[:200])
-    np.testing.assert_allclose(ahead.x[:, :2], forced[:200], atol=1e-4 if noise == 0 else 0.05)
 
 
 # --------------------------------------------------------------------------------- origin

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.physics import physics_of
+from vidsindy_lite.dynamics.physics import Quantity, physics_of
 
 TIMES = np.linspace(0, 6, 300)
 DRAG = Library.terms({"|v|v": lambda vx, vy: np.hypot(vx, vy) * np.array([vx, vy])})
@@ -41,6 +41,20 @@ def test_g_its_direction_and_drag():
     assert np.linalg.norm(said["direction"].error) == pytest.approx(turn, rel=1e-5)
     assert said["drag"].value == pytest.approx(0.4)
     assert said["drag"].error == pytest.approx(0.004 / np.sqrt(2), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (9.81, 0.012, "g = 9.810 ± 0.012"),
+        (9.81e9, 9755.0, "g = (9.8100000 ± 0.0000098)e9"),
+        (3.2e-7, 1.1e-9, "g = (3.200 ± 0.011)e-7"),
+        ([0.0, -1.0], 0.01, "g = (0.000, -1.000) ± 0.010"),
+        (9.81, 0.0, "g = 9.81"),
+    ],
+)
+def test_quantities_have_the_digits_that_their_errors_allow(value, error, text):
+    assert str(Quantity("g", np.array(value), np.array(error))) == text
 
 
 def test_g_along_a_direction_that_is_given():

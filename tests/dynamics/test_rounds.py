@@ -113,6 +113,14 @@ def test_errors_that_all_positions_share_are_passed_on():
     assert ball.systematic is None
 
 
+def test_what_hardly_bends_is_said_to_be_on_no_circle():
+    rng, t = np.random.default_rng(0), np.linspace(0, 30, 400)
+    wave = np.column_stack([t, np.sin(t)])
+    assert "hardly bends" in vl.on_circle(wave).warnings[-1]
+    arc = np.column_stack([np.sin(0.5 * np.sin(t)), np.cos(0.5 * np.sin(t))])
+    assert vl.on_circle(arc + 0.01 * rng.standard_normal((400, 2))).warnings == ()
+
+
 def test_what_is_on_no_circle_is_said_in_short():
     rng = np.random.default_rng(0)
     fine = vl.on_circle(bob(SWING) + 0.01 * rng.standard_normal((400, 3)))

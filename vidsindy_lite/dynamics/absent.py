@@ -21,9 +21,7 @@ HALF_WIDTH = 1.96
 """Of a 95 % interval, in standard errors."""
 
 
-def intervals(
-    problem: Problem, state: State, model: Linearisation, tolerated: Floats
-) -> Floats:
+def intervals(problem: Problem, state: State, model: Linearisation, tolerated: Floats) -> Floats:
     """Between which values each absent candidate term would be if it alone joined the law.
 
     With the information ``S`` and the gradient ``g`` of the last fit, of which the curve is

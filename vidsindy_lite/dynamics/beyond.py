@@ -88,7 +88,7 @@ def beyond(problem: Problem, fit: Fit) -> Beyond:
     size, form = len(problem.exponents), problem.form
     equations = np.flatnonzero(form.candidates.any(axis=0))
     budget = BUDGET / fit.collocation.grid.x.size / len(equations)
-    exponents = _widened(problem.exponents, len(form.names), budget)
+    exponents = _widened(problem.exponents, form.states, budget)
     l, new = len(exponents), len(exponents) - size
 
     def padded(array: NDArray[Any]) -> NDArray[Any]:

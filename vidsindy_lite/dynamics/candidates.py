@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..checks import check_instance, check_integer, check_number
-from .library import Function, monomial_exponents, name_latex
+from .inputs import Input
+from .library import CLOCK, Function, monomial_exponents, name_latex
 
 FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
 """What can be written as text."""
@@ -49,6 +50,7 @@ class Library:
     >>> vl.Library.polynomial(3)  # what `discover` takes by default
     >>> vl.Library.polynomial(1) + vl.Library.fourier(1)  # a pendulum
     >>> vl.Library.polynomial(1) + vl.Library.terms({"x/r^3": lambda x, y: x / np.hypot(x, y)**3})
+    >>> vl.Library.polynomial(3) + vl.Library.inputs(t, {"u": u})  # a force that was measured
     """
 
     degree: int | None = None
@@ -89,7 +91,9 @@ class Library:
             needs (``x, y``; of a law of second order also ``vx, vy``); it takes and returns arrays
             of shape (n,). Derivatives are taken by differences of fourth order. If it returns as
             many arrays as there are measured coordinates, these are the directions of a vector,
-            and the term has the same coefficient in all of them.
+            and the term has the same coefficient in all of them. An argument ``t``, which no
+            coordinate is named, is the time, as in ``lambda t: np.cos(3 * t)``; it then is the last
+            variable of the law, with ``dt/dt = 1``.
 
         Raises
         ------
@@ -104,6 +108,36 @@ class Library:
             if not isinstance(name, str) or not name.strip() or not callable(rule):
                 raise ValueError(f"functions: must map a name to a function, got {name!r:.60}")
         return cls(functions=tuple(functions.items()))
+
+    @classmethod
+    def inputs(cls, t: ArrayLike, values: Mapping[str, ArrayLike]) -> Library:
+        """Measured inputs as terms: functions of the time that are known, whatever the state is.
+
+        Between the samples each is a cubic spline. A law with inputs is one of the state and the
+        time, as with `terms` of ``t``.
+
+        Parameters
+        ----------
+        t : array_like, shape (n,), or list of such
+            Increasing times, those of the states or others; for several trajectories a list. As an
+            input is a function of the time, trajectories with different inputs must have times
+            apart from each other: add a number to those of the second.
+        values : mapping of str to array_like, shape (n,), or list of such
+            Names and values; for several trajectories lists.
+
+        Raises
+        ------
+        ValueError
+            If times or values are not such, or times of trajectories overlap.
+
+        Examples
+        --------
+        >>> library = vl.Library.polynomial(3) + vl.Library.inputs(t, {"u": u})
+        >>> vl.discover(t, x, library=library, order=2)  # x'' = -x - x^3 - 0.2 vx + 0.5 u
+        """
+        if not isinstance(values, Mapping) or not values:
+            raise ValueError(f"inputs: must map names to values at t, got {values!r:.60}")
+        return cls.terms({name: Input.of(name, t, given) for name, given in values.items()})
 
     def where(self, equations: Mapping[str, Mapping[str, float | None]]) -> Library:
         """The same terms, of which some are known, forbidden or alone allowed in an equation.
@@ -207,8 +241,15 @@ class Library:
             text += f"; {name}: {', '.join(known)}"
         return text
 
+    def timed(self, names: tuple[str, ...]) -> bool:
+        """Whether a function has the time as an argument, which is none of the named variables."""
+        arguments = {argument for _, rule in self.functions for argument in _arguments(rule)}
+        return CLOCK in arguments - set(names)
+
     def resolve(self, names: tuple[str, ...], measured: int) -> tuple[Ints, tuple[Function, ...]]:
         """The terms of a law in named variables, of which the first ``measured`` were measured.
+
+        The last of them is the time, if that was not measured.
 
         Returns
         -------
@@ -222,6 +263,7 @@ class Library:
             If a function has an argument that is no variable.
         """
         d = len(names)
+        states = d - (CLOCK in names[measured:])
         functions = [
             harmonic(names, axis, multiple, kind)
             for axis in range(measured)
@@ -235,16 +277,16 @@ class Library:
             raise ValueError(f"library: a term must have a name of its own, got {clash!r} twice")
         powers = np.empty((0, d), dtype=int)
         if self.degree is not None:
-            powers = monomial_exponents(d, self.degree)
+            powers = np.pad(monomial_exponents(states, self.degree), ((0, 0), (0, d - states)))
         exponents = np.zeros((len(powers) + len(functions), d + len(functions)), dtype=int)
         exponents[: len(powers), :d] = powers
         exponents[len(powers) :, d:] = np.eye(len(functions), dtype=int)
         if self.denominators:
             exponents = np.pad(exponents, ((0, 0), (0, d)))
-            below = monomial_exponents(d, self.denominators)[1:]
-            for slope in range(d - measured, d):
+            below = monomial_exponents(states, self.denominators)[1:]
+            for slope in range(states - measured, states):
                 rows = np.zeros((len(below), exponents.shape[1]), dtype=int)
-                rows[:, :d], rows[:, slope - d] = below, 1
+                rows[:, :states], rows[:, slope - d] = below, 1
                 exponents = np.concatenate([exponents, rows])
         return exponents, tuple(functions)
 
@@ -311,6 +353,7 @@ def own(
 ) -> list[Function]:
     """A function of one's own, whose arguments are named like variables; or its components."""
     axes = _axes(names, name, rule)
+    moving = [axis for axis in axes if names[axis] != CLOCK or axis < measured]
 
     def evaluate(x: Floats) -> Floats:
         with np.errstate(all="ignore"):  # what is not finite is refused where it matters
@@ -339,8 +382,9 @@ def own(
             name=f"{name}_{of}" if of else name,
             latex=rf"\mathrm{{{name}}}" + (f"_{{{of}}}" if of else ""),
             value=value,
-            gradient=lambda x: _differences(value, x, axes),
+            gradient=lambda x: _differences(value, x, moving),
             direction=direction,
+            of_time=not moving,
         )
 
     return [component(j) for j in (range(measured) if len(shape) == 2 else [None])]
@@ -348,10 +392,7 @@ def own(
 
 def _axes(names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]) -> list[int]:
     """Which variables the arguments of a function are."""
-    try:
-        arguments = list(inspect.signature(rule).parameters)
-    except (TypeError, ValueError):  # of some functions in C
-        arguments = []
+    arguments = _arguments(rule)
     unknown = [argument for argument in arguments if argument not in names]
     if not arguments or unknown:
         raise ValueError(
@@ -359,6 +400,14 @@ def _axes(names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]) -> 
             f"({', '.join(names)}), as in lambda x: np.sin(x), got {', '.join(unknown) or 'none'}"
         )
     return [names.index(argument) for argument in arguments]
+
+
+def _arguments(rule: Callable[..., ArrayLike]) -> list[str]:
+    """Names of the arguments of a function; none of some functions in C."""
+    try:
+        return list(inspect.signature(rule).parameters)
+    except (TypeError, ValueError):
+        return []
 
 
 def _differences(value: Callable[[Floats], Floats], x: Floats, axes: Sequence[int]) -> Floats:

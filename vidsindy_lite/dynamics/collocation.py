@@ -281,22 +281,24 @@ class Collocation:
         right[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
         pull = self.grid.samples.T @ self._shared[0].reshape(len(self.grid.x), -1)
         right[:, 1 + len(columns) :] = pull.reshape(len(right), -1)
+        right *= -1
         solved = cho_solve_banded((factor, True), right, check_finite=False)
         solved = np.ascontiguousarray(solved)
 
-        gram = self._gram(unknowns - physics @ solved, solved, data_residual, sizes)
-        solved = solved.reshape(-1, self.d, solved.shape[1])
-        gram, solved = _without_systematic(gram, solved, 1 + len(columns))
         objective = (data_residual**2 * self.sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
+        unknowns += physics @ solved
+        gram = self._gram(unknowns, solved, data_residual, sizes)
+        solved = solved.reshape(-1, self.d, solved.shape[1])
+        gram, solved = _without_systematic(gram, solved, 1 + len(columns))
         return Linearisation(
             fall=float(objective - gram[0, 0]),
             columns=columns,
             information=gram[1:, 1:],
             gradient=-gram[1:, 0],
-            curve_step=-solved[:, :, 0],
-            curve_response=-solved[:, :, 1:],
+            curve_step=solved[:, :, 0],
+            curve_response=solved[:, :, 1:],
         )
 
     def _factor(self, physics: sparse.csr_array, damping: float = 0.0) -> Floats:
@@ -361,8 +363,8 @@ class Collocation:
         """
         shared = slice(left.shape[1] - len(sizes), left.shape[1])
         gram = left.T @ left
-        curve = self.grid.samples @ solved.reshape(self.grid.r, -1)
-        follow = -curve.reshape(-1, self.d, left.shape[1])
+        follow = self.grid.samples @ solved.reshape(self.grid.r, -1)
+        follow = follow.reshape(-1, self.d, left.shape[1])
         follow[:, :, 0] += data_residual
         follow[:, :, shared] += self.systematic
         follow *= np.sqrt(self.sample_weights)[:, :, None]

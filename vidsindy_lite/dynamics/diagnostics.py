@@ -15,7 +15,7 @@ from ..arrays import Floats
 from .beyond import beyond_the_library
 from .collocation import CLEANEST, Fit, Linearisation, Status
 from .errors import effective_noise, residual_noise, rough
-from .library import shift_matrix
+from .library import shift_generators, shift_matrix
 from .persistence import SMOOTH, Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
@@ -152,7 +152,8 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     yield from shapes(problem.measured, noise, problem.form.names[:measured], terms)
     x, _ = fit.collocation.node_states(fit.state.control_points)
     yield from cancelling(problem.law(fit.state), x - fit.state.offset)
-    yield from tied(problem.form.names, x)
+    states = problem.form.states
+    yield from tied(problem.form.names[:states], x[:, :states])
 
 
 def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
@@ -224,7 +225,7 @@ def _selection(
     model = model.of(problem.form.searched)
     yield from _left_over(model, fit.state)
     yield from _near_tie(problem, fit.state, model)
-    yield from _elsewhere(problem, fit, law)
+    yield from _elsewhere(problem, fit.state, model, law)
 
 
 def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]:
@@ -283,17 +284,21 @@ def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[
     )
 
 
-def _elsewhere(problem: Problem, fit: Fit, law: PolynomialSystem) -> Iterator[str]:
+def _elsewhere(
+    problem: Problem, state: State, model: Linearisation, law: PolynomialSystem
+) -> Iterator[str]:
     """Would another law fit almost as well, one axis nearer home or one away from it?"""
-    state, exponents = fit.state, problem.exponents
+    exponents = problem.exponents
     own = problem.price(state)
     for axis, there in _neighbours(problem, state):
-        for value, rival in _cheapest_two(problem, fit, there):
+        for value, rival in _cheapest_two(problem, state, model, there):
+            cost = value + problem.axis_penalty * there.moving.sum() - own
+            if not cost < NEAR_TIE:
+                break  # the next costs more
             matrix = shift_matrix(exponents, rival.offset - problem.home)
             parts = np.abs(matrix) @ np.abs(rival.coefficients)
             terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
-            cost = value + problem.axis_penalty * there.moving.sum() - own
-            if cost < NEAR_TIE and (terms != law.support).any():
+            if (terms != law.support).any():
                 where = "another origin" if there.moving[axis] else "the origin of the data"
                 yield (
                     f"the data hardly tell where the law's origin is in {problem.form.names[axis]}:"
@@ -313,18 +318,33 @@ def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
         yield axis, replace(state, coefficients=moved, offset=origin, moving=moving)
 
 
-def _cheapest_two(problem: Problem, fit: Fit, there: State) -> Iterator[tuple[float, State]]:
-    """The cheapest law around a state in another frame and its closest rival, with their costs."""
-    columns = problem.columns(there)
+def _cheapest_two(
+    problem: Problem, state: State, model: Linearisation, there: State
+) -> Iterator[tuple[float, State]]:
+    """The cheapest law around a state in another frame and its closest rival, with their costs.
+
+    The quadratic model around the law knows them: what a move does to polynomials is exact.
+    """
+    columns, size = problem.columns(there), state.coefficients.size
+    back = shift_matrix(problem.exponents, there.offset - state.offset)
+    axes = np.flatnonzero(there.moving)
+    rates = -shift_generators(problem.exponents)[axes] @ there.coefficients
+    changes = np.vstack([np.eye(size), rates.transpose(0, 2, 1).reshape(-1, size)])
+    changes = changes[np.append(problem.form.searched, np.arange(size, len(changes)))]
+    changes = (changes @ np.kron(np.eye(problem.d), back.T))[:, model.columns]
+    step = (back @ there.coefficients - state.coefficients).T.ravel()[model.columns]
+    pull, present = model.gradient - model.information @ step, there.flat()[columns]
+    quadratic = changes @ model.information @ changes.T, changes @ pull, present
+    risen = float(-step @ (model.gradient + pull))
     prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
-    model, present = fit.collocation.linearise(there, columns), there.flat()[columns]
-    quadratic = (model.information, model.gradient, present)
-    start = (present != 0) | (columns >= problem.exponents.size)
-    support, solution, value = subset_search(*quadratic, prices, start)
-    yield value, model.along(there, solution - present, 1.0)
+    support, solution, value = subset_search(*quadratic, prices, (present != 0) | (columns >= size))
+    flat = there.flat()
+    flat[columns] = solution
+    yield risen + value, there.moved(there.control_points, flat)
     cost, dropped, added = closest_rival(*quadratic, prices, support)
     support[dropped], support[added] = False, True
-    yield value + cost, model.along(there, minimiser(*quadratic, support) - present, 1.0)
+    flat[columns] = minimiser(*quadratic, support)
+    yield risen + value + cost, there.moved(there.control_points, flat)
 
 
 def _standstill(law: PolynomialSystem) -> Iterator[str]:
@@ -355,7 +375,7 @@ def _sampling(problem: Problem) -> Iterator[str]:
     runs, form = problem.trajectories, problem.form
     turns = sum(t[-1] - t[0] for t, _ in runs) / (2 * np.pi)
     # On a line nothing turns; and a body need not turn, if it is seen from several starts.
-    bound = len(form.names) > 1 and (form.movable.all() or len(runs) == 1)
+    bound = form.states > 1 and (form.movable.all() or len(runs) == 1)
     if turns < TURNS and bound:
         yield (
             f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "

@@ -21,7 +21,7 @@ from .history import History, Step
 from .library import shift_generators, shift_matrix
 from .persistence import Path, Plateau
 from .physics import Physics, physics_of
-from .polynomials import PolynomialSystem
+from .polynomials import PolynomialSystem, power_of_ten
 from .problem import Problem, Units
 from .selection import inverse
 from .splines import DEGREE
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-SMALLEST, LARGEST = -5, 6
-"""Numbers of fewer and of more digits are printed with a power of ten."""
 SHOWN = 3
 """Most absent terms that are printed."""
 
@@ -183,9 +181,14 @@ class Discovery:
         Parameters
         ----------
         x0 : array_like, shape (d,)
-            Where to start.
+            Where to start; of a law with inputs without the time, its last variable.
         t : array_like, shape (n,)
             Increasing times.
+
+        Raises
+        ------
+        ValueError
+            If the state has another shape, or an input of the law is not known at a time.
         """
         x = self.system.simulate(t, x0)
         lost = np.isnan(x).any(axis=1)
@@ -423,9 +426,7 @@ def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:
 
 def _with_error(value: float, error: float, term: str) -> str:
     """A term of an equation with two digits of its error; one that is known has none."""
-    largest = max(abs(value), error)
-    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
-    power = 0 if SMALLEST <= power < LARGEST else power
+    power = power_of_ten(max(abs(value), error))
     size, spread = abs(value) / 10.0**power, error / 10.0**power
     number = f"{size:g}"
     if error > 0:

@@ -1,7 +1,8 @@
 """The form of a law before it is searched: its variables, its candidate terms, and what is known.
 
 A law of second order, ``x'' = f(x, x')``, is one of first order in positions and velocities. The
-velocities are states that nobody has measured, and their half of the law is known: ``x' = v``.
+velocities are states that nobody has measured, and their half of the law is known: ``x' = v``. So
+is the time, if there are inputs: a last state, with ``t' = 1``.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .candidates import OTHERS, Library
-from .library import Function, closure
+from .library import CLOCK, Function, closure
 from .polynomials import PolynomialSystem, parse_term, velocity_names
 
 
@@ -23,7 +24,8 @@ class Form:
     Parameters
     ----------
     names : tuple of str
-        Of the d state variables: first those that were measured.
+        Of the d state variables: first those that were measured, then their velocities, and last
+        the time, as far as a law has them.
     exponents : ndarray of int, shape (l, d + k) or (l, 2 d + k)
         The library: with every term all that divides it. Slopes are variables, too, if the law may
         be a fraction.
@@ -56,22 +58,26 @@ class Form:
         measured, names = len(coordinates), coordinates
         if order == 2:
             names += velocity_names(coordinates)
+        states = len(names)  # those that an equation is sought or known of
+        if library.timed(names):
+            names += (CLOCK,)
         d = len(names)
         wanted, functions = library.resolve(names, measured)
-        velocities = np.eye(wanted.shape[1], dtype=int)[measured:d]
+        velocities = np.eye(wanted.shape[1], dtype=int)[measured:states]
         exponents = closure(np.concatenate([wanted, velocities]))
         row = {tuple(powers): k for k, powers in enumerate(exponents.tolist())}
         known = np.zeros((len(exponents), d))
         for position, velocity in enumerate(velocities.tolist()):
             known[row[tuple(velocity)], position] = 1.0
-        candidates = np.zeros(known.shape, dtype=bool)
-        candidates[[row[tuple(powers)] for powers in wanted.tolist()], d - measured :] = True
+        known[0, states:] = 1.0
+        candidates, sought = np.zeros(known.shape, dtype=bool), slice(states - measured, states)
+        candidates[[row[tuple(powers)] for powers in wanted.tolist()], sought] = True
         shared, first = np.arange(candidates.size).reshape(d, -1), 0
         alone = np.eye(wanted.shape[1], dtype=int)[d:].tolist()
         for powers, function in zip(alone, functions, strict=False):
             direction = function.direction
             if direction is not None:
-                equation, here = d - measured + direction, row[tuple(powers)]
+                equation, here = states - measured + direction, row[tuple(powers)]
                 candidates[here, np.arange(d) != equation] = False
                 first = shared[equation, here] if direction == 0 else first
                 shared[equation, here] = first
@@ -80,21 +86,23 @@ class Form:
         candidates &= (slopes.sum(axis=1) == 0)[:, None] | (slopes > 0 if slopes.size else False)
         # A function of the state does not move with the origin, so that none is sought; and what is
         # given is so in the frame of the data.
-        still = origin == "data" or exponents.shape[1] > d or library.given
+        stays = slopes.size or not all(function.of_time for function in functions)
+        still = origin == "data" or stays or library.given
         movable = (np.arange(d) < measured) & (not still)
         form = cls(names, exponents, functions, candidates, known, movable, shared.ravel())
         for of, terms in library.given:
-            form = form._given(of, dict(terms), d - measured)
+            form = form._given(of, dict(terms), names[sought])
         if not form.candidates.any():
             raise ValueError("library: must leave a term to be found, got all of them given")
         return form
 
-    def _given(self, equation: str, terms: dict[str, float | None], first: int) -> Form:
-        """The same with some terms of an equation given; the first equations are none to choose."""
-        if equation not in self.names[first:]:
+    def _given(
+        self, equation: str, terms: dict[str, float | None], sought: tuple[str, ...]
+    ) -> Form:
+        """The same with some terms of an equation given, which is one of those that are sought."""
+        if equation not in sought:
             raise ValueError(
-                f"library: must give terms of an equation of {', '.join(self.names[first:])}, "
-                f"got {equation!r}"
+                f"library: must give terms of an equation of {', '.join(sought)}, got {equation!r}"
             )
         j = self.names.index(equation)
         rows: dict[int, float | None] = {}
@@ -133,6 +141,11 @@ class Form:
     def law(self, coefficients: Floats) -> PolynomialSystem:
         """The law with these coefficients, (l, d), in the units of the data."""
         return PolynomialSystem(self.names, self.exponents, coefficients, functions=self.functions)
+
+    @property
+    def states(self) -> int:
+        """How many variables there are besides the time."""
+        return self.law(self.known).states
 
     @property
     def implicit(self) -> Bools:

@@ -24,6 +24,10 @@ def variable_names(d: int) -> tuple[str, ...]:
     return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
 
 
+CLOCK = "t"
+"""The time as a variable of a law: after all others, with dt/dt = 1."""
+
+
 def name_latex(name: str) -> str:
     """A variable as LaTeX: digits at its end become an index."""
     letters = name.rstrip("0123456789")
@@ -45,6 +49,8 @@ class Function:
     direction : int, optional
         Of a component of a vector, which one it is: the first has the others after it, each stands
         in the equation of its direction alone, and all have one coefficient.
+    of_time : bool
+        Whether it depends on the time alone.
     """
 
     name: str
@@ -52,6 +58,7 @@ class Function:
     value: Callable[[Floats], Floats]
     gradient: Callable[[Floats], Floats]
     direction: int | None = None
+    of_time: bool = False
 
     def standardised(self, centre: Floats, scale: Floats, size: float) -> Function:
         """The same function over ``size``, of points less ``centre``, over ``scale``."""

@@ -79,9 +79,12 @@ def better(first: Discovery, second: Discovery) -> Discovery:
     The second order, if the first misses the data; or if the second is beyond doubt and has no more
     terms.
     """
-    m = first.system.d
-    terms, others = int(first.native.support.sum()), int(second.native.support[:, m:].sum())
-    if (first.noise > MISFIT * second.noise[:m]).any():
+    m = first.system.states
+    terms, others = (
+        int(native.support[:, begin : begin + m].sum())
+        for native, begin in ((first.native, 0), (second.native, m))
+    )
+    if (first.noise[:m] > MISFIT * second.noise[:m]).any():
         return replace(second, note="order 2: the law of order 1 misses the data")
     if not second.warnings and others <= terms:
         cause = f"the law of order 1 is doubtful and has {terms} terms, not {others}"

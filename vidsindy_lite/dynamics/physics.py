@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline
 from ..arrays import Floats
 from ..checks import check_vector
 from .library import extended
-from .polynomials import PolynomialSystem
+from .polynomials import PolynomialSystem, power_of_ten
 
 POINTS = 1001
 """Points of each fitted curve at which forces and energy are looked at."""
@@ -72,11 +72,14 @@ class Quantity:
 
     def __str__(self) -> str:
         error = float(self.error.max())
+        power = power_of_ten(max(float(np.abs(self.value).max()), error)) if error > 0 else 0
+        value, error = self.value / 10.0**power, error / 10.0**power
         digits = int(np.clip(1 - np.floor(np.log10(error)), 0, 12)) if error > 0 else 0
         form = f".{digits}f" if error > 0 else ".4g"
-        numbers = ", ".join(f"{number + 0.0:{form}}" for number in np.atleast_1d(self.value))
+        numbers = ", ".join(f"{number + 0.0:{form}}" for number in np.atleast_1d(value))
         text = f"({numbers})" if self.value.ndim else numbers
-        return f"{self.name} = {text}" + (f" ± {error:{form}}" if error > 0 else "")
+        text += f" ± {error:{form}}" if error > 0 else ""
+        return f"{self.name} = ({text})e{power}" if power else f"{self.name} = {text}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +152,8 @@ def physics_of(
         down = down / np.linalg.norm(down)
     if law.order == 1:
         return Physics((), (), ("a law of first order holds no forces: order=2 looks for them",))
+    if law.timed:
+        return Physics((), (), ("a force changes with the time: no energy and no place of rest",))
     times = [np.linspace(curve.t[0], curve.t[-1], POINTS) for curve in curves]
     paths = [curve(t) for curve, t in zip(curves, times, strict=True)]
     body = _Body(law, covariance, np.concatenate(paths))

@@ -20,6 +20,7 @@ from ..checks import check_array, check_integer, check_number, check_times, chec
 from .candidates import Library
 from .integrate import integrate
 from .library import (
+    CLOCK,
     Function,
     along_state,
     closure,
@@ -30,6 +31,15 @@ from .library import (
     name_latex,
     shift_matrix,
 )
+
+SMALLEST, LARGEST = -5, 6
+"""Numbers of fewer and of more digits are printed with a power of ten."""
+
+
+def power_of_ten(largest: float) -> int:
+    """What numbers up to one are divided by where they are printed; 0 for those of few digits."""
+    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
+    return 0 if SMALLEST <= power < LARGEST else power
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +131,10 @@ class PolynomialSystem:
                 "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
                 f"'y': {{'x': 1}}}}, got {equations!r:.60}"
             )
-        names, m = tuple(equations), len(equations) // 2
-        accelerations = m and names[m:] == velocity_names(names[:m])
-        held, measured = library or Library(), m if accelerations else len(names)
+        names, held = tuple(equations), library or Library()
+        states = names[:-1] if CLOCK in names[-1:] and held.timed(names[:-1]) else names
+        m = len(states) // 2
+        measured = m if m and states[m:] == velocity_names(states[:m]) else len(states)
         _, functions = held.resolve(names, measured)
         known = (*names, *(function.name for function in functions))
         known += tuple(f"{name}'" for name in names if held.denominators)
@@ -176,13 +187,26 @@ class PolynomialSystem:
         return np.asarray(self.exponents[:, self.d + len(self.functions) :].any(axis=1))
 
     @cached_property
+    def timed(self) -> bool:
+        """Whether the last variable is the time, of which functions are terms: ``dt/dt = 1``."""
+        constant = (self.exponents.sum(axis=1) == 0).astype(float)
+        named = bool(self.functions) and self.names[-1] == CLOCK
+        return named and bool((self.coefficients[:, -1] == constant).all())
+
+    @property
+    def states(self) -> int:
+        """How many variables there are besides the time."""
+        return self.d - self.timed
+
+    @cached_property
     def order(self) -> int:
         """2 if the second half of the variables are the velocities of the first, else 1.
 
-        Velocities are named like vx, and the first half of the law is ``dx/dt = vx``.
+        Velocities are named like vx, and the first half of the law is ``dx/dt = vx``. The time is
+        not counted.
         """
-        m = self.d // 2
-        if self.names[m:] != velocity_names(self.names[:m]):
+        m = self.states // 2
+        if self.names[m : self.states] != velocity_names(self.names[:m]):
             return 1
         tied = (self.exponents[:, : self.d] @ np.arange(self.d))[:, None] == np.arange(m, 2 * m)
         tied &= self.exponents.sum(axis=1)[:, None] == 1
@@ -243,7 +267,8 @@ class PolynomialSystem:
             If the law is no polynomial, and the shift is not zero.
         """
         shift = check_vector("offset", offset, self.d)
-        if not self.is_polynomial and shift.any():
+        moves = all(function.of_time for function in self.functions) and not self.implicit.any()
+        if shift[self.states :].any() or (shift.any() and not moves):
             raise ValueError(
                 f"offset: must be zero for a law that is no polynomial, got {offset!r:.60}"
             )
@@ -267,7 +292,7 @@ class PolynomialSystem:
         t : array_like, shape (n,)
             Increasing, finite times.
         x0 : array_like, shape (d,)
-            State at ``t[0]``.
+            State at ``t[0]``; the time itself, if it is a variable, may be left out.
 
         Returns
         -------
@@ -277,9 +302,14 @@ class PolynomialSystem:
         Raises
         ------
         ValueError
-            If the times do not increase, or a time or a number of the state is not finite.
+            If the times do not increase, a time or a number of the state is not finite, or an input
+            is not known at a time.
         """
-        t, x0 = check_times(t), check_vector("x0", x0, self.d)
+        t = check_times(t)
+        if self.timed and np.shape(x0) == (self.d - 1,):
+            x0 = np.append(x0, t[0])
+        x0 = check_vector("x0", x0, self.d)
+        self._check_inputs(x0[-1] + t - t[0])
         active = self.support.any(axis=1)
         exponents, coefficients = self.exponents[active], self.coefficients[active]
         above, below = ~self.implicit[active], self.implicit[active]
@@ -294,11 +324,22 @@ class PolynomialSystem:
 
         return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
 
+    def _check_inputs(self, t: Floats) -> None:
+        """Refuse times at which an input in the law is not known."""
+        used = self.exponents[self.support.any(axis=1), self.d :].sum(axis=0)
+        for function, times in zip(self.functions, used.tolist(), strict=False):
+            if function.of_time and times:
+                unknown = ~np.isfinite(function.value(np.repeat(t[:, None], self.d, axis=1)))
+                if unknown.any():
+                    raise ValueError(
+                        f"t: must lie where {function.name} is known, got {t[unknown][0]:g}"
+                    )
+
     def sides(self) -> dict[int, str]:
         """What stands left in text, by number of equation: ``dx/dt``, or ``x''`` of order 2."""
         if self.order == 1:
-            return {j: f"d{name}/dt" for j, name in enumerate(self.names)}
-        m = self.d // 2
+            return {j: f"d{name}/dt" for j, name in enumerate(self.names[: self.states])}
+        m = self.states // 2
         return {m + j: f"{name}''" for j, name in enumerate(self.names[:m])}
 
     def text(self, digits: int = 4) -> str:
@@ -311,9 +352,7 @@ class PolynomialSystem:
             for j, side in self.sides().items()
         )
 
-    def _right(
-        self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str
-    ) -> str:
+    def _right(self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str) -> str:
         """The right-hand side of an equation, given how terms, fractions and products are written.
 
         Terms without their slopes.
@@ -330,9 +369,10 @@ class PolynomialSystem:
         names = tuple(map(name_latex, self.names))
         left = {j: rf"\dot{{{name}}}" for j, name in enumerate(names)}
         if self.order == 2:
-            m = self.d // 2
-            names = names[:m] + tuple(left[j] for j in range(m))
-            left = {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
+            m = self.states // 2
+            names = names[:m] + tuple(left[j] for j in range(m)) + names[2 * m :]
+            left |= {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
+        left = {j: left[j] for j in self.sides()}
         names += tuple(function.latex for function in self.functions) + ("1",) * self.d
         terms = [_term_text(e, names, "{}^{{{}}}", " ") for e in self.exponents]
         rows = (

@@ -308,19 +308,18 @@ def pose(
         process_noise=np.zeros(len(form.names)),
         measured_errors=sigma is not None,
     )
-    if len(form.names) > x.shape[1]:
+    if form.states > x.shape[1]:
         problem = _with_velocities(problem, curves)
+    if form.states < len(form.names):
+        problem = _with_time(problem)
     if form.exponents.shape[1] > len(form.names):
         problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))
 
 
 def _with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
-    """The same with velocities as further states, which nobody has measured.
-
-    Their standard units have mean 0, so that a velocity of zero stays what it is.
-    """
-    units, m = problem.units, len(problem.noise)
+    """The same with velocities as further states: a velocity of zero stays what it is."""
+    units = problem.units
     slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in positions]
     rms = np.sqrt((np.concatenate(slopes) ** 2).mean(axis=0))
 
@@ -328,8 +327,32 @@ def _with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
         velocity = position.derivative()
         return lambda t: np.hstack([position(t), velocity(t) / rms])
 
+    curves = [with_velocity(spline) for spline in positions]
+    return _with_unseen(problem, curves, rms * units.scale / units.time)
+
+
+def _with_time(problem: Problem) -> Problem:
+    """The same with the time as a further state, in time units."""
+
+    def with_time(curve: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+        return lambda t: np.column_stack([curve(t), t])
+
+    curves = [with_time(curve) for curve in problem.curves]
+    return _with_unseen(problem, curves, np.array([problem.units.time]))
+
+
+def _with_unseen(
+    problem: Problem, curves: Sequence[Callable[[Floats], Floats]], scale: Floats
+) -> Problem:
+    """The same with further states, (k,), of curves and scales, which nobody has measured.
+
+    Their standard units have mean 0.
+    """
+    units, (m,), (k,) = problem.units, problem.noise.shape, scale.shape
+
     def unseen(values: Floats, filling: float) -> Floats:
-        return np.concatenate([values, np.full_like(values, filling)], axis=1)
+        shape = (len(values), k, *values.shape[2:])
+        return np.concatenate([values, np.full(shape, filling)], axis=1)
 
     return replace(
         problem,
@@ -337,13 +360,13 @@ def _with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
         systematic=[unseen(modes, 0.0) for modes in problem.systematic],
         precision=[unseen(precision, 0.0) for precision in problem.precision],
         stretches=[(i, (t, unseen(x, np.nan))) for i, (t, x) in problem.stretches],
-        curves=[with_velocity(spline) for spline in positions],
+        curves=curves,
         units=Units(
-            centre=np.append(units.centre, np.zeros(m)),
-            scale=np.append(units.scale, rms * units.scale / units.time),
+            centre=np.append(units.centre, np.zeros(k)),
+            scale=np.append(units.scale, scale),
             time=units.time,
         ),
-        noise=spread_to_unseen(problem.noise, np.arange(2 * m) < m),
+        noise=spread_to_unseen(problem.noise, np.arange(m + k) < m),
     )
 
 

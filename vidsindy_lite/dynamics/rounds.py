@@ -19,6 +19,8 @@ from .errors import inflation
 ASIDE, ASTRAY = 0.1, 0.01
 """Distance of a motion from what is round, over its radius, that doubts it: of single samples, and
 what neighbours have in common."""
+STRAIGHT = 0.3
+"""Standard error of a radius, over the radius, beyond which a motion may as well have none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,21 +215,27 @@ def _round(
     distance = float(np.sqrt((off**2).sum(axis=1).mean()))
     shared = float(np.sqrt(max((off[1:] * off[:-1]).sum(axis=1).mean(), 0.0)))
     shape = "circle" if len(axes) == 2 else "sphere"
-    doubts: tuple[str, ...] = ()
+    doubts: list[str] = []
     if distance > ASIDE * radius or shared > ASTRAY * radius:
-        doubts = (
+        doubts.append(
             f"the motion may be on no {shape}: it is off by {100 * distance / radius:.2g} % of the "
-            f"radius, of which neighbours share {100 * shared / radius:.2g} %",
+            f"radius, of which neighbours share {100 * shared / radius:.2g} %"
+        )
+    radius_error = float(np.sqrt(covariance[-1, -1]))
+    if radius_error > STRAIGHT * radius:
+        doubts.append(
+            f"the motion may be on no {shape}: it hardly bends, so that the radius is known to "
+            f"{100 * radius_error / radius:.0f} % alone"
         )
     return Round(
         centre=centre,
         radius=float(radius),
         centre_errors=np.sqrt(np.diag(errors)),
-        radius_error=float(np.sqrt(covariance[-1, -1])),
+        radius_error=radius_error,
         distance=distance,
         axes=axes,
         angle=angle,
-        warnings=doubts,
+        warnings=tuple(doubts),
     )
 
 

@@ -95,7 +95,8 @@ def discover(
         where the first is doubtful and the motion is that of a body, and says in `Discovery.note`
         which was taken and why. Where terms are given of the equations, it is 1.
     library : Library, optional
-        The candidate terms, in place of ``degree``; `Library.where` says what is known of them.
+        The candidate terms, in place of ``degree``; `Library.where` says what is known of them, and
+        `Library.inputs` brings measured inputs.
         With terms that are no polynomials the law is sought in the frame of the data only, as no
         shift of its origin is exact.
     sigma : float, or array_like of shape (d,) or (n, d), optional
@@ -135,7 +136,9 @@ def discover(
     found, problem = solved(Form.of(names, library, 1, origin))
     settled = order == 1 or library.given or not found.warnings
     drowned = problem.noise.max() > DROWNED
-    if settled or drowned or not accelerated(problem.curves):
+    # With inputs a place is passed with several velocities, whatever the order is.
+    bodily = found.system.timed or accelerated(problem.curves)
+    if settled or drowned or not bodily:
         return found
     try:
         second, _ = solved(Form.of(names, library, 2, origin))

@@ -1,0 +1,150 @@
+"""Laws with known functions of the time: measured inputs, harmonics, products with the state."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+import vidsindy_lite as vl
+from vidsindy_lite import Library
+from vidsindy_lite.dynamics.discovery import Discovery
+from vidsindy_lite.dynamics.inputs import Input
+
+T = np.linspace(0, 40, 800)
+CUBIC = Library.polynomial(3)
+
+
+def force(t):
+    return 0.5 * np.cos(1.2 * t) + 0.3 * np.sin(0.37 * t + 1)
+
+
+def duffing(t=T, start=(0.5, 0.0), push=lambda t, x: force(t)):
+    return solve_ivp(
+        lambda s, x: [x[1], -0.3 * x[1] + x[0] - x[0] ** 3 + push(s, x[0])],
+        (t[0], t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-12,
+    ).y.T  # fmt: skip
+
+
+FORCED = duffing()
+U = Library.inputs(T, {"u": force(T)})
+
+
+def noisy(x, noise, seed=0):
+    return x + noise * x.std(axis=0) * np.random.default_rng(seed).standard_normal(x.shape)
+
+
+def terms(law, equation):
+    column = law.support[:, law.names.index(equation)]
+    return {law.terms[k] for k in np.flatnonzero(column)}
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_a_forced_oscillator_is_found_with_its_input_and_foretold(order, noise):
+    x = noisy(FORCED[:, : 3 - order], noise)
+    found = vl.discover(T, x, library=CUBIC + U, order=order)
+    law, v = found.system, "vx" if order == 2 else "y"
+    assert found.status == "ok"
+    assert law.names == ("x", v, "t")
+    assert law.order == order
+    assert (terms(law, v), terms(law, "t")) == ({"x", v, "x^3", "u"}, {"1"})
+    ahead = found.simulate(FORCED[0], T[:200])
+    np.testing.assert_allclose(ahead.x[:, :2], FORCED[:200], atol=1e-4 if noise == 0 else 0.05)
+    assert "dt/dt" not in found.equations() + law.text() + law.latex()
+    assert r"\mathrm{u}" in law.latex()
+
+
+def test_the_origin_of_a_forced_law_is_found():
+    found = vl.discover(T, noisy(FORCED[:, :1], 0.01) + 2, library=CUBIC + U, order=2)
+    assert found.offset[0] == pytest.approx(2, abs=4 * found.offset_errors[0])
+    assert terms(found.native, "vx") == {"x", "vx", "x^3", "u"}
+    again = found.native.shift(found.offset)
+    np.testing.assert_allclose(again.coefficients, found.coefficients, atol=1e-9)
+
+
+def test_the_order_of_a_forced_law_is_decided():
+    found = vl.discover(T, noisy(FORCED[:, :1], 0.01), library=CUBIC + U)
+    assert (found.system.order, found.status) == (2, "ok")
+    both = vl.discover(T, noisy(FORCED, 0.01), library=CUBIC + U)
+    assert (both.system.order, both.status) == (1, "ok")
+
+
+def test_the_order_of_several_forced_coordinates_is_decided():
+    springs = solve_ivp(
+        lambda s, x: [x[2], x[3], -x[0] - 0.1 * x[2] + force(s), x[0] - 2 * x[1] - 0.1 * x[3]],
+        (0, 40), (0.5, 0.2, 0.0, 0.3), t_eval=T, rtol=1e-10, atol=1e-12,
+    ).y.T  # fmt: skip
+    found = vl.discover(T, noisy(springs[:, :2], 0.01), library=Library.polynomial(1) + U)
+    assert found.system.order == 2
+    assert terms(found.system, "vx") == {"x", "vx", "u"}
+    assert terms(found.system, "vy") == {"x", "y", "vy"}
+
+
+def test_functions_of_the_time_may_multiply_the_state():
+    x = duffing(push=lambda t, x: 0.4 * x * np.cos(1.9 * t))[:, :1]
+    library = CUBIC + Library.terms(
+        {"h": lambda t: np.cos(1.9 * t), "hx": lambda x, t: x * np.cos(1.9 * t)}
+    )
+    found = vl.discover(T, noisy(x, 0.01), library=library, order=2)
+    assert terms(found.system, "vx") == {"x", "vx", "x^3", "hx"}
+
+
+def test_each_trajectory_has_its_input_and_a_gap_is_bridged():
+    later = T + 100
+    second = duffing(later, (-1.0, 0.4), lambda t, x: np.sin(0.7 * t))
+    library = CUBIC + Library.inputs([T, later], {"u": [force(T), np.sin(0.7 * later)]})
+    runs = [(T, noisy(FORCED[:, :1], 0.02)), (later, noisy(second[:, :1], 0.02, 1))]
+    runs[0][1][300:340] = np.nan
+    found = vl.discover(runs, library=library, order=2)
+    assert terms(found.system, "vx") == {"x", "vx", "x^3", "u"}
+    assert len(found.curves) == 2
+
+
+def test_a_law_with_an_input_is_saved_and_read_with_its_library(tmp_path):
+    found = vl.discover(T, noisy(FORCED[:, :1], 0.01), library=CUBIC + U, order=2)
+    found.save(tmp_path / "law.json")
+    again = Discovery.load(tmp_path / "law.json", CUBIC + U)
+    state = np.array([0.1, 0.2, 3.0])  # the time is the last
+    assert again.predict(state)[1] == found.predict(state)[1]
+    assert "changes with the time" in str(again.physics())
+    with pytest.raises(ValueError, match="library: must hold the function 'u'"):
+        Discovery.load(tmp_path / "law.json")
+    with pytest.raises(ValueError, match=r"t: must lie where u is known, got 42"):
+        found.simulate((0, 0), np.linspace(30, 42, 5))
+
+
+def test_an_input_is_a_spline_and_unknown_outside():
+    t = np.array([0.0, 1.0, 2.5, 3.0, 4.0])
+    u = Input.of("u", t, np.sin(t))
+    s = np.linspace(0, 4, 41)
+    np.testing.assert_array_equal(u(s), CubicSpline(t, np.sin(t))(s))
+    assert np.isnan(u(np.array([-0.1, 4.1]))).all()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (lambda: Library.inputs(T, {"u": T[1:]}), r"u must have shape \(800,\), .* got \(799,\)"),
+        (lambda: Library.inputs(T, {"u": 1.0}), r"u must have shape \(800,\), .* got \(\)"),
+        (
+            lambda: Library.inputs(T, {"u": np.where(T > 3, np.nan, T)}),
+            r"u must be finite, got NaN or infinity at t = 3\.0",
+        ),
+        (lambda: Library.inputs(T, {}), "inputs: must map names to values"),
+        (lambda: Library.inputs([1.0], {"u": [1.0]}), "at least 2 samples, got 1"),
+        (lambda: Library.inputs([T, T], {"u": [T]}), r"one per trajectory \(2\), got 1"),
+        (lambda: Library.inputs([T, T], {"u": [T, T]}), "times apart .* to t = 40 and one from"),
+        (
+            lambda: vl.discover(T, FORCED, library=CUBIC + Library.inputs(T, {"x": T})),
+            "must have a name of its own, got 'x' twice",
+        ),
+        (
+            lambda: vl.discover(T + 1, FORCED, library=CUBIC + U),
+            "u must be finite on the data, got none",
+        ),
+    ],
+)
+def test_bad_inputs_are_refused_in_one_line(given, message):
+    with pytest.raises(ValueError, match=message) as refused:
+        given()
+    assert "\n" not in str(refused.value)
