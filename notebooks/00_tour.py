@@ -51,6 +51,7 @@
 profile: str = "full"  # full or quick
 system: str = "Lorenz"  # one of vidsindy_lite.study.SYSTEMS
 camera: int = 1  # which of the three is calibrated
+noise_variance: float = 0.0  # of the image noise, intensities from 0 to 1
 seed: int = 0  # of the scenes in the videos
 
 # %%
@@ -65,6 +66,8 @@ from vidsindy_lite.study import SYSTEMS, film, plots, score, trajectory_error
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 frames = {"full": 1500, "quick": 400}[profile]
+# Of clean videos tracks are exact to this, in pixels, and laws to these relative errors.
+exact, l2_within, worst_within = (0.1, 1e-5, 1e-4) if noise_variance == 0 else (1.0, 1e-2, 1e-1)
 
 # %% [markdown]
 # ## All of it
@@ -76,7 +79,7 @@ frames = {"full": 1500, "quick": 400}[profile]
 
 # %%
 folder = TemporaryDirectory()
-shot = film(system, folder.name, frames, seed)
+shot = film(system, folder.name, frames, seed, noise_variance=noise_variance)
 found = discover_from_videos(shot.paths, shot.rig.uncalibrated(keep=camera - 1), shot.t)
 law = found.discovery
 print(law.equations("native"))
@@ -113,11 +116,11 @@ save_figure("tour_frames", fig, caption=caption, numbers=numbers)
 for title, seen, true in zip(titles, found.tracks, shot.tracks, strict=True):
     rms = np.sqrt(np.mean(np.sum((seen - true) ** 2, axis=1)))
     print(f"{title}: rms error {rms:.3f} px, {np.isnan(seen).any(axis=1).sum()} frames lost")
-    assert rms < 0.1
+    assert rms < exact
 
 # %% [markdown]
-# These videos are clean and lossless, so that the coverage of every pixel can be read from its colour;
-# that is why the error is so much smaller than a pixel. Noise and occlusion follow in notebook 02.
+# These videos are clean (try `noise_variance = 0.01`) and lossless, so that the coverage of every pixel can be read from
+# its colour; that is why the error is so much smaller than a pixel. Noise and occlusion follow in notebook 02.
 
 # %% [markdown]
 # ## The cameras
@@ -136,7 +139,7 @@ rows = [
     }
     for title, true, learned in zip(titles, shot.rig.cameras, found.rig.cameras, strict=True)
 ]  # fmt: skip
-assert all(abs(row["scale, learned"] / row["scale, true"] - 1) < 1e-3 for row in rows)
+assert all(abs(row["scale, learned"] / row["scale, true"] - 1) < 0.01 * exact for row in rows)
 caption = f"Scale in scene units per pixel. Camera {camera} was given, the others were learned."
 save_table("tour_cameras", rows, caption=caption)
 
@@ -157,7 +160,7 @@ error = trajectory_error(found.x, shot.x)
 pixel = np.mean([camera.scale for camera in shot.rig.cameras])
 print("rms error, scene units:", error.round(5))
 print("one pixel, scene units:", pixel.round(3))
-assert error.max() < 0.1 * pixel
+assert error.max() < exact * pixel
 
 # %%
 part = slice(400)  # four periods
@@ -220,11 +223,12 @@ save_figure("tour_coefficients", fig, caption=caption, numbers=numbers)
 # %%
 scored = score(law, shot.truth)
 assert scored.exact
-assert scored.l2 < 1e-5
-assert scored.max_coefficient_error < 1e-4
+assert scored.l2 < l2_within
+assert scored.max_coefficient_error < worst_within
 rows = [{
     "true terms": int(shot.truth.support.sum()), "missing": scored.missing,
-    "false": scored.false_positives, "l2": "below 1e-5", "worst coefficient": "below 1e-4",
+    "false": scored.false_positives, "l2": f"below {l2_within:.0e}".replace("e-0", "e-"),
+    "worst coefficient": f"below {worst_within:.0e}".replace("e-0", "e-"),
 }]  # fmt: skip
 caption = "The law in the cameras' frame beside the true one; errors are relative."
 save_table("tour_score", rows, caption=caption)
@@ -246,7 +250,7 @@ forecast = law.system.simulate(t, law.curve(t[:1])[0])
 apart = np.linalg.norm(forecast - truth, axis=1) > 0.1 * truth.std(axis=0).max()
 good = int(np.argmax(apart)) if apart.any() else len(t)
 print(f"good for {t[good - 1] / period:.1f} periods; the videos last {shot.t[-1] / period:.1f}")
-assert t[good - 1] > 4 * period
+assert t[good - 1] > (4 if noise_variance == 0 else 1) * period
 
 # %%
 fig = plots.plot_attractors({system: (truth[:2000], forecast[:2000])})
@@ -281,18 +285,18 @@ save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "eq
 #
 # * Three videos, the geometry of the cameras and **one** calibration are enough for the law of motion:
 #   terms, coefficients and their standard errors.
-#   <!-- by: scored.exact; scored.max_coefficient_error < 1e-4; 05: np.abs(every) < 2 -->
+#   <!-- by: scored.exact; scored.max_coefficient_error < worst_within; 05: np.abs(every) < 2 -->
 # * The origin in which the law is sparse is found from the data as well.
 #   <!-- by: law.native.support == SYSTEMS[system].support -->
 # * On clean videos nothing is lost on the way: tracks to a thousandth of a pixel, cameras and path
 #   accordingly, and no false term.
-#   <!-- by: figure videos_tracker; abs(row["scale, learned"] / row["scale, true"] - 1) < 1e-3; scored.exact -->
+#   <!-- by: figure videos_tracker; abs(row["scale, learned"] / row["scale, true"] - 1) < 0.01 * exact; scored.exact -->
 #
 # **What the paper says and what we found.** The paper finds the Lorenz system in the cameras' frame
 # with all its terms, one false one (a constant of -0.94 in dx/dt) and $\ell_2=1.50\cdot10^{-2}$. Here
 # the false term is gone, and the error is below a thousandth of a percent. All seven systems stand in
 # notebook [05](05_discovery.ipynb).
-# <!-- by: 10: term.endswith(": 1"); scored.exact; scored.l2 < 1e-5 -->
+# <!-- by: 10: term.endswith(": 1"); scored.exact; scored.l2 < l2_within -->
 #
 # Next: [the geometry of a camera](01_projection_proofs.ipynb).
 

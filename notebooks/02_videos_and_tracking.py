@@ -37,6 +37,7 @@
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
+noise_variance: float = 0.01  # of the image noise, intensities from 0 to 1
 seed: int = 0  # of the scenes and the image noise
 
 # %%
@@ -166,16 +167,16 @@ save_figure("videos_scenes", fig, caption=caption, numbers={"place": spot[0]})
 base = scenes[2]
 cases = {
     "clean": base,
-    "noise of variance 0.01": replace(base, noise_variance=0.01),
+    f"noise of variance {noise_variance:g}": replace(base, noise_variance=noise_variance),
     "a post in the way": replace(base, occluders=((262, 0, 40, 512),)),
 }
 images = [next(vision.render(spot, scene, seed)) for scene in cases.values()]
 fig = plots.plot_frames(images, list(cases), [spot] * 3)
-caption = "One scene, clean, with the paper's image noise, and with an occluder."
+caption = "One scene, clean, with image noise, and with an occluder."
 save_figure("videos_disturbances", fig, caption=caption, numbers={"place": spot[0]})
 
 # %% [markdown]
-# *One scene clean, with the paper's image noise (variance 0.01 for intensities from 0 to 1), and with a
+# *One scene clean, with image noise (the paper's has a variance of 0.01 for intensities from 0 to 1), and with a
 # post in front of half the target.*
 
 # %% [markdown]
@@ -303,10 +304,11 @@ def errors_of(scene, stream, places=truth):
 
 
 scene, number = shot.scenes[0], {"full": 20, "quick": 3}[profile]
+noisy = f"noise, variance {noise_variance:g}"
 errors = {
     "clean": errors_of(scene, seed),
     "lossy codec (mp4v)": np.linalg.norm(track(lossy).pixels - truth, axis=1),
-    "noise, variance 0.01": errors_of(replace(scene, noise_variance=0.01), seed),
+    noisy: errors_of(replace(scene, noise_variance=noise_variance), seed),
     "a post in the way": errors_of(replace(scene, occluders=((300, 0, 50, 512),)), seed),
     "a post where it lingers": errors_of(replace(scene, occluders=((230, 0, 50, 512),)), seed),
 }
@@ -346,7 +348,7 @@ save_figure("videos_tracker_errors", fig, caption=caption, numbers=errors)
 table = {row["videos"]: row for row in rows}
 assert table["clean"]["rms error (px)"] < 0.1
 assert table["clean"]["target seen (%)"] == 100
-assert table["noise, variance 0.01"]["rms error (px)"] < 0.15
+assert table[noisy]["rms error (px)"] < 1.5 * np.sqrt(noise_variance)
 assert table["a post in the way"]["largest error (px)"] < 0.5
 assert table["a post where it lingers"]["largest error (px)"] < 0.5
 assert np.median([np.sqrt(np.nanmean(error**2)) for error in drawn]) < 0.15
@@ -432,10 +434,12 @@ for name, ways in found.items():
 save_table("detector_restless", rows, caption="Background model, learned detector, and `auto`.")
 
 # %%
+seen = 90 if profile == "full" else 50  # of few frames `auto` may leave out the first and the last
 for row in rows[1:]:
     assert row["auto"] == "motion"
     assert row["learned: rms error (px)"] < 1
-    assert min(row["learned: within 1 px (%)"], row["auto: within 1 px (%)"]) > 90
+    assert row["learned: within 1 px (%)"] > 90
+    assert row["auto: within 1 px (%)"] > seen
 for row in (rows[1], rows[3]):  # where the camera trembles
     assert row["background: within 1 px (%)"] < 60
 assert rows[0]["auto"] == "background"
@@ -496,10 +500,10 @@ save_figure("figure_S3", fig, caption=caption, numbers={"t": shot.t, "x": x, "tr
 # * With the coverage of pixels, a classical tracker is good to a thousandth of a pixel on clean and to
 #   less than a tenth on noisy videos. It says NaN where the target is not seen whole, which its
 #   shape tells.
-#   <!-- by: figure videos_tracker; table["noise, variance 0.01"]["rms error (px)"] < 0.15; table["a post in the way"]["largest error (px)"] < 0.5 -->
+#   <!-- by: figure videos_tracker; table[noisy]["rms error (px)"] < 1.5 * np.sqrt(noise_variance); table["a post in the way"]["largest error (px)"] < 0.5 -->
 # * Where the background moves, a learned detector finds the target in each frame by itself, to some
 #   tenths of a pixel; `auto` follows the motion and is more exact.
-#   <!-- by: min(row["learned: within 1 px (%)"], row["auto: within 1 px (%)"]) > 90; row["auto: rms error (px)"] < row["learned: rms error (px)"]; figure detector_restless -->
+#   <!-- by: row["learned: within 1 px (%)"] > 90; row["auto: within 1 px (%)"] > seen; row["auto: rms error (px)"] < row["learned: rms error (px)"]; figure detector_restless -->
 #
 # **What the paper says and what we found.** The paper tracks with YOLO-v8 and calls its pixels
 # "approximate integer values" (rounding alone is 0.29 px per coordinate). It gives no step size, no
@@ -518,8 +522,8 @@ save_figure("figure_S3", fig, caption=caption, numbers={"t": shot.t, "x": x, "tr
 # %% tags=["hide-cell"]
 rms_of = {}
 for size in (8, 16, 40):
-    noisy = replace(scene, size=size, noise_variance=0.01)
-    rms_of[size] = np.sqrt(np.nanmean(errors_of(noisy, seed) ** 2))
+    grainy = replace(scene, size=size, noise_variance=noise_variance)
+    rms_of[size] = np.sqrt(np.nanmean(errors_of(grainy, seed) ** 2))
 print({size: f"{rms:.2f} px" for size, rms in rms_of.items()})
 assert rms_of[8] > 1.5 * rms_of[40]
 
@@ -531,21 +535,21 @@ assert rms_of[8] > 1.5 * rms_of[40]
 # $R\cdot R^2/(R^2)^2=1/R$.
 # </details>
 #
-# **2.** (Explore.) What if the target hardly moves? Track it on circles with a radius of 5 and of 10 px.
+# **2.** (Explore.) What if the target hardly moves? Track it on circles with a radius of 0.3 and of 0.7 times its width.
 
 # %% tags=["hide-cell"]
 angle = np.linspace(0, 20, frames)
-for radius in (5, 10):
-    circle = 256 + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+for share in (0.3, 0.7):
+    circle = 256 + share * scene.size * np.column_stack([np.cos(angle), np.sin(angle)])
     off = errors_of(scene, seed, circle)
-    print(f"radius {radius} px: seen in {np.isfinite(off).mean():.0%} of the frames, off by "
+    print(f"radius {share * scene.size:.1f} px: seen in {np.isfinite(off).mean():.0%} of the frames, off by "
           f"{np.sqrt(np.nanmean(off**2)):.3f} px (rms)")  # fmt: skip
-    assert np.nanmax(off) < {5: 0.5, 10: 0.05}[radius]
+    assert np.nanmax(off) < {0.3: 1.0, 0.7: 0.05}[share]
 
 # %% [markdown]
 # <details><summary>Solution</summary>
 #
-# A target of 18 px never leaves its place on the smaller circle: the median takes its middle for
+# The target never leaves its place on the smaller circle: the median takes its middle for
 # background, and what differs from that are slivers. `track` notices, puts the ground that is seen around the
 # place beneath it, and follows what then differs; as that ground is a guess, it is off by some hundredths of a pixel,
 # or tenths. On the larger circle every frame is as exact as ever.

@@ -524,13 +524,52 @@ def start(t, x):
     return state, problem, squares / len(curve)
 
 
-def unpruned(t, x):
+def continued(t, x):
     state, problem, unmet = start(t, x)
     for alpha in (0.1, 1.0, 10.0, 100.0):
         problem = problem.weighted(problem.data_weights, alpha / unmet)
         state = problem.solve(state, tolerance=1.0).state
+        yield alpha, problem, state
+
+
+def unpruned(t, x):
+    *_, (_, problem, state) = continued(t, x)
     information = problem.linearise(state, everything).information
     return dynamics.ShiftedLaw(exponents, state.coefficients, information), state
+
+
+# %% [markdown]
+# What the weight does, one step after the other:
+
+
+# %%
+def weighted(problem, state):
+    knots = problem.grid.knots[0]
+    ends = np.unique(knots)
+    middles = ((ends[1:] + ends[:-1]) / 2)[(ends[:-1] > low) & (ends[1:] < high)]
+    held, curve, slope = (dynamics.design_matrix(knots, times, order=k) @ state.control_points
+                          for times, k in ((middles, 0), (window, 0), (window, 1)))  # fmt: skip
+    rate = dynamics.monomials(curve - state.offset, exponents) @ state.coefficients
+    left = (slope - rate)[:, 0] / np.sqrt(np.mean(slope[:, 0] ** 2))
+    shown = {"final": (window, curve[:, 0]), "nodes": (middles, held[:, 0]), "residual": (window, left)}
+    fig = plots.plot_collocation(**samples, first=curves["first"], **shown)
+    fig.axes[1].set_ylim(-0.5, 0.5)
+    return fig, np.sqrt(np.mean(left**2))
+
+
+
+
+# %%
+pairs = {f"alpha = {alpha:g}": weighted(problem, state) for alpha, problem, state in continued(t, x)}
+unmet_at = [missed for _, missed in pairs.values()]
+assert np.all(np.diff(unmet_at) < 0)
+caption = "Curve and residual of the law while the weight of the law rises."
+numbers = {"alpha": list(pairs), "residual": unmet_at}
+save_slider("solver_weight_slider", {name: fig for name, (fig, _) in pairs.items()}, caption=caption, numbers=numbers)
+
+# %% [markdown]
+# *Move the slider: with a small weight the curve follows the noise, and no law is met; with every step it gives in to the law
+# that it has itself suggested.*
 
 
 # %% [markdown]

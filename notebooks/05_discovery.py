@@ -23,8 +23,9 @@
 # * the systems as data, in two frames of reference;
 # * the equations found, term by term with standard errors, beside the truth;
 # * the discovered laws set in motion, and for how long their forecasts hold;
-# * PySINDy, E-SINDy, WeakSINDy and Model-A on the same trajectories, in five trials;
-# * all of it from whole pixels, which is the paper's regime, and from sub-pixel tracks, which is an upper bound.
+# * PySINDy in five trials, and E-SINDy, WeakSINDy and Model-A in some, on the same trajectories;
+# * all of it from a learned detector's tracks in whole pixels, which is the paper's regime, and from sub-pixel tracks,
+#   which is an upper bound.
 #
 # **Afterwards you can** read the paper's main tables, and compare methods on equal terms.
 #
@@ -36,6 +37,7 @@
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
 seed: int = 0  # number of the first trial: seeds the scenes in the videos
+noise: float = 0.05  # of the path in the second exercise, over its spread
 jobs: int = 2  # films or trials at a time
 
 # %%
@@ -167,20 +169,28 @@ print(f"thresholds: {baselines.THRESHOLDS[0]:g} to {baselines.THRESHOLDS[-1]:g},
       f"as good as the best: up to {baselines.TOLERANCE:g} times its error")  # fmt: skip
 
 # %% [markdown]
-# "Camera pixels can only take approximate integer values", says the paper, so this is its regime: tracks that
-# are rounded to **whole pixels**, cameras and path learned anew from them. Our tracker keeps the digits
-# behind the point, and from clean and lossless videos it reads them to a thousandth of a pixel. What it makes of
-# them is an upper bound, of no use in a comparison with the paper.
+# "Camera pixels can only take approximate integer values", says the paper, and it tracks with a detector that sees
+# one frame at a time. So this is its regime: tracks of our **learned detector**, rounded to whole pixels, cameras and path
+# learned anew from them. It is off by some tenths of a pixel, by other amounts at other places. (To spare time it looks in a
+# square of 64 px around the target, along the grid of its anchors; what it says there is what it says in the whole
+# frame, to a tenth of a pixel or three.)
+#
+# The background model is more exact. Rounded to **whole pixels**, its tracks hold the rounding alone. **Sub-pixel**, as
+# they are, they are read to a thousandth of a pixel from clean and lossless videos. What our method makes of
+# those is an upper bound, of no use in a comparison with the paper.
 
 # %%
-tasks = grid(names, {"clean": (0,)}, trials, METHODS, frames)
-whole = [
-    replace(task, source="whole pixels")
-    for task in tasks
-    if task.trial == seed or task.method in ("ours", "PySINDy")
+two = ("ours", "PySINDy")
+sources = {"detector": "detector", "whole pixels": "whole", "videos": "sub"}
+others = {"detector": (), "whole pixels": trials[:1], "videos": trials[:3]}  # of the slower methods
+tasks = [
+    replace(task, source=source)
+    for source in sources
+    for task in grid(names, {"clean": (0,)}, trials, METHODS, frames)
+    if task.method in two or task.trial in others[source]
 ]
-trialled = tabulate(sweep(run_trial, tasks + whole, jobs=jobs, desc="trials"))
-results, coarse = (trialled[trialled.source == name] for name in ("videos", "whole pixels"))
+trialled = tabulate(sweep(run_trial, tasks, jobs=jobs, desc="trials"))
+detected, whole, results = (trialled[trialled.source == source] for source in sources)
 
 # %% [markdown]
 # Medians over the trials, in the paper's units and beside its numbers. "Terms found" counts the
@@ -197,15 +207,15 @@ def beside_paper(table, results, methods):
     return rows
 
 
-two = ("ours", "PySINDy")
-parts = {"whole": beside_paper("Table 1", coarse, two), "sub": beside_paper("Table 1", results, two)}
+groups = trialled.groupby("source", sort=False)
+parts = {sources[source]: beside_paper("Table 1", group, two) for source, group in groups}
 table_1 = pd.concat(parts, names=["pixels"]).reset_index(level=0)
-caption = f"Ours and PySINDy on the same tracks, medians of {len(trials)} trials; 0.001 is 0.001 or less."
+caption = f"Ours and PySINDy on the same tracks, medians of {len(trials)} trials; detector and whole: in whole pixels; 0.001 is 0.001 or less."
 save_table("table_1", table_1.to_dict("records"), caption=caption)
 
 # %%
 table_S3 = beside_paper("Table S3", results, ("ours", "E-SINDy", "WeakSINDy", "Model-A"))
-caption = f"Ours, E-SINDy, WeakSINDy and Model-A, from sub-pixel tracks, medians of {len(trials)} trials; 0.001 is 0.001 or less."
+caption = "Ours, E-SINDy, WeakSINDy and Model-A, from sub-pixel tracks, medians of the trials; 0.001 is 0.001 or less."
 save_table("table_S3", table_S3.to_dict("records"), caption=caption)
 
 # %%
@@ -352,7 +362,7 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # ## Whole pixels
 #
-# What do all methods make of the paper's regime? Here is the first trial.
+# What do all methods make of whole pixels? Here is the first trial.
 
 # %%
 rows = [
@@ -362,24 +372,25 @@ rows = [
         "l2 (e-2)": significant(100 * row.l2),
         "worst coefficient (%)": significant(100 * row.max_coefficient_error),
     }
-    for row in coarse[coarse.trial == seed].itertuples()
+    for row in whole[whole.trial == seed].itertuples()
 ]  # fmt: skip
 caption = "From tracks rounded to whole pixels, one trial."
 save_table("discovery_whole_pixels", rows, caption=caption)
 
 # %%
-mine = coarse[coarse.method == "ours"]
-print(f"ours: {rate(mine.exact)} exact, {rate(mine.status == 'ok')} not doubted")
-assert mine.exact.mean() >= 0.9
-assert (mine[mine.exact].l2 <= 0.5e-2).all()
-assert (mine.status == "ok").mean() >= 0.8
+for name, group, share in (("detector", detected, 0.8), ("whole pixels", whole, 0.9)):
+    mine = group[group.method == "ours"]
+    print(f"{name}: {rate(mine.exact)} exact, {rate(mine.status == 'ok')} not doubted")
+    assert mine.exact.mean() >= share
+    assert (mine[mine.exact].l2 <= 0.5e-2).all()
+    assert (mine.status == "ok").mean() >= 0.8
 
 # %% [markdown]
 # The errors are far larger than before and still well below the paper's.
 
 # %%
-both = trialled[trialled.trial == seed].copy()
-both["source"] = both.source.replace("videos", "as tracked")
+both = trialled[(trialled.trial == seed) & (trialled.source != "detector")].copy()
+both["source"] = both.source.replace("videos", "sub-pixel")
 fig = plots.plot_methods(both)
 caption = (
     "Relative error of each method on each system, one trial; open symbols: the terms are wrong."
@@ -393,16 +404,16 @@ numbers = {
 save_figure("discovery_methods", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
-# *Relative error of each method in the first trial. From exact paths (left), PySINDy and E-SINDy
+# *Relative error of each method in the first trial. From exact paths (right), PySINDy and E-SINDy
 # err by a percent and more: that is what their finite differences cost. Splines and integrals do
-# better. From whole pixels (right) most errors grow, and open symbols show where a term was lost or
+# better. From whole pixels (left) most errors are larger, and open symbols show where a term was lost or
 # a false one found. The weak form depends on its random windows; this is one draw.*
 
 # %%
 print(
     both.groupby(["source", "method"], sort=False).exact.agg(rate).unstack(sort=False).to_string()
 )
-error = coarse[coarse.trial == seed].groupby("method").l2.median()
+error = whole[whole.trial == seed].groupby("method").l2.median()
 assert all(error[method] > 2 * error["ours"] for method in baselines.BASELINES)
 
 # %% [markdown]
@@ -410,8 +421,8 @@ assert all(error[method] > 2 * error["ours"] for method in baselines.BASELINES)
 #
 # * Seven systems, one call, nothing chosen by hand: all true terms, no false one, from three videos
 #   with one calibrated camera. From whole pixels the relative error is of the order of $10^{-4}$, from the sub-pixel tracks of
-#   lossless videos below $10^{-5}$.
-#   <!-- by: ours.exact.all(); ours.groupby("system").l2.median().max() < LEAST; mine.exact.mean() >= 0.9; figure table_1 -->
+#   lossless videos below $10^{-5}$. A learned detector's tracks give an error of the order of $10^{-3}$, and now and then a false term.
+#   <!-- by: ours.exact.all(); ours.groupby("system").l2.median().max() < LEAST; mine.exact.mean() >= share; figure table_1 -->
 # * The offset of the reference frame was not given and is found with the law.
 #   <!-- by: np.allclose(law.offset, REFERENCE_OFFSET -->
 # * The standard errors are not too small: more than nine of ten coefficients lie within two of them.
@@ -461,15 +472,15 @@ assert round(scored.max_coefficient_error, 2) == 0.37
 # that the shift creates dominates the norm. Hence the column "worst coefficient".
 # </details>
 #
-# **2.** (Explore.) Add noise of 5 % to the path of the first system and compare the methods again.
+# **2.** (Explore.) Add noise to the path of the first system, 5 % of its spread, and compare the methods again.
 
 # %% tags=["hide-cell"]
 from vidsindy_lite.study import Trial
 
-five = {m: run_trial(Trial(names[0], "noise", 0.05, seed, m, frames=frames)).score for m in METHODS}
-print(*(f"{method}: {scored}" for method, scored in five.items()), sep="\n")
-assert five["ours"].exact
-assert five["ours"].l2 <= min(scored.l2 for scored in five.values())
+under = {m: run_trial(Trial(names[0], "noise", noise, seed, m, frames=frames)).score for m in METHODS}
+print(*(f"{method}: {scored}" for method, scored in under.items()), sep="\n")
+assert under["ours"].exact
+assert under["ours"].l2 <= min(scored.l2 for scored in under.values())
 
 # %% [markdown]
 # <details><summary>Solution</summary>

@@ -36,6 +36,7 @@
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
 seed: int = 0  # number of the first trial: seeds films, noise, gaps
+share: float = 0.1  # noise of the one trial by hand, over the spread of the path
 jobs: int = 2  # trials at a time
 
 # %%
@@ -130,12 +131,12 @@ assert all(row["error / noise of 10 %"] < 0.02 for row in rows)
 
 # %%
 one, rng = films_of["SprottF"][0], np.random.default_rng(seed)
-noisy = one.x + 0.1 * one.x.std(axis=0) * rng.normal(size=one.x.shape)
-assert np.allclose(noisy, add_noise(one.x, 0.1, np.random.default_rng(seed)))
+noisy = one.x + share * one.x.std(axis=0) * rng.normal(size=one.x.shape)
+assert np.allclose(noisy, add_noise(one.x, share, np.random.default_rng(seed)))
 gappy = one.x.copy()
 for start in np.linspace(0, len(gappy), 7).astype(int)[1:-1]:  # five gaps of 4 % of the record
     gappy[start : start + len(gappy) // 25] = np.nan
-for name, x in (("noise of 10 %", noisy), ("20 % hidden", gappy)):
+for name, x in ((f"noise of {share:.0%}", noisy), ("20 % hidden", gappy)):
     law = discover(one.t, x, systematic=one.systematic, order=1)
     print(f"{name}: {score(law, one.truth)}\n{law.equations()}\n")
     assert score(law, one.truth).exact
@@ -144,7 +145,7 @@ for name, x in (("noise of 10 %", noisy), ("20 % hidden", gappy)):
 # A `Trial` draws its own, `run_trial` does the rest. It is no more than this:
 
 # %%
-trial = Trial("SprottF", "noise", 0.1, seed, frames=frames)
+trial = Trial("SprottF", "noise", share, seed, frames=frames)
 law = discover(one.t, trial.corrupt(one.x), systematic=one.systematic, order=1)
 by_package = run_trial(trial)
 assert np.allclose(by_package.law.coefficients, law.system.coefficients, rtol=1e-6)
@@ -491,11 +492,11 @@ rows["noise (%)"] *= 100
 save_table("study_methods", rows.to_dict("records"), caption="Exact laws under noise, all systems.")
 
 # %%
-error, share = by_method.l2.median().unstack(), by_method.exact.mean().unstack()
+error, right = by_method.l2.median().unstack(), by_method.exact.mean().unstack()
 for level in noise["noise"][1:]:
     others = [method for method in methods if method != "ours"]
     assert (error.loc[level, others] > 1.5 * error.loc[level, "ours"]).all(), level
-    assert (share.loc[level, others] < share.loc[level, "ours"]).all(), level
+    assert (right.loc[level, others] < right.loc[level, "ours"]).all(), level
 
 # %% [markdown]
 # ## Do the error bars hold?
@@ -621,7 +622,7 @@ for row in rows:
 # * Noise is what sets the methods apart. Ours has the smallest error and the largest share of exact
 #   laws at every level of it, because curve and law are fitted together: all samples take part in every
 #   derivative.
-#   <!-- by: error.loc[level, others] > 1.5; share.loc[level, others] < share.loc[level, "ours"] -->
+#   <!-- by: error.loc[level, others] > 1.5; right.loc[level, others] < right.loc[level, "ours"] -->
 # * Gaps in exact samples cost our method next to nothing.
 #   <!-- by: gaps.exact.all(); (gaps.l2 < 1e-4).all() -->
 # * The limit is information, and the Cramér-Rao bound knows it in advance: Tsucs2 has one term that

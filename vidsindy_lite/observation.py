@@ -241,6 +241,7 @@ def _observed(
         with refusing("cameras", raw, names):
             begun = np.zeros(len(raw)) if lags is None else lags
             rig = posed(align(raw, begun, clock.rates, clock.uneven), rig, lags is not None)
+            doubts = (*rig.warnings, *doubts)
     with refusing("lags", raw, names):
         best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress)
         if lags is not None:

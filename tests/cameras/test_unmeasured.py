@@ -1,11 +1,13 @@
 """Rigs of which only the lenses are known: where they stand, their frame, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers import aligned_error, room, walk
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import posed
+from vidsindy_lite.cameras import learn_cameras_eq4, posed
 from vidsindy_lite.observation import observe_tracks
 
 FRAMES = 400
@@ -79,9 +81,7 @@ def test_a_known_distance_gives_the_unit_of_length():
     tracks = filmed(rng, rig)
     first, second, _ = (c.position for c in rig.cameras)
     distance = float(np.linalg.norm(first - second))
-    seen = observe_tracks(
-        tracks, lenses(rng, rig, distance=distance), np.arange(FRAMES) / 30
-    )
+    seen = observe_tracks(tracks, lenses(rng, rig, distance=distance), np.arange(FRAMES) / 30)
     spread = [np.sqrt(np.mean(np.var(x, axis=0))) for x in (seen.x, walk(np.arange(FRAMES)))]
     assert abs(spread[0] / spread[1] - 1) < 0.01
     assert seen.warnings == ()
@@ -116,6 +116,63 @@ def test_tracks_at_other_instants_tell_no_rig():
         posed(tracks, lenses(rng, rig))
 
 
+def of_lenses(rig, times):
+    """The same views, by lenses so many times as long, from so many times as far."""
+    return vl.Rig(
+        replace(c, position=times * c.position, scale=c.scale / times) for c in rig.cameras
+    )
+
+
+def blind(rig, known=0):
+    """Cameras of which nothing is known, but for the focal lengths of some."""
+    return vl.Rig(
+        vl.PerspectiveCamera(scale=c.scale if i < known else None, image_size=c.image_size)
+        for i, c in enumerate(rig.cameras)
+    )
+
+
+@pytest.mark.parametrize(("times", "known"), [(1, 0), (1, 1), (6, 0)])
+def test_nothing_is_known_at_all(times, known):
+    rng = np.random.default_rng([5, times])
+    rig = of_lenses(room(rng), times)
+    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig)
+    learned = vl.learn_cameras(tracks, blind(rig, known))
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 0.005 * np.ptp(x, axis=0).max()
+    assert "focal lengths are those that the tracks tell" in learned.note
+    if times == 1:
+        found = [c.focal_length for c in learned.cameras]
+        np.testing.assert_allclose(found, [c.focal_length for c in rig.cameras], rtol=0.05)
+
+
+def test_from_infinity_either_hand_fits():
+    rng = np.random.default_rng(6)
+    rig = vl.Rig(
+        vl.OrthographicCamera(
+            position=np.zeros(3), normal=c.normal, angle=c.angle, image_size=c.image_size,
+            scale=c.scale * (c.normal @ c.position),
+        )
+        for c in room(rng).cameras
+    )  # fmt: skip
+    x, tracks = walk(np.arange(FRAMES)), filmed(rng, rig)
+    learned = vl.learn_cameras(tracks, blind(rig))
+    assert any("true one or its mirror image" in text for text in learned.warnings)
+    found, size = vl.reconstruct(tracks, learned), np.ptp(x, axis=0).max()
+    assert min(aligned_error(found * [1, 1, hand], x) for hand in (1, -1)) < 0.01 * size
+    seen = observe_tracks(tracks, blind(rig), np.arange(FRAMES) / 30)
+    assert any("true one or its mirror image" in text for text in seen.warnings)
+
+
+def test_a_small_target_before_cameras_far_apart():
+    """OpenCV refuses points that are close together, in whatever unit."""
+    rng = np.random.default_rng(8)
+    rig = of_lenses(room(rng), 30)
+    x = walk(np.arange(FRAMES))
+    x[: FRAMES // 3] = x[0]  # and at rest
+    tracks = [c.project(x) + 0.2 * rng.normal(size=(FRAMES, 2)) for c in rig.cameras]
+    learned = posed(tracks, lenses(rng, rig, off=0.02))
+    assert aligned_error(vl.reconstruct(tracks, learned), x) < 0.01 * np.ptp(x, axis=0).max()
+
+
 def test_a_file_of_lenses(tmp_path):
     text = '[[camera]]\nmodel = "perspective"\nfield_of_view = 60\nscale_error = 0.03\n'
     (tmp_path / "rig.toml").write_text("distance = 2.5\n" + 3 * text)
@@ -139,9 +196,7 @@ def test_what_is_no_rig_of_lenses():
         vl.Rig([flat, vl.OrthographicCamera(normal=(1, 0, 0))], distance=2.0)
     with pytest.raises(ValueError, match="distance: must be positive"):
         vl.Rig([lens] * 3, distance=0.0)
-    blind = vl.Rig([vl.PerspectiveCamera(), lens, lens])
-    tracks = [walk(np.arange(20))[:, :2]] * 3
-    with pytest.raises(ValueError, match=r"scale or field_of_view .* none of cameras\[0\]"):
-        vl.learn_cameras(tracks, blind)
+    with pytest.raises(ValueError, match=r"Eq. \(4\) needs all positions, got none"):
+        learn_cameras_eq4([walk(np.arange(20))[:, :2]] * 3, vl.Rig([lens] * 3))
     with pytest.raises(ValueError, match="camera: position must be known"):
         lens.project(np.zeros((1, 3)))

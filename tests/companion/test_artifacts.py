@@ -147,6 +147,11 @@ def test_slider_registers_the_first_frame_and_shows_all_in_one_picture(folder):
     assert contents(folder) == first
 
 
+def test_a_slider_without_figures_is_named(folder):
+    with pytest.raises(ValueError, match=r"figures: slider 'noise' needs at least one figure"):
+        save_slider("noise", {}, caption="Nothing.", numbers={})
+
+
 def test_table_round_trip(folder):
     saved = save_table("table_1", ROWS, caption="Two systems.")
     assert load_table("table_1", folder) == saved

@@ -87,6 +87,10 @@ def test_functions_of_the_time_may_multiply_the_state():
     )
     found = vl.discover(T, noisy(x, 0.01), library=library, order=2)
     assert terms(found.system, "vx") == {"x", "vx", "x^3", "hx"}
+    library = CUBIC + Library.inputs(T, {"h": np.cos(1.9 * T)})
+    library += Library.terms({"hx": lambda h, x: h * x})
+    same = vl.discover(T, noisy(x, 0.01), library=library, order=2)
+    np.testing.assert_allclose(same.coefficients, found.coefficients, rtol=1e-3, atol=1e-3)
 
 
 def test_each_trajectory_has_its_input_and_a_gap_is_bridged():

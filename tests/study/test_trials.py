@@ -12,10 +12,11 @@ from vidsindy_lite.study import baselines, score
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.baselines import BASELINES
 from vidsindy_lite.study.corruption import add_noise, drop_blocks, drop_fibers
-from vidsindy_lite.study.films import FilmResult, FilmTask, run_film
+from vidsindy_lite.study.films import FilmResult, FilmTask, detect_near, film, run_film
 from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.tables import by_condition, rate, significant, summary, tabulate
 from vidsindy_lite.study.trials import Trial, grid, run_trial, source_path
+from vidsindy_lite.vision import LearnedDetector, detections, read_video
 
 pytestmark = pytest.mark.slow  # films and discovers
 
@@ -35,6 +36,7 @@ def simulated(task):
         pixel_error=(0.0,) * 3,
         path_error=np.zeros(3),
         seconds=0.0,
+        detected=(),
     )
 
 
@@ -69,6 +71,19 @@ def test_whole_pixels_are_coarser_but_near(filmed):
     pixel = max(camera.scale for camera in filmed.rig.cameras)
     assert fine < 0.2 * coarse
     assert coarse < 2 * pixel
+    assert np.abs(source_path(filmed, "detector")[0] - truth).max() < 4 * pixel
+
+
+def test_near_its_target_the_detector_sees_what_it_sees_in_the_whole_frame(tmp_path):
+    shot = film("SprottE", tmp_path, 12)
+    track = shot.tracks[0].copy()
+    track[3], track[5:] = np.nan, shot.tracks[0][5:] + [3, -2]  # lost once, then only about there
+    near = detect_near(shot.paths[0], track)
+    whole = [detections(LearnedDetector().predict(f))[0].centre for f in read_video(shot.paths[0])]
+    assert np.isnan(near[3]).all()
+    others = np.arange(len(near)) != 3
+    np.testing.assert_allclose(near[others], np.array(whole)[others], atol=0.3)
+    assert np.linalg.norm(near - shot.tracks[0], axis=1)[others].mean() < 1
 
 
 def test_ours_is_told_the_systematic_errors_of_what_cameras_reconstructed(filmed, monkeypatch):

@@ -89,14 +89,16 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     Paper: Eq. (4); by itself it is `learn_cameras_eq4`.
     """
     check_learnable(rig)
-    rig = posed(tracks, rig)
+    given, rig = rig, posed(tracks, rig)
+    doubted = () if rig is given else rig.warnings
     unknowns = Unknowns.of(rig)
     views, footage = check_views(tracks, rig), Footage.of(check_seen(tracks, rig))
     errors = np.array([known_to(camera) for camera in rig.cameras])
     if not errors.any():
         return Rig(rig.cameras, note=rig.note)
     if not unknowns.any:
-        return replace(_closest(footage, rig.cameras, errors), note=rig.note)
+        learned = _closest(footage, rig.cameras, errors)
+        return replace(learned, warnings=(*doubted, *learned.warnings), note=rig.note)
     if all_orthographic(rig.cameras):
         equations, decided = agreement(views, unknowns)
         start = unknowns.filled(*solve(equations.design, equations.target, unknowns))
@@ -112,8 +114,8 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     return replace(learned, warnings=learned.warnings + doubts, note=rig.note)
 
 
-def check_learnable(rig: Rig) -> Unknowns:
-    """What is unknown of a rig, if enough is known of its cameras to learn the rest.
+def check_learnable(rig: Rig) -> None:
+    """That enough is known of the cameras of a rig to learn the rest.
 
     Raises
     ------
@@ -121,20 +123,14 @@ def check_learnable(rig: Rig) -> Unknowns:
         If it is not.
     """
     check_instance("rig", rig, Rig)
+    if not rig.is_measured:
+        return
     if not any(camera.is_calibrated for camera in rig.cameras):
         raise ValueError(
             "rig: at least one camera must be calibrated (scale and angle given) to learn the "
             f"others, got none of {len(rig.cameras)}"
         )
-    unknowns = Unknowns.of(rig)
-    loose = unknowns.unplaced
-    if not rig.is_measured:
-        if unknowns.uncalibrated.size:
-            raise ValueError(
-                "rig: scale or field_of_view must be given, at least roughly, of cameras of which "
-                f"nothing else is known, got none of {names(unknowns.uncalibrated)}"
-            )
-        return unknowns
+    loose = Unknowns.of(rig).unplaced
     if loose.size and not rig.is_orthographic:
         raise ValueError(
             "rig: all positions must be given if a camera is perspective, got none of "
@@ -146,7 +142,6 @@ def check_learnable(rig: Rig) -> Unknowns:
             "rig: the positions of two cameras with independent normals must be given to learn "
             f"those of {names(loose)}, got {len(placed)}"
         )
-    return unknowns
 
 
 def calibration_errors(rig: Rig, truth: Rig) -> Floats:

@@ -72,7 +72,10 @@ def _learned(
     tracks: Sequence[Floats], rig: Rig, method: Callable[[Equations, Unknowns], Complex]
 ) -> Rig:
     """The rig with s exp(i theta) by a method, from Eq. (4) in all frames without outliers."""
-    unknowns, views = check_learnable(rig), check_views(tracks, rig)
+    check_learnable(rig)
+    if not rig.is_measured:
+        raise ValueError("rig: Eq. (4) needs all positions, got none; use learn_cameras")
+    unknowns, views = Unknowns.of(rig), check_views(tracks, rig)
     if not unknowns.any:
         return rig
     if unknowns.unplaced.size:

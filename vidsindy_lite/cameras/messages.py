@@ -21,6 +21,14 @@ def far_from_measured(camera: int, what: str, times: float) -> str:
     )
 
 
+def either_hand() -> str:
+    """Perspective does not tell a path from its mirror image."""
+    return (
+        "whether the path is the true one or its mirror image cannot be told, as the cameras are "
+        "too far away: measure roughly where they stand, or come closer"
+    )
+
+
 def undecided_outliers() -> str:
     """Fit and outliers kept changing each other."""
     return (

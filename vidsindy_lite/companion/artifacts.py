@@ -254,7 +254,7 @@ def save_slider(
     slider_id : str
         As of `save_figure`.
     figures : mapping of str to matplotlib Figure
-        All of one size, by what stands beside the slider.
+        At least one, all of one size, by what stands beside the slider.
     caption, numbers
         As of `save_figure`.
 
@@ -266,8 +266,10 @@ def save_slider(
     Raises
     ------
     ValueError, TypeError
-        As `save_figure` does.
+        If there is no figure, and as `save_figure` does.
     """
+    if not figures:
+        raise ValueError(f"figures: slider {slider_id!r} needs at least one figure, got none")
     save_figure(slider_id, next(iter(figures.values())), caption=caption, numbers=numbers)
     frames = []
     for figure in figures.values():

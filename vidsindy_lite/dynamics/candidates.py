@@ -114,7 +114,8 @@ class Library:
         """Measured inputs as terms: functions of the time that are known, whatever the state is.
 
         Between the samples each is a cubic spline. A law with inputs is one of the state and the
-        time, as with `terms` of ``t``.
+        time, as with `terms` of ``t``. Functions in `terms` may have inputs as arguments, as in
+        ``{"ux": lambda u, x: u * x}``.
 
         Parameters
         ----------
@@ -270,8 +271,9 @@ class Library:
             for multiple in range(1, self.harmonics + 1)
             for kind in ("sin", "cos")
         ]
+        inputs = {name: rule for name, rule in self.functions if isinstance(rule, Input)}
         for name, rule in self.functions:
-            functions += own(names, measured, name, rule)
+            functions += own(names, measured, name, rule, inputs)
         taken = [*names, *(function.name for function in functions)]
         if clash := next((name for name in taken if taken.count(name) > 1), None):
             raise ValueError(f"library: a term must have a name of its own, got {clash!r} twice")
@@ -349,15 +351,22 @@ def restored(
 
 
 def own(
-    names: tuple[str, ...], measured: int, name: str, rule: Callable[..., ArrayLike]
+    names: tuple[str, ...],
+    measured: int,
+    name: str,
+    rule: Callable[..., ArrayLike],
+    inputs: Mapping[str, Input],
 ) -> list[Function]:
-    """A function of one's own, whose arguments are named like variables; or its components."""
-    axes = _axes(names, name, rule)
+    """A function of one's own, of variables and inputs by their names; or its components."""
+    arguments = _checked_arguments((*names, *inputs), name, rule)
+    axes = [names.index(argument) for argument in arguments if argument in names]
     moving = [axis for axis in axes if names[axis] != CLOCK or axis < measured]
 
     def evaluate(x: Floats) -> Floats:
+        values = dict(zip(names, x.T, strict=True))
+        values |= {known: of_time(values[CLOCK]) for known, of_time in inputs.items()}
         with np.errstate(all="ignore"):  # what is not finite is refused where it matters
-            return np.asarray(rule(*(x[:, axis] for axis in axes)), dtype=float)
+            return np.asarray(rule(*(values[argument] for argument in arguments)), dtype=float)
 
     try:
         shape = evaluate(np.ones((2, len(names)))).shape
@@ -390,8 +399,10 @@ def own(
     return [component(j) for j in (range(measured) if len(shape) == 2 else [None])]
 
 
-def _axes(names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]) -> list[int]:
-    """Which variables the arguments of a function are."""
+def _checked_arguments(
+    names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]
+) -> list[str]:
+    """The arguments of a function, which must be among some names."""
     arguments = _arguments(rule)
     unknown = [argument for argument in arguments if argument not in names]
     if not arguments or unknown:
@@ -399,7 +410,7 @@ def _axes(names: tuple[str, ...], name: str, rule: Callable[..., ArrayLike]) -> 
             f"library: the arguments of {name!r} must be named like variables "
             f"({', '.join(names)}), as in lambda x: np.sin(x), got {', '.join(unknown) or 'none'}"
         )
-    return [names.index(argument) for argument in arguments]
+    return arguments
 
 
 def _arguments(rule: Callable[..., ArrayLike]) -> list[str]:

@@ -36,9 +36,10 @@ METHODS = ("ours", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
 """Ours, and the `baselines.BASELINES` by their names there."""
 RANDOM_METHODS = ("E-SINDy", "WeakSINDy", "Model-A")
 """The baselines that draw random numbers: the number of the trial is their seed."""
-SOURCES = ("videos", "tracks", "whole pixels", "truth")
+SOURCES = ("videos", "tracks", "whole pixels", "detector", "truth")
 """Where a path comes from: the tracks; the tracks, which are corrupted in its place before the
-cameras are learned; the tracks rounded to whole pixels; or the simulation."""
+cameras are learned; the tracks rounded to whole pixels; those of the learned detector, rounded to
+whole pixels; or the simulation."""
 
 
 @dataclass(frozen=True)
@@ -189,6 +190,8 @@ def source_path(filmed: FilmResult, source: str) -> tuple[Floats, Floats | None]
         return filmed.truth.simulate(filmed.t, np.array(filmed.truth.x0)), None
     if source == "whole pixels":
         return _reconstructed(filmed, [np.round(track) for track in filmed.tracks])
+    if source == "detector":
+        return _reconstructed(filmed, [np.round(track) for track in filmed.detected])
     return filmed.x, filmed.systematic
 
 
