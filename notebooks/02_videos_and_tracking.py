@@ -566,6 +566,35 @@ for share in (0.3, 0.7):
 # have opposite signs at opposite ends of the disc and nearly cancel. Rounding to 1/255 of the contrast adds
 # independent errors of $1/(255\sqrt{12})$ in the $2\pi R$ pixels of the rim, a few ten-thousandths of a pixel together.
 # </details>
+#
+# **4.** (Implement.) One step of the Runge-Kutta method, and how its error falls with the step.
+
+# %% tags=["hide-cell"]
+def advance(law, x, h):
+    k1 = law(x)
+    k2 = law(x + h / 2 * k1)
+    k3 = law(x + h / 2 * k2)
+    return x + h / 6 * (k1 + 2 * k2 + 2 * k3 + law(x + h * k3))
+
+
+# %% tags=["hide-cell"]
+lorenz = SYSTEMS["Lorenz"]
+begin, span = np.array(lorenz.x0), np.array([0, lorenz.period / 50])
+exact, off = lorenz.simulate(span, begin)[-1], []
+for steps in (1, 2, 4):
+    end = begin
+    for _ in range(steps):
+        end = advance(lorenz, end, span[1] / steps)
+    assert np.allclose(end, dynamics.runge_kutta_4(lorenz, span, begin, substeps=steps)[-1])
+    off.append(np.linalg.norm(end - exact))
+print("each half of the step divides the error by", (np.array(off[:-1]) / off[1:]).round(1))
+assert (np.array(off[:-1]) > 10 * np.array(off[1:])).all()
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# By about 16, as the error of a fixed time is of the fourth order in the step.
+# </details>
 
 # %% [markdown]
 # ## Run time and versions

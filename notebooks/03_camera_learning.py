@@ -436,6 +436,28 @@ assert two.max() < 3 * rmse.max()
 # times $\lambda$: $s\,\mathcal T\mathbf x_c+\Delta_c=\mathbf R^-\mathbf x$ is linear in all of them. Here the measured
 # positions would betray it, if they were exact; the one calibrated camera settles it without them.
 # </details>
+#
+# **4.** (Implement.) Solve Eq. (4) for cameras 2 and 3 by one call of `np.linalg.lstsq`.
+
+# %% tags=["hide-cell"]
+known, *unknown = start.cameras
+inverse = known.rows @ np.linalg.pinv(np.vstack([camera.rows for camera in unknown]))
+blocks, target = [], known.plane_coordinates(rounded[0])
+for camera, track, part in zip(unknown, rounded[1:], (inverse[:, :2], inverse[:, 2:]), strict=True):
+    X, Y = camera.centred(track).T
+    blocks.append(part @ np.array([[X, Y], [Y, -X]]).transpose(2, 0, 1))
+    target = target - part @ camera.offset
+c2, s2, c3, s3 = np.linalg.lstsq(np.concatenate(blocks, axis=2).reshape(-1, 4), target.ravel())[0]
+packaged = cameras.learn_cameras_eq4(rounded, start).cameras[1:]
+assert np.allclose(np.hypot([c2, c3], [s2, s3]), [camera.scale for camera in packaged])
+assert np.allclose(np.exp(1j * np.arctan2([s2, s3], [c2, c3])), np.exp(1j * np.array([camera.angle for camera in packaged])))
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# Two rows a frame, four columns, and what is known on the right: the pixels of camera 1 in its plane, less what the offsets of
+# the others predict. The scales are the lengths of $(s\cos\vartheta,s\sin\vartheta)$, the angles their directions.
+# </details>
 
 # %% [markdown]
 # ## Run time and versions

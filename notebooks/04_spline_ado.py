@@ -532,6 +532,7 @@ def continued(t, x):
         yield alpha, problem, state
 
 
+# %%
 def unpruned(t, x):
     *_, (_, problem, state) = continued(t, x)
     information = problem.linearise(state, everything).information
@@ -577,7 +578,8 @@ save_slider("solver_weight_slider", {name: fig for name, (fig, _) in pairs.items
 # have, for any $\boldsymbol\lambda$, what the fit would lose: $(\boldsymbol\lambda-\mathbf c)^T
 # \mathbf S\,(\boldsymbol\lambda-\mathbf c)$. That is a small regression problem, and a threshold or
 # a search can be tried on it. `subset_search` drops, adds and swaps single terms as long as
-# the loss plus a penalty per term falls; the penalties are the same for all systems.
+# the loss plus a penalty per term falls; the penalties (`term_penalties`) are the same for all systems. A `ShiftedLaw` is
+# law and information together; its method `at` writes both from another origin.
 
 # %%
 penalty = np.tile(dynamics.term_penalties(exponents), 3)
@@ -1139,6 +1141,16 @@ assert np.isclose(priced(path[-1]), priced(support))
 # Terms go one by one, and it ends at the package's support. The package gets the cost of every change from one
 # inverse, by formulas like the $z^2$ of a drop, in place of a fit for each; and it starts from nothing as well, as a
 # descent may stop early.
+# </details>
+#
+# **4.** (Prove.) Show that a fit without one term loses $z^2$, the square of its coefficient over its standard error.
+#
+# <details><summary>Solution</summary>
+#
+# Minimise $(\boldsymbol\lambda-\mathbf c)^T\mathbf S(\boldsymbol\lambda-\mathbf c)$ under $\lambda_k=0$. With a multiplier $\mu$,
+# $\mathbf S(\boldsymbol\lambda-\mathbf c)=\mu\,\mathbf e_k$, so $\boldsymbol\lambda-\mathbf c=\mu\,\mathbf S^{-1}\mathbf e_k$. Row $k$ says
+# $-c_k=\mu\,(\mathbf S^{-1})_{kk}$, and the loss is $\mu^2(\mathbf S^{-1})_{kk}=c_k^2/(\mathbf S^{-1})_{kk}$. As $\mathbf S^{-1}$ is the
+# covariance, $(\mathbf S^{-1})_{kk}$ is the square of the standard error.
 # </details>
 
 # %% [markdown]

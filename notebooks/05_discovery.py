@@ -498,6 +498,31 @@ assert under["ours"].l2 <= min(scored.l2 for scored in under.values())
 # $\Delta_z$ changes the coefficient of $x$ in dy/dt, which may even vanish. Constants come with every shift but
 # those along which the law does not move.
 # </details>
+#
+# **4.** (Implement.) Compute precision, recall and the relative $\ell_2$ error of a law from its table of coefficients.
+
+# %% tags=["hide-cell"]
+law, truth = found[names[0]], first[names[0]].truth
+terms = sorted({*law.terms, *truth.terms})
+
+
+def table(one):
+    rows = dict(zip(one.terms, one.coefficients, strict=True))
+    return np.array([rows.get(term, np.zeros(3)) for term in terms])
+
+
+ours, true = table(law), table(truth)
+right = np.sum((ours != 0) & (true != 0))
+by_hand = right / np.sum(ours != 0), right / np.sum(true != 0), np.linalg.norm(ours - true) / np.linalg.norm(true)
+scored = score(law, truth)
+assert np.allclose(by_hand, (scored.precision, scored.recall, scored.l2))
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# Precision is the share of the found terms that are true, recall that of the true terms that are found. The error is
+# that of all coefficients as one vector, so the largest of them decides.
+# </details>
 
 # %% [markdown]
 # ## Run time and versions

@@ -471,6 +471,24 @@ assert rms(reconstruct(rounded[:2], pair) - x) < 3
 # tangent bends upwards, their middle lies farther out than $f\tan\beta$, by about
 # $f\rho^2\tan\beta/\cos^2\beta$: outwards, and growing with the square of the radius.
 # </details>
+#
+# **4.** (Implement.) Project the path into a camera by the pinhole equation above.
+
+# %% tags=["hide-cell"]
+one = truth.cameras[camera - 1]
+depth = (one.position - x) @ one.normal
+cos, sin = np.cos(one.angle), np.sin(one.angle)
+X, Y = np.array([[cos, -sin], [sin, cos]]) @ (one.rows @ (x - one.position).T) / (one.scale * depth)
+width, height = one.image_size
+by_hand = np.column_stack([(width - 1) / 2 + X, (height - 1) / 2 - Y])
+assert np.allclose(by_hand, one.project(x))
+
+# %% [markdown]
+# <details><summary>Solution</summary>
+#
+# $\mathcal T(\vartheta)$ has orthonormal columns, so its inverse is its transpose; and the image counts from its upper left
+# pixel, with $v$ downwards.
+# </details>
 
 # %% [markdown]
 # ## Run time and versions
