@@ -1,11 +1,14 @@
 """Laws that are approximations along their data are doubted, and true laws are not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, discover, monomial_exponents
-from vidsindy_lite.dynamics.beyond import _widened, newcomers
+from vidsindy_lite.dynamics.beyond import Beyond, _widened, newcomers
+from vidsindy_lite.study.scoreboard import OdeContest
 
 TIMES = np.linspace(0, 20, 600)
 WORDS = "terms of higher degree explain what the law leaves"
@@ -50,6 +53,20 @@ def test_a_cubic_for_another_function_is_doubted(name, share):
 def test_a_true_law_is_not(name, share):
     found = discover(TIMES, noisy(swung(*INSIDE[name]), share, seed=3), order=2)
     assert not any(WORDS in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(("number", "status"), [(4, "suspect"), (13, "suspect"), (21, "suspect"),
+                                                (2, "ok"), (12, "ok"), (17, "ok")])  # fmt: skip
+def test_a_way_to_rest_on_a_line_is_doubted_where_higher_terms_explain_what_is_left(number, status):
+    data = OdeContest(number).data()  # an exponential, a sine, a fraction; and three cubics
+    assert discover(data.t, data.x).status == status
+
+
+def test_many_terms_that_explain_all_are_no_reason_to_doubt():
+    few = Beyond(gain=9.5, best=0.1, count=2, left=10.0, term="x^4 in dx/dt")
+    assert few.decisive
+    assert not replace(few, gain=8.5).decisive
+    assert not replace(few, count=3).decisive  # ten errors that are left are many for two terms
 
 
 def test_a_degree_that_is_too_low_is_told():

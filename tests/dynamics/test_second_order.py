@@ -197,10 +197,13 @@ def test_a_law_is_shortest_around_its_own_origin():
         found = away(problem, state)
         assert (len(found) > 0) == (rest > 0)
         if found:
-            assert found[0].offset == pytest.approx([rest, 0])
-            assert found[0].active.sum() == 3
-            assert found[0].moving.tolist() == [True, False]
+            origin, off = found[0]
+            assert origin == pytest.approx([rest, 0])
+            assert off.tolist() == [True, False]
         assert away(problem, replace(state, moving=np.array([True, False]))) == []
+    outside = problem.box[1] * [1, 0] + [0.1, 0]  # no motion is there
+    far = shift_matrix(exponents, outside) @ coefficients
+    assert away(problem, replace(state, coefficients=far, active=far != 0)) == []
 
 
 def test_all_axes_leave_home_one_after_the_other():

@@ -33,6 +33,9 @@ those of tracks in compressed video (1.2 was seen)."""
 MOST = 0.9
 """Share of what is left that a term explains which a law lacks: errors that last, of an integrator
 or a lens, are spread over several (up to two thirds were seen)."""
+FEW = 4
+"""Errors that are left, to a term, at which all terms together are few: chance leaves more than
+that share."""
 DEPENDENT = 1e-9
 """Share of a term that those of the law leave, below which they have it already."""
 
@@ -66,8 +69,10 @@ class Beyond:
 
     @property
     def decisive(self) -> bool:
-        """Whether one term explains nearly all that is left, be that noise or not."""
-        return bool(self.count and self._one and self.best > MOST * self.left)
+        """Whether one term, or few, explain nearly all that is left, be that noise or not."""
+        one, few = self._one, FEW * self.count < self.left
+        most = MOST * self.left
+        return bool(self.count and (one and self.best > most or few and self.gain > most))
 
     @property
     def _all(self) -> bool:
@@ -153,8 +158,9 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
 def beyond_the_library(problem: Problem, fit: Fit, noisy: bool) -> Iterator[str]:
     """A warning if the law is an approximation on these data.
 
-    Errors that last may follow the state, too; they are no reason to doubt, unless a single term
-    explains nearly all of them. What is ``noisy`` has errors of single samples.
+    Errors that last may follow the state, too; they are no reason to doubt, unless a single term,
+    or the few that a single coordinate has, explain nearly all of them. What is ``noisy`` has
+    errors of single samples.
     """
     if problem.law(fit.state).implicit.any():
         return  # a fraction, of which the terms are not those of its slope

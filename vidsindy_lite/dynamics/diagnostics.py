@@ -214,9 +214,10 @@ def _selection(
     problem: Problem, fit: Fit, model: Linearisation, path: Path, law: PolynomialSystem
 ) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), fit.state, path)
-    if (fit.collocation.data_weights**-0.5 <= CLEANEST).all():
+    clean = (fit.collocation.data_weights**-0.5 <= CLEANEST).all()
+    if clean and not problem.kicked:
         return  # what is left is the error of the splines, not noise: it settles nothing
-    tolerant = max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
+    tolerant = clean or max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
     yield from beyond_the_library(problem, fit, noisy=not tolerant)
     if tolerant:
         return  # weaker errors than those tolerated say nothing about the law
@@ -288,7 +289,7 @@ def _elsewhere(
 ) -> Iterator[str]:
     """Would another law fit almost as well, one axis nearer home or one away from it?"""
     exponents = problem.exponents
-    own = _price(problem, state)
+    own = problem.price(state)
     for axis, there in _neighbours(problem, state):
         for value, rival in _cheapest_two(problem, state, model, there):
             cost = value + problem.axis_penalty * there.moving.sum() - own
@@ -307,21 +308,14 @@ def _elsewhere(
                 break
 
 
-def _price(problem: Problem, state: State) -> float:
-    """Of the terms and axes of a law."""
-    terms = problem.penalties @ state.active.sum(axis=1)
-    return float(terms + problem.axis_penalty * state.moving.sum())
-
-
 def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
     """The same law with an axis at home that is not, or away from where it is, and which."""
-    for axis in np.flatnonzero(state.moving).tolist():
-        home = np.arange(problem.d) == axis
-        origin = np.where(home, problem.home, state.offset)
+    axes = np.eye(problem.d, dtype=bool)[state.moving]
+    nearer = [(np.where(home, problem.home, state.offset), state.moving & ~home) for home in axes]
+    for origin, moving in [*nearer, *away(problem, state)]:
         moved = shift_matrix(problem.exponents, state.offset - origin) @ state.coefficients
-        yield axis, replace(state, coefficients=moved, offset=origin, moving=state.moving & ~home)
-    for there in away(problem, state):
-        yield int(np.argmax(there.moving & ~state.moving)), there
+        axis = int(np.argmax(moving != state.moving))
+        yield axis, replace(state, coefficients=moved, offset=origin, moving=moving)
 
 
 def _cheapest_two(

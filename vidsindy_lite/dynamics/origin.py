@@ -160,8 +160,8 @@ def sparse_origins(
     -------
     list of ndarray, shape (d,), best first
     """
-    low, high = np.minimum(box[0], home), np.maximum(box[1], home)
-    starts = _starts(law, active, home, (low, high), rng)
+    low, high = box
+    starts = _starts(law, active, home, box, rng)
     counts = [law.smooth_count(start, active, penalty)[0] for start in starts]
     found: list[tuple[float, Floats]] = []
     for index in np.argsort(counts)[: 4 * keep]:

@@ -173,6 +173,17 @@ class Problem:
         """The origin of the data's frame, shape (d,)."""
         return self.units.standard(np.zeros(self.d))
 
+    @cached_property
+    def box(self) -> tuple[Floats, Floats]:
+        """Corners of the box of data and home, in which a law has its origin, each (d,)."""
+        x = np.concatenate([values for _, (_, values) in self.stretches])
+        movable, home = self.form.movable, self.home
+        low, high = (
+            np.where(movable, extreme(extreme.reduce(x), home), home)
+            for extreme in (np.fmin, np.fmax)
+        )
+        return low, high
+
     @property
     def axis_penalty(self) -> float:
         """Price of an axis along which the law's origin is not at home."""
@@ -227,8 +238,12 @@ class Problem:
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
+        return collocation.objective(state) + self.price(state)
+
+    def price(self, state: State) -> float:
+        """The penalties of the terms and axes of a law."""
         terms = self.prices @ state.free()[: len(self.prices)]
-        return collocation.objective(state) + terms + self.axis_penalty * state.moving.sum()
+        return float(terms + self.axis_penalty * state.moving.sum())
 
     def law(self, state: State) -> PolynomialSystem:
         """The law of a state in its own frame."""

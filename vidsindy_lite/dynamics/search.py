@@ -22,7 +22,7 @@ from .library import closure_mask, divides, shift_matrix
 from .origin import ShiftedLaw, sparse_origins
 from .persistence import LARGEST, TOLERATED
 from .problem import Problem, fit_curves
-from .selection import subset_search
+from .selection import PLATEAU, subset_search
 from .state import State
 from .trajectories import Trajectory
 
@@ -36,8 +36,6 @@ FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
 NEEDLESS_START = 0.1
 """Chance that a second start, from terms of all degrees, is made though the first left nothing."""
-FAINT = 0.02
-"""What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
 ROUNDING = 1e-9
 """Moves of an origin, in units of the spread of the data, that are none."""
 ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
@@ -190,12 +188,8 @@ def _in_sparse_frames(
     # A law exact in another frame has no firm minimum here: some steps are near enough.
     closed = closed.collocation.solve(closed.state, tolerance=0.1, max_steps=8)
     law = _as_shifted(problem, closed)
-    x, movable = fit.collocation.grid.x, problem.form.movable
-    low, high = (
-        np.where(movable, extreme.reduce(x), problem.home) for extreme in (np.fmin, np.fmax)
-    )
     origins = sparse_origins(
-        law, closed.state.active, problem.home, (low, high),
+        law, closed.state.active, problem.home, problem.box,
         problem.penalties.max(), keep=4, rng=rng,
     )  # fmt: skip
     unique = {
@@ -284,7 +278,7 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
             break
         promised = model.along(state, solution - state.flat()[columns], 1.0)
         trial = refit(replace(promised, active=promised.coefficients != 0))
-        if not trial.criterion < best.criterion - 1e-6:
+        if not trial.criterion < best.criterion - PLATEAU:
             break
         best = trial
         history.add(stage, problem, best, weight)
@@ -337,37 +331,34 @@ def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
         return fit  # what has not converged is no law whose terms could tell
     closed = _closed(problem, fit, FINAL_WEIGHT)
     law = _as_shifted(problem, closed)
-    starts = [_candidate(problem, closed, law, there.offset, there.moving) for there in elsewhere]
+    starts = [_candidate(problem, closed, law, *there) for there in elsewhere]
     for start in sorted(starts, key=lambda candidate: candidate.criterion)[:REFINED]:
         if not start.criterion < fit.criterion + problem.penalties.max():
             break
         trial = select(problem, start, FINAL_WEIGHT, "offset away", history)
-        if trial.criterion < fit.criterion - 1e-6:
+        if trial.criterion < fit.criterion - PLATEAU:
             return leave_home(problem, trial, history)  # one axis at a time: the others next
     return fit
 
 
-def away(problem: Problem, state: State) -> list[State]:
-    """The same law around origins at which a term of it vanishes, the shortest law first.
+def away(problem: Problem, state: State) -> list[tuple[Floats, Bools]]:
+    """Origins at which a term of a law vanishes, where motion is, and the axes then off home.
 
     Terms that a move brings in are the data's to decide on, while the origin moves.
     """
     exponents, home = problem.exponents, problem.form.movable & ~state.moving
     frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), home)
     below = divides(exponents, home) & ~np.eye(len(exponents), dtype=bool)
-    found: list[State] = []
+    low, high = problem.box
+    found: list[tuple[Floats, Bools]] = []
     for entry in np.argwhere((state.active & (below @ state.active)).T):
         step = frames.vanish(np.zeros(problem.d), entry[None])
         origin, moved = state.offset + step, np.abs(step) > ROUNDING
-        known = any(np.allclose(origin, other.offset) for other in found)
-        if known or not moved.any() or not np.isfinite(origin).all():
-            continue
-        matrix = shift_matrix(exponents, -step)
-        there = matrix @ state.coefficients
-        left = np.abs(there) > FAINT * (np.abs(matrix) @ np.abs(state.coefficients))
-        around = replace(state, coefficients=there, offset=origin, moving=state.moving | moved)
-        found.append(around.of_terms(left & problem.form.candidates))
-    return sorted(found, key=lambda state: int(state.active.sum() + state.moving.sum()))
+        known = any(np.allclose(origin, other) for other, _ in found)
+        inside = ((low <= origin) & (origin <= high))[moved].all()  # not if it is infinite
+        if inside and moved.any() and not known:
+            found.append((origin, state.moving | moved))
+    return found
 
 
 def bridge(problem: Problem, fit: Fit, history: History) -> Fit:

@@ -247,9 +247,9 @@ def _refitted(
     for weight in SEARCH_WEIGHTS:
         collocation = problem.weighted(collocation, weight)
         state = collocation.solve(state, tolerance=1.0, max_steps=10).state
-    fit = collocation.solve(state, EXACT)
-    priced = replace(fit, criterion=problem.criterion(collocation, fit.state))
-    # Terms that come in may be those of a shift.
+    fit = at_own_noise(problem, collocation.solve(state, EXACT))
+    priced = replace(fit, criterion=problem.criterion(fit.collocation, fit.state))
+    # Terms that come in may be those of a shift, and worth their price at these errors alone.
     fit = at_own_noise(problem, leave_home(problem, priced, history))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     largest = max(plateau.low for plateau in changed)
