@@ -12,10 +12,11 @@ from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.persistence import Plateau, follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.problem import Units, pose
+from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.dynamics.splines import DEGREE, Segment
 from vidsindy_lite.dynamics.state import State
 from vidsindy_lite.dynamics.trajectories import check_trajectories
+from vidsindy_lite.dynamics.units import Units
 from vidsindy_lite.study import SYSTEMS, corruption
 
 FORM = Form.of(("x", "y"), Library.polynomial(3))

@@ -8,8 +8,8 @@ import pytest
 from vidsindy_lite.dynamics.discovery import Discovery, _pruned, _with_error
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.problem import Units
 from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.dynamics.units import Units
 from vidsindy_lite.study import add_noise
 
 

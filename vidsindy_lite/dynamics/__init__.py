@@ -14,7 +14,7 @@ history: how a discovery went
 rounds: circles and spheres, whose angles are coordinates
 storage: the result as a file; drawing: its path of laws as a picture
 law: polynomials, on a library of monomials, also of functions of the state; candidates are the
-libraries that a user asks for; integrate solves a law
+libraries that a user asks for, inputs what is known of the time; integrate solves a law
 sindy: the same for code that is written for pysindy
 order: first or second, where that is left open
 beside the way: cramer_rao, the least errors that any estimate could have
@@ -31,7 +31,7 @@ from .order import check_order
 from .origin import ShiftedLaw
 from .persistence import Plateau
 from .polynomials import PolynomialSystem
-from .problem import FALSE_ALARM, Units, term_penalties
+from .problem import FALSE_ALARM, term_penalties
 from .rounds import Round, on_circle, on_sphere
 from .selection import closest_rival, subset_search
 from .sindy import SplineSINDy
@@ -40,3 +40,4 @@ from .solver import discover
 from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .state import State
 from .trajectories import Trajectory, check_trajectory, cut, typical_step
+from .units import Units

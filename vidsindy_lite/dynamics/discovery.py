@@ -22,9 +22,10 @@ from .library import shift_generators, shift_matrix
 from .persistence import Path, Plateau
 from .physics import Physics, physics_of
 from .polynomials import PolynomialSystem, power_of_ten
-from .problem import Problem, Units
+from .problem import Problem
 from .selection import inverse
 from .splines import DEGREE
+from .units import Units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,7 +7,7 @@ root-mean-square speed is 1.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,7 @@ from .smoothing import smooth
 from .splines import DEGREE, Segment, basis, clamped_knots, normal_band
 from .state import State
 from .trajectories import Trajectory, cut, typical_step
+from .units import Units
 
 FALSE_ALARM = 0.004
 """Chance of a false term in a law, if all candidates were independent."""
@@ -40,40 +41,6 @@ DEPENDENT, INVOLVED = 1e-10, 1e-3
 """Least singular value over the largest at which terms depend on each other, and least share."""
 NOISY, WIDE, NARROW = 0.02, 1 / 5, 1 / 16
 """Knot spacing in time scales: wide where the noise is above this, narrow elsewhere."""
-
-
-@dataclass(frozen=True)
-class Units:
-    """Standard units of a fit: every coordinate with mean 0 and variance 1, time in time scales.
-
-    Parameters
-    ----------
-    centre, scale : ndarray, shape (d,)
-        Mean and standard deviation of the data.
-    time : float
-        Length of a standard time unit.
-    sizes : ndarray, shape (k,) or (k + d,)
-        Root mean squares of the functions of the state in the library; of an implicit law also
-        the units of the slopes.
-    """
-
-    centre: Floats
-    scale: Floats
-    time: float
-    sizes: Floats = field(default_factory=lambda: np.empty(0))
-
-    def standard(self, point: Floats) -> Floats:
-        """A point of the data's frame in standard units."""
-        return (point - self.centre) / self.scale
-
-    def point(self, standard: Floats) -> Floats:
-        """A standard point in the data's frame and units."""
-        return standard * self.scale + self.centre
-
-    def factors(self, exponents: Ints) -> Floats:
-        """What turns standard coefficients into those of the data's units, shape (l, d)."""
-        scales = np.append(self.scale, self.sizes)
-        return self.scale / np.prod(scales**exponents, axis=1)[:, None] / self.time
 
 
 @dataclass(frozen=True, eq=False)
