@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # pandas and seaborn are imported where they draw
 
 COLOURS = {"ours": "C0", "PySINDy": "C1", "E-SINDy": "C2", "WeakSINDy": "C3", "Model-A": "C4"}
 MARKERS = {"ours": "o", "PySINDy": "s", "E-SINDy": "^", "WeakSINDy": "v", "Model-A": "D"}
-_TITLES = {"noise": "noise", "blocks": "random blocks missing", "fibers": "fibers missing"}
+_TITLES = {"noise": "noise", "blocks": "blocks missing", "fibers": "fibers missing"}
 
 VERDICTS = {
     "exact, ok": ("C0", ""),
