@@ -196,8 +196,14 @@ def test_other_package_or_requirements_are_a_change(good, tmp_path, monkeypatch)
     assert executed(runner.run(root=good.root)) == ["01_first"]
 
 
-@pytest.mark.parametrize("name", ["figures/fig_1.svg", "figures/table_systems.csv"])
-@pytest.mark.parametrize("tamper", [lambda path: path.unlink(), lambda path: path.write_text("x")])
+@pytest.mark.parametrize(
+    ("name", "tamper"),
+    [
+        ("figures/fig_1.svg", lambda path: path.unlink()),
+        ("figures/table_systems.csv", lambda path: path.write_text("x")),
+    ],
+    ids=["missing", "tampered"],
+)
 def test_tampered_or_missing_output_is_made_again(good, name, tamper):
     before = files(good.root)
     tamper(good.root / name)
@@ -241,10 +247,21 @@ def test_longest_notebook_begins_first(good, capsys):
     "damaged",
     ["", "{", "[]", "3", '{"01_first": 1}', '{"01_first": {}}', '{"01_first": {"seconds": "x"}}'],
 )
-def test_a_damaged_ledger_or_table_of_times_is_made_again(good, damaged):
-    before = files(good.root)
+def test_a_damaged_ledger_or_table_of_times_tells_nothing(good, damaged):
+    notebook = good.root / "notebooks" / "01_first.py"
+    stamp = runner.notebook_stamp(notebook, "full")
+    assert ledger.seconds_if_current(good.root, notebook, stamp) is not None
+    assert "01_first" in registry.load_run_times(good.root / "figures")
     for name in (LEDGER, f"figures/{RUN_TIMES}"):
         (good.root / name).write_text(damaged)
+    assert ledger.seconds_if_current(good.root, notebook, stamp) is None
+    assert registry.load_run_times(good.root / "figures") == {}
+
+
+def test_a_damaged_ledger_or_table_of_times_is_made_again(good):
+    before = files(good.root)
+    for name in (LEDGER, f"figures/{RUN_TIMES}"):
+        (good.root / name).write_text("{")
     assert executed(runner.run(root=good.root)) == ["01_first"]
     assert files(good.root).keys() == before.keys()
     assert executed(runner.run(root=good.root)) == []
