@@ -175,7 +175,7 @@ def _rig_import(options: argparse.Namespace) -> int:
 
 
 def _rig_export(options: argparse.Namespace) -> int:
-    """Write a rig for other tools: .toml for Anipose and Pose2Sim, .npz, or .csv for DLT.
+    """Write a rig as .toml (Anipose, Pose2Sim), .yaml, .xml, .json (OpenCV), .npz, or .csv (DLT).
 
     examples:
       python -m vidsindy_lite rig-export report/rig.toml calibration.toml
@@ -406,7 +406,7 @@ COMMANDS = {
     }),
     "rig-export": _Command(_rig_export, "a rig file as a calibration for other tools", {
         "rig": _text("RIG", "a rig file of perspective cameras, all calibrated"),
-        "file": _text("FILE", "to write: .toml, .npz or .csv"),
+        "file": _text("FILE", "to write: .toml, .yaml, .xml, .json, .npz or .csv"),
     }),
     "run": _Command(_run, "execute the notebooks, regenerate figures and tables", {
         "notebooks": _text("NOTEBOOK", "number, name or path (default: all)", nargs="*"),

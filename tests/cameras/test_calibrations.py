@@ -144,7 +144,7 @@ def test_a_skew_is_told_and_a_large_one_refused(tmp_path):
                 read_calibration([tmp_path / "p.npy"], SIZE)
 
 
-@pytest.mark.parametrize("suffix", [".toml", ".npz", ".csv"])
+@pytest.mark.parametrize("suffix", [".toml", ".yaml", ".yml", ".xml", ".json", ".npz", ".csv"])
 def test_there_and_back(tmp_path, suffix):
     parts = rooms(9, dist=suffix != ".csv")
     (tmp_path / "a.toml").write_text(toml(parts), encoding="utf-8")
@@ -152,6 +152,19 @@ def test_there_and_back(tmp_path, suffix):
     write_calibration(rig, tmp_path / f"b{suffix}")
     again = read_calibration([tmp_path / f"b{suffix}"], SIZE)
     assert_same(again, parts)
+
+
+def test_opencv_reads_what_was_written(tmp_path):
+    parts = rooms(12)
+    (tmp_path / "a.toml").write_text(toml(parts), encoding="utf-8")
+    write_calibration(read_calibration([tmp_path / "a.toml"]), tmp_path / "b.yaml")
+    storage = cv2.FileStorage(str(tmp_path / "b.yaml"), cv2.FILE_STORAGE_READ)
+    for i, part in enumerate(parts):
+        node = storage.getNode(f"cam_{i}")
+        k, bent = (node.getNode(n).mat() for n in ("camera_matrix", "distortion_coefficients"))
+        turned = cv2.Rodrigues(node.getNode("R").mat())[0]
+        image = cv2.projectPoints(POINTS, turned, node.getNode("T").mat(), k, bent)[0][:, 0]
+        np.testing.assert_allclose(image, seen(part), rtol=0, atol=1e-9)
 
 
 def test_the_command_line(tmp_path, capsys):
@@ -247,5 +260,5 @@ def test_what_cannot_be_written(tmp_path):
     rig = read_calibration([tmp_path / "a.toml"])
     with pytest.raises(ValueError, match="DLT coefficients hold no distortion, got one in cameras"):
         write_calibration(rig, tmp_path / "a.csv")
-    with pytest.raises(ValueError, match=r"path: must end in \.toml, \.npz or \.csv"):
+    with pytest.raises(ValueError, match=r"path: must end in \.toml, \.yaml, \.yml, \.xml"):
         write_calibration(rig, tmp_path / "a.mat")

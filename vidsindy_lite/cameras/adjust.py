@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
+from scipy.special import gammaincinv
 
 from ..arrays import Bools, Floats
 from .alignment import Footage
@@ -366,11 +367,15 @@ def _cost(
 
 
 def _noise(misses: Floats) -> float:
-    """Standard deviation of the errors of the tracks, if most residuals are those of noise."""
-    seen = np.isfinite(misses)
-    if not seen.any():
+    """Standard deviation of the errors of the tracks, if most residuals are those of noise.
+
+    Of the 2 m numbers of a frame its point takes three, and leaves the squared length of the others,
+    whose median is that of chi-squared; numbers one by one would not do, as two views err along
+    their epipolar lines without a residual.
+    """
+    freedom = np.isfinite(misses).sum(axis=1) - 3
+    squares = np.nansum(misses**2, axis=1)[freedom > 0]
+    if not squares.size:
         return _FINEST
-    count = seen.sum(axis=1, keepdims=True)
-    # Of 2 m numbers of a frame its point takes three.
-    grown = np.where(seen, np.abs(misses) * np.sqrt(count / np.maximum(count - 3, 1)), 0.0)
-    return max(1.4826 * float(np.median(grown[seen])), _FINEST)
+    expected = 2 * gammaincinv(freedom[freedom > 0] / 2, 0.5)
+    return max(float(np.sqrt(np.median(squares / expected))), _FINEST)

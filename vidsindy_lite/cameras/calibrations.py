@@ -50,6 +50,7 @@ _NAMES = {
     "t": ("t", "translation", "tvec", "translation_vector"),
     "size": ("size", "image_size", "imagesize", "resolution", "img_size"),
 }  # fmt: skip
+_STORAGE = (".yaml", ".yml", ".xml", ".json")  # of OpenCV
 _SKEW = 1e-6  # pixels, at the edge of the image, that are rounding; and ...
 _MOST_SKEW = 5.0  # ... that are no camera's
 
@@ -109,9 +110,9 @@ def write_calibration(rig: Rig, path: str | os.PathLike) -> None:
     rig : Rig
         Perspective cameras, all calibrated.
     path : path
-        ``.toml`` for Anipose and Pose2Sim, ``.npz`` with K, dist, R, t and size, stacked, or
-        ``.csv`` for DLT coefficients (pixels from 1, from the upper left, as DLTdv8; without
-        distortion).
+        ``.toml`` for Anipose and Pose2Sim; ``.yaml``, ``.yml``, ``.xml`` or ``.json`` for OpenCV's
+        FileStorage, a map per camera; ``.npz`` with K, dist, R, t and size, stacked; or ``.csv``
+        for DLT coefficients (pixels from 1, from the upper left, as DLTdv8; without distortion).
 
     Raises
     ------
@@ -125,6 +126,8 @@ def write_calibration(rig: Rig, path: str | os.PathLike) -> None:
     if file.suffix == ".toml":
         tables = [_table(i, part) for i, part in enumerate(parts)]
         file.write_text("\n".join([*tables, "[metadata]\n"]), encoding="utf-8")
+    elif file.suffix in _STORAGE:
+        file.write_text(_storage(file.suffix, parts), encoding="utf-8")
     elif file.suffix == ".npz":
         inner, dist, rotation, shift, size = (
             np.array([part[key] for part in parts]) for key in ("K", "dist", "R", "t", "size")
@@ -134,7 +137,8 @@ def write_calibration(rig: Rig, path: str | os.PathLike) -> None:
         columns = [_coefficients(i, part) for i, part in enumerate(parts)]
         np.savetxt(file, np.column_stack(columns), delimiter=",", fmt="%.17g")
     else:
-        raise ValueError(f"path: must end in .toml, .npz or .csv, got {file.name}")
+        known = ", ".join((".toml", *_STORAGE, ".npz"))
+        raise ValueError(f"path: must end in {known} or .csv, got {file.name}")
 
 
 def _cameras(path: Path, size: tuple[int, int] | None) -> Iterator[tuple[PerspectiveCamera, float]]:
@@ -160,7 +164,7 @@ def _content(path: Path, suffix: str) -> object:
                 return dict(archive)
         if suffix == ".json" and '"opencv-matrix"' not in path.read_text(encoding="utf-8"):
             return json.loads(path.read_text(encoding="utf-8"))
-        if suffix in (".yaml", ".yml", ".xml", ".json"):
+        if suffix in _STORAGE:
             storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
             try:
                 return _plain(storage.root())
@@ -356,6 +360,21 @@ def _table(i: int, part: dict[str, Floats]) -> str:
         f"matrix = {part['K'].tolist()}\ndistortions = {part['dist'].tolist()}\n"
         f"rotation = {turned.tolist()}\ntranslation = {part['t'].tolist()}\nfisheye = false\n"
     )
+
+
+def _storage(suffix: str, parts: Sequence[dict[str, Floats]]) -> str:
+    """All cameras for OpenCV, in the names of its own calibration samples."""
+    storage = cv2.FileStorage(suffix, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+    for i, part in enumerate(parts):
+        storage.startWriteStruct(f"cam_{i}", cv2.FileNode_MAP)
+        for name, pixels in zip(("image_width", "image_height"), part["size"], strict=True):
+            storage.write(name, int(pixels))
+        storage.write("camera_matrix", part["K"])
+        storage.write("distortion_coefficients", part["dist"][:, None])
+        storage.write("R", part["R"])
+        storage.write("T", part["t"][:, None])
+        storage.endWriteStruct()
+    return storage.releaseAndGetString()
 
 
 def _coefficients(i: int, part: dict[str, Floats]) -> Floats:
