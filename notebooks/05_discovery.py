@@ -328,8 +328,11 @@ print(len(save_table("table_S2", rows, caption=caption).rows), "terms, stored as
 
 
 # %%
-def forecast(benchmark, law, periods=40, rate=400):
-    t = benchmark.times(periods * rate, rate)
+horizon = 40 if full else 10  # periods
+
+
+def forecast(benchmark, law, rate=400):
+    t = benchmark.times(horizon * rate, rate)
     truth = benchmark.simulate(t, benchmark.x0)
     motion = law.system.simulate(t, law.curve(t[:1])[0])
     near = np.linalg.norm(motion - truth, axis=1) < 0.1 * truth.std(axis=0).max()
@@ -345,7 +348,7 @@ rows = [
     for name, (truth, _) in forecasts.items()
 ]
 assert all(row["forecast good for (periods)"] > 4 for row in rows)
-caption = f"Forecast from the first frame, at most 40 periods; the videos last {frames / 100:g}."
+caption = f"Forecast from the first frame, at most {horizon} periods; the videos last {frames / 100:g}."
 save_table("discovery_forecast", rows, caption=caption)
 
 # %%

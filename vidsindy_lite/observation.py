@@ -486,8 +486,8 @@ def _rig_warnings(
         advice = (
             "no single cause explains it; check the positions and normals, the scales and angles "
             "that are given, and that at least half of the shortest video is in common with the "
-            "others; what was measured by hand needs its errors in the rig file, as a number without "
-            "one is exact: normal_error = 2, position_error = 0.03 (if in metres), "
+            "others; what was measured by hand needs its errors in the rig file, as a number "
+            "without one is exact: normal_error = 2, position_error = 0.03 (if in metres), "
             "scale_error = 0.03"
         )
     else:

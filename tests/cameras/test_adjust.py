@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
-from vidsindy_lite.cameras.adjust import adjust
+from vidsindy_lite.cameras.adjust import adjust, linearised
 from vidsindy_lite.cameras.alignment import Footage
 from vidsindy_lite.cameras.changes import PARTS, SIZE, changed, known_to
 from vidsindy_lite.cameras.shutter import steadied
@@ -226,3 +226,13 @@ def test_a_measurement_that_is_far_off_is_told():
     (warning,) = learn_cameras(tracks, vl.Rig([wrong, *others])).warnings
     assert "of cameras[0] is" in warning
     assert "times its error from what was measured" in warning
+
+
+@pytest.mark.parametrize("views", [2, 3, 4])
+def test_the_noise_is_that_of_the_tracks_however_many_views_there_are(views):
+    told = []
+    for rng in np.random.default_rng(6).spawn(8):
+        rig = room(rng, views)
+        _, tracks = film(rng, rig, noise=0.4, n=1500)
+        told += [linearised(Footage.of(tracks), rig.cameras, np.zeros((views, SIZE))).noise]
+    assert np.mean(told) == pytest.approx(0.4, rel=0.04)

@@ -369,9 +369,9 @@ def _cost(
 def _noise(misses: Floats) -> float:
     """Standard deviation of the errors of the tracks, if most residuals are those of noise.
 
-    Of the 2 m numbers of a frame its point takes three, and leaves the squared length of the others,
-    whose median is that of chi-squared; numbers one by one would not do, as two views err along
-    their epipolar lines without a residual.
+    Of the 2 m numbers of a frame its point takes three, and leaves the squared length of the
+    others, whose median is that of chi-squared. Numbers one by one would not do: two views err
+    along their epipolar lines without a residual.
     """
     freedom = np.isfinite(misses).sum(axis=1) - 3
     squares = np.nansum(misses**2, axis=1)[freedom > 0]
