@@ -129,7 +129,7 @@ class Library:
         Raises
         ------
         ValueError
-            If times or values are not such, or times of trajectories overlap.
+            If a name is none, times or values are not such, or times of trajectories overlap.
 
         Examples
         --------

@@ -36,9 +36,11 @@ class Input:
         Raises
         ------
         ValueError
-            If times or values are not such, or times of trajectories overlap.
+            If the name is none, times or values are not such, or times of trajectories overlap.
         """
-        several = isinstance(t, list | tuple) and all(np.ndim(part) == 1 for part in t)
+        if not isinstance(name, str) or not name.isidentifier():
+            raise ValueError(f"inputs: must be named like variables, such as u, got {name!r:.60}")
+        several = isinstance(t, list | tuple) and any(np.ndim(part) for part in t)
         times = cast("Sequence[Floats]", t if several else [t])
         runs = cast("Sequence[Floats]", values if several else [values])
         if len(runs) != len(times):

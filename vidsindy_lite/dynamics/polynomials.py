@@ -306,8 +306,8 @@ class PolynomialSystem:
             is not known at a time.
         """
         t = check_times(t)
-        if self.timed and np.shape(x0) == (self.d - 1,):
-            x0 = np.append(x0, t[0])
+        if self.timed and np.shape(x0) != (self.d,):
+            x0 = np.append(check_vector("x0", x0, self.states), t[0])
         x0 = check_vector("x0", x0, self.d)
         self._check_inputs(x0[-1] + t - t[0])
         active = self.support.any(axis=1)
