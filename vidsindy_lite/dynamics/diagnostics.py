@@ -118,10 +118,14 @@ def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
     """
     found = []
     for t, x in trajectories:
-        away = np.abs(x - np.median(x, axis=0))
-        spread = np.quantile(away, 0.9, axis=0)
-        rows, columns = np.nonzero((away > OUTLIER * spread) & (spread > 0))
-        far = {row for row, j in zip(rows.tolist(), columns, strict=True) if _leaps(x[:, j], row)}
+        far: set[int] = set()
+        for column in x.T:
+            seen = np.flatnonzero(np.isfinite(column))
+            values = column[seen]
+            away = np.abs(values - np.median(values))
+            spread = np.quantile(away, 0.9)
+            rows = np.flatnonzero((away > OUTLIER * spread) & (spread > 0)).tolist()
+            far |= {int(seen[row]) for row in rows if _leaps(values, row)}
         found += [
             f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in sorted(far)
         ]
@@ -149,7 +153,10 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     terms = fit.state.active.sum(axis=0)[-measured:]
     if problem.form.functions:
         terms = np.zeros_like(terms)  # who names a sine knows more than one orbit tells
-    yield from shapes(problem.measured, noise, problem.form.names[:measured], terms)
+    rows = [np.isfinite(values).all(axis=1) for _, values in problem.measured]
+    whole = [(t[r], x[r]) for r, (t, x) in zip(rows, problem.measured, strict=True) if r.any()]
+    if whole:
+        yield from shapes(whole, noise, problem.form.names[:measured], terms)
     x, _ = fit.collocation.node_states(fit.state.control_points)
     yield from cancelling(problem.law(fit.state), x - fit.state.offset)
     states = problem.form.states

@@ -50,11 +50,20 @@ def effective_noise(fit: Fit) -> Floats:
     Errors that last for several samples do not average out: their variance counts times the sum
     of their autocorrelations (`inflation`).
     """
-    residual, _ = fit.collocation.data_residual(fit.state.control_points)
-    residual *= np.sqrt(fit.collocation.precision)
-    ends = np.cumsum([len(segment.t) for segment in fit.collocation.segments])[:-1]
-    lasting = np.sqrt(inflation(np.split(residual, ends)))
-    return np.maximum(_spread(fit) * lasting, CLEANEST)
+    pieces = [[piece[:, None] for piece in errors] for errors in _errors_seen(fit)]
+    lasting = np.concatenate([inflation(errors) for errors in pieces])
+    return np.maximum(_spread(fit) * np.sqrt(lasting), CLEANEST)
+
+
+def _errors_seen(fit: Fit) -> list[list[Floats]]:
+    """Residuals of each coordinate, of precision 1, at the samples of it, stretch by stretch."""
+    collocation = fit.collocation
+    residual, _ = collocation.data_residual(fit.state.control_points)
+    residual *= np.sqrt(collocation.precision)
+    seen = np.isfinite(collocation.grid.x)
+    ends = np.cumsum([len(segment.t) for segment in collocation.segments])[:-1]
+    stretches = list(zip(np.split(residual, ends), np.split(seen, ends), strict=True))
+    return [[errors[here[:, j], j] for errors, here in stretches] for j in range(collocation.d)]
 
 
 def time_inflation(fit: Fit) -> float:
@@ -72,7 +81,8 @@ def time_inflation(fit: Fit) -> float:
     scale = (np.sqrt(collocation.precision) / residual_noise(fit))[:, seen]
     residual, slopes = residual[:, seen] * scale, slopes[:, seen] * scale
     along = (residual * slopes).sum(axis=1) ** 2 / np.maximum((slopes**2).sum(axis=1), LEAST)
-    ratio = float(along.sum() / np.maximum((residual**2).mean(axis=1).sum(), LEAST))
+    apart = (residual**2).sum(axis=1) / np.maximum((scale > 0).sum(axis=1), 1)
+    ratio = float(along.sum() / np.maximum(apart.sum(), LEAST))
     return float(np.sqrt(ratio)) if ratio > 1 + CHANCE * np.sqrt(2 / len(residual)) else 1.0
 
 
@@ -88,11 +98,11 @@ def inflation(pieces: Sequence[Floats]) -> Floats:
     pieces : sequence of ndarray, shape (n_i, d)
         Errors of successive samples, of mean zero.
     """
-    size = 2 * max(len(piece) for piece in pieces)
+    size = 2 * max(max(len(piece) for piece in pieces), 1)
     powers = [np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces]
     covariances = np.fft.irfft(np.sum(powers, axis=0), size, axis=0)[: size // 2]
     result = np.ones(covariances.shape[1])
-    limit = CHANCE / np.sqrt(sum(map(len, pieces)))
+    limit = CHANCE / np.sqrt(max(sum(map(len, pieces)), 1))
     for j, covariance in enumerate(covariances.T):
         if covariance[1:].any() and covariance[1] > limit * covariance[0]:
             even = len(covariance) // 2 * 2
@@ -126,12 +136,11 @@ def rough(fit: Fit) -> Bools:
 
 def _autoregressions(fit: Fit) -> Floats:
     """Gain of predicting each error by those before it, for every number of these, (orders, d)."""
-    residual, _ = fit.collocation.data_residual(fit.state.control_points)
-    residual *= np.sqrt(fit.collocation.precision)
-    n = len(residual)
-    lags = range(min(ORDER, n // 10) + 1)
-    covariances = np.stack([(residual[k:] * residual[: n - k]).sum(axis=0) for k in lags])
-    return np.stack([_levinson(covariance, n) for covariance in covariances.T], axis=1)
+    errors = [np.concatenate(pieces) for pieces in _errors_seen(fit)]
+    lags = range(min(ORDER, min(len(e) for e in errors if len(e)) // 10) + 1)
+    covariances = [np.array([e[k:] @ e[: len(e) - k] for k in lags]) for e in errors]
+    sizes = map(len, errors)
+    return np.stack([_levinson(c, n) for c, n in zip(covariances, sizes, strict=True)], axis=1)
 
 
 def _levinson(covariance: Floats, n: int) -> Floats:

@@ -24,7 +24,7 @@ from .polynomials import PolynomialSystem
 from .smoothing import smooth
 from .splines import DEGREE, Segment, basis, clamped_knots, normal_band
 from .state import State
-from .trajectories import Trajectory, cut, typical_step
+from .trajectories import Trajectory, cut, typical_step, typical_steps
 from .units import Units
 
 FALSE_ALARM = 0.004
@@ -237,13 +237,13 @@ def pose(
         the library is not finite on the data, or its terms depend on each other.
     """
     x = np.concatenate([values for _, values in measured])
-    unknowns = len(form.exponents) + 1
-    if len(x) < unknowns:
+    unknowns, samples = len(form.exponents) + 1, int(np.isfinite(x).sum(axis=0).min())
+    if samples < unknowns:
         raise ValueError(
             f"x: must hold at least as many samples as unknowns per equation ({unknowns} for this "
-            f"library and d = {x.shape[1]}), got {len(x)} samples"
+            f"library and d = {x.shape[1]}), got {samples} samples"
         )
-    centre, scale = x.mean(axis=0), x.std(axis=0)
+    centre, scale = np.nanmean(x, axis=0), np.nanstd(x, axis=0)
     if not (scale > 1e-12 * np.abs(centre)).all():
         still = int(np.argmin(scale))
         raise ValueError(f"x: every coordinate must move, got a constant column {still}")
@@ -255,11 +255,11 @@ def pose(
     speed = _rms_speed(curves)
     curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]
     noise = np.maximum(noise, CLEANEST)
-    precision = [np.ones(values.shape) for _, values in measured]
+    precision = [np.isfinite(values).astype(float) for _, values in measured]
     if sigma is not None:
         errors = [np.maximum(part / scale, CLEANEST) for part in sigma]
-        noise = np.median(np.concatenate(errors), axis=0)
-        precision = [(noise / part) ** 2 for part in errors]
+        noise = np.nanmedian(np.concatenate(errors), axis=0)
+        precision = [np.nan_to_num((noise / part) ** 2) for part in errors]
     problem = Problem(
         measured=measured,
         trajectories=[(t * speed, values) for t, values in trajectories],
@@ -383,23 +383,28 @@ def _smoothed(
     """Stretches between gaps, their smoothing splines and the noise; time in typical steps.
 
     Where the data pause is a gap or not depending on how fast the target moves, which a first
-    smoothing tells; if there are other gaps, a second one respects them.
+    smoothing tells; if there are other gaps, a second one respects them. A coordinate that is
+    seen less often than others pauses later.
     """
-    first = _stretches(trajectories, 5.0)
+    steps = typical_steps(trajectories)
+    first = _stretches(trajectories, 5.0 * steps)
     smoothed = smooth([piece for _, piece in first], rng)
-    stretches = _stretches(trajectories, max(2.5, GAP / _rms_speed(smoothed.splines)))
+    longest = np.maximum(2.5 * steps, GAP / _rms_speed(smoothed.splines))
+    stretches = _stretches(trajectories, longest)
     if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:
         smoothed = smooth([piece for _, piece in stretches], rng)
     return stretches, smoothed.splines, smoothed.noise
 
 
 def _stretches(
-    trajectories: Sequence[Trajectory], longest_step: float
+    trajectories: Sequence[Trajectory], longest_step: Floats
 ) -> list[tuple[int, Trajectory]]:
     pieces = [
         (i, piece) for i, whole in enumerate(trajectories) for piece in cut(whole, longest_step)
     ]
     longest = max(len(t) for _, (t, _) in pieces)
+    if longest < 2:
+        raise ValueError("x: must hold all coordinates at about the same times, got none")
     return [piece for piece in pieces if len(piece[1][0]) >= min(SHORTEST_STRETCH, longest)]
 
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
@@ -51,30 +52,47 @@ def smooth(stretches: Sequence[Trajectory], rng: np.random.Generator) -> Smooth:
     Parameters
     ----------
     stretches : sequence of (t, x)
-        Times (n,) and values (n, d) without gaps, n >= 2.
+        Times (n,) and values (n, d) without gaps, n >= 2; NaN where a coordinate was not seen.
     rng : numpy.random.Generator
         For the probes.
     """
     grid = Grid.of([Segment(t, x, t) for t, x in stretches])
-    (n, d), roughness = grid.x.shape, _roughness(stretches, grid)
+    roughness, signs = _roughness(stretches, grid), rng.choice([-1.0, 1.0], size=len(grid.x))
+    control, noise = np.zeros((grid.r, grid.x.shape[1])), np.zeros(grid.x.shape[1])
+    patterns, kind = np.unique(np.isfinite(grid.x), axis=1, return_inverse=True)
+    for k, seen in enumerate(patterns.T):
+        alike, rows = np.flatnonzero(kind == k), np.flatnonzero(seen)
+        smoothed = _cross_validated(
+            grid.samples[rows], grid.x[np.ix_(rows, alike)], roughness, signs[rows]
+        )
+        control[:, alike], noise[alike] = smoothed
+    return Smooth(tuple(grid.splines(control)), noise)
+
+
+def _cross_validated(
+    samples: sparse.csr_array, x: Floats, roughness: Floats, signs: Floats
+) -> tuple[Floats, Floats]:
+    """Control points, (r, d), and noise, (d,), of coordinates that were seen at the same times."""
+    n, d = x.shape
+    sample_band = normal_band(samples)
     # Combs of random signs: exact where the influence of a sample dies out within a comb's pitch.
     probes = np.zeros((n, PROBES))
-    probes[np.arange(n), np.arange(n) % PROBES] = rng.choice([-1.0, 1.0], size=n)
-    right = grid.samples.T @ np.concatenate([grid.x, probes], axis=1)
+    probes[np.arange(n), np.arange(n) % PROBES] = signs
+    right = samples.T @ np.concatenate([x, probes], axis=1)
     best, noise = np.full(d, np.inf), np.zeros(d)
-    control, chosen = np.zeros((grid.r, d)), np.zeros(d, dtype=int)
+    control, chosen = np.zeros((samples.shape[1], d)), np.zeros(d, dtype=int)
     every = np.arange(len(PENALTIES))
     coarse = every % COARSE == 0
     for refined in (False, True):
         near = np.abs(every[:, None] - chosen).min(axis=1) < COARSE
         for index in every[near & ~coarse if refined else coarse]:
-            band = grid.sample_band + PENALTIES[index] * roughness
+            band = sample_band + PENALTIES[index] * roughness
             band[0] += 1e-12 * band[0].max()
             solved = cho_solve_banded((cholesky_banded(band, lower=True), True), right)
-            fitted = grid.samples @ solved
+            fitted = samples @ solved
             trace = (probes * fitted[:, d:]).sum()
             free = max(n - trace, 1e-9 * n)
-            squares = ((grid.x - fitted[:, :d]) ** 2).sum(axis=0)
+            squares = ((x - fitted[:, :d]) ** 2).sum(axis=0)
             score = n * squares / free**2
             better = score < best
             best[better], chosen[better] = score[better], index
@@ -82,7 +100,7 @@ def smooth(stretches: Sequence[Trajectory], rng: np.random.Generator) -> Smooth:
             # E |K e|^2 = variance tr(K K'), K = I - influence: holds where hardly anything is
             # smoothed.
             noise[better] = np.sqrt(squares[better] / ((probes - fitted[:, d:]) ** 2).sum())
-    return Smooth(tuple(grid.splines(control)), noise)
+    return control, noise
 
 
 def _roughness(stretches: Sequence[Trajectory], grid: Grid) -> Floats:
@@ -92,7 +110,7 @@ def _roughness(stretches: Sequence[Trajectory], grid: Grid) -> Floats:
     so two Gauss points integrate its square.
     """
     spans = np.concatenate([np.diff(t) for t, _ in stretches])
-    total = np.zeros_like(grid.sample_band)
+    total = np.zeros((WIDTH, grid.r))
     for node in (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)):
         times = [t[:-1] + node * np.diff(t) for t, _ in stretches]
         bend = basis(grid.knots, grid.starts, times, order=2)

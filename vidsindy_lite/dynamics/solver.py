@@ -76,8 +76,9 @@ def discover(
     t : array_like, shape (n,), or list of (t, x)
         Increasing times, even or uneven; or several trajectories of one system.
     x : array_like, shape (n, d), optional
-        States with d of at least 1; a row with a NaN is missing. Omitted when ``t`` is a list. The
-        columns of a data frame name the variables, if they are names.
+        States with d of at least 1, NaN where a coordinate was not seen: what was seen at the same
+        time counts. Omitted when ``t`` is a list. The columns of a data frame name the variables,
+        if they are names.
     degree : int, optional
         Highest degree of the candidate terms: short for ``library=Library.polynomial(degree)``; 3
         by default.

@@ -137,8 +137,6 @@ class Grid:
         The same for the curve and its slope at the collocation nodes.
     node_weights : ndarray, shape (k,)
         Share of each node in the physics loss; they sum to n.
-    sample_band : ndarray, shape (4, r)
-        ``G' G`` in lower banded storage.
     """
 
     segments: tuple[Segment, ...]
@@ -149,7 +147,6 @@ class Grid:
     nodes: sparse.csr_array
     slopes: sparse.csr_array
     node_weights: Floats
-    sample_band: Floats
 
     @classmethod
     def of(cls, segments: Sequence[Segment]) -> Grid:
@@ -161,17 +158,15 @@ class Grid:
         spans = [np.diff(b) for b in ends]
         width = np.concatenate([np.concatenate([w[:1] / 2, w, w[-1:] / 2]) for w in spans])
         x = np.concatenate([segment.x for segment in segments])
-        samples = basis(knots, starts, [segment.t for segment in segments])
         return cls(
             segments=tuple(segments),
             knots=knots,
             starts=starts,
             x=x,
-            samples=samples,
+            samples=basis(knots, starts, [segment.t for segment in segments]),
             nodes=basis(knots, starts, nodes),
             slopes=basis(knots, starts, nodes, order=1),
             node_weights=width / width.sum() * len(x),
-            sample_band=normal_band(samples),
         )
 
     @property

@@ -12,18 +12,18 @@ from ..checks import check_array, check_times
 from .library import variable_names
 
 Trajectory = tuple[Floats, Floats]
-"""Times (n,) and states (n, d) without missing rows."""
+"""Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was."""
 
 
 def check_trajectory(t: Floats, x: Floats) -> Trajectory:
-    """Check one trajectory and leave out its missing rows.
+    """Check one trajectory and leave out the rows in which a coordinate was not seen.
 
     Parameters
     ----------
     t : array_like, shape (n,)
         Increasing, finite times.
     x : array_like, shape (n, d)
-        States; a row with a NaN, or with a masked entry of a masked array, is missing.
+        States, NaN or masked where they were not seen.
 
     Returns
     -------
@@ -35,6 +35,15 @@ def check_trajectory(t: Floats, x: Floats) -> Trajectory:
     ValueError
         If shapes disagree, ``t`` does not increase, a value is infinite or nothing is left.
     """
+    t, x = _check_samples(t, x)
+    whole = ~np.isnan(x).any(axis=1)
+    if not whole.any():
+        raise ValueError(f"x: must hold at least one row without NaN, got {len(x)} with one")
+    return t[whole], x[whole]
+
+
+def _check_samples(t: Floats, x: Floats) -> Trajectory:
+    """The same of all rows in which a coordinate was seen."""
     t, x = check_array("t", t), check_array("x", x)
     if x.ndim != 2 or x.shape[1] < 1:
         raise ValueError(f"x: must have shape (n, d) with d of at least 1, got {x.shape}")
@@ -43,13 +52,17 @@ def check_trajectory(t: Floats, x: Floats) -> Trajectory:
     t = check_times(t)
     if np.isinf(x).any():
         raise ValueError(
-            f"x: must not be infinite (NaN marks a missing row), "
+            f"x: must not be infinite (NaN marks what was not seen), "
             f"got infinity in row {int(np.flatnonzero(np.isinf(x).any(axis=1))[0])}"
         )
-    seen = ~np.isnan(x).any(axis=1)
-    if not seen.any():
-        raise ValueError(f"x: must hold at least one row without NaN, got {len(x)} missing rows")
-    return t[seen], x[seen]
+    seen = ~np.isnan(x)
+    if not seen.any(axis=0).all():
+        column = int(np.argmin(seen.any(axis=0)))
+        raise ValueError(
+            f"x: every coordinate must be seen, got {len(x)} rows of NaN in column {column}"
+        )
+    rows = seen.any(axis=1)
+    return t[rows], x[rows]
 
 
 def check_trajectories(
@@ -60,14 +73,15 @@ def check_trajectories(
     Raises
     ------
     ValueError
-        If ``t`` is neither, or a trajectory is malformed; see `check_trajectory`.
+        If ``t`` is neither, or a trajectory is malformed: see `check_trajectory`; of these a row
+        is left out only if nothing was seen in it.
     """
     pairs = t if x is None else [(t, x)]
     if not isinstance(pairs, list | tuple) or not all(
         isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs
     ):
         raise ValueError(f"x: must be given, unless t is a list of pairs (t, x), got t = {t!r:.60}")
-    trajectories = [check_trajectory(*pair) for pair in pairs]
+    trajectories = [_check_samples(*pair) for pair in pairs]
     if len({values.shape[1] for _, values in trajectories}) != 1:
         raise ValueError(
             "t: a list of trajectories must hold at least one, all of the same dimension, "
@@ -113,6 +127,7 @@ def check_sigma(
     Returns
     -------
     list of ndarray, shape (m, d), or None
+        NaN where a coordinate was not seen.
 
     Raises
     ------
@@ -135,10 +150,10 @@ def check_sigma(
                 f"sigma: must be a number, or have shape {shape[1:]} or {shape}, got {errors.shape}"
             )
         errors = np.broadcast_to(errors, shape)[np.searchsorted(t, seen)]
-        wrong = errors[~(np.isfinite(errors) & (errors > 0))]
+        wrong = errors[np.isfinite(x) & ~(np.isfinite(errors) & (errors > 0))]
         if wrong.size:
             raise ValueError(f"sigma: must be finite and positive where x is, got {wrong[0]:g}")
-        checked.append(errors)
+        checked.append(np.where(np.isfinite(x), errors, np.nan))
     return checked
 
 
@@ -181,6 +196,7 @@ def check_systematic(
                 f"systematic: must have shape (k, {len(t)}, {x.shape[1]}), got {part.shape}"
             )
         part = np.moveaxis(part, 0, -1)[np.searchsorted(t, seen)]
+        part = np.where(np.isfinite(x)[:, :, None], part, 0.0)
         if not np.isfinite(part).all():
             raise ValueError("systematic: must be finite where x is, got NaN or infinity")
         checked.append(part)
@@ -192,13 +208,30 @@ def check_systematic(
     return checked
 
 
-def cut(trajectory: Trajectory, longest_step: float) -> list[Trajectory]:
-    """Cut a trajectory wherever two samples are further apart than ``longest_step``."""
+def cut(trajectory: Trajectory, longest_step: float | Floats) -> list[Trajectory]:
+    """Cut a trajectory wherever a coordinate is not seen for longer than ``longest_step``, (d,)."""
     t, x = trajectory
-    ends = np.flatnonzero(np.diff(t) > longest_step) + 1
+    longest, kept = np.broadcast_to(longest_step, x.shape[1]), np.ones(len(t), dtype=bool)
+    for seen, longest_here in zip(np.isfinite(x).T, longest, strict=True):
+        at = np.concatenate([[-np.inf], t[seen], [np.inf]])
+        after = np.searchsorted(at, t)
+        kept &= seen | (at[after] - at[after - 1] <= longest_here)
+    t, x = t[kept], x[kept]
+    ends = np.flatnonzero(np.diff(t) > longest.min()) + 1
     return list(zip(np.split(t, ends), np.split(x, ends), strict=True))
 
 
 def typical_step(trajectories: Sequence[Trajectory]) -> float:
     """Median time between two samples of the trajectories."""
     return float(np.median(np.concatenate([np.diff(t) for t, _ in trajectories])))
+
+
+def typical_steps(trajectories: Sequence[Trajectory]) -> Floats:
+    """The same of each coordinate over that of all samples, (d,): 1 if it is seen in all."""
+    steps = np.ones(trajectories[0][1].shape[1])
+    for j in range(len(steps)):
+        seen = [np.isfinite(x[:, j]) for _, x in trajectories]
+        if not np.concatenate(seen).all():
+            own = [(t[rows], x[rows]) for (t, x), rows in zip(trajectories, seen, strict=True)]
+            steps[j] = typical_step(own) / typical_step(trajectories)
+    return steps
