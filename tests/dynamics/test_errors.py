@@ -63,6 +63,9 @@ def fit_with(residual, precision=1.0):
         data_residual=lambda _: (residual.copy(), None),
         precision=precision,
         counts=(residual != 0).sum(axis=0),
+        grid=SimpleNamespace(x=np.where(residual == 0, np.nan, residual)),
+        segments=[SimpleNamespace(t=np.arange(n))],
+        d=d,
     )
     state = SimpleNamespace(control_points=None, moving=np.zeros(d, dtype=bool))
     return SimpleNamespace(collocation=data, state=state)
@@ -107,11 +110,13 @@ def test_errors_are_rough_if_the_last_alone_foretells_them():
 def test_errors_of_time_are_along_the_path():
     rng, t = np.random.default_rng(9), np.linspace(0, 60, 2000)
     slopes = np.stack([np.cos(t), -2 * np.sin(2 * t), 3 * np.cos(t + 1)], axis=1)
-    grid = SimpleNamespace(splines=lambda _: [lambda times, order: slopes])
+
+    def splines(_):
+        return [lambda times, order: slopes]
 
     def inflated(errors):
         fit = fit_with(errors)
-        fit.collocation.grid, fit.collocation.segments = grid, [SimpleNamespace(t=t)]
+        fit.collocation.grid.splines, fit.collocation.segments = splines, [SimpleNamespace(t=t)]
         fit.state.free = lambda: np.zeros(4)
         return time_inflation(fit)
 

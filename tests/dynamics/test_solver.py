@@ -143,6 +143,21 @@ def test_a_gap_in_which_the_target_was_kicked_stays_open(kick, bridges):
     assert len(found.curves) == (1 if bridges else 2)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("missing", ["a third of all entries", "nine of ten of a coordinate"])
+def test_what_was_seen_in_a_row_counts(missing, noise):
+    truth, t, x = measured("Lorenz", noise, n=1500)
+    if missing == "a third of all entries":
+        x[np.random.default_rng(8).random(x.shape) < 1 / 3] = np.nan
+    else:
+        x[np.arange(len(t)) % 10 > 0, 1] = np.nan
+    found = discover(t, x)
+    result = score(found, truth)
+    assert result.exact
+    assert result.l2 < 1e-4 + noise / 5
+    assert found.status == "ok"
+
+
 @pytest.mark.slow
 def test_missing_single_rows_are_no_gaps():
     truth, t, x = measured("WangSun", 0.02)

@@ -8,6 +8,7 @@ from vidsindy_lite.dynamics.trajectories import (
     check_trajectory,
     cut,
     typical_step,
+    typical_steps,
 )
 
 T, X = np.arange(5.0), np.ones((5, 2))
@@ -32,7 +33,8 @@ def with_value(row, value):
         (np.array([0, 1, 1, 3, 4]), X, r"t: must increase, got t\[1\] = 1 before t\[2\] = 1"),
         (T[::-1], X, "t: must increase"),
         (T, with_value(3, np.inf), "x: must not be infinite .* got infinity in row 3"),
-        (T, np.full((5, 2), np.nan), "x: must hold at least one row without NaN, got 5"),
+        (T, np.diag(np.full(5, np.nan)) + 1, "x: must hold at least one row without NaN, got 5"),
+        (T, np.full((5, 2), np.nan), "x: every coordinate must be seen, got 5 rows .* in column 0"),
         (np.empty(0), np.empty((0, 2)), "t: must hold at least one time"),
     ],
 )
@@ -70,6 +72,28 @@ def test_what_is_no_list_of_trajectories(t):
 def test_trajectories_of_one_system(pairs):
     with pytest.raises(ValueError, match="t: a list of trajectories must hold at least one, all"):
         check_trajectories(pairs)
+
+
+def test_rows_of_several_trajectories_count_for_what_was_seen_in_them():
+    x = with_value(2, np.nan)
+    x[3] = np.nan
+    ((t, left),) = check_trajectories(T, x)
+    assert t.tolist() == [0, 1, 2, 4]
+    assert np.isnan(left[2]).tolist() == [False, True]
+
+
+def test_a_coordinate_that_pauses_cuts():
+    t = np.arange(10.0)
+    x = np.stack([t, np.where((t > 1) & (t < 6), np.nan, t)], axis=1)
+    assert [piece[0].tolist() for piece in cut((t, x), 2.5)] == [[0, 1], [6, 7, 8, 9]]
+    assert [piece[0].tolist() for piece in cut((t, x), np.array([2.5, 5]))] == [t.tolist()]
+
+
+def test_steps_are_those_of_each_coordinate():
+    x = np.ones((9, 2))
+    assert typical_steps([(np.arange(0, 18, 2.0), x)]).tolist() == [1, 1]
+    x[1::3, 1] = x[2::3, 1] = np.nan
+    assert typical_steps([(np.arange(9.0), x)]).tolist() == [1, 3]
 
 
 def test_cut_at_long_steps_and_nowhere_else():

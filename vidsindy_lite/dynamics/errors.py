@@ -137,7 +137,8 @@ def rough(fit: Fit) -> Bools:
 def _autoregressions(fit: Fit) -> Floats:
     """Gain of predicting each error by those before it, for every number of these, (orders, d)."""
     errors = [np.concatenate(pieces) for pieces in _errors_seen(fit)]
-    lags = range(min(ORDER, min(len(e) for e in errors if len(e)) // 10) + 1)
+    fewest = min((len(e) for e in errors if len(e)), default=0)
+    lags = range(min(ORDER, fewest // 10) + 1)
     covariances = [np.array([e[k:] @ e[: len(e) - k] for k in lags]) for e in errors]
     sizes = map(len, errors)
     return np.stack([_levinson(c, n) for c, n in zip(covariances, sizes, strict=True)], axis=1)

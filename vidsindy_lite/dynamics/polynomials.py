@@ -171,10 +171,15 @@ class PolynomialSystem:
         return self._named(("1",) * self.d)
 
     def _named(self, slopes: tuple[str, ...]) -> tuple[str, ...]:
-        """Names of the monomials, given those of the slopes; factors of 1 are left out."""
-        names = (*self.names, *(function.name for function in self.functions))
-        between = "" if all(len(name) == 1 for name in names) else " "
-        return tuple(_term_text(e, names + slopes, "{}^{}", between) for e in self.exponents)
+        """Names of the monomials, given those of the slopes; factors of 1 are left out.
+
+        A blank sets apart what has more than a letter, and all if a function is named like a
+        product of variables.
+        """
+        functions = tuple(function.name for function in self.functions)
+        alike = any(set(name) <= set(self.names) for name in functions)
+        names = (*self.names, *functions, *slopes)
+        return tuple(_term_text(e, names, "{}^{}", int(not alike)) for e in self.exponents)
 
     @property
     def is_polynomial(self) -> bool:
@@ -374,7 +379,7 @@ class PolynomialSystem:
             left |= {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
         left = {j: left[j] for j in self.sides()}
         names += tuple(function.latex for function in self.functions) + ("1",) * self.d
-        terms = [_term_text(e, names, "{}^{{{}}}", " ") for e in self.exponents]
+        terms = [_term_text(e, names, "{}^{{{}}}", 0) for e in self.exponents]
         rows = (
             f"{side} &= " + self._right(j, terms, digits, r"\frac{{{}}}{{{}}}", r"\,")
             for j, side in left.items()
@@ -416,14 +421,15 @@ def parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(exponents.values())
 
 
-def _term_text(exponents: Ints, names: tuple[str, ...], power: str, between: str) -> str:
-    """A monomial as text, given how a power is written and what stands between two factors."""
-    factors = [
-        name if e == 1 else power.format(name, e)
-        for name, e in zip(names, exponents, strict=False)
-        if e and name != "1"
-    ]
-    return between.join(factors) or "1"
+def _term_text(exponents: Ints, names: tuple[str, ...], power: str, letters: int) -> str:
+    """A monomial as text, given how a power is written; a blank beside names of more letters."""
+    text, before = "", ""
+    for name, e in zip(names, exponents, strict=False):
+        if e and name != "1":
+            apart = text and max(len(before), len(name.rstrip("'"))) > letters
+            text += (" " if apart else "") + (name if e == 1 else power.format(name, e))
+            before = name.rstrip("'")
+    return text or "1"
 
 
 def _sum_text(

@@ -113,8 +113,8 @@ def _factors(residual: Floats, causes: list[Floats]) -> Floats:
     """Precision of measurements over the typical one, (n,): 0 for what is no noise."""
     n = len(residual)
     even = np.ones(n)
-    pieces = np.minimum(np.arange(n) * STRETCHES // n, STRETCHES - 1)
-    stretches = (pieces == np.arange(STRETCHES)[:, None]).astype(float)
+    pieces = np.arange(n) * STRETCHES // n
+    stretches = (pieces == np.unique(pieces)[:, None]).astype(float)
     models = [even[None], *([even, z] for z in causes), stretches]
     fits = [_variance(residual, np.array(model)) for model in models]
     cost, variance, gross = min(fits, key=lambda fit: fit[0])
