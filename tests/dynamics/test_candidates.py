@@ -332,7 +332,8 @@ def test_a_library_is_a_sum_of_libraries_only():
 
 def test_a_product_of_coordinates_is_named_alike_in_every_library():
     wave = Library.polynomial(2) + Library.fourier(1)
-    law = PolynomialSystem.from_terms({"x": {"xy": 1.0, "x^2": 2.0}, "y": {"sin(x)": 3.0}}, library=wave)
+    terms = {"x": {"xy": 1.0, "x^2": 2.0}, "y": {"sin(x)": 3.0}}
+    law = PolynomialSystem.from_terms(terms, library=wave)
     assert law.text() == "dx/dt = 2 x^2 + xy\ndy/dt = 3 sin(x)"
     own = Library.polynomial(2) + Library.terms({"xy": lambda x, y: np.exp(x * y)})
     law = PolynomialSystem.from_terms({"x": {"x": 1.0}, "y": {"xy": 3.0}}, library=own)
