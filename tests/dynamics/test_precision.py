@@ -143,3 +143,12 @@ def test_residuals_that_are_exactly_zero_are_no_accident(share):
         cost, variance, _ = weighing._variance(residual, causes)
         assert np.isfinite(cost)
         assert (variance > 0).all()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("n", [2, 5, 9, 28])
+def test_fewer_errors_than_stretches_have_precisions_too(n):
+    residual = np.random.default_rng(n).standard_normal(n)
+    precision = weighing._factors(residual, [np.linspace(1, 2, n)])
+    assert precision.shape == (n,)
+    assert (np.isfinite(precision) & (precision >= 0)).all()
