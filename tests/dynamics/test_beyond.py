@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, discover, monomial_exponents
-from vidsindy_lite.dynamics.beyond import Beyond, _widened, newcomers
+from vidsindy_lite.dynamics.beyond import Beyond, _higher, newcomers
 from vidsindy_lite.study.scoreboard import OdeContest
 
 TIMES = np.linspace(0, 20, 600)
@@ -77,13 +77,13 @@ def test_a_degree_that_is_too_low_is_told():
 
 def test_the_wider_library_keeps_the_old_one_and_within_the_budget():
     cubic = monomial_exponents(3, 3)
-    wide = _widened(cubic, 3, 1000)
+    wide = _higher(cubic, 3, 1000)
     assert (wide[: len(cubic)] == cubic).all()
     assert len(wide) == len(monomial_exponents(3, 5))
-    pairs, single = _widened(cubic, 3, 30), _widened(cubic, 3, 6)
+    pairs, single = _higher(cubic, 3, 30), _higher(cubic, 3, 6)
     assert ((pairs[len(cubic) :] > 0).sum(axis=1) <= 2).all()
     assert len(single) == len(cubic) + 6
-    assert _widened(cubic, 3, 5) is cubic
+    assert _higher(cubic, 3, 5) is cubic
 
 
 def test_what_a_single_term_explains_is_what_a_refit_gains():

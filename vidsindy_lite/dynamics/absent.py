@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from ..arrays import Floats
-from .beyond import newcomers
+from .beyond import newcomers, place
 from .collocation import Linearisation
 from .polynomials import PolynomialSystem
 from .problem import Problem
@@ -72,4 +72,4 @@ def unseen(
     for entry in np.argsort(-reach, axis=None, kind="stable")[: int((reach > 1).sum())].tolist():
         row, j = divmod(entry, law.d)
         low, high = absent[row, j]
-        yield f"{law.terms[row]} in d{law.names[j]}/dt ({low:.2g} to {high:.2g})"
+        yield f"{place(law, j * len(law.terms) + row)} ({low:.2g} to {high:.2g})"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,12 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
-from .collocation import Fit
+from .collocation import Collocation, Fit, Linearisation
 from .library import monomial_exponents
-from .problem import Problem
+from .polynomials import PolynomialSystem
+from .problem import Problem, term_penalties
 from .selection import inverse
+from .state import State
 
 HIGHER = 2
 """Degrees beyond that of the library: an odd function needs two."""
@@ -83,49 +86,95 @@ class Beyond:
         return bool(chi2.sf(self.best, 1) * self.count < CHANCE_OF_ONE)
 
 
-def beyond(problem: Problem, fit: Fit) -> Beyond:
-    """The score test of the polynomial terms beyond a library, at the last fit."""
-    size, form = len(problem.exponents), problem.form
+@dataclass(frozen=True)
+class Wider:
+    """A fit among the candidates of a library and the terms of the next degrees.
+
+    Parameters
+    ----------
+    law : PolynomialSystem
+        In the wider library, of which it has the old terms alone.
+    state : State
+        The same.
+    collocation : Collocation
+        The same.
+    searched, further : ndarray of int
+        Places in the coefficients, equation by equation: of the old candidates, and of the terms
+        that the library has not.
+    prices : ndarray
+        Of all places.
+    """
+
+    law: PolynomialSystem
+    state: State
+    collocation: Collocation
+    searched: Ints
+    further: Ints
+    prices: Floats
+
+    @cached_property
+    def model(self) -> Linearisation:
+        """The quadratic model around the fit, in all candidates and moving axes."""
+        axes = self.law.coefficients.size + np.flatnonzero(self.state.moving)
+        columns = np.sort(np.concatenate([self.searched, self.further]))
+        return self.collocation.linearise(self.state, np.concatenate([columns, axes]))
+
+    @property
+    def candidates(self) -> Linearisation:
+        """The same with the axes as they are: the same law in another frame would count."""
+        return self.model.of(np.sort(np.concatenate([self.searched, self.further])))
+
+
+def widened(problem: Problem, fit: Fit) -> Wider:
+    """The last fit among terms beyond its library; of a fraction, whose terms are others, none."""
+    form, size, d = problem.form, len(problem.exponents), problem.d
     equations = np.flatnonzero(form.candidates.any(axis=0))
     budget = BUDGET / fit.collocation.grid.x.size / len(equations)
-    exponents = _widened(problem.exponents, form.states, budget)
+    law, exponents = problem.law(fit.state), problem.exponents
+    if not law.implicit.any():
+        exponents = _higher(exponents, form.states, budget)
     l, new = len(exponents), len(exponents) - size
 
     def padded(array: NDArray[Any]) -> NDArray[Any]:
         return np.vstack([array, np.zeros((new, array.shape[1]), array.dtype)])
 
-    # With a known part of its own shape: a collocation is made for its library.
+    places = np.arange(d * l).reshape(d, l)
+    shared = places.copy()
+    shared[:, :size] = places[:, :size].ravel()[form.shared].reshape(d, size)
     known = padded(fit.collocation.known)
-    collocation = replace(fit.collocation, exponents=exponents, known=known)
-    state = replace(
-        fit.state,
-        coefficients=padded(fit.state.coefficients),
-        active=padded(fit.state.active),
-        shared=None,
+    return Wider(
+        law=replace(law, exponents=exponents, coefficients=padded(law.coefficients)),
+        state=replace(
+            fit.state,
+            coefficients=padded(fit.state.coefficients),
+            active=padded(fit.state.active),
+            shared=shared.ravel(),
+        ),
+        # With a known part of its own shape: a collocation is made for its library.
+        collocation=replace(fit.collocation, exponents=exponents, known=known),
+        searched=places[:, :size].ravel()[form.searched],
+        further=places[equations, size:].ravel(),
+        prices=np.tile(term_penalties(exponents, problem.measured[0][1].shape[1]), d),
     )
-    own = np.flatnonzero(state.free())
-    extra = np.concatenate([j * l + np.arange(size, l) for j in equations.tolist()])
-    model = collocation.linearise(state, np.concatenate([own, extra]))
+
+
+def beyond(wider: Wider) -> Beyond:
+    """The score test of the terms beyond a library, at the last fit."""
+    own, further = np.flatnonzero(wider.state.free()), wider.further
+    model = wider.model.of(np.concatenate([own, further]))
     gain = float(model.newton()[1] - model.fall)
     estimate, variance = newcomers(model.information, model.gradient, len(own))
     single = estimate**2 / variance
-    place = int(single.argmax()) if new else 0
-    law = problem.law(fit.state)
-    term = ""
-    if new:
-        names = replace(law, exponents=exponents, coefficients=np.zeros((l, problem.d))).terms
-        equation = law.names[equations[place // new]]
-        term = f"{names[size + place % new]} in d{equation}/dt"
     return Beyond(
         gain=gain,
         best=float(single.max(initial=0.0)),
-        count=len(extra),
-        left=float(collocation.objective(state)),
-        term=term,
+        count=len(further),
+        left=float(wider.collocation.objective(wider.state)),
+        term=place(wider.law, int(further[single.argmax()])) if len(further) else "",
     )
 
 
-def _widened(exponents: Ints, d: int, budget: float) -> Ints:
+def _higher(exponents: Ints, d: int, budget: float) -> Ints:
     """A library with the monomials of the next degrees; of few variables each, if they are many.
 
     Its first ``d`` columns are the variables, of which functions may be further ones.
@@ -155,16 +204,20 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
     return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)
 
 
-def beyond_the_library(problem: Problem, fit: Fit, noisy: bool) -> Iterator[str]:
+def place(law: PolynomialSystem, entry: int) -> str:
+    """Name of an entry of the coefficients, counted equation by equation."""
+    equation, term = divmod(int(entry), len(law.terms))
+    return f"{law.terms[term]} in d{law.names[equation]}/dt"
+
+
+def beyond_the_library(wider: Wider, noisy: bool) -> Iterator[str]:
     """A warning if the law is an approximation on these data.
 
     Errors that last may follow the state, too; they are no reason to doubt, unless a single term,
     or the few that a single coordinate has, explain nearly all of them. What is ``noisy`` has
     errors of single samples.
     """
-    if problem.law(fit.state).implicit.any():
-        return  # a fraction, of which the terms are not those of its slope
-    found = beyond(problem, fit)
+    found = beyond(wider)
     if found.decisive or (noisy and found.significant):
         yield (
             f"terms of higher degree explain what the law leaves ({found.term}: chi-square "

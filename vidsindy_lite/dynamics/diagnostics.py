@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import Floats
-from .beyond import beyond_the_library
+from .beyond import Wider, beyond_the_library, place, widened
 from .collocation import CLEANEST, Fit, Linearisation, Status
 from .errors import effective_noise, residual_noise, rough
 from .library import shift_generators, shift_matrix
@@ -225,13 +225,14 @@ def _selection(
     if clean and not problem.kicked:
         return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
-    yield from beyond_the_library(problem, fit, noisy=not tolerant)
+    wider = widened(problem, fit)
+    yield from beyond_the_library(wider, noisy=not tolerant)
     if tolerant:
         return  # weaker errors than those tolerated say nothing about the law
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = model.of(problem.form.searched)
     yield from _left_over(model, fit.state)
-    yield from _near_tie(problem, fit.state, model)
+    yield from _near_tie(wider)
     yield from _elsewhere(problem, fit.state, model, law)
 
 
@@ -267,24 +268,25 @@ def _left_over(model: Linearisation, state: State) -> Iterator[str]:
         )
 
 
-def _near_tie(problem: Problem, state: State, model: Linearisation) -> Iterator[str]:
-    law = problem.law(state)
+def _near_tie(wider: Wider) -> Iterator[str]:
+    """Would another law fit almost as well, of the library or of a higher degree?"""
+    model, law = wider.candidates, wider.law
     cost, dropped, added = closest_rival(
         model.information,
         model.gradient,
-        state.flat()[model.columns],
-        problem.prices[model.columns],
-        state.free()[model.columns],
+        wider.state.flat()[model.columns],
+        wider.prices[model.columns],
+        wider.state.free()[model.columns],
     )
     if cost > NEAR_TIE:
         return
     out, into = (
-        " and ".join(_place(law, k) for k in model.columns[entries]) for entries in (dropped, added)
+        " and ".join(place(law, k) for k in model.columns[entries]) for entries in (dropped, added)
     )
     change = (
         f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
     )
-    frame = "in its own frame, " if state.moving.any() else ""
+    frame = "in its own frame, " if wider.state.moving.any() else ""
     yield (
         f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
         "do not settle it: use a longer or cleaner trajectory"
@@ -364,18 +366,12 @@ def _standstill(law: PolynomialSystem) -> Iterator[str]:
 
 def _narrow(law: PolynomialSystem, margins: Floats) -> Iterator[str]:
     close, kept = np.flatnonzero(margins < NEAR_TIE).tolist(), law.support.T.ravel()
-    changes = ", ".join(f"{'without' if kept[k] else 'with'} {_place(law, k)}" for k in close)
+    changes = ", ".join(f"{'without' if kept[k] else 'with'} {place(law, k)}" for k in close)
     if changes:
         yield (
             f"in the frame of the data another law fits almost as well: {changes} (criterion "
             f"{margins[close].min():+.1f}); the standard errors do not count this in"
         )
-
-
-def _place(law: PolynomialSystem, entry: int) -> str:
-    """Name of an entry of the coefficients, counted equation by equation."""
-    equation, term = divmod(int(entry), len(law.terms))
-    return f"{law.terms[term]} in d{law.names[equation]}/dt"
 
 
 def _sampling(problem: Problem) -> Iterator[str]:
