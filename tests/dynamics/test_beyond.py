@@ -11,7 +11,7 @@ from vidsindy_lite.dynamics.beyond import Beyond, _higher, newcomers
 from vidsindy_lite.study.scoreboard import OdeContest
 
 TIMES = np.linspace(0, 20, 600)
-WORDS = "terms of higher degree explain what the law leaves"
+WORDS = "terms that the law has not explain what it leaves"
 
 
 def swung(pull, start):
@@ -63,10 +63,33 @@ def test_a_way_to_rest_on_a_line_is_doubted_where_higher_terms_explain_what_is_l
 
 
 def test_many_terms_that_explain_all_are_no_reason_to_doubt():
-    few = Beyond(gain=9.5, best=0.1, count=2, left=10.0, term="x^4 in dx/dt")
+    few = Beyond(gain=9.5, count=2, best=0.1, tried=5, left=10.0, term="x^4 in dx/dt")
     assert few.decisive
     assert not replace(few, gain=8.5).decisive
     assert not replace(few, count=3).decisive  # ten errors that are left are many for two terms
+
+
+def test_one_term_that_explains_all_is_a_reason_where_chance_would_share_it_out():
+    one = Beyond(gain=0.0, count=0, best=9.5, tried=5, left=10.0, term="x^3 in dx/dt")
+    assert one.decisive
+    assert not replace(one, best=8.9).decisive
+    assert not replace(one, best=2.85, left=3.0).decisive  # of three errors one is often that large
+    assert not replace(one, tried=100_000).decisive
+
+
+def test_a_small_term_that_an_integrator_hides_is_missed_aloud():
+    data = OdeContest(8, start=1).data()  # growth with an Allee effect, of which x^3 is 2 %
+    found = discover(data.t, data.x)
+    assert not found.system.support.any() or found.status == "suspect"
+    assert "x^3 in dx/dt" in " ".join(found.warnings)
+
+
+@pytest.mark.parametrize("library", [None, Library.polynomial(3) + Library.rational(1)])
+def test_a_rival_of_higher_degree_is_told(library):
+    data = OdeContest(16, noise=0.02).data()  # of degree five, which a cubic imitates
+    found = discover(data.t, data.x, library=library)
+    assert found.status == "suspect"
+    assert "x^5" in " ".join(w for w in found.warnings if "another law fits" in w)
 
 
 def test_a_degree_that_is_too_low_is_told():

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import beta, chi2
 
 from ..arrays import Floats, Ints
 from .collocation import Collocation, Fit, Linearisation
@@ -45,14 +45,18 @@ DEPENDENT = 1e-9
 
 @dataclass(frozen=True)
 class Beyond:
-    """What terms of higher degree would explain.
+    """What terms of higher degree would explain, and the best of those that a law has not.
 
     Parameters
     ----------
-    gain, best : float
-        What all of them lower the objective by, in chi-square units, and what the best does.
+    gain : float
+        What all of them lower the objective by, in chi-square units.
     count : int
         How many there are.
+    best : float
+        What the best term does that the law has not, one of theirs or of the library.
+    tried : int
+        How many these are.
     left : float
         The objective, of which they explain a part.
     term : str
@@ -60,8 +64,9 @@ class Beyond:
     """
 
     gain: float
-    best: float
     count: int
+    best: float
+    tried: int
     left: float
     term: str
 
@@ -73,9 +78,14 @@ class Beyond:
     @property
     def decisive(self) -> bool:
         """Whether one term, or few, explain nearly all that is left, be that noise or not."""
-        one, few = self._one, FEW * self.count < self.left
-        most = MOST * self.left
-        return bool(self.count and (one and self.best > most or few and self.gain > most))
+        few, most = FEW * self.count < self.left, MOST * self.left
+        return bool(self._alone and self.best > most or few and self.count and self.gain > most)
+
+    @property
+    def _alone(self) -> bool:
+        # Of as many independent errors as are left, one direction seldom has such a share.
+        share, others = min(self.best / self.left, 1.0), max(self.left - 1, 0.0) / 2
+        return bool(others and beta.sf(share, 0.5, others) * self.tried < CHANCE_OF_ONE)
 
     @property
     def _all(self) -> bool:
@@ -83,7 +93,7 @@ class Beyond:
 
     @property
     def _one(self) -> bool:
-        return bool(chi2.sf(self.best, 1) * self.count < CHANCE_OF_ONE)
+        return bool(chi2.sf(self.best, 1) * self.tried < CHANCE_OF_ONE)
 
 
 @dataclass(frozen=True)
@@ -131,7 +141,7 @@ def widened(problem: Problem, fit: Fit) -> Wider:
     equations = np.flatnonzero(form.candidates.any(axis=0))
     budget = BUDGET / fit.collocation.grid.x.size / len(equations)
     law, exponents = problem.law(fit.state), problem.exponents
-    if not law.implicit.any():
+    if not (law.support & law.implicit[:, None]).any():
         exponents = _higher(exponents, form.states, budget)
     l, new = len(exponents), len(exponents) - size
 
@@ -161,16 +171,18 @@ def widened(problem: Problem, fit: Fit) -> Wider:
 def beyond(wider: Wider) -> Beyond:
     """The score test of the terms beyond a library, at the last fit."""
     own, further = np.flatnonzero(wider.state.free()), wider.further
-    model = wider.model.of(np.concatenate([own, further]))
-    gain = float(model.newton()[1] - model.fall)
+    others = np.concatenate([further, np.setdiff1d(wider.searched, own)])
+    model = wider.model.of(np.concatenate([own, others]))
     estimate, variance = newcomers(model.information, model.gradient, len(own))
     single = estimate**2 / variance
+    model = wider.model.of(np.concatenate([own, further]))
     return Beyond(
-        gain=gain,
-        best=float(single.max(initial=0.0)),
+        gain=float(model.newton()[1] - model.fall),
         count=len(further),
+        best=float(single.max(initial=0.0)),
+        tried=len(others),
         left=float(wider.collocation.objective(wider.state)),
-        term=place(wider.law, int(further[single.argmax()])) if len(further) else "",
+        term=place(wider.law, int(others[single.argmax()])) if len(others) else "",
     )
 
 
@@ -220,8 +232,8 @@ def beyond_the_library(wider: Wider, noisy: bool) -> Iterator[str]:
     found = beyond(wider)
     if found.decisive or (noisy and found.significant):
         yield (
-            f"terms of higher degree explain what the law leaves ({found.term}: chi-square "
-            f"{found.best:.0f}, all {found.count} together {found.gain:.0f}): it may be an "
-            "approximation along these data, as of a sine or a drag; raise the degree, or name "
-            "its terms with library="
+            f"terms that the law has not explain what it leaves ({found.term}: chi-square "
+            f"{found.best:.0f}, all {found.count} of higher degree together {found.gain:.0f}): it "
+            "may be an approximation along these data, as of a sine or a drag; raise the degree, "
+            "or name its terms with library="
         )

@@ -28,6 +28,7 @@ RIDGE = 1e-12
 """Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
 def subset_search(
     information: Floats, gradient: Floats, present: Floats, penalty: Floats, start: Bools
 ) -> tuple[Bools, Floats, float]:
@@ -71,6 +72,7 @@ def subset_search(
     return best.support, solution, best.value
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
 def closest_rival(
     information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
 ) -> Change:
