@@ -101,6 +101,22 @@ def test_behind_a_gap_in_all_views_a_target_goes_on_smoothly():
     assert_told_apart(told.tracks, views)
 
 
+def test_a_view_may_be_blind_between_two_gaps_in_all_views():
+    rng = np.random.default_rng(8)
+    rig = room(rng)
+    paths = [walk(np.arange(FRAMES)), walk(np.arange(FRAMES) + 700)]
+    views = [np.stack([camera.project(x) for x in paths], axis=1) for camera in rig.cameras]
+    tracks = [view.copy() for view in views]
+    for track in tracks:
+        track[100:140] = track[100:140, ::-1]
+        for gap in (slice(97, 103), slice(137, 143)):
+            track[gap] = np.nan
+    tracks[0][97:143] = np.nan
+    told = identify([track.reshape(FRAMES, -1) for track in tracks], rig)
+    assert not told.doubts
+    assert_told_apart(told.tracks, views)
+
+
 def test_targets_that_meet_in_space_unseen_are_doubted():
     rig = room(np.random.default_rng(5))
     t = np.linspace(-1, 1, FRAMES)

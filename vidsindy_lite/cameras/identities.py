@@ -235,10 +235,11 @@ def _on_from(
 def _in_space(runs: Sequence[_Run], cameras: Rig) -> tuple[Ints, Floats]:
     """The frames in which two views or more have runs, and the targets' places, (m, k, 3)."""
     n, count = 1 + max(int(run.frames[-1]) for run in runs), runs[0].places.shape[1]
-    views = [np.full((n, count, 2), np.nan) for _ in cameras.cameras]
+    views = {run.view: np.full((n, count, 2), np.nan) for run in runs}  # a view may have none
     for run in runs:
         views[run.view][run.frames] = run.places
-    x = side_by_side(reconstruct(_rows(views), cameras), count).reshape(n, count, 3)
+    theirs = Rig(tuple(cameras.cameras[view] for view in views))
+    x = side_by_side(reconstruct(_rows([*views.values()]), theirs), count).reshape(n, count, 3)
     frames = np.flatnonzero(np.isfinite(x).all(axis=(1, 2)))
     return frames, x[frames]
 
