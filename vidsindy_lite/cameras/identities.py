@@ -4,7 +4,8 @@ Two targets that meet in one image are apart in the others. So each view's track
 *runs*, in which none can be mistaken for another. Two runs of different views that share some time
 belong together in the one order in which their lines of sight meet in space, and so the runs of all
 views hang together, unless all views are blind at once: then the targets go on smoothly in space,
-where they hardly ever meet.
+where they hardly ever meet. Where they do, a guess would spoil all that is known: the longest part
+is told, the others are left out.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ _NEAR, _NOISE = 2.0, 2.0  # by how much closer, in times and pixels, a target is
 _CLEAR = 2.0  # factor between the misfits of two orders, from which the better one is sure
 _FEW = 0.05  # share of the frames
 _AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
+_FARTHEST = 4 * _AHEAD  # frames of a gap that these can tell anything about
 
 
 class Identities(NamedTuple):
@@ -68,6 +70,8 @@ def side_by_side(rows: Floats, count: int) -> Floats:
 def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
     """Give each target its own columns in all views, from left to right as the first view begins.
 
+    Only the longest part in which that is sure is told; elsewhere the tracks are NaN.
+
     Parameters
     ----------
     tracks : sequence of ndarray, shape (n, 2 k)
@@ -86,28 +90,41 @@ def identify(tracks: Sequence[Floats], rig: Rig) -> Identities:
     runs = [run for i, view in enumerate(views) for run in _runs(i, view)]
     cameras = _cameras(views, runs, rig)
     groups = _joined(runs, cameras)
-    together, doubts = groups[0], []
-    for group in groups[1:]:
-        order, sure = _on_from(together, group, cameras)
-        if not sure and len(_in_space(group, cameras)[0]) < _FEW * len(views[0]):
-            continue  # a few frames that are left out do no harm
-        together = together + [run.ordered(order) for run in group]
-        if not sure:
-            doubts.append(_first(group))
-    start = min((run for run in together if run.view == 0), key=lambda run: run.frames[0])
+    *others, together = sorted(_parts(groups, cameras), key=lambda part: _size(part, cameras))
+    start = min(together, key=lambda run: (run.view, run.frames[0]))
     numbered = np.argsort(start.places[0, :, 0]).tolist()
     told = [np.full_like(view, np.nan) for view in views]
     for run in (one.ordered(numbered) for one in together):
         told[run.view][run.frames] = run.places
     flat = [view.reshape(len(view), -1) for view in told]
-    if not doubts:
+    left = sum(_size(part, cameras)[1] for part in others)
+    if left < _FEW * len(views[0]):  # a few frames that are left out do no harm
         return Identities(flat, ())
-    frames = ", ".join(map(str, doubts[:5]))
     doubt = (
-        f"targets: who is who is not sure from frame {frames} on: before, no two views tell the "
-        "targets apart, and in space they meet, or are lost for too long"
+        f"targets: {left} frames are left out, e.g. from frame {min(map(_first, others))} on: who "
+        "is who there is not sure, as in between no two views tell the targets apart, and in space "
+        "they meet, or are lost for too long"
     )
     return Identities(flat, (doubt,))
+
+
+def _parts(groups: Sequence[Sequence[_Run]], cameras: Rig) -> list[list[_Run]]:
+    """Groups in one order of the targets, as far as that is sure: each with where it goes on."""
+    parts: list[list[_Run]] = []
+    for group in groups:
+        for part in reversed(parts):
+            order, sure = _on_from(part, group, cameras)
+            if sure:
+                part += [run.ordered(order) for run in group]
+                break
+        else:
+            parts.append(list(group))
+    return parts
+
+
+def _size(part: Sequence[_Run], cameras: Rig) -> tuple[int, int]:
+    """How many views have runs of a part, and in how many frames it tells where the targets are."""
+    return len({run.view for run in part}), len(_in_space(part, cameras)[0])
 
 
 def _runs(number: int, view: Floats) -> list[_Run]:
@@ -224,8 +241,10 @@ def _on_from(
     x, there = x[there < start][-_AHEAD:], there[there < start][-_AHEAD:]
     y, here = y[:_AHEAD], here[:_AHEAD]
     orders = list(permutations(range(y.shape[1])))
-    if min(len(x), len(y)) < _DEGREE or len(orders) == 1:
-        return orders[0], len(orders) == 1
+    if len(orders) == 1:
+        return orders[0], True
+    if min(len(x), len(y)) < _DEGREE or here[0] - there[-1] > _FARTHEST:
+        return orders[0], False
     frames = np.concatenate((there, here))
     rough = [_roughness(frames, np.concatenate((x, y[:, list(order)]))) for order in orders]
     best, second = np.argsort(rough)[:2]
@@ -235,10 +254,11 @@ def _on_from(
 def _in_space(runs: Sequence[_Run], cameras: Rig) -> tuple[Ints, Floats]:
     """The frames in which two views or more have runs, and the targets' places, (m, k, 3)."""
     n, count = 1 + max(int(run.frames[-1]) for run in runs), runs[0].places.shape[1]
-    views = [np.full((n, count, 2), np.nan) for _ in cameras.cameras]
+    views = {run.view: np.full((n, count, 2), np.nan) for run in runs}  # a view may have none
     for run in runs:
         views[run.view][run.frames] = run.places
-    x = side_by_side(reconstruct(_rows(views), cameras), count).reshape(n, count, 3)
+    theirs = Rig(tuple(cameras.cameras[view] for view in views))
+    x = side_by_side(reconstruct(_rows([*views.values()]), theirs), count).reshape(n, count, 3)
     frames = np.flatnonzero(np.isfinite(x).all(axis=(1, 2)))
     return frames, x[frames]
 
