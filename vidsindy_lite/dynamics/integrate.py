@@ -7,12 +7,12 @@ So the integrators here use nothing whose rounding is left to a library of linea
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.integrate import DOP853
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..checks import check_array, check_integer, check_times
 
 STAGES = DOP853.n_stages
@@ -63,6 +63,33 @@ def runge_kutta_4(
             x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         states.append(x)
     return np.array(states)
+
+
+def one_by_one(exponents: Ints, coefficients: Floats) -> Callable[[Sequence[float]], list[float]]:
+    """Sums of monomials at a point, (d,), as a function of its coordinates.
+
+    No digit is left to a BLAS; and for the few numbers of a law it is faster than arrays.
+    """
+    terms = [
+        ([(i, e) for i, e in enumerate(powers) if e], [(j, c) for j, c in enumerate(parts) if c])
+        for powers, parts in zip(exponents.tolist(), coefficients.tolist(), strict=True)
+        if any(parts)
+    ]
+
+    def value(z: Sequence[float]) -> list[float]:
+        sums = [0.0] * coefficients.shape[1]
+        for powers, parts in terms:
+            product = 1.0
+            for i, exponent in powers:
+                power = z[i]
+                for _ in range(exponent - 1):
+                    power *= z[i]
+                product *= power
+            for j, coefficient in parts:
+                sums[j] += product * coefficient
+        return sums
+
+    return value
 
 
 def integrate(
@@ -130,8 +157,8 @@ def _step(
     slopes = np.empty((STAGES, len(x)))
     slopes[0] = rate(x)
     for stage in range(1, STAGES):
-        slopes[stage] = rate(x + step * (STAGE_WEIGHTS[stage] * slopes[:stage]).sum(axis=0))
-    moved = x + step * (WEIGHTS * slopes).sum(axis=0)
+        slopes[stage] = rate(x + step * np.add.reduce(STAGE_WEIGHTS[stage] * slopes[:stage]))
+    moved = x + step * np.add.reduce(WEIGHTS * slopes)
     scale = tolerance * (1 + np.maximum(np.abs(x), np.abs(moved)))
     third, fifth = (
         float((((weights * slopes).sum(axis=0) / scale) ** 2).sum()) for weights in (THIRD, FIFTH)

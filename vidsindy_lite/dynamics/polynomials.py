@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..checks import check_array, check_integer, check_number, check_times, check_vector
 from .candidates import Library
-from .integrate import integrate
+from .integrate import integrate, one_by_one
 from .library import (
     CLOCK,
     Function,
@@ -315,17 +315,18 @@ class PolynomialSystem:
             x0 = np.append(check_vector("x0", x0, self.states), t[0])
         x0 = check_vector("x0", x0, self.d)
         self._check_inputs(x0[-1] + t - t[0])
-        active = self.support.any(axis=1)
-        exponents, coefficients = self.exponents[active], self.coefficients[active]
-        above, below = ~self.implicit[active], self.implicit[active]
+        fraction, size = bool(self.implicit.any()), self.d + len(self.functions)
+        above, below = (
+            one_by_one(self.exponents[rows, :size], self.coefficients[rows])
+            for rows in (~self.implicit, self.implicit)
+        )
 
-        def rate(x: Floats) -> Floats:  # sums and products one by one: no digit is left to a BLAS
-            z = extended(x[None], self.functions)
-            if below.any():
-                z = np.column_stack([z, np.ones((1, self.d))])
-            parts = monomials(z, exponents[:, : z.shape[1]]).T * coefficients
+        def rate(x: Floats) -> Floats:
+            z = (extended(x[None], self.functions)[0] if self.functions else x).tolist()
+            if not fraction:
+                return np.array(above(z))
             with np.errstate(divide="ignore", invalid="ignore"):  # at a pole the path ends
-                return parts[above].sum(axis=0) / (1 - parts[below].sum(axis=0))
+                return np.array(above(z)) / (1 - np.array(below(z)))
 
         return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
 
