@@ -388,7 +388,7 @@ def measured_by_hand(rig, seed):
 @pytest.mark.parametrize("seed", range(2))
 def test_lags_at_half_a_pixel_of_noise(seed):
     lags = (0, 31.4, -22.7)
-    rig, tracks = room(seed, 600, lags)
+    rig, tracks = room(seed, 300, lags)
     for known, limit in ((rig, 0.05), (rig.uncalibrated(), 0.05), (measured_by_hand(rig, 0), 0.3)):
         found = learn_lags(tracks, known)
         assert found.agree
