@@ -130,6 +130,35 @@ def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
     assert best_path(seen.only(np.zeros(0, int)))[1] == 0
 
 
+def one_a_frame(places, qualities):
+    """One candidate in each frame, all alike but for their places and qualities."""
+    places = np.asarray(places, float)
+    found = [
+        [Candidate(place, np.array([*place - 4, 9, 9]), 60.0, np.array([30.0, 30, 200]), quality)]
+        for place, quality in zip(places, qualities, strict=True)
+    ]
+    return Sightings.of(found, list(places[:, None]), 400.0)
+
+
+def test_a_path_ends_where_nothing_that_follows_is_worth_it():
+    places = np.column_stack([10 + 5 * np.arange(20), np.full(20, 50)])
+    for low, last in ((0.1, 11), (0.2, 19)):  # a candidate below a quality of .15 has no worth
+        rows, value = best_path(one_a_frame(places, np.where(np.arange(20) < 12, 0.9, low)))
+        assert rows[-1] == last
+        assert value == pytest.approx(12 * 0.75 + (last - 11) * 0.05, abs=0.1)
+
+
+def test_the_faster_a_target_the_further_it_may_turn():
+    def price(step, turn):
+        places = np.column_stack([50 + step * np.arange(20), np.full(20, 100.0)])
+        straight = best_path(one_a_frame(places, np.full(20, 0.9)))[1]
+        places[10:, 1] += turn
+        return straight - best_path(one_a_frame(places, np.full(20, 0.9)))[1]
+
+    assert price(40, 12) < 0.6
+    assert price(2, 12) > 1
+
+
 def test_partial_views_and_jumps_are_left_out():
     frames = np.arange(40)
     places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
