@@ -1,6 +1,7 @@
 """From video files to equations, and what is refused on the way."""
 
 from dataclasses import replace
+from itertools import islice
 
 import cv2
 import numpy as np
@@ -40,9 +41,7 @@ def test_a_wrong_normal_is_named_first(shot, wrong, calibrated):
     normal = cameras[wrong].normal
     cameras[wrong] = replace(cameras[wrong], normal=rodrigues([0, 0, 1], np.deg2rad(20)) @ normal)
     rig = vl.Rig(cameras) if calibrated == 3 else vl.Rig(cameras).uncalibrated()
-    found = vl.discover_from_videos(shot.paths, rig, shot.t, degree=2)
-    assert found.status == "suspect"
-    text = found.warnings[0]
+    text = vl.observe(shot.paths, rig, shot.t).warnings[0]
     assert text.startswith("the rig does not agree with the tracks: ")
     assert f"of cameras[{wrong}] (Lorenz_{wrong + 1}.mov) would explain it best" in text
     proposed = [float(number) for number in text.split("normal (")[1].split(")")[0].split(",")]
@@ -53,6 +52,7 @@ def test_a_wrong_position_is_named_first(shot):
     first, *others = shot.rig.cameras
     moved = replace(first, position=first.position + np.array([0, 5.0, 5.0]))
     found = vl.discover_from_videos(shot.paths, vl.Rig([moved, *others]), shot.t, degree=2)
+    assert found.status == "suspect"
     assert found.warnings[0].startswith("the rig does not agree with the tracks: ")
     assert "the position (" in found.warnings[0]
     assert "of cameras[0] (Lorenz_1.mov) would explain it best" in found.warnings[0]
@@ -151,9 +151,10 @@ def test_different_frame_rates(shot, tmp_path):
 
 
 def test_a_grey_video(shot, tmp_path):
-    grey = (cv2.cvtColor(f, cv2.COLOR_BGR2GRAY) for f in vl.read_video(shot.paths[0]))
+    frames = islice(vl.read_video(shot.paths[0]), 80)
+    grey = (cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) for frame in frames)
     path = vl.write_video(tmp_path / "grey.mkv", (np.dstack([g] * 3) for g in grey))
-    error = vl.track(path).pixels - shot.tracks[0]
+    error = vl.track(path).pixels - shot.tracks[0][:80]
     assert np.isfinite(error).all(axis=1).mean() > 0.8
     assert np.sqrt(np.nanmean(error**2)) < 0.5
 
@@ -189,7 +190,7 @@ def test_a_video_that_is_cut_off_is_named(shot, cut_off):
 
 def test_a_target_that_never_moves_is_named(shot, tmp_path):
     still = tmp_path / "still.mkv"
-    vl.render_video(still, np.tile([[200.0, 300.0]], (200, 1)), vl.Scene())
+    vl.render_video(still, np.tile([[200.0, 300.0]], (40, 1)), vl.Scene())
     with pytest.raises(ValueError, match="paths: still.mkv must show one moving target, got none"):
         vl.discover_from_videos([still, *shot.paths[1:]], shot.rig)
 

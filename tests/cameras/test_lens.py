@@ -80,6 +80,19 @@ def test_where_the_model_folds_there_is_no_ideal_image():
     np.testing.assert_allclose(distorted(found[:2], coefficients), points[:2], atol=1e-13)
 
 
+@pytest.mark.parametrize(("power", "which"), [(1, 0), (2, 1), (3, 4)])
+def test_every_power_of_the_radius_folds_where_its_image_is_largest(power, which):
+    # With k = -1/(2p + 1) the image of the radius r is r + k r^(2p + 1), largest at r = 1.
+    coefficients = np.zeros(5)
+    coefficients[which] = -1 / (2 * power + 1)
+    largest = 1 - 1 / (2 * power + 1)
+    radii = np.array([0.5, 0.9, 0.999])
+    points = np.outer(radii * (1 + coefficients[which] * radii ** (2 * power)), [0.6, -0.8])
+    found = undistorted(points, coefficients)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), radii, rtol=1e-9)
+    assert np.isnan(undistorted(np.array([[0.0, 1.001 * largest]]), coefficients)).all()
+
+
 def test_principal_point_and_aspect_by_hand():
     camera = OrthographicCamera(
         position=(0, 0, 0), normal=(0, 0, 1), scale=0.5, angle=0.0,

@@ -20,7 +20,7 @@ from vidsindy_lite.cameras import (
     list_lags,
 )
 from vidsindy_lite.cameras import synchronise as synchrony
-from vidsindy_lite.cameras.alignment import Curve
+from vidsindy_lite.cameras.alignment import Curve, Footage
 from vidsindy_lite.cameras.pairs import pair_missed, promising_lags
 from vidsindy_lite.cameras.timing import Timing
 from vidsindy_lite.cameras.triangulate import epipolar_lines
@@ -106,6 +106,16 @@ def test_cubic_motions_are_interpolated_exactly(lag, rate):
     instants = np.arange(20)
     covered = (instants >= lag + 1 / rate) & (instants <= lag + 58 / rate)
     assert shown[covered].all()
+
+
+def test_a_drift_is_counted_from_the_first_instant_to_the_last(motion):
+    """A video that is later by a lag in the middle is so by half of the drift less, then more."""
+    tracks = filmed(motion, (101, 101, 101), (0, 0, 0))
+    footage = Footage.of(tracks).later(np.array([0, 7.5, -3]), np.array([0, 0.4, -1.0]))
+    middle = np.linspace(-0.5, 0.5, 101)  # from the first instant to the last
+    for i, (lag, drift) in enumerate([(0, 0), (7.5, 0.4), (-3, -1.0)]):
+        expected = np.arange(101) - lag - drift * middle
+        np.testing.assert_allclose(footage.frames(i), expected, atol=1e-12)
 
 
 def test_nothing_is_made_up_in_gaps(motion):
@@ -388,7 +398,7 @@ def measured_by_hand(rig, seed):
 @pytest.mark.parametrize("seed", range(2))
 def test_lags_at_half_a_pixel_of_noise(seed):
     lags = (0, 31.4, -22.7)
-    rig, tracks = room(seed, 600, lags)
+    rig, tracks = room(seed, 300, lags)
     for known, limit in ((rig, 0.05), (rig.uncalibrated(), 0.05), (measured_by_hand(rig, 0), 0.3)):
         found = learn_lags(tracks, known)
         assert found.agree

@@ -8,7 +8,7 @@ import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
 from vidsindy_lite.cameras.covariance import fitted_factor, long_run_covariance
-from vidsindy_lite.cameras.uncertainty import systematic_errors, trailing_errors
+from vidsindy_lite.cameras.uncertainty import _of_shape, systematic_errors, trailing_errors
 
 NOISE = 0.05  # pixels
 
@@ -64,6 +64,22 @@ def test_errors_of_cameras_that_saw_one_short_throw_are_not_understated():
         sizes, *_ = np.linalg.lstsq(modes.reshape(len(modes), -1).T, turned.ravel())
         pulls.append(sizes)
     assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < 1.1
+
+
+def test_errors_that_move_or_stretch_the_whole_path_are_left_out():
+    """What is left is what they do to its shape, as large as it was."""
+    x = trajectory(np.random.default_rng(11), 80)
+    x[30] = np.nan
+    seen = np.isfinite(x).all(axis=1)[:, None]
+    bend = np.nan_to_num(np.where(seen, np.sin(x / np.nanstd(x, axis=0)), 0.0))
+    centred = np.where(seen, x - np.nanmean(x, axis=0), 0.0)
+    moves = np.array([0.0, 2.0, -1.0]) * seen, 0.1 * centred
+    frame = np.reshape([*(seen * axis for axis in np.eye(3)), centred], (4, -1)).T
+    sizes, *_ = np.linalg.lstsq(frame, bend.ravel())
+    (found,) = _of_shape(np.array([bend + 3 * moves[0], *moves]), x)
+    expected = bend - (frame @ sizes).reshape(bend.shape)
+    found *= np.sign(np.sum(found * expected))
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_known_cameras_share_no_errors():

@@ -68,6 +68,22 @@ def good(executed_once, tmp_path):
     return TinyRepository(tmp_path / "repository")
 
 
+@pytest.fixture(scope="module")
+def bare_once(tmp_path_factory):
+    """One whose notebook imports nothing, for what does not depend on what a notebook does."""
+    tiny = TinyRepository(tmp_path_factory.mktemp("bare"))
+    tiny.write("01_first", "print(1)")
+    assert runner.run(root=tiny.root).ok
+    return tiny
+
+
+@pytest.fixture
+def bare(bare_once, tmp_path):
+    """A copy of it, to change."""
+    shutil.copytree(bare_once.root, tmp_path / "bare")
+    return TinyRepository(tmp_path / "bare")
+
+
 def test_full_run_writes_into_the_repository(executed_once):
     made = {"fig_1.png", "fig_1.svg", "fig_1.json", "README.md", "run_times.json"}
     made |= {f"table_systems.{suffix}" for suffix in ("csv", "md", "json")}
@@ -165,28 +181,31 @@ def test_what_is_up_to_date_is_kept(good, capsys):
     assert str(report.systems) in str(report)
 
 
-def test_only_what_has_changed_is_executed(good):
-    good.write("02_second", "x = 1")
-    assert executed(runner.run(root=good.root)) == ["02_second"]
-    good.write("02_second", "x = 2")
-    assert executed(runner.run(root=good.root)) == ["02_second"]
-    assert executed(runner.run(root=good.root)) == []
+def test_only_what_has_changed_is_executed(bare):
+    bare.write("02_second", "x = 1")
+    assert executed(runner.run(root=bare.root)) == ["02_second"]
+    bare.write("02_second", "x = 2")
+    assert executed(runner.run(root=bare.root)) == ["02_second"]
+    assert executed(runner.run(root=bare.root)) == []
 
 
-def test_edited_prose_gets_into_the_executed_half(good):
-    path = good.notebooks / "01_first.py"
+def test_edited_prose_gets_into_the_executed_half(bare):
+    path = bare.notebooks / "01_first.py"
     path.write_text(path.read_text().replace("A tiny notebook", "A small notebook"))
-    assert executed(runner.run(root=good.root)) == ["01_first"]
+    assert executed(runner.run(root=bare.root)) == ["01_first"]
     assert "A small notebook" in path.with_suffix(".ipynb").read_text()
 
 
-def test_force_executes_what_is_up_to_date(good):
-    assert executed(runner.run(root=good.root, force=True)) == ["01_first"]
+def test_force_executes_what_is_up_to_date(bare):
+    assert executed(runner.run(root=bare.root, force=True)) == ["01_first"]
 
 
-def test_other_package_or_requirements_are_a_change(good, tmp_path, monkeypatch):
-    (good.root / "requirements.txt").write_text("numpy==1.0\n")
-    assert executed(runner.run(root=good.root)) == ["01_first"]
+def test_other_requirements_are_a_change(bare):
+    (bare.root / "requirements.txt").write_text("numpy==1.0\n")
+    assert executed(runner.run(root=bare.root)) == ["01_first"]
+
+
+def test_another_package_is_a_change(good, tmp_path, monkeypatch):
     package = tmp_path / "elsewhere" / "vidsindy_lite"
     shutil.copytree(repository.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(repository, "PACKAGE", package)
@@ -221,23 +240,23 @@ def test_tampered_notebook_or_record_is_made_again(good):
         assert files(good.root)[name] == before[name]
 
 
-def test_clean_clone_executes_everything(good):
-    shutil.rmtree(good.root / "build")
-    assert executed(runner.run(root=good.root)) == ["01_first"]
+def test_clean_clone_executes_everything(bare):
+    shutil.rmtree(bare.root / "build")
+    assert executed(runner.run(root=bare.root)) == ["01_first"]
 
 
-def test_profiles_and_folders_have_their_own_ledgers(good, tmp_path):
-    assert executed(runner.run(profile="quick", root=good.root)) == ["01_first"]
-    assert executed(runner.run(profile="quick", root=good.root)) == []
-    assert executed(runner.run(output=tmp_path / "other", root=good.root)) == ["01_first"]
-    assert executed(runner.run(root=good.root)) == []
+def test_profiles_and_folders_have_their_own_ledgers(bare, tmp_path):
+    assert executed(runner.run(profile="quick", root=bare.root)) == ["01_first"]
+    assert executed(runner.run(profile="quick", root=bare.root)) == []
+    assert executed(runner.run(output=tmp_path / "other", root=bare.root)) == ["01_first"]
+    assert executed(runner.run(root=bare.root)) == []
 
 
-def test_longest_notebook_begins_first(good, capsys):
-    good.write("02_long", "print(2)")
+def test_longest_notebook_begins_first(bare, capsys):
+    bare.write("02_long", "print(2)")
     for name, seconds in {"01_first": 1, "02_long": 100}.items():
-        registry.record_run_time(good.root / "figures", name, "of an earlier run", seconds)
-    report = runner.run(root=good.root, force=True)
+        registry.record_run_time(bare.root / "figures", name, "of an earlier run", seconds)
+    report = runner.run(root=bare.root, force=True)
     begun = [line.split()[1] for line in capsys.readouterr().out.splitlines() if ": " not in line]
     assert begun == ["02_long", "01_first"]
     assert executed(report) == ["01_first", "02_long"]
@@ -258,19 +277,19 @@ def test_a_damaged_ledger_or_table_of_times_tells_nothing(good, damaged):
     assert registry.load_run_times(good.root / "figures") == {}
 
 
-def test_a_damaged_ledger_or_table_of_times_is_made_again(good):
-    before = files(good.root)
+def test_a_damaged_ledger_or_table_of_times_is_made_again(bare):
+    before = files(bare.root)
     for name in (LEDGER, f"figures/{RUN_TIMES}"):
-        (good.root / name).write_text("{")
-    assert executed(runner.run(root=good.root)) == ["01_first"]
-    assert files(good.root).keys() == before.keys()
-    assert executed(runner.run(root=good.root)) == []
+        (bare.root / name).write_text("{")
+    assert executed(runner.run(root=bare.root)) == ["01_first"]
+    assert files(bare.root).keys() == before.keys()
+    assert executed(runner.run(root=bare.root)) == []
 
 
-def test_failed_notebook_is_not_up_to_date(good):
-    good.write("02_bad", "1 / 0")
+def test_failed_notebook_is_not_up_to_date(bare):
+    bare.write("02_bad", "1 / 0")
     for _ in range(2):
-        first, second = runner.run(root=good.root).outcomes
+        first, second = runner.run(root=bare.root).outcomes
         assert (first.verdict, second.verdict) == ("up to date", "FAILED")
 
 

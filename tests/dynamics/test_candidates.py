@@ -211,6 +211,21 @@ def test_a_degree_is_short_for_a_polynomial_library():
     assert short.equations() == long.equations()
 
 
+@pytest.mark.parametrize("size", [0.5, 4.0])
+def test_functions_in_standard_units_are_those_of_the_data_and_know_their_slopes(size):
+    library = Library.fourier(2) + Library.terms({"|v|v": drag})
+    _, functions = library.resolve(("v", "u"), 2)
+    centre, scale = np.array([0.3, -1.2]), np.array([2.5, 0.4])
+    x = np.random.default_rng(0).normal(size=(30, 2))
+    assert len(functions) == 9
+    for function in functions:
+        ours = function.standardised(centre, scale, size)
+        np.testing.assert_allclose(size * ours.value(x), function.value(centre + scale * x))
+        for i, axis in enumerate(1e-6 * np.eye(2)):
+            slope = (ours.value(x + axis) - ours.value(x - axis)) / 2e-6
+            np.testing.assert_allclose(ours.gradient(x)[:, i], slope, atol=1e-7)
+
+
 def test_a_law_evaluates_differentiates_and_prints():
     library = Library.fourier(2) + Library.terms({"|v|v": drag})
     terms = {"v": {"|v|v": -0.2, "sin(2 v)": 1.0}, "u": {"cos(u)": 2.0}}

@@ -83,6 +83,24 @@ def test_schur_complement_and_gradient_agree_with_dense_algebra(problem, state):
     assert model.fall == pytest.approx((residual**2).sum() - left, rel=1e-6)
 
 
+def test_a_curve_that_nothing_tells_of_has_a_factor(state):
+    # Three samples, more control points, and a law that counts for nothing.
+    t = np.array([0.0, 0.1, 4.0])
+    segments = [Segment.even(t, np.stack([t, t**2], axis=1), 0.5, 0)]
+    none = Collocation.of(segments, monomial_exponents(2, 2), np.ones(2), np.zeros(2))
+    free = replace(state, control_points=np.zeros((none.grid.r, 2)))
+    factor, _ = none.factor(free)
+    assert none.grid.r > len(t)
+    assert np.isfinite(factor).all()
+    assert (factor[0] > 0).all()
+
+
+def test_the_factor_follows_the_unit_of_the_weights(problem, state):
+    factor, _ = problem.factor(state)
+    scaled = problem.weighted(1e-12 * problem.data_weights, 1e-12 * problem.physics_weights)
+    np.testing.assert_allclose(scaled.factor(state)[0], 1e-6 * factor, rtol=1e-6, atol=1e-20)
+
+
 def test_solve_reaches_a_stationary_point(problem, state):
     solved = problem.solve(state, tolerance=1e-9, max_steps=200).state
     assert problem.objective(solved) < problem.objective(state)

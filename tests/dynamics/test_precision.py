@@ -62,6 +62,17 @@ def test_variance_is_that_of_the_errors(kind):
     assert np.corrcoef(np.log(factors), np.log(expected))[0, 1] > 0.85
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+@pytest.mark.parametrize("kind", ["growing", "for a while", "faster"])
+def test_the_unit_of_the_errors_does_not_matter(kind, unit):
+    x, _ = uneven(kind, np.random.default_rng(4))
+    causes = [PATH[:, 0] ** 2, LAW(PATH)[:, 0] ** 2]
+    residual = (x - PATH)[:, 0]
+    ours, others = (weighing._factors(scale * residual, causes) for scale in (1.0, unit))
+    assert np.ptp(ours) > 0.1
+    np.testing.assert_allclose(others, ours, rtol=1e-6)
+
+
 def test_gross_errors_do_no_harm():
     rng = np.random.default_rng(6)
     x = PATH + 0.02 * rng.standard_normal(PATH.shape)

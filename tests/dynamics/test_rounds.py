@@ -27,6 +27,13 @@ def test_a_pendulum_gives_its_length_and_angle():
     assert circle.axes == pytest.approx(np.stack([DOWN, ASIDE]), abs=1e-9)
 
 
+@pytest.mark.parametrize("length", [0.2, 5.0])
+def test_the_length_of_the_direction_of_zero_does_not_matter(length):
+    circle = vl.on_circle(bob(SWING), zero=length * DOWN)
+    assert circle.angle == pytest.approx(SWING, abs=1e-9)
+    assert circle.axes == pytest.approx(np.stack([DOWN, ASIDE]), abs=1e-9)
+
+
 def test_the_errors_cover_in_space():
     rng = np.random.default_rng(0)
     truth, covered = np.array([1.2, 1, 2, 3]), []

@@ -5,6 +5,7 @@ import math
 import os
 import pickle
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -138,6 +139,29 @@ def clone(tmp_path, monkeypatch):
     return Clone(root)
 
 
+TASKS = [[number, 0.0] for number in range(1, 7)]
+
+
+@pytest.fixture(scope="module")
+def swept_once(tmp_path_factory):
+    """A folder with a clone after a sweep, and the results of that."""
+    folder = tmp_path_factory.mktemp("swept")
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("VIDSINDY_CACHE", "VIDSINDY_DASK"):
+            patch.delenv(name, raising=False)
+        root = folder / "clone"
+        root.mkdir()
+        return root, Clone(root).sweep(TASKS)
+
+
+@pytest.fixture
+def swept(swept_once, clone):
+    """A clone that holds the results of a sweep, to change, and these results."""
+    root, results = swept_once
+    shutil.copytree(root, clone.root, dirs_exist_ok=True)
+    return clone, results
+
+
 def wait_for(condition):
     """Poll until a condition holds; fail after a minute."""
     deadline = time.monotonic() + 60
@@ -198,45 +222,43 @@ def test_a_process_has_one_thread(clone):
 
 
 @pytest.mark.parametrize(
-    ("file", "old", "new", "computed"),
+    ("file", "old", "new", "again"),
     [
-        ("vidsindy_lite/toy.py", "power(task.number)", "1 * power(task.number)", [1, 2]),
-        ("vidsindy_lite/powers.py", "number**2", "number * number", [1, 2]),
-        ("vidsindy_lite/unrelated.py", "1", "2", []),
-        ("vidsindy_lite/study/sweeps.py", "if jobs < 1", "if jobs <= 0", []),
-        ("requirements.txt", "2.4.6", "2.4.7", [1, 2]),
-        ("vidsindy_lite/toy.py", "A result with", "Numbers with", []),
+        ("vidsindy_lite/toy.py", "power(task.number)", "1 * power(task.number)", True),
+        ("vidsindy_lite/powers.py", "number**2", "number * number", True),
+        ("vidsindy_lite/unrelated.py", "1", "2", False),
+        ("vidsindy_lite/study/sweeps.py", "if jobs < 1", "if jobs <= 0", False),
+        ("requirements.txt", "2.4.6", "2.4.7", True),
+        ("vidsindy_lite/toy.py", "A result with", "Numbers with", False),
     ],
 )
-def test_other_code_finds_no_results(clone, file, old, new, computed):
-    tasks = [[1, 0.0], [2, 0.0]]
-    results = clone.sweep(tasks)
+def test_other_code_finds_no_results(swept, file, old, new, again):
+    clone, results = swept
     path = clone.root / file
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
-    assert clone.sweep(tasks) == results
-    assert clone.called() == computed
+    assert clone.sweep(TASKS) == results
+    assert clone.called() == [number for number, _ in TASKS if again]
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda content: b"",
-        lambda content: content[:-1],
-        lambda content: content[: len(content) // 2],
-        lambda content: bytes([content[0] ^ 1]) + content[1:],
-        lambda content: content[:40] + bytes([content[40] ^ 1]) + content[41:],
-    ],
-)
-def test_damaged_file_is_computed_again(clone, damage):
-    tasks = [[1, 0.0], [2, 0.0]]
-    results = clone.sweep(tasks)
-    file = clone.stored()[2]
-    whole = file.read_bytes()
-    file.write_bytes(damage(whole))
-    assert clone.sweep(tasks) == results
-    assert clone.called() == [2]
-    assert file.read_bytes() == whole
+DAMAGES = [
+    lambda content: b"",
+    lambda content: content[:-1],
+    lambda content: content[: len(content) // 2],
+    lambda content: bytes([content[0] ^ 1]) + content[1:],
+    lambda content: content[:40] + bytes([content[40] ^ 1]) + content[41:],
+]
+
+
+def test_damaged_files_are_computed_again(swept):
+    clone, results = swept
+    stored = clone.stored()
+    whole = {number: file.read_bytes() for number, file in stored.items()}
+    for number, damage in enumerate(DAMAGES, start=2):  # of the first task nothing is damaged
+        stored[number].write_bytes(damage(whole[number]))
+    assert clone.sweep(TASKS) == results
+    assert clone.called() == [2, 3, 4, 5, 6]
+    assert {number: file.read_bytes() for number, file in stored.items()} == whole
 
 
 def test_error_names_the_task_and_what_was_finished_stays(clone):

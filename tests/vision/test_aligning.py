@@ -29,9 +29,16 @@ def similar(u, v, turn=0.0, scale=1.0):
     return np.array([[c, -s, u], [s, c, v], [0, 0, 1]])
 
 
+def about_the_middle(**change):
+    here = similar((SIZE[0] - 1) / 2, (SIZE[1] - 1) / 2)
+    return here @ similar(0, 0, **change) @ np.linalg.inv(here)
+
+
 @pytest.mark.parametrize(
     ("move", "light"),
     [
+        (about_the_middle(turn=0.06), 1.0),
+        (about_the_middle(scale=1.05), 1.0),
         (similar(0, 0), 1.0),
         (similar(0.7, -0.4), 1.0),
         (similar(-6, 9, 0.01), 1.1),

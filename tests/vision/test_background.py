@@ -166,6 +166,29 @@ def test_the_model_of_a_film(variance):
     assert model.measure(frames[20], truth[20] + 30, 10) is None  # nothing there
 
 
+def test_a_change_is_five_times_the_noise_that_smoothing_leaves():
+    rng = np.random.default_rng(0)
+    frames = np.clip(rng.normal(128, 30, (21, 96, 128, 3)), 0, 255).astype(np.uint8)
+    model = BackgroundModel(frames)
+    left = cv2.GaussianBlur(rng.normal(0, model.noise, (200, 200)), (0, 0), model.blur).std()
+    assert model.noise == pytest.approx(30, rel=0.1)
+    assert model.floor == pytest.approx(5 * left, rel=0.1)
+
+
+def test_an_outline_is_as_soft_as_its_blur_whatever_its_length():
+    truth = np.column_stack([np.linspace(20, 108, 45), 48 + 20 * np.sin(np.arange(45) / 5)])
+
+    def softness(size, blur):
+        frames = render(truth, Scene("bricks", size=size, image_size=SIZE), 1)
+        frames = np.array([cv2.GaussianBlur(f, (0, 0), blur) if blur else f for f in frames])
+        return np.median([blob.softness for blob in track_blobs(learned(frames[::2]), frames)])
+
+    sharp = softness(12, 0)
+    assert softness(24, 0) == pytest.approx(sharp, rel=0.2)
+    assert softness(24, 1.5) == pytest.approx(softness(12, 1.5), rel=0.3)
+    assert softness(24, 1.5) > 2 * sharp
+
+
 def test_a_target_cut_off_by_the_window_or_the_image():
     truth = np.column_stack([np.linspace(0, 108, 45), np.full(45, 48.0)])
     frames = list(render(truth, Scene("sea", size=16, image_size=SIZE), 1))

@@ -1,5 +1,6 @@
 """The tracker for films that people make: phone footage with known truth, hints, real clips."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,8 +14,9 @@ from vidsindy_lite.vision.candidates import Candidate, Plate, reduce, tolerance
 from vidsindy_lite.vision.hints import load_hints
 from vidsindy_lite.vision.lingering import lingering, uncover
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.refining import fitting, scatter
-from vidsindy_lite.vision.steadying import Steadying, carry, stands_still
+from vidsindy_lite.vision.moving import rate
+from vidsindy_lite.vision.refining import _nearest, fitting, scatter
+from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, stands_still
 
 REAL = Path(vidsindy_lite.__file__).parents[2] / "shared" / "real"
 SMALL = {"image_size": (320, 240), "frames": 60}
@@ -128,6 +130,78 @@ def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
     np.testing.assert_array_equal(seen.which[rows], 0)
     assert value > 15
     assert best_path(seen.only(np.zeros(0, int)))[1] == 0
+
+
+def one_a_frame(places, qualities):
+    """One candidate in each frame, all alike but for their places and qualities."""
+    places = np.asarray(places, float)
+    found = [
+        [Candidate(place, np.array([*place - 4, 9, 9]), 60.0, np.array([30.0, 30, 200]), quality)]
+        for place, quality in zip(places, qualities, strict=True)
+    ]
+    return Sightings.of(found, list(places[:, None]), 1000.0)
+
+
+def test_a_path_ends_where_nothing_that_follows_is_worth_it():
+    places = np.column_stack([10 + 5 * np.arange(20), np.full(20, 50)])
+    for low, last in ((0.1, 11), (0.2, 19)):  # a candidate below a quality of .15 has no worth
+        rows, value = best_path(one_a_frame(places, np.where(np.arange(20) < 12, 0.9, low)))
+        assert rows[-1] == last
+        assert value == pytest.approx(12 * 0.75 + (last - 11) * 0.05, abs=0.1)
+
+
+def test_the_faster_a_target_the_further_it_may_turn():
+    def price(step, turn):
+        places = np.column_stack([50 + step * np.arange(20), np.full(20, 100.0)])
+        straight = best_path(one_a_frame(places, np.full(20, 0.9)))[1]
+        places[10:, 1] += turn
+        rows, value = best_path(one_a_frame(places, np.full(20, 0.9)))
+        assert len(rows) == 20
+        return straight - value
+
+    assert price(40, 12) < 0.6
+    assert price(2, 12) > 1
+
+
+def test_what_travels_and_stays_what_it_is_is_plainest():
+    frames = np.arange(30)
+    rng = np.random.default_rng(0)
+    places = np.column_stack([5.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    plain = one_a_frame(places, np.full(30, 0.9))
+    flickering = plain.colour + 40 * rng.normal(size=(30, 1))
+    trembling = places + rng.normal(0, 6, places.shape)
+    others = [
+        replace(plain, colour=flickering),
+        replace(plain, centre=trembling),
+        replace(plain, size=20 * plain.size),  # of a part of something large
+        replace(plain, centre=places[:1] + 0.1 * (places - places[:1])),  # hardly travels
+    ]
+    best, *ratings = [rate(seen, frames, 20.0) for seen in (plain, *others)]
+    assert 0 < min(ratings) < max(ratings) < 0.6 * best < 12
+
+
+@pytest.mark.parametrize(("top", "area"), [(28, 100), (30, 56)])
+def test_of_several_parts_the_largest_for_its_distance_is_taken(top, area):
+    # 100 pixels count half where they are as far away as their side and two pixels more.
+    mask = np.zeros((60, 60), bool)
+    mask[20:27, 19:27] = True
+    mask[top : top + 10, 18:28] = True
+    assert _nearest(mask, np.array([22.5, 23.0])).sum() == area
+
+
+def test_relief_is_by_how_much_brighter_than_around_in_any_light():
+    cloud = np.random.default_rng(0).normal(size=(120, 160, 1)).astype(np.float32)
+    cloud = np.tile(cv2.GaussianBlur(cloud, (0, 0), 3)[..., None], 3)
+    cloud /= 30 * cloud.std()
+
+    def relief(light, contrast):
+        seen = np.rint(light * (1 + contrast * cloud)).astype(np.uint8)
+        return _Relief.of(seen).fine.astype(float) - 128
+
+    plain = relief(200, 1)
+    assert np.corrcoef(plain.ravel(), cloud[..., 0].ravel())[0, 1] > 0.8
+    np.testing.assert_allclose(relief(200, 2).std(), 2 * plain.std(), rtol=0.1)
+    np.testing.assert_allclose(relief(140, 1).std(), plain.std(), rtol=0.2)
 
 
 def test_partial_views_and_jumps_are_left_out():

@@ -80,3 +80,12 @@ def test_training_frames_look_as_they_did():
     mean, spread = ([stat(frame) for frame in frames] for stat in (np.mean, np.std))
     np.testing.assert_allclose(mean, numbers(FRAMES[0]), atol=1)
     np.testing.assert_allclose(spread, numbers(FRAMES[1]), atol=1)
+
+
+def test_joints_part_all_bricks():
+    """A pale line of three pixels above each course, and before each brick of it."""
+    image = scenery.BACKGROUNDS["bricks"](np.random.default_rng(7), (256, 192)).astype(int)
+    red = image[..., 2] - image[..., 0] > 30
+    rows, columns = np.mgrid[:192, :256]
+    shifts = 32 * (rows // 32 % 2)  # every second course begins half a brick on
+    np.testing.assert_array_equal(red, (rows % 32 >= 3) & ((columns + shifts) % 64 >= 3))

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision import Scene, render_video, track_targets
+from vidsindy_lite.vision.moving import Ways
+from vidsindy_lite.vision.several import _touching
 
 FRAMES, SIZE = 160, 16.0
 
@@ -58,6 +60,18 @@ def test_a_third_thing_that_moves_is_told(tmp_path):
     found = track_targets(filmed(tmp_path, [*crossing(0), third]), 2)
     assert any("one thing more moves than there are targets" in one.warnings[0] for one in found
                if one.warnings)  # fmt: skip
+
+
+@pytest.mark.parametrize(("sizes", "least"), [((16, 16), 22.8), ((4, 8), 9.8)])
+def test_targets_touch_within_their_sizes_and_a_little(sizes, least):
+    # Their mean size, a third of it more for what a centre may be off, and two pixels of blur.
+    apart = np.array([least - 0.1, least + 0.1, np.nan])
+    ways = []
+    for u, size in zip((0 * apart, apart), sizes, strict=True):
+        centre = np.column_stack([u, 0 * apart])
+        ways.append(Ways(centre, np.full((3, 4), size), np.zeros((3, 3))))
+    for found in _touching(ways):
+        assert found.tolist() == [True, False, False]
 
 
 @pytest.mark.parametrize("count", [0, 1.5, True])
