@@ -12,7 +12,6 @@ from helpers import TinyRepository
 from hypothesis import settings
 
 from vidsindy_lite import observation
-from vidsindy_lite.study.systems import Benchmark
 
 # The same examples in every run, so that a red test stays red; no deadline on a busy machine.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -26,23 +25,6 @@ def pytest_collection_modifyitems(items):
         for mark in ("notebooks", "slow")
     ]
     items.sort(key=lambda item: [-count[item.path] for count in marked])
-
-
-@pytest.fixture(scope="session", autouse=True)
-def simulated_once():
-    """Follows each benchmark system once, however many tests begin with so many of its frames."""
-    paths, trajectory = {}, Benchmark.trajectory
-
-    def remembered(system, *arguments, **options):
-        law = system.exponents.tobytes(), system.coefficients.tobytes()
-        key = *law, system.x0, system.period, repr((arguments, options))
-        if key not in paths:
-            paths[key] = trajectory(system, *arguments, **options)
-        return tuple(part.copy() for part in paths[key])
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Benchmark, "trajectory", remembered)
-        yield
 
 
 @pytest.fixture(scope="module")
