@@ -2,7 +2,8 @@
 
 A cubic imitates a sine, the drag of air or the pull of a planet on the path that was recorded, and
 nowhere else. What it leaves is small but follows the state, so that terms of the next two degrees
-explain it: Rao's score test, of all of them together and of the best of them.
+explain it: Rao's score test, of all of them together and of the best of them. And where noise hides
+what it leaves, a law with one of them may fit as well.
 """
 
 from __future__ import annotations

@@ -418,7 +418,8 @@ class Collocation:
                 continue
             miss = abs(value - trial_value - promise)
             state, value = trial, trial_value
-            if fraction == 1.0 and damping == 0.0 and miss**2 < FAITHFUL * tolerance * promise:
+            faithful = miss * miss < FAITHFUL * tolerance * promise  # a power may overflow
+            if fraction == 1.0 and damping == 0.0 and faithful:
                 return Fit(state, self, Status.CONVERGED)
             damping = damping / 10 if damping > 1e-8 else 0.0
         near = damping == 0.0 and promise < NEARLY
