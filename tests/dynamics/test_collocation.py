@@ -202,3 +202,9 @@ def test_a_sample_twice_is_one_of_double_precision(problem, state):
     first, second = (one.linearise(state, columns) for one in (twice, once))
     np.testing.assert_allclose(first.information, second.information, rtol=1e-9, atol=1e-9)
     assert twice.objective(state) == pytest.approx(once.objective(state), rel=1e-9)
+
+
+def test_an_absurd_start_is_no_error(problem, state):
+    """Where no law can be seen, a law that crosses a gap may leave all bounds."""
+    far = replace(state, control_points=1e60 * state.control_points)
+    assert problem.objective(problem.solve(far).state) < problem.objective(far)
