@@ -139,8 +139,8 @@ def plot_histories(
     for frame, terms in true_terms.items():
         panels[2].axhline(terms, color="k", lw=0.8, ls=":")
         panels[2].annotate(
-            f"truth, {frame}", (1, terms), xycoords=("axes fraction", "data"), fontsize=9,
-            ha="right", va="center", bbox=_WHITE,
+            f"truth, {frame}", (0.01, terms), xycoords=("axes fraction", "data"), fontsize=9,
+            ha="left", va="center", bbox=_WHITE,  # where no optimiser has come that far
         )  # fmt: skip
     panels[2].set_yticks(ticks, [str(tick) for tick in ticks])
     panels[2].minorticks_off()
