@@ -87,12 +87,16 @@ def test_a_meeting_that_one_view_alone_does_not_see_costs_its_frames_only():
         np.testing.assert_allclose(told.tracks[i][seen], expected[seen])
 
 
-def test_behind_a_gap_in_all_views_a_target_goes_on_smoothly():
-    rng = np.random.default_rng(4)
-    rig = room(rng)
+def two_walks(seed):
+    """A room, two targets in its views, (n, 2, 2) each, and copies of these to change."""
+    rig = room(np.random.default_rng(seed))
     paths = [walk(np.arange(FRAMES)), walk(np.arange(FRAMES) + 700)]
     views = [np.stack([camera.project(x) for x in paths], axis=1) for camera in rig.cameras]
-    tracks = [view.copy() for view in views]
+    return rig, views, [view.copy() for view in views]
+
+
+def test_behind_a_gap_in_all_views_a_target_goes_on_smoothly():
+    rig, views, tracks = two_walks(4)
     for track in tracks:
         track[120:] = track[120:, ::-1]
         track[117:123] = np.nan
@@ -102,11 +106,7 @@ def test_behind_a_gap_in_all_views_a_target_goes_on_smoothly():
 
 
 def test_a_view_may_be_blind_between_two_gaps_in_all_views():
-    rng = np.random.default_rng(8)
-    rig = room(rng)
-    paths = [walk(np.arange(FRAMES)), walk(np.arange(FRAMES) + 700)]
-    views = [np.stack([camera.project(x) for x in paths], axis=1) for camera in rig.cameras]
-    tracks = [view.copy() for view in views]
+    rig, views, tracks = two_walks(8)
     for track in tracks:
         track[100:140] = track[100:140, ::-1]
         for gap in (slice(97, 103), slice(137, 143)):

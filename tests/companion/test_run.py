@@ -61,11 +61,15 @@ def executed_once(tmp_path_factory):
     return tiny
 
 
+def copied(tiny, folder):
+    shutil.copytree(tiny.root, folder)
+    return TinyRepository(folder)
+
+
 @pytest.fixture
 def good(executed_once, tmp_path):
     """A copy of it, to change."""
-    shutil.copytree(executed_once.root, tmp_path / "repository")
-    return TinyRepository(tmp_path / "repository")
+    return copied(executed_once, tmp_path / "repository")
 
 
 @pytest.fixture(scope="module")
@@ -80,8 +84,7 @@ def bare_once(tmp_path_factory):
 @pytest.fixture
 def bare(bare_once, tmp_path):
     """A copy of it, to change."""
-    shutil.copytree(bare_once.root, tmp_path / "bare")
-    return TinyRepository(tmp_path / "bare")
+    return copied(bare_once, tmp_path / "bare")
 
 
 def test_full_run_writes_into_the_repository(executed_once):
