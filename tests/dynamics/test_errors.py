@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from vidsindy_lite.dynamics.errors import inflation, prediction_gain, rough, time_inflation
+from vidsindy_lite.dynamics.errors import (
+    has_period,
+    inflation,
+    passing,
+    prediction_gain,
+    time_inflation,
+)
 
 
 def lasting(n, correlation, rng):
@@ -67,7 +73,9 @@ def fit_with(residual, precision=1.0):
         segments=[SimpleNamespace(t=np.arange(n))],
         d=d,
     )
-    state = SimpleNamespace(control_points=None, moving=np.zeros(d, dtype=bool))
+    state = SimpleNamespace(
+        control_points=None, moving=np.zeros(d, dtype=bool), free=lambda: np.zeros(d, dtype=bool)
+    )
     return SimpleNamespace(collocation=data, state=state)
 
 
@@ -97,14 +105,25 @@ def test_what_uneven_errors_foretell_is_counted_in_their_own_sizes():
     assert prediction_gain(fit_with(error))[0] > 0.2 * weighed  # the large ones hide the others
 
 
-def test_errors_are_rough_if_the_last_alone_foretells_them():
-    rng = np.random.default_rng(8)
+def test_errors_pass_that_are_forgotten_and_have_no_period():
+    rng, t = np.random.default_rng(8), np.arange(1500)
     white, slow = rng.standard_normal(1500), lasting(1500, 0.9, rng)
+    drift = lasting(1500, 0.99, rng)
     averaged = np.convolve(rng.standard_normal(1508), np.ones(9) / 3, "valid")
-    missed = np.sin(np.arange(1500) / 7 + np.sin(np.arange(1500) / 31)) + 0.3 * white
-    errors = np.stack([slow, white, averaged, missed, np.zeros(1500)], axis=1)
-    assert rough(fit_with(errors)).tolist() == [True, False, False, False, False]
-    assert rough(fit_with(errors[:, [0, 4]])).tolist() == [True, True]  # the second was not seen
+    missed = np.sin(t / 7) + 0.3 * white
+    errors = np.stack([white, slow, averaged, drift, missed, np.zeros(1500)], axis=1)
+    assert passing(fit_with(errors), 56).tolist() == [True, True, True, False, False, False]
+    assert passing(fit_with(errors[:, [1, 5]]), 56).tolist() == [True, True]  # the 2nd was not seen
+    assert not passing(fit_with(errors[:, :3]), 1500).any()  # so many terms these cannot judge
+
+
+def test_a_period_is_seen_in_what_chance_does_not_make():
+    rng, t = np.random.default_rng(10), np.arange(400)
+    assert not any(has_period(rng.standard_normal(400), 1.0) for _ in range(100))
+    assert not any(has_period(lasting(400, 0.9, rng), 1 / 19) for _ in range(100))
+    assert has_period(np.sin(t / 5) + rng.standard_normal(400), 1.0)
+    assert not has_period(np.sin(t / 5), 1 / 400)  # a single error has no period
+    assert not has_period(np.zeros(400), 1.0)
 
 
 def test_errors_of_time_are_along_the_path():

@@ -9,7 +9,7 @@ from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics import precision as weighing
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.problem import pose
+from vidsindy_lite.dynamics.posing import pose
 
 LAW = PolynomialSystem.from_terms(
     {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3

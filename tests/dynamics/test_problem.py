@@ -10,7 +10,8 @@ from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.errors import residual_noise
 from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.problem import GAP, NARROW, OFFSET_PENALTY, WIDE, fit_curves, pose
+from vidsindy_lite.dynamics.posing import GAP, pose
+from vidsindy_lite.dynamics.problem import NARROW, OFFSET_PENALTY, WIDE, fit_curves
 from vidsindy_lite.dynamics.search import _as_shifted, _candidate, _closed, _variants
 from vidsindy_lite.dynamics.state import State
 

@@ -8,7 +8,8 @@ from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, Status
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.history import History
-from vidsindy_lite.dynamics.problem import fit_curves, pose
+from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics.problem import fit_curves
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=2)
 

@@ -13,7 +13,8 @@ from vidsindy_lite.dynamics.discovery import History
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.library import shift_matrix
 from vidsindy_lite.dynamics.order import accelerated, better, unexplained
-from vidsindy_lite.dynamics.problem import fit_curves, pose
+from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics.problem import fit_curves
 from vidsindy_lite.dynamics.search import FINAL_WEIGHT, away, leave_home, select
 from vidsindy_lite.dynamics.smoothing import smooth
 from vidsindy_lite.dynamics.solver import discover

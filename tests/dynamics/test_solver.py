@@ -11,7 +11,8 @@ from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.problem import pose, term_penalties
+from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics.problem import term_penalties
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
 

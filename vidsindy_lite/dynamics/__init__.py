@@ -1,6 +1,7 @@
 """A trajectory goes in, its law comes out.
 
-trajectories -> problem (smoothing: noise, gaps, units; form: order, candidates, what is known)
+trajectories -> posing -> problem (smoothing: noise, gaps, units; form: order, candidates, what is
+known)
 -> solver -> discovery (diagnostics)
 solver: `discover`; its stages (search, then polish and settle) use collocation on splines,
 selection of terms, origin, gaps, errors that last, precision (whom to trust how far),

@@ -123,17 +123,39 @@ class Wider:
     further: Ints
     prices: Floats
 
+    @property
+    def columns(self) -> Ints:
+        """Places of all candidates and further terms."""
+        return np.sort(np.concatenate([self.searched, self.further]))
+
     @cached_property
     def model(self) -> Linearisation:
         """The quadratic model around the fit, in all candidates and moving axes."""
         axes = self.law.coefficients.size + np.flatnonzero(self.state.moving)
-        columns = np.sort(np.concatenate([self.searched, self.further]))
-        return self.collocation.linearise(self.state, np.concatenate([columns, axes]))
+        return self.collocation.linearise(self.state, np.concatenate([self.columns, axes]))
 
     @property
     def candidates(self) -> Linearisation:
         """The same with the axes as they are: the same law in another frame would count."""
-        return self.model.of(np.sort(np.concatenate([self.searched, self.further])))
+        return self.model.of(self.columns)
+
+    @cached_property
+    def beyond(self) -> Beyond:
+        """The score test of the terms that the law has not."""
+        own = np.flatnonzero(self.state.free())
+        others = np.concatenate([self.further, np.setdiff1d(self.searched, own)])
+        model = self.model.of(np.concatenate([own, others]))
+        estimate, variance = newcomers(model.information, model.gradient, len(own))
+        single = estimate**2 / variance
+        model = self.model.of(np.concatenate([own, self.further]))
+        return Beyond(
+            gain=float(model.newton()[1] - model.fall),
+            count=len(self.further),
+            best=float(single.max(initial=0.0)),
+            tried=len(others),
+            left=float(self.collocation.objective(self.state)),
+            term=place(self.law, int(others[single.argmax()])) if len(others) else "",
+        )
 
 
 def widened(problem: Problem, fit: Fit) -> Wider:
@@ -166,24 +188,6 @@ def widened(problem: Problem, fit: Fit) -> Wider:
         searched=places[:, :size].ravel()[form.searched],
         further=places[equations, size:].ravel(),
         prices=np.tile(term_penalties(exponents, problem.measured[0][1].shape[1]), d),
-    )
-
-
-def beyond(wider: Wider) -> Beyond:
-    """The score test of the terms beyond a library, at the last fit."""
-    own, further = np.flatnonzero(wider.state.free()), wider.further
-    others = np.concatenate([further, np.setdiff1d(wider.searched, own)])
-    model = wider.model.of(np.concatenate([own, others]))
-    estimate, variance = newcomers(model.information, model.gradient, len(own))
-    single = estimate**2 / variance
-    model = wider.model.of(np.concatenate([own, further]))
-    return Beyond(
-        gain=float(model.newton()[1] - model.fall),
-        count=len(further),
-        best=float(single.max(initial=0.0)),
-        tried=len(others),
-        left=float(wider.collocation.objective(wider.state)),
-        term=place(wider.law, int(others[single.argmax()])) if len(others) else "",
     )
 
 
@@ -230,7 +234,7 @@ def beyond_the_library(wider: Wider, noisy: bool) -> Iterator[str]:
     or the few that a single coordinate has, explain nearly all of them. What is ``noisy`` has
     errors of single samples.
     """
-    found = beyond(wider)
+    found = wider.beyond
     if found.decisive or (noisy and found.significant):
         yield (
             f"terms that the law has not explain what it leaves ({found.term}: chi-square "

@@ -428,7 +428,9 @@ class Collocation:
 
 def _without_systematic(gram: Floats, solved: Floats, size: int) -> tuple[Floats, Floats]:
     """Eliminate the sizes of the systematic errors, which go with the law as the curve does."""
-    shared = slice(size, gram.shape[0])
+    if len(gram) == size:
+        return gram, solved
+    shared = slice(size, len(gram))
     response = np.linalg.solve(gram[shared, shared], gram[shared])
     left = (gram - gram[:, shared] @ response)[:size, :size]
     return left, (solved - solved[:, :, shared] @ response)[:, :, :size]

@@ -14,9 +14,9 @@ from scipy.stats import chi2
 from ..arrays import Floats
 from .beyond import Wider, beyond_the_library, place, widened
 from .collocation import CLEANEST, Fit, Linearisation, Status
-from .errors import effective_noise, residual_noise, rough
+from .errors import passing, residual_noise
 from .library import shift_generators, shift_matrix
-from .persistence import SMOOTH, Path
+from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import Problem
 from .search import away
@@ -89,15 +89,16 @@ def diagnose(
         By how much the criterion rises if a term of this law is taken out or put back, equation
         by equation.
     """
+    wider = widened(problem, fit)
     return (
         *outliers(problem.measured),
         *_shape(problem, fit),
-        *_misfit(problem, fit),
+        *_misfit(problem, fit, wider),
         *_doubtful_sigma(problem, fit),
         *_unfinished(fit),
         *_unmet(problem, fit),
         *_another_in_the_data(problem, fit, law),
-        *_selection(problem, fit, model, path, law),
+        *_selection(problem, fit, model, wider, path, law),
         *_sampling(problem),
         *_standstill(law),
         *_narrow(law, margins),
@@ -163,15 +164,16 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
     yield from tied(problem.form.names[:states], x[:, :states])
 
 
-def _misfit(problem: Problem, fit: Fit) -> Iterator[str]:
+def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     residual = residual_noise(fit)
-    # A curve without a law follows errors that last: no misfit if rough, but large ones hide terms.
-    harmless = rough(fit) & (effective_noise(fit) < SMOOTH)
-    doubtful = (residual > RESOLVED) & ~harmless
-    ratio = np.where(doubtful, residual / problem.noise, 0.0)
-    j = int(ratio.argmax())
-    told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
-    if not ratio[j] < MISFIT:
+    ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
+    misses = ~(ratio < MISFIT)
+    # A curve without a law follows errors that last, too: they are no misfit.
+    if misses.any() and wider.beyond.count and not wider.beyond.significant:
+        misses &= ~passing(fit, len(wider.law.terms))
+    if misses.any():
+        j = int(np.where(misses, ratio, 0.0).argmax())
+        told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
         yield (
             f"the curve misses the data of {problem.form.names[j]} by {ratio[j]:.1f} times "
             f"{told}: the law may lie outside the library (raise the "
@@ -218,14 +220,18 @@ def _another_in_the_data(problem: Problem, fit: Fit, law: PolynomialSystem) -> I
 
 
 def _selection(
-    problem: Problem, fit: Fit, model: Linearisation, path: Path, law: PolynomialSystem
+    problem: Problem,
+    fit: Fit,
+    model: Linearisation,
+    wider: Wider,
+    path: Path,
+    law: PolynomialSystem,
 ) -> Iterator[str]:
     yield from _contested(problem.law(fit.state), fit.state, path)
     clean = (fit.collocation.data_weights**-0.5 <= CLEANEST).all()
     if clean and not problem.kicked:
         return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
-    wider = widened(problem, fit)
     yield from beyond_the_library(wider, noisy=not tolerant)
     if tolerant:
         return  # weaker errors than those tolerated say nothing about the law

@@ -15,8 +15,8 @@ ORDER = 40
 """Most errors that foretell the next."""
 LEAST = 1e-300
 """Keeps a quotient finite where nothing moves or is left."""
-LIKELY = 10.0
-"""Gain of the criterion from which on more errors than the last foretell the next."""
+UNLIKELY = 1e-3
+"""Probability below which a period of the errors is no chance."""
 
 
 def residual_noise(fit: Fit) -> Floats:
@@ -118,33 +118,45 @@ def prediction_gain(fit: Fit) -> Floats:
     Minus twice the log likelihood of an autoregressive model of the residual over that of white
     noise (Levinson's recursion; its order by the Bayesian information criterion).
     """
-    return _autoregressions(fit).min(axis=0)
-
-
-def rough(fit: Fit) -> Bools:
-    """Which errors depend on the one before and on no others, (d,).
-
-    An autoregression of first order is nowhere smooth, as the drift of a sensor. What a law misses,
-    or a filter leaves, is smooth: the errors before the last foretell it, too. Of a coordinate that
-    was never observed, what is true of all others.
-    """
-    gains, seen = _autoregressions(fit), fit.collocation.counts > 0
-    first = gains[1] if len(gains) > 1 else gains[0]
-    alone = (first < -LIKELY) & (first < gains.min(axis=0) + LIKELY)
-    return np.where(seen, alone, alone[seen].all())
-
-
-def _autoregressions(fit: Fit) -> Floats:
-    """Gain of predicting each error by those before it, for every number of these, (orders, d)."""
     errors = [np.concatenate(pieces) for pieces in _errors_seen(fit)]
     fewest = min((len(e) for e in errors if len(e)), default=0)
     lags = range(min(ORDER, fewest // 10) + 1)
     covariances = [np.array([e[k:] @ e[: len(e) - k] for k in lags]) for e in errors]
     sizes = map(len, errors)
-    return np.stack([_levinson(c, n) for c, n in zip(covariances, sizes, strict=True)], axis=1)
+    return np.array([_levinson(c, n).min() for c, n in zip(covariances, sizes, strict=True)])
+
+
+def passing(fit: Fit, tried: int) -> Bools:
+    """Which errors last but are none that the motion brings along, (d,).
+
+    What a law misses comes back with the motion: few such errors are independent, or they have a
+    period. More than are ``tried`` as further terms must be independent, so that those could tell.
+    Of a coordinate that was never observed, what is true of all others.
+    """
+    pieces, seen = _errors_seen(fit), fit.collocation.counts > 0
+    shares = (residual_noise(fit) / effective_noise(fit)) ** 2
+    paired = zip(pieces, shares.tolist(), strict=True)
+    period = np.array([has_period(max(here, key=len), share) for here, share in paired])
+    alone = (fit.collocation.counts * shares > tried) & ~period
+    return np.where(seen, alone, alone[seen].all())
+
+
+def has_period(errors: Floats, independent: float) -> bool:
+    """Whether one frequency has more of some errors, (n,), than chance gives to any.
+
+    Fisher's test (1929) of the largest ordinate of a periodogram, of as many as there are pairs of
+    errors of which a share is ``independent``.
+    """
+    ordinates = independent * len(errors) / 2
+    if ordinates <= 1 or not errors.any():
+        return False
+    powers = np.abs(np.fft.rfft(errors)[1:]) ** 2
+    others = 1 - powers.max() / powers.sum()
+    return bool(ordinates * others ** (ordinates - 1) < UNLIKELY)
 
 
 def _levinson(covariance: Floats, n: int) -> Floats:
+    """The gain for every number of errors that foretell the next."""
     gains = np.zeros(len(covariance))
     if not covariance[0] > 0:
         return gains  # of what was never observed

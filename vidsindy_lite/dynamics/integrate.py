@@ -161,7 +161,8 @@ def _step(
     moved = x + step * np.add.reduce(WEIGHTS * slopes)
     scale = tolerance * (1 + np.maximum(np.abs(x), np.abs(moved)))
     third, fifth = (
-        float((((weights * slopes).sum(axis=0) / scale) ** 2).sum()) for weights in (THIRD, FIFTH)
+        float(np.add.reduce((np.add.reduce(weights * slopes) / scale) ** 2))
+        for weights in (THIRD, FIFTH)
     )
     if fifth == 0:
         return moved, 0.0

@@ -28,8 +28,9 @@ from .form import Form
 from .history import History
 from .order import accelerated, better, check_order
 from .persistence import Path, Plateau, follow, typical
+from .posing import pose
 from .precision import foreseen, with_precision
-from .problem import Problem, fit_curves, pose
+from .problem import Problem, fit_curves
 from .process_noise import rebalanced, with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, leave_home, search
 from .selection import inverse
