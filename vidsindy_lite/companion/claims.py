@@ -8,6 +8,7 @@ figure or table with its numbers; a path is a page of docs/, or a test as pytest
 import ast
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import jupytext
@@ -79,15 +80,17 @@ def _check(name: str, page: Path) -> str:
 
 def _assertion(part: str, notebook: Path) -> str:
     """The assertion of a notebook that holds a piece of code, in one line; empty if none does."""
-    for cell in jupytext.read(notebook).cells:
-        if cell.cell_type == "code":
-            for node in ast.walk(ast.parse(cell.source)):
-                source = ast.get_source_segment(cell.source, node) if _asserts(node) else ""
-                line = " ".join((source or "").split())
-                if part in line:
-                    return line.removeprefix("assert ")
-    return ""
+    found = (line for line in _assertions(notebook.read_text("utf-8")) if part in line)
+    return next(found, "").removeprefix("assert ")
 
 
-def _asserts(node: ast.AST) -> bool:
-    return isinstance(node, ast.Assert)
+@lru_cache(maxsize=32)  # many claims look into one notebook
+def _assertions(notebook: str) -> list[str]:
+    """All assertions of a notebook's source half, in one line each."""
+    cells = [c.source for c in jupytext.reads(notebook, "py:percent").cells if c.cell_type == "code"]
+    return [
+        " ".join((ast.get_source_segment(source, node) or "").split())
+        for source in cells
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Assert)
+    ]
