@@ -223,7 +223,7 @@ def test_figures_are_complete_and_of_this_code():
 
 
 @pytest.fixture(scope="module")
-def quick(tmp_path_factory):
+def quick(tmp_path_factory, undisplayed):
     """Where all quick runs go, one after the other, so that one may read another's tables.
 
     Every track and trajectory is disturbed by a relative 1e-9, see `test_disturbed`, and the tables
