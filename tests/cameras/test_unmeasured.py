@@ -203,7 +203,7 @@ def test_what_is_no_rig_of_lenses():
 
 
 def test_of_exact_tracks_some_start_is_exact():
-    """What two cameras see tells where any other one stands; seen from far away, it is only near."""
+    """What two cameras see tells where any other one stands; as if from far away, only about."""
     rng = np.random.default_rng(9)
     rig = room(rng, 4)
     starts = unmeasured._starts(filmed(rng, rig, noise=0.0), lenses(rng, rig, off=0.0))

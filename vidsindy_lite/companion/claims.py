@@ -8,10 +8,11 @@ figure or table with its numbers; a path is a page of docs/, or a test as pytest
 import ast
 import re
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import jupytext
+from nbformat import NotebookNode
 
 BY = re.compile(r"\s*<!-- by: (.*?) -->", re.DOTALL)
 # What a notebook claims: the items and the answers to the paper under these headings.
@@ -43,7 +44,7 @@ def claims_of(page: Path) -> list[Claim]:
     if page.suffix == ".md":
         items = [item for item in ITEM.split(page.read_text("utf-8")) if BY.search(item)]
     else:
-        cells = [c.source for c in jupytext.read(page).cells if c.cell_type == "markdown"]
+        cells = _cells(page.read_text("utf-8"), "markdown")
         said = "".join(CLAIMING.findall("\n\n".join(cells)))
         items = [item for item in ITEM.split(said) if item.startswith(("* ", "**What the paper"))]
         items = [item for item in items if not item.rstrip().endswith("what we found.**")]
@@ -84,13 +85,23 @@ def _assertion(part: str, notebook: Path) -> str:
     return next(found, "").removeprefix("assert ")
 
 
-@lru_cache(maxsize=32)  # many claims look into one notebook
+@cache  # many claims look into one notebook
 def _assertions(notebook: str) -> list[str]:
     """All assertions of a notebook's source half, in one line each."""
-    cells = [c.source for c in jupytext.reads(notebook, "py:percent").cells if c.cell_type == "code"]
     return [
         " ".join((ast.get_source_segment(source, node) or "").split())
-        for source in cells
+        for source in _cells(notebook, "code")
         for node in ast.walk(ast.parse(source))
         if isinstance(node, ast.Assert)
     ]
+
+
+def _cells(notebook: str, kind: str) -> list[str]:
+    """The sources of the cells of one kind."""
+    return [cell.source for cell in _read(notebook).cells if cell.cell_type == kind]
+
+
+@cache
+def _read(notebook: str) -> NotebookNode:
+    """A notebook from its source half."""
+    return jupytext.reads(notebook, "py:percent")
