@@ -3,6 +3,7 @@
 import os
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 # Before numpy is imported: results then do not depend on the number of cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -32,6 +33,16 @@ def tracked_once():
     """Tracks each video file once, however many tests of a module discover from it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(observation, "track", cache(observation.track))
+        yield
+
+
+@pytest.fixture(scope="module")
+def undisplayed():
+    """Notebooks draw their figures on no paper, see `disturbed/undisplayed.py`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MPLBACKEND", "module://undisplayed")
+        folder = Path(__file__).parent / "disturbed"
+        patch.setenv("PYTHONPATH", str(folder), prepend=os.pathsep)
         yield
 
 

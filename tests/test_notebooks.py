@@ -1,6 +1,7 @@
 """Gates that keep the notebooks honest, each with a test in which it fails, and their quick run."""
 
 import ast
+import io
 import json
 import os
 import re
@@ -8,6 +9,8 @@ import re
 import jupytext
 import nbformat
 import pytest
+from disturbed.undisplayed import FigureCanvas
+from matplotlib.figure import Figure
 
 from vidsindy_lite.companion import run as runner
 from vidsindy_lite.companion.clean import clean
@@ -223,7 +226,7 @@ def test_figures_are_complete_and_of_this_code():
 
 
 @pytest.fixture(scope="module")
-def quick(tmp_path_factory):
+def quick(tmp_path_factory, undisplayed):
     """Where all quick runs go, one after the other, so that one may read another's tables.
 
     Every track and trajectory is disturbed by a relative 1e-9, see `test_disturbed`, and the tables
@@ -246,6 +249,18 @@ def test_quick_run(path, quick):
 
 
 # ------------------------------------------------------------------------------ each gate can fail
+
+
+@pytest.mark.parametrize("form", ["png", "svg"])
+def test_a_figure_that_cannot_be_drawn_is_seen_without_paper(form):
+    figure, file = Figure(layout="constrained"), io.BytesIO()
+    FigureCanvas(figure)
+    figure.subplots().set_title("$x^2$")
+    figure.savefig(file, format=form)
+    assert file.getvalue().startswith(b"\x89PNG" if form == "png" else b"<svg")
+    figure.axes[0].set_title(r"$\frac{x$")
+    with pytest.raises(ValueError, match="ParseFatalException|Expected"):
+        figure.savefig(file, format="png")
 
 
 @pytest.fixture

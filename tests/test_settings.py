@@ -43,6 +43,6 @@ def test_every_notebook_has_two():
 
 
 @pytest.mark.parametrize(("number", "settings"), CASES)
-def test_a_notebook_holds_for_other_settings(number, settings, tmp_path):
+def test_a_notebook_holds_for_other_settings(number, settings, tmp_path, undisplayed):
     places = {"VIDSINDY_FIGURES": str(tmp_path / "figures"), "VIDSINDY_CACHE": str(tmp_path)}
     execute(NOTEBOOKS[number], {"profile": "quick", **settings}, environment=places)

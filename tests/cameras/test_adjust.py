@@ -236,3 +236,15 @@ def test_the_noise_is_that_of_the_tracks_however_many_views_there_are(views):
         _, tracks = film(rng, rig, noise=0.4, n=1500)
         told += [linearised(Footage.of(tracks), rig.cameras, np.zeros((views, SIZE))).noise]
     assert np.mean(told) == pytest.approx(0.4, rel=0.04)
+
+
+@pytest.mark.parametrize("tilt", [(0.02, 0), (0, 0.02), (-0.1, 0.3)])
+def test_a_tilt_leads_the_normal_along_the_axes_of_the_image(tilt):
+    camera = room(np.random.default_rng(10)).cameras[0]
+    change = np.zeros(SIZE)
+    change[PARTS["normal"]] = tilt
+    normal = changed(camera, change).normal
+    along, across = camera.normal @ normal, camera.rows @ normal
+    np.testing.assert_allclose(across / along, tilt, atol=1e-12)
+    assert along > 0
+    np.testing.assert_allclose(np.linalg.norm(normal), 1)

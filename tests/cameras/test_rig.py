@@ -115,6 +115,15 @@ def test_most_cameras_of_a_template():
         rig_template(101)
 
 
+@pytest.mark.parametrize("image_size", [(512, 512), (1280, 720)])
+def test_cameras_around_see_all_of_the_scene_and_fill_their_images(image_size):
+    x = np.random.default_rng(0).normal(size=(50, 3)) * [3, 1, 0.2] + [10, -20, 30]
+    for camera in vl.Rig.around(x, image_size=image_size).cameras:
+        half = (np.array(image_size) - 1) / 2
+        farthest = np.max(np.abs(camera.project(x) - half) / half)
+        assert farthest == pytest.approx(0.85)
+
+
 def test_cameras_around_stand_off_the_scene_by_its_diagonal():
     x = np.array([[1, 2, 3], [4, 6, 3], [2, 3, 15]])  # a box of 3 x 4 x 12
     for camera in vl.Rig.around(x).cameras:

@@ -10,6 +10,7 @@ from helpers import trajectory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
+from tqdm import tqdm
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import (
@@ -416,6 +417,21 @@ def test_a_wrong_rig_does_not_spoil_the_lags(motion):
     found = learn_lags(tracks, vl.Rig([first, turned, third]))
     assert max(disagreement(align(tracks, (0, 9.3, -4)), vl.Rig([first, turned, third]))) > 3
     np.testing.assert_allclose(found.frames, (0, 9.3, -4), atol=0.05)
+
+
+@pytest.mark.parametrize(("tilt", "noise", "doubted"), [(0.003, 0.05, True), (0, 0.5, False)])
+def test_a_rig_is_doubted_if_it_leaves_more_than_the_tracks_do(motion, tilt, noise, doubted):
+    """Both leave less than a pixel, but cameras that may turn only take out what a tilt leaves."""
+    first, second, third = motion[1].cameras
+    turned = replace(second, normal=second.normal + tilt * second.rows[0])
+    tracks = filmed(motion, (80,) * 3, (0, 2, 0), noise=noise)
+    curves = tuple(Curve(track, np.arange(80.0)) for track in tracks)
+    unknowns = Unknowns.of(vl.Rig([first, turned, third]))
+    videos = synchrony._Videos(curves, unknowns, np.ones(3), tqdm(disable=True))
+    loose, (best, *_) = synchrony._searched(videos, np.zeros(3))
+    assert loose is doubted
+    assert best.score < 1
+    np.testing.assert_allclose(best.lags, (0, 2, 0), atol=0.1)
 
 
 @pytest.mark.slow

@@ -102,3 +102,33 @@ def test_a_plain_wall_tells_no_motion(tmp_path):
     write_phone(tmp_path / "clip.mp4", phone, 3)
     found = track(tmp_path / "clip.mp4")
     assert found.maps is None
+
+
+def waves(faint, u=0.0, v=0.0):
+    """Plain waves to the right, grey levels, and such faint ones downwards, shifted by pixels."""
+    down, right = np.mgrid[:120, :160].astype(float)
+    plain = 20 * np.sin((right - u) / 9) + 20 * np.sin((right - u) / 5 + 1)
+    return [(100 + plain + faint * np.sin((down - v) / 11)).astype(np.float32)]
+
+
+def test_the_less_is_told_of_a_direction_the_closer_to_the_guess_it_stays():
+    faints = np.geomspace(1e-3, 1, 16)
+    found = [align(waves(faint), waves(faint, 2, 3), np.eye(3)) for faint in faints]
+    shifts = np.array([one.map[:2, 2] for one in found])  # of an image twice as large
+    np.testing.assert_allclose(shifts[:, 0], 4, atol=0.01)
+    assert (np.diff(shifts[:, 1]) > -0.01).all()
+    np.testing.assert_allclose(shifts[[0, -1], 1], (0, 6), atol=0.5)
+
+
+@pytest.mark.parametrize("turn", [0.05, 0.2])
+def test_a_turn_alone_is_followed_to_its_end(turn):
+    # Clouds that are the same upside down tell no shift at all, at no step.
+    clouds = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(241, 321)), (0, 0), 8)
+    clouds = 20 * (clouds + clouds[::-1, ::-1]) / clouds.std()
+    views = []
+    for angle in (0.0, turn):
+        middle = similar(160, 120) @ similar(0, 0, -angle) @ similar(-79.5, -59.5)
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        views.append([cv2.warpAffine(clouds, middle[:2], (160, 120), flags=flags)])
+    found = align(*[[np.float32(100 + level) for level in view] for view in views], np.eye(3))
+    assert np.arctan2(found.map[1, 0], found.map[0, 0]) == pytest.approx(turn, abs=1e-4)

@@ -163,6 +163,17 @@ def test_the_faster_a_target_the_further_it_may_turn():
     assert price(2, 12) > 1
 
 
+def test_the_longer_nothing_is_seen_the_less_it_is_worth_to_go_on():
+    values = []
+    for gap in (0, 1, 2, 5, 10):
+        places = np.column_stack([50 + 5 * np.arange(20 + gap), np.full(20 + gap, 100.0)])
+        kept = np.append(np.arange(10), np.arange(10 + gap, 20 + gap))
+        rows, value = best_path(one_a_frame(places, np.full(20 + gap, 0.9)).only(kept))
+        assert len(rows) == 20  # it does go on
+        values.append(value)
+    assert (np.diff(values) < -0.01).all()
+
+
 def test_what_travels_and_stays_what_it_is_is_plainest():
     frames = np.arange(30)
     rng = np.random.default_rng(0)

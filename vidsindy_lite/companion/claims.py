@@ -8,9 +8,11 @@ figure or table with its numbers; a path is a page of docs/, or a test as pytest
 import ast
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import jupytext
+from nbformat import NotebookNode
 
 BY = re.compile(r"\s*<!-- by: (.*?) -->", re.DOTALL)
 # What a notebook claims: the items and the answers to the paper under these headings.
@@ -42,7 +44,7 @@ def claims_of(page: Path) -> list[Claim]:
     if page.suffix == ".md":
         items = [item for item in ITEM.split(page.read_text("utf-8")) if BY.search(item)]
     else:
-        cells = [c.source for c in jupytext.read(page).cells if c.cell_type == "markdown"]
+        cells = _cells(page.read_text("utf-8"), "markdown")
         said = "".join(CLAIMING.findall("\n\n".join(cells)))
         items = [item for item in ITEM.split(said) if item.startswith(("* ", "**What the paper"))]
         items = [item for item in items if not item.rstrip().endswith("what we found.**")]
@@ -79,15 +81,27 @@ def _check(name: str, page: Path) -> str:
 
 def _assertion(part: str, notebook: Path) -> str:
     """The assertion of a notebook that holds a piece of code, in one line; empty if none does."""
-    for cell in jupytext.read(notebook).cells:
-        if cell.cell_type == "code":
-            for node in ast.walk(ast.parse(cell.source)):
-                source = ast.get_source_segment(cell.source, node) if _asserts(node) else ""
-                line = " ".join((source or "").split())
-                if part in line:
-                    return line.removeprefix("assert ")
-    return ""
+    found = (line for line in _assertions(notebook.read_text("utf-8")) if part in line)
+    return next(found, "").removeprefix("assert ")
 
 
-def _asserts(node: ast.AST) -> bool:
-    return isinstance(node, ast.Assert)
+@cache  # many claims look into one notebook
+def _assertions(notebook: str) -> list[str]:
+    """All assertions of a notebook's source half, in one line each."""
+    return [
+        " ".join((ast.get_source_segment(source, node) or "").split())
+        for source in _cells(notebook, "code")
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Assert)
+    ]
+
+
+def _cells(notebook: str, kind: str) -> list[str]:
+    """The sources of the cells of one kind."""
+    return [cell.source for cell in _read(notebook).cells if cell.cell_type == kind]
+
+
+@cache
+def _read(notebook: str) -> NotebookNode:
+    """A notebook from its source half."""
+    return jupytext.reads(notebook, "py:percent")

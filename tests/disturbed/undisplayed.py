@@ -1,0 +1,20 @@
+"""A backend of matplotlib for tests of notebooks: figures are laid out and drawn, but on no paper.
+
+    MPLBACKEND=module://undisplayed PYTHONPATH=tests/disturbed
+
+Colouring, packing and showing pictures takes as long as all that small notebooks compute.
+"""
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
+
+
+class FigureCanvas(FigureCanvasAgg):
+    """Saves pictures of one pixel; what cannot be drawn raises all the same."""
+
+    def print_figure(self, filename, *_, format="png", **__):
+        if format == "svg":  # of what is drawn for the PNG
+            filename.write(b"<svg/>")
+            return
+        self.figure.draw_without_rendering()
+        Image.new("RGB", (1, 1)).save(filename, "PNG")

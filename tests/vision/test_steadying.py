@@ -1,0 +1,44 @@
+"""The motion of a camera from the corners of its frames: which map of them is taken."""
+
+import cv2
+import numpy as np
+import pytest
+
+from vidsindy_lite.vision.steadying import Steadying, carry
+
+SIZE = 960, 720
+
+
+def grains(seed=0):
+    """A picture full of corners."""
+    rng = np.random.default_rng(seed)
+    soft = cv2.GaussianBlur(rng.normal(size=SIZE[::-1]), (0, 0), 2)
+    grey = np.clip(128 + 40 * soft / soft.std(), 0, 255).astype(np.uint8)
+    return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
+
+
+def followed(*frames):
+    """The map of the first frame to the last."""
+    steadying = Steadying(1)
+    for frame in frames:
+        steadying.add(frame)
+    return np.linalg.inv(steadying.motion().maps[-1])
+
+
+def test_a_plane_that_is_seen_more_from_the_side_has_a_map_of_eight_numbers():
+    tilt = np.array([[1, 0, -3], [0, 1, 4], [4e-6, -5e-6, 1]])
+    found = followed(grains(), cv2.warpPerspective(grains(), tilt, SIZE, flags=cv2.INTER_CUBIC))
+    corners = np.array([[100, 100], [860, 100], [860, 620], [100, 620.0]])
+    np.testing.assert_allclose(carry(found, corners), carry(tilt, corners), atol=0.2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_only_half_of_the_corners_obey_is_no_reason_for_more_than_four_numbers(seed):
+    before = grains(seed)
+    after = cv2.warpAffine(before, np.array([[1, 0, 1.8], [0, 1, 0]]), SIZE)
+    stays = np.random.default_rng(seed).uniform(size=(12, 12)) < 0.55
+    stays = cv2.resize(stays.astype(np.uint8), SIZE, interpolation=cv2.INTER_NEAREST) > 0
+    after[stays] = before[stays]
+    found = followed(before, after)
+    (a, b, _), (c, d, _), (e, f, _) = found
+    np.testing.assert_allclose((d, c, e, f), (a, -b, 0, 0), atol=1e-9)
