@@ -14,7 +14,7 @@ from vidsindy_lite.vision.candidates import Candidate, Plate, reduce, tolerance
 from vidsindy_lite.vision.hints import load_hints
 from vidsindy_lite.vision.lingering import lingering, uncover
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import rate
+from vidsindy_lite.vision.moving import _learned, rate
 from vidsindy_lite.vision.refining import _nearest, fitting, scatter
 from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, stands_still
 
@@ -148,6 +148,22 @@ def test_a_path_ends_where_nothing_that_follows_is_worth_it():
         rows, value = best_path(one_a_frame(places, np.where(np.arange(20) < 12, 0.9, low)))
         assert rows[-1] == last
         assert value == pytest.approx(12 * 0.75 + (last - 11) * 0.05, abs=0.1)
+
+
+def test_a_faint_target_is_followed_once_its_looks_are_known():
+    # Where its size wavers as it moves off, that costs more than a faint look at it is worth.
+    areas = np.where(np.arange(30) < 15, 60.0, np.where(np.arange(30) % 2, 60.0, 85.0))
+    found = [
+        [Candidate(np.array([10.0 + 5 * i, 50]), np.array([6.0 + 5 * i, 46, 9, 9]), area,
+                   np.array([30.0, 30, 200]), 0.3)]
+        for i, area in enumerate(areas)
+    ]  # fmt: skip
+    places = [np.array([c.centre for c in some]) for some in found]
+    seen = Sightings.of(found, places, 400.0)
+    rows, _ = best_path(seen)
+    assert seen.frame[rows[-1]] < 20
+    known = Sightings.of(_learned(found, seen, rows), places, 400.0)
+    np.testing.assert_array_equal(known.frame[best_path(known)[0]], np.arange(30))
 
 
 def test_the_faster_a_target_the_further_it_may_turn():

@@ -170,9 +170,17 @@ def linked(
 
 
 def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[list[Candidate]]:
-    """Candidates as far as they have the colour of a path, whose best one is sure."""
+    """Candidates as far as they have the colour of a path, whose best one is sure.
+
+    What is as plain as the target usually is, is worth all: else a faint one would be left wherever
+    its size and colour waver.
+    """
     colour = np.median(seen.colour[rows], axis=0)
-    alike = [[replace(c, quality=c.quality * _alike(c.colour, colour)) for c in f] for f in found]
+    usual = float(np.median(seen.quality[rows]))
+    alike = [
+        [replace(c, quality=min(c.quality / usual, 1.0) * _alike(c.colour, colour)) for c in f]
+        for f in found
+    ]
     worth = [alike[seen.frame[r]][seen.which[r]].quality for r in rows]
     best = rows[int(np.argmax(worth))]
     frame = int(seen.frame[best])
