@@ -14,7 +14,7 @@ from vidsindy_lite.vision.candidates import Candidate, Plate, reduce, tolerance
 from vidsindy_lite.vision.hints import load_hints
 from vidsindy_lite.vision.lingering import lingering, uncover
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import _learned, rate
+from vidsindy_lite.vision.moving import _learned, joined, rate
 from vidsindy_lite.vision.refining import _nearest, fitting, scatter
 from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, stands_still
 
@@ -228,6 +228,20 @@ def test_partial_views_and_jumps_are_left_out():
     places[25] += 15
     good = fitting(frames, places, areas, np.arange(40) != 5)
     np.testing.assert_array_equal(np.flatnonzero(~good), [5, 10, 25])
+
+
+def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
+    areas = np.linspace(100, 200, 60)
+    areas[20:40] *= 2.5  # one beside the other
+    areas[50:52] *= 0.4  # hidden in part
+    np.testing.assert_array_equal(np.flatnonzero(joined(areas)), np.arange(20, 40))
+    # Nothing tells which is the target, where they never part, or were one from the beginning.
+    assert not joined(areas[:40]).any()
+    assert not joined(areas[18:]).any()
+    # Between two posts, each of which hides it in two views, it is whole.
+    areas = np.full(40, 100.0)
+    areas[[10, 11, 30, 31]] = 30
+    assert not joined(areas).any()
 
 
 def test_scatter_is_the_noise_of_a_smooth_motion():
