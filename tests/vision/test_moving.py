@@ -14,7 +14,7 @@ from vidsindy_lite.vision.candidates import Candidate, Plate, reduce, tolerance
 from vidsindy_lite.vision.hints import load_hints
 from vidsindy_lite.vision.lingering import lingering, uncover
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import rate
+from vidsindy_lite.vision.moving import _learned, joined, rate
 from vidsindy_lite.vision.refining import _nearest, fitting, scatter
 from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, stands_still
 
@@ -150,6 +150,22 @@ def test_a_path_ends_where_nothing_that_follows_is_worth_it():
         assert value == pytest.approx(12 * 0.75 + (last - 11) * 0.05, abs=0.1)
 
 
+def test_a_faint_target_is_followed_once_its_looks_are_known():
+    # Where its size wavers as it moves off, that costs more than a faint look at it is worth.
+    areas = np.where(np.arange(30) < 15, 60.0, np.where(np.arange(30) % 2, 60.0, 85.0))
+    found = [
+        [Candidate(np.array([10.0 + 5 * i, 50]), np.array([6.0 + 5 * i, 46, 9, 9]), area,
+                   np.array([30.0, 30, 200]), 0.3)]
+        for i, area in enumerate(areas)
+    ]  # fmt: skip
+    places = [np.array([c.centre for c in some]) for some in found]
+    seen = Sightings.of(found, places, 400.0)
+    rows, _ = best_path(seen)
+    assert seen.frame[rows[-1]] < 20
+    known = Sightings.of(_learned(found, seen, rows), places, 400.0)
+    np.testing.assert_array_equal(known.frame[best_path(known)[0]], np.arange(30))
+
+
 def test_the_faster_a_target_the_further_it_may_turn():
     def price(step, turn):
         places = np.column_stack([50 + step * np.arange(20), np.full(20, 100.0)])
@@ -223,6 +239,20 @@ def test_partial_views_and_jumps_are_left_out():
     places[25] += 15
     good = fitting(frames, places, areas, np.arange(40) != 5)
     np.testing.assert_array_equal(np.flatnonzero(~good), [5, 10, 25])
+
+
+def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
+    areas = np.linspace(100, 200, 60)
+    areas[20:40] *= 2.5  # one beside the other
+    areas[50:52] *= 0.4  # hidden in part
+    np.testing.assert_array_equal(np.flatnonzero(joined(areas)), np.arange(20, 40))
+    # Nothing tells which is the target, where they never part, or were one from the beginning.
+    assert not joined(areas[:40]).any()
+    assert not joined(areas[18:]).any()
+    # Between two posts, each of which hides it in two views, it is whole.
+    areas = np.full(40, 100.0)
+    areas[[10, 11, 30, 31]] = 30
+    assert not joined(areas).any()
 
 
 def test_scatter_is_the_noise_of_a_smooth_motion():
