@@ -255,6 +255,32 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     assert not joined(areas).any()
 
 
+def dashing(frames, turn, width):
+    """Round in `turn` frames, by up to 37 pixels a frame in a few of them."""
+    angle = 2 * np.pi * frames / turn
+    up = 130 * np.exp((np.cos(angle) - 1) / width**2)
+    return np.column_stack([160 + 100 * np.cos(angle), 200 - up])
+
+
+@pytest.mark.parametrize(("turn", "width"), [(50, 0.25), (60, 0.25)])
+def test_of_a_fast_target_no_view_is_left_out_but_one_that_is_displaced(turn, width):
+    frames, areas, inside = np.arange(2 * turn), np.full(2 * turn, 150.0), np.full(2 * turn, True)
+    places = dashing(frames, turn, width)
+    assert fitting(frames, places, areas, inside).all()
+    for displaced in range(turn - 12, turn + 13):
+        seen = places.copy()
+        seen[displaced] += [20, 15]
+        good = fitting(frames, seen, areas, inside)
+        np.testing.assert_array_equal(np.flatnonzero(~good), [displaced])
+
+
+def test_of_a_fast_target_no_view_is_left_out_beside_a_gap():
+    for gap in range(40, 80):
+        frames = np.delete(np.arange(120), np.s_[gap : gap + 3])
+        places = dashing(frames, 60, 0.25)
+        assert fitting(frames, places, np.full(117, 150.0), np.full(117, True)).all()
+
+
 def test_scatter_is_the_noise_of_a_smooth_motion():
     rng = np.random.default_rng(0)
     frames = np.arange(400)

@@ -132,9 +132,10 @@ def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Boo
         usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="nearest"))
         good = inside & (np.abs(logs - usual) < np.log(_WHOLE))
     while (use := np.flatnonzero(good)).size >= 7:
-        off = np.array([_leave_out(frames[use], places[use], i) for i in range(len(use))])
+        told = [_leave_out(frames[use], places[use], i) for i in range(len(use))]
+        off, unsure = np.array(told).T
         usual = max(float(np.median(off)), 0.05)
-        over = off / np.maximum(10 * usual, 1 + 0.3 * np.sqrt(areas[use]))
+        over = off / (np.maximum(10 * usual, 1 + 0.3 * np.sqrt(areas[use])) + unsure)
         # A wrong place spoils what its neighbours seem to be: the worst of them goes first.
         worst = (over > 1) & (over == maximum_filter1d(over, 7))
         if not worst.any():
@@ -143,15 +144,22 @@ def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Boo
     return good
 
 
-def _leave_out(frames: Floats, places: Floats, i: int) -> float:
-    """How far a place is from the parabola through the three on both sides of it."""
+def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
+    """How far a place is from where the three on both sides of it say, and how unsure that is.
+
+    A quartic through these says it. Where a target turns within a few frames, or some of them are
+    missing, no polynomial is right, and a parabola says something else.
+    """
     others = np.array([j for j in range(max(i - 3, 0), min(i + 4, len(frames))) if j != i])
     t = frames[others] - frames[i]
     if len(others) < 4 or np.ptp(t) > 15:
-        return 0.0
-    basis = np.vander(t, 3)
-    fit, *_ = np.linalg.lstsq(basis, places[others], rcond=None)
-    return float(np.linalg.norm(fit[-1] - places[i]))
+        return 0.0, 0.0
+    basis = np.vander(t / 3, min(5, len(others)))
+    quartic, parabola = (
+        np.linalg.lstsq(powers, places[others])[0][-1] for powers in (basis, basis[:, -3:])
+    )
+    off, unsure = np.linalg.norm([quartic - places[i], quartic - parabola], axis=1)
+    return float(off), float(unsure)
 
 
 def scatter(frames: Ints, places: Floats) -> float:
