@@ -14,8 +14,8 @@ from vidsindy_lite.vision.candidates import Candidate, Plate, reduce, tolerance
 from vidsindy_lite.vision.hints import load_hints
 from vidsindy_lite.vision.lingering import lingering, uncover
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import _learned, joined, rate
-from vidsindy_lite.vision.refining import _nearest, fitting, scatter
+from vidsindy_lite.vision.moving import _learned, rate
+from vidsindy_lite.vision.refining import _nearest, fitting, joined, scatter
 from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, stands_still
 
 REAL = Path(vidsindy_lite.__file__).parents[2] / "shared" / "real"
@@ -246,6 +246,9 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     areas[20:40] *= 2.5  # one beside the other
     areas[50:52] *= 0.4  # hidden in part
     np.testing.assert_array_equal(np.flatnonzero(joined(areas)), np.arange(20, 40))
+    frames, inside = np.arange(60), np.full(60, True)
+    good = fitting(frames, np.column_stack([2.0 * frames, frames]), areas, inside)
+    np.testing.assert_array_equal(np.flatnonzero(~good), [*range(20, 40), 50, 51])
     # Nothing tells which is the target, where they never part, or were one from the beginning.
     assert not joined(areas[:40]).any()
     assert not joined(areas[18:]).any()

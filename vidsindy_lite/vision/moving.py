@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Floats32, Image, Ints
+from ..arrays import Floats, Floats32, Image, Ints
 from .background import SAMPLES, light
 from .candidates import Candidate, Difference, Plate, enlarged, reduce, reduction, tolerance
 from .hints import Hint
@@ -34,8 +34,6 @@ _COLOUR = 70.0  # grey levels between colours that are not alike
 _TOLD = 100.0  # quality of the candidate that a user points at
 _PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
 _DENSE = 640  # pixels in a row of which the noise is known well
-_JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
-_BESIDE = 5  # views before and after such a meeting, which show how large it was and is
 _LARGE = 0.01  # share of the image that a target hardly fills
 
 
@@ -360,24 +358,6 @@ def expected(seen: Sightings, rows: Ints, film: Film, n: int) -> Ways:
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
 
-def joined(areas: Floats) -> Bools:
-    """Which views (n,), of these areas, are of the target and of something like it in one.
-
-    Where the two meet the area grows at once, and it shrinks at once where they part. What was
-    hidden before and after was so for a few views only.
-    """
-    step = np.diff(np.log(np.maximum(areas, 1e-3)))
-    parts = np.flatnonzero(step < -np.log(_JOINED))
-    found = np.zeros(len(areas), bool)
-    for meets in np.flatnonzero(step > np.log(_JOINED)):
-        first, last = meets + 1, min(parts[parts > meets], default=len(areas))
-        before, after = areas[max(first - _BESIDE, 0) : first], areas[last + 1 :][:_BESIDE]
-        if min(len(before), len(after)) == _BESIDE:
-            usual = max(np.median(before), np.median(after))
-            found[first : last + 1] = np.median(areas[first : last + 1]) > _JOINED * usual
-    return found
-
-
 def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]) -> Followed:
     """The views of the whole target as a track."""
     n = len(views)
@@ -389,7 +369,7 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
-    good = fitting(at, steady, areas, inside & ~joined(areas))
+    good = fitting(at, steady, areas, inside)
     if good.sum() < max(_SHORTEST, _SCARCE * n):
         return nothing(motion, n)
     pixels[at[good]] = steady[good]

@@ -2,8 +2,8 @@
 
 Near each place of the path, what differs from the steadied background and has the target's colour
 is taken apart from the rest; its *coverage* of each pixel (see `background`) gives the centroid. A
-view whose size or place does not fit those around it is of a part, or of something else, and is
-left out.
+view whose size or place does not fit those around it is of a part, of something else, or of both
+in one, and is left out.
 """
 
 from dataclasses import dataclass
@@ -21,6 +21,8 @@ _GROW = 0.5  # of its size, by which a window exceeds the target; and
 _ROOM = 8  # pixels more
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
+_JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
+_BESIDE = 5  # views before and after such a meeting, which show how large it was and is
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,7 @@ def _nearest(mask: Bools, centre: Floats) -> Bools | None:
 
 def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Bools:
     """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2)."""
+    inside = inside & ~joined(areas)
     good = inside.copy()
     logs = np.log(np.maximum(areas, 1e-3))
     for _ in range(2):
@@ -142,6 +145,24 @@ def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Boo
             break
         good[use[worst]] = False
     return good
+
+
+def joined(areas: Floats) -> Bools:
+    """Which views (n,), of these areas, are of the target and of something like it in one.
+
+    Where the two meet the area grows at once, and it shrinks at once where they part. What was
+    hidden before and after was so for a few views only.
+    """
+    step = np.diff(np.log(np.maximum(areas, 1e-3)))
+    parts = np.flatnonzero(step < -np.log(_JOINED))
+    found = np.zeros(len(areas), bool)
+    for meets in np.flatnonzero(step > np.log(_JOINED)):
+        first, last = meets + 1, min(parts[parts > meets], default=len(areas))
+        before, after = areas[max(first - _BESIDE, 0) : first], areas[last + 1 :][:_BESIDE]
+        if min(len(before), len(after)) == _BESIDE:
+            usual = max(np.median(before), np.median(after))
+            found[first : last + 1] = np.median(areas[first : last + 1]) > _JOINED * usual
+    return found
 
 
 def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
