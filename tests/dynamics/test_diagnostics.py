@@ -10,6 +10,7 @@ from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
 from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.integrate import runge_kutta_4
 from vidsindy_lite.dynamics.persistence import Plateau, follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.posing import pose
@@ -207,3 +208,14 @@ def test_a_drive_that_nobody_named_is_a_misfit():
     x = np.stack([np.cos(t) + 0.1 * np.cos(2.3 * t), -np.sin(t) - 0.23 * np.sin(2.3 * t)], axis=1)
     found = discover(t, x + 0.02 * np.random.default_rng(3).standard_normal(x.shape), order=1)
     assert [warning[:26] for warning in found.warnings] == ["the curve misses the data "]
+
+
+def test_what_a_law_misses_is_told_among_errors_that_last():
+    # A cubic for the sine of a pendulum: further terms follow what it leaves.
+    t = np.linspace(0, 120, 1800)
+    swing = runge_kutta_4(
+        lambda x: np.array([x[1], -np.sin(x[0]) - 0.02 * x[1]]), t, np.array([2.5, 0])
+    )
+    x = corruption.add_correlated_noise(swing, 0.03, np.random.default_rng(2))
+    found = discover(t, x, order=1)
+    assert any("times the noise estimated beforehand" in warning for warning in found.warnings)
