@@ -1,6 +1,7 @@
 """What all tests share: settings and fixtures."""
 
 import os
+import signal
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -44,6 +45,14 @@ def undisplayed():
         folder = Path(__file__).parent / "disturbed"
         patch.setenv("PYTHONPATH", str(folder), prepend=os.pathsep)
         yield
+
+
+@pytest.fixture
+def interruptible():
+    """Commands that a test starts heed Ctrl+C; those of a shell's background job do not."""
+    earlier = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, earlier)
 
 
 @pytest.fixture

@@ -331,7 +331,7 @@ def test_every_kind_of_film_under_any_name(folder, tmp_path, monkeypatch, capsys
     assert data["cameras"][1]["lag"] == pytest.approx(7, abs=0.1)
 
 
-def test_ctrl_c_ends_the_command_in_one_line(tracked):
+def test_ctrl_c_ends_the_command_in_one_line(tracked, interruptible):
     command = [sys.executable, "-m", "vidsindy_lite", "discover", "--rig", "rig.toml", "--fps", "9"]
     environment = os.environ | {"PYTHONPATH": str(Path(vl.__file__).parent.parent)}
     with subprocess.Popen(

@@ -351,7 +351,7 @@ def test_a_kernel_that_dies_takes_no_other_notebook_along(tiny, capsys):
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_run_that_is_ended_leaves_no_process_behind(tiny, number):
+def test_a_run_that_is_ended_leaves_no_process_behind(tiny, interruptible, number):
     busy = "[os.getpid(), *(process.pid for process in psutil.Process().children())]"
     tiny.write(
         "01_long",
