@@ -219,3 +219,15 @@ def test_what_a_law_misses_is_told_among_errors_that_last():
     x = corruption.add_correlated_noise(swing, 0.03, np.random.default_rng(2))
     found = discover(t, x, order=1)
     assert any("times the noise estimated beforehand" in warning for warning in found.warnings)
+
+
+@pytest.mark.xfail(strict=True, reason="several periods side by side pass for errors of a sensor")
+def test_a_slow_drive_that_nobody_named_is_a_misfit():
+    t = np.linspace(0, 60, 1000)
+    swing = runge_kutta_4(  # the third state is the time
+        lambda s: np.array([s[1], -(1 + 0.1 * np.cos(0.3 * s[2])) * s[0] - 0.02 * s[1], 1.0]),
+        t,
+        np.array([1.0, 0.0, 0.0]),
+    )[:, :2]
+    found = discover(t, swing + 0.02 * np.random.default_rng(1).standard_normal(swing.shape))
+    assert found.status == "suspect"
