@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from vidsindy_lite.dynamics.errors import (
-    has_period,
+    independent,
     inflation,
     passing,
     prediction_gain,
@@ -105,7 +105,7 @@ def test_what_uneven_errors_foretell_is_counted_in_their_own_sizes():
     assert prediction_gain(fit_with(error))[0] > 0.2 * weighed  # the large ones hide the others
 
 
-def test_errors_pass_that_are_forgotten_and_have_no_period():
+def test_errors_pass_of_which_many_are_independent():
     rng, t = np.random.default_rng(8), np.arange(1500)
     white, slow = rng.standard_normal(1500), lasting(1500, 0.9, rng)
     drift = lasting(1500, 0.99, rng)
@@ -114,16 +114,29 @@ def test_errors_pass_that_are_forgotten_and_have_no_period():
     errors = np.stack([white, slow, averaged, drift, missed, np.zeros(1500)], axis=1)
     assert passing(fit_with(errors), 56).tolist() == [True, True, True, False, False, False]
     assert passing(fit_with(errors[:, [1, 5]]), 56).tolist() == [True, True]  # the 2nd was not seen
-    assert not passing(fit_with(errors[:, :3]), 1500).any()  # so many terms these cannot judge
+    assert not passing(fit_with(errors[:, :3]), 2000).any()  # so many terms these cannot judge
 
 
-def test_a_period_is_seen_in_what_chance_does_not_make():
-    rng, t = np.random.default_rng(10), np.arange(400)
-    assert not any(has_period(rng.standard_normal(400), 1.0) for _ in range(100))
-    assert not any(has_period(lasting(400, 0.9, rng), 1 / 19) for _ in range(100))
-    assert has_period(np.sin(t / 5) + rng.standard_normal(400), 1.0)
-    assert not has_period(np.sin(t / 5), 1 / 400)  # a single error has no period
-    assert not has_period(np.zeros(400), 1.0)
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+def test_as_many_errors_are_independent_as_theory_says(correlation):
+    # Bartlett: n over the sum of the squared autocorrelations, here c^(2 |k|).
+    error = lasting(20_000, correlation, np.random.default_rng(10))
+    expected = 20_000 * (1 - correlation**2) / (1 + correlation**2)
+    assert independent(error) == pytest.approx(expected, rel=0.1)
+
+
+def test_few_errors_are_independent_of_which_few_periods_are_left():
+    t = 2 * np.pi * np.arange(600) / 600
+    assert independent(np.sin(5 * t)) == pytest.approx(4)
+    together = sum(np.sin(k * t + k) for k in (5, 6, 7))
+    assert independent(together) == pytest.approx(12)
+    noise = np.random.default_rng(11).standard_normal(600)
+    assert independent(together + 0.3 * noise) < 21 < independent(noise)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 50])
+def test_no_error_is_independent_where_there_is_none(n):
+    assert independent(np.zeros(n)) == 0
 
 
 def test_errors_of_time_are_along_the_path():

@@ -15,8 +15,6 @@ ORDER = 40
 """Most errors that foretell the next."""
 LEAST = 1e-300
 """Keeps a quotient finite where nothing moves or is left."""
-UNLIKELY = 1e-3
-"""Probability below which a period of the errors is no chance."""
 
 
 def residual_noise(fit: Fit) -> Floats:
@@ -129,30 +127,24 @@ def prediction_gain(fit: Fit) -> Floats:
 def passing(fit: Fit, tried: int) -> Bools:
     """Which errors last but are none that the motion brings along, (d,).
 
-    What a law misses comes back with the motion: few such errors are independent, or they have a
-    period. More than are ``tried`` as further terms must be independent, so that those could tell.
-    Of a coordinate that was never observed, what is true of all others.
+    What a law misses comes back with the motion: few such errors are independent. More must be than
+    are ``tried`` as further terms, so that those could tell. Of a coordinate that was never
+    observed, what is true of all others.
     """
-    pieces, seen = _errors_seen(fit), fit.collocation.counts > 0
-    shares = (residual_noise(fit) / effective_noise(fit)) ** 2
-    paired = zip(pieces, shares.tolist(), strict=True)
-    period = np.array([has_period(max(here, key=len), share) for here, share in paired])
-    alone = (fit.collocation.counts * shares > tried) & ~period
+    seen = fit.collocation.counts > 0
+    counts = np.array([sum(map(independent, pieces)) for pieces in _errors_seen(fit)])
+    alone = counts > tried
     return np.where(seen, alone, alone[seen].all())
 
 
-def has_period(errors: Floats, independent: float) -> bool:
-    """Whether one frequency has more of some errors, (n,), than chance gives to any.
+def independent(errors: Floats) -> float:
+    """How many independent errors have a variance as uncertain as that of these, (n,).
 
-    Fisher's test (1929) of the largest ordinate of a periodogram, of as many as there are pairs of
-    errors of which a share is ``independent``.
+    Their number over the sum of the squared autocorrelations (Bartlett 1946), which is that of the
+    ordinates of their periodogram that matter: few, if they have periods.
     """
-    ordinates = independent * len(errors) / 2
-    if ordinates <= 1 or not errors.any():
-        return False
-    powers = np.abs(np.fft.rfft(errors)[1:]) ** 2
-    others = 1 - powers.max() / powers.sum()
-    return bool(ordinates * others ** (ordinates - 1) < UNLIKELY)
+    powers = np.abs(np.fft.rfft(errors, max(len(errors), 1))[1:]) ** 2
+    return float(4 * powers.sum() ** 2 / (powers**2).sum()) if powers.any() else 0.0
 
 
 def _levinson(covariance: Floats, n: int) -> Floats:

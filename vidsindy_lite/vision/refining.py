@@ -126,7 +126,7 @@ def _nearest(mask: Bools, centre: Floats) -> Bools | None:
 def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Bools:
     """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2)."""
     inside = inside & ~joined(areas)
-    good = inside.copy()
+    good = inside
     logs = np.log(np.maximum(areas, 1e-3))
     for _ in range(2):
         use = np.flatnonzero(good)
