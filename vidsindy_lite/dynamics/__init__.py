@@ -32,7 +32,7 @@ from .order import check_order
 from .origin import ShiftedLaw
 from .persistence import Plateau
 from .polynomials import PolynomialSystem
-from .problem import FALSE_ALARM, term_penalties
+from .problem import FALSE_ALARM, fit_curves, term_penalties
 from .rounds import Round, on_circle, on_sphere
 from .selection import closest_rival, subset_search
 from .sindy import SplineSINDy

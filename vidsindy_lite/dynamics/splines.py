@@ -169,6 +169,16 @@ class Grid:
             node_weights=width / width.sum() * len(x),
         )
 
+    def asked_at(self, times: Sequence[Floats]) -> Grid:
+        """The same with the law at other times of each segment, which count alike."""
+        count = sum(map(len, times))
+        return replace(
+            self,
+            nodes=basis(self.knots, self.starts, times),
+            slopes=basis(self.knots, self.starts, times, order=1),
+            node_weights=np.full(count, len(self.x) / count),
+        )
+
     @property
     def r(self) -> int:
         """Number of control points."""

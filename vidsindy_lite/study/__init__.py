@@ -11,6 +11,7 @@
 * `films`, `realistic`, `lab`: what is filmed: benchmarks, a scene with trees, a ball on a table.
 * `trials`, `baselines`, `paper_ado`: who finds the law: `discover`, the methods of the paper's
   tables, the paper's own optimiser.
+* `asking`: where the law is asked for, and what that does to it.
 * `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
 * `metrics`, `tables`: how good a law is, and many of them side by side.
 * `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
@@ -23,6 +24,7 @@ The names below are at hand at once. Modules that need large libraries are impor
 `plots` matplotlib and seaborn.
 """
 
+from .asking import Asked, law_error
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
 from .metrics import Score, pulls, score, term_errors, trajectory_error

@@ -109,6 +109,24 @@ def plot_collocation(
     return figure
 
 
+def plot_asked(errors: Mapping[str, Mapping[float, float]]) -> Figure:
+    """Error of a law against the residual it may leave, for several choices of times.
+
+    Parameters
+    ----------
+    errors : dict of str to dict of float to float
+        l2 error of the coefficients by tolerated residual (over the speed), by choice of times.
+    """
+    figure, axes = plt.subplots(figsize=(7, 3.8))
+    for (label, row), style in zip(errors.items(), ("o-", "s--", "^--", "v:", "D:"), strict=False):
+        axes.plot(list(row), list(row.values()), style, label=label)
+    axes.set(xscale="log", yscale="log", ylabel="l2 error of the law")
+    axes.set_xlabel("tolerated residual of the law / speed (physics weight grows to the right)")
+    axes.invert_xaxis()
+    figure.legend(loc="outside upper center", ncols=3)
+    return figure
+
+
 # ------------------------------------------------------------------------------------ optimisation
 
 
