@@ -790,11 +790,19 @@ save_table("audit", findings, caption=caption)
 #
 # Each solution is folded: its code, which has run with this notebook, and what to see in it.
 #
-# **1.** (Explore.) How many false positives would make the row of RayleighBenard, WeakSINDy consistent?
+# **1.** (Implement.) Which numbers of true and false terms give a printed precision and recall? Try all of them for the
+# row of RayleighBenard, WeakSINDy. How many false positives would have made it consistent?
 
 # %% tags=["hide-cell"]
+def printed_as(hits, false, true_terms=11):
+    return f"{hits / true_terms:.2%}", f"{hits / (hits + false):.2%}"
+
+
 row = SCORES["Table S3", "WeakSINDy", "RayleighBenard"]
-print(audit.counts_behind(row, 11))
+asked = f"{row.recall:.2%}", f"{row.precision:.2%}"
+possible = [(hits, false) for hits in range(1, 12) for false in range(50) if printed_as(hits, false) == asked]
+print(f"printed: {row.false_positives} false; possible, as (true, false): {possible}")
+assert possible == audit.counts_behind(row, 11)
 assert not audit.could_be(row, 11)
 assert audit.could_be(replace(row, false_positives=10), 11)
 

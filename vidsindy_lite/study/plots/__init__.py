@@ -15,6 +15,7 @@ from .robustness import plot_recomputed, plot_robustness, plot_shares, plot_verd
 from .robustness import plot_what_l2_sees
 from .scoreboard import plot_lorenz_grids, plot_standings
 from .solver import plot_asked, plot_basis, plot_collocation, plot_errors_and_bound
-from .solver import plot_histories, plot_normal_matrix, plot_origin_map, plot_price, plot_ranks, plot_windows
+from .solver import plot_histories, plot_normal_matrix, plot_origin_map, plot_price, plot_ranks
+from .solver import plot_windows
 from .videos import draw_tour, plot_confidence, plot_frames, plot_loss, plot_track_errors
 from .videos import plot_tracker_steps
