@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import discover
 from vidsindy_lite.dynamics.candidates import Library
@@ -218,6 +219,21 @@ def test_what_a_law_misses_is_told_among_errors_that_last():
     )
     x = corruption.add_correlated_noise(swing, 0.03, np.random.default_rng(2))
     found = discover(t, x, order=1)
+    assert any("times the noise estimated beforehand" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize("pushes", [1, 2])
+def test_random_pushes_that_nobody_named_are_a_misfit(pushes):
+    # A spring swings where it is pushed: what its law misses comes back with the other sign.
+    t = np.linspace(0, 80, 1500)
+    rng = np.random.default_rng(pushes)
+    push = make_interp_spline(np.linspace(-2, 82, 71), rng.standard_normal(71))
+    swing = runge_kutta_4(
+        lambda s: np.array([s[1], -s[0] - 0.05 * s[1] + 0.15 * push(s[2]), 1.0]),
+        t,
+        np.array([2.0, 0.0, 0.0]),
+    )[:, :2]
+    found = discover(t, swing + 0.002 * rng.standard_normal(swing.shape), order=1)
     assert any("times the noise estimated beforehand" in warning for warning in found.warnings)
 
 

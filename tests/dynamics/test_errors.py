@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from vidsindy_lite.dynamics.errors import (
@@ -11,6 +12,7 @@ from vidsindy_lite.dynamics.errors import (
     inflation,
     passing,
     prediction_gain,
+    swing,
     time_inflation,
 )
 
@@ -105,16 +107,29 @@ def test_what_uneven_errors_foretell_is_counted_in_their_own_sizes():
     assert prediction_gain(fit_with(error))[0] > 0.2 * weighed  # the large ones hide the others
 
 
-def test_errors_pass_of_which_many_are_independent():
+def test_errors_pass_that_are_forgotten_and_do_not_swing():
     rng, t = np.random.default_rng(8), np.arange(1500)
     white, slow = rng.standard_normal(1500), lasting(1500, 0.9, rng)
-    drift = lasting(1500, 0.99, rng)
     averaged = np.convolve(rng.standard_normal(1508), np.ones(9) / 3, "valid")
+    filtered = gaussian_filter1d(rng.standard_normal(1500), 6)
     missed = np.sin(t / 7) + 0.3 * white
-    errors = np.stack([white, slow, averaged, drift, missed, np.zeros(1500)], axis=1)
-    assert passing(fit_with(errors), 56).tolist() == [True, True, True, False, False, False]
-    assert passing(fit_with(errors[:, [1, 5]]), 56).tolist() == [True, True]  # the 2nd was not seen
-    assert not passing(fit_with(errors[:, :3]), 2000).any()  # so many terms these cannot judge
+    pushed = lfilter([1], [1, -1.97, 0.98], rng.standard_normal(1500))  # a spring, at random
+    errors = np.stack([white, slow, averaged, filtered, missed, pushed, np.zeros(1500)], axis=1)
+    assert passing(fit_with(errors), 56).tolist() == [True] * 4 + [False] * 3
+    assert passing(fit_with(errors[:, [1, 6]]), 56).tolist() == [True, True]  # the 2nd was not seen
+    assert not passing(fit_with(errors[:, :4]), 2000).any()  # so many terms these cannot judge
+
+
+def test_errors_swing_as_theory_says():
+    t = 2 * np.pi * np.arange(6000) / 6000
+    assert swing([np.sin(60 * t)[:, None]])[0] == pytest.approx(-1, abs=0.02)
+    # One for the last and minus a half for the one before: at lag 1, -.5 / 1.25.
+    white = np.random.default_rng(10).standard_normal(20_001)
+    assert swing([(white[1:] - 0.5 * white[:-1])[:, None]])[0] == pytest.approx(-0.4, abs=0.03)
+    assert -0.1 < swing([white[:, None]])[0] < 0
+    # Two stretches know nothing of each other, and one that is empty of none.
+    assert swing([np.ones((50, 1)), -np.ones((50, 1))])[0] >= 0
+    assert swing([white[:, None], np.zeros((0, 1))])[0] == swing([white[:, None]])[0]
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])

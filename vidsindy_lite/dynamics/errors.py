@@ -15,6 +15,9 @@ ORDER = 40
 """Most errors that foretell the next."""
 LEAST = 1e-300
 """Keeps a quotient finite where nothing moves or is left."""
+SWING = 0.3
+"""Autocorrelation below zero from which on errors come back with the other sign, as a motion does:
+three standard errors of a hundred independent ones."""
 
 
 def residual_noise(fit: Fit) -> Floats:
@@ -96,9 +99,7 @@ def inflation(pieces: Sequence[Floats]) -> Floats:
     pieces : sequence of ndarray, shape (n_i, d)
         Errors of successive samples, of mean zero.
     """
-    size = 2 * max(max(len(piece) for piece in pieces), 1)
-    powers = [np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces]
-    covariances = np.fft.irfft(np.sum(powers, axis=0), size, axis=0)[: size // 2]
+    covariances = _autocovariances(pieces)
     result = np.ones(covariances.shape[1])
     limit = CHANCE / np.sqrt(max(sum(map(len, pieces)), 1))
     for j, covariance in enumerate(covariances.T):
@@ -108,6 +109,13 @@ def inflation(pieces: Sequence[Floats]) -> Floats:
             positive = len(pairs) if (pairs > 0).all() else int((pairs <= 0).argmax())
             result[j] = max(2 * pairs[:positive].sum() - 1, 1.0)
     return result
+
+
+def _autocovariances(pieces: Sequence[Floats]) -> Floats:
+    """Sums of the products of errors so many samples apart, over all pieces, (lags, d)."""
+    size = 2 * max(max(len(piece) for piece in pieces), 1)
+    powers = [np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces]
+    return np.fft.irfft(np.sum(powers, axis=0), size, axis=0)[: size // 2]
 
 
 def prediction_gain(fit: Fit) -> Floats:
@@ -127,14 +135,15 @@ def prediction_gain(fit: Fit) -> Floats:
 def passing(fit: Fit, tried: int) -> Bools:
     """Which errors last but are none that the motion brings along, (d,).
 
-    What a law misses comes back with the motion: few such errors are independent. More must be than
-    are ``tried`` as further terms, so that those could tell. Of a coordinate that was never
-    observed, what is true of all others.
+    What a law misses swings with the motion; errors of a sensor or a filter are forgotten. More
+    must be independent than are ``tried`` as further terms, so that those could tell. Of a
+    coordinate that was never observed, what is true of all others.
     """
-    seen = fit.collocation.counts > 0
-    counts = np.array([sum(map(independent, pieces)) for pieces in _errors_seen(fit)])
-    alone = counts > tried
-    return np.where(seen, alone, alone[seen].all())
+    seen, errors = fit.collocation.counts > 0, _errors_seen(fit)
+    counts = np.array([sum(map(independent, pieces)) for pieces in errors])
+    lowest = np.array([swing([piece[:, None] for piece in pieces])[0] for pieces in errors])
+    forgotten = (counts > tried) & (lowest > -SWING)
+    return np.where(seen, forgotten, forgotten[seen].all())
 
 
 def independent(errors: Floats) -> float:
@@ -145,6 +154,12 @@ def independent(errors: Floats) -> float:
     """
     powers = np.abs(np.fft.rfft(errors, max(len(errors), 1))[1:]) ** 2
     return float(4 * powers.sum() ** 2 / (powers**2).sum()) if powers.any() else 0.0
+
+
+def swing(pieces: Sequence[Floats]) -> Floats:
+    """The lowest autocorrelation of errors at any lag, (d,), as those of `inflation`."""
+    covariances = _autocovariances(pieces)
+    return covariances.min(axis=0) / np.maximum(covariances[0], LEAST)
 
 
 def _levinson(covariance: Floats, n: int) -> Floats:
