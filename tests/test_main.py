@@ -191,6 +191,13 @@ def test_who_exports_a_rig_that_is_not_learned_is_told_the_command(tmp_path, cap
     assert "as the command discover does, which writes them to rig.toml" in capsys.readouterr().err
 
 
+def test_a_film_of_one_frame_is_none(capsys):
+    assert main(["demo", "--frames", "1"]) == 2
+    shown = capsys.readouterr()
+    assert shown.err == "error: frames: must be an integer of at least 2, got 1\n"
+    assert not shown.out
+
+
 def test_messages_name_what_was_typed(tmp_path, capsys):
     missing, other = str(tmp_path / "none.toml"), str(tmp_path / "a.mat")
     assert main(["rig-import", missing]) == 2
@@ -235,6 +242,7 @@ def tracked(tmp_path, monkeypatch):
         rows = (f"{i},{u:.9f},{v:.9f}" for i, (u, v) in enumerate(camera.project(x)))
         (tmp_path / f"{name}.csv").write_text("\n".join(["frame,u,v", *rows]))
     (tmp_path / "still.csv").write_text("u,v\n" + "200,200\n" * 200)
+    (tmp_path / "1.csv").write_text("u,v\n1,2\n")
     return tmp_path
 
 
@@ -294,6 +302,7 @@ def test_frames_of_files_count_from_the_start_of_their_videos(tracked):
         (["--tracks", "a.csv", "none.csv"], "tracks: no such file, got 'none.csv'"),
         (["--tracks", "a.csv", "--fps", "9"], "tracks: must be one per camera, got 1 for 3"),
         (["--tracks", "rig.toml", "--fps", "9"], "tracks: rig.toml must"),
+        (["--tracks", "1.csv", "1.csv", "1.csv", "--fps", "9"], "tracks: must have two frames or"),
     ],
 )
 def test_bad_tracks_are_told(tracked, capsys, options, message):

@@ -235,9 +235,11 @@ def _demo(options: argparse.Namespace) -> int:
     Two of the cameras are forgotten, too, and learned from the video files: this is the whole
     pipeline in less than a minute.
     """
+    from .checks import check_integer
     from .pipeline import discover_from_videos
     from .study import film, score
 
+    check_integer("frames", options.frames, 2)
     with tempfile.TemporaryDirectory() as folder:
         print(f"filming {options.system}: three videos of {options.frames} frames ...", flush=True)
         shot = film(options.system, folder, options.frames, options.seed)

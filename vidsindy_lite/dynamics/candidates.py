@@ -193,6 +193,7 @@ class Library:
         ValueError
             If it names an unknown family, or what follows is no such list.
         """
+        check_instance("text", text, str)
         total, (families, *equations) = cls(), text.split(";")
         for part in families.split("+"):
             match = re.fullmatch(r"\s*(polynomial|fourier|rational)\s*\(\s*(\d+)\s*\)\s*", part)
