@@ -124,3 +124,9 @@ def test_rows_of_a_wrong_shape(values):
         check_rows("x", values, 2)
     with pytest.raises(ValueError, match="x: must be finite or NaN, got 1 infinite values"):
         check_rows("x", [[0, np.inf]], 2)
+
+
+def test_a_value_is_shown_in_one_line():
+    with pytest.raises(ValueError, match="x: must be an array of real numbers, got") as caught:
+        check_array("x", np.ones((9, 2)) + 1j)
+    assert "\n" not in str(caught.value)

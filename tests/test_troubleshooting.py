@@ -190,7 +190,7 @@ TROUBLES = {
     "the lags that are given differ from those of the tracks": lambda studio: studio.says(
         lags=(0, 0.2, 0)
     ),
-    "lags: must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
+    "must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
     "the curve misses the data": lambda studio: pendulum(degree=1),
     "another law fits almost as well": undecided,
     "is settled by how large an error is tolerated": contested,

@@ -11,24 +11,29 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from . import __version__
+from .options import Parser, as_library, as_number, as_numbers, as_size, choice, count, words
 from .study import SYSTEMS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    options = _parser().parse_args(arguments)
+    typed: dict[str, str] = {}
     try:
+        options = _parser().parse_args(arguments)
+        typed = options.typed
         return options.command(options)
     except KeyboardInterrupt:
         print("\nstopped; nothing was written", file=sys.stderr)
         return 130
     except (ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        name, colon, rest = str(error).partition(":")
+        name = typed.get(name.partition("[")[0], name)
+        print(f"error: {name}{colon}{rest}", file=sys.stderr)
         return 2
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m vidsindy_lite",
         description="From three videos of a moving target to its governing equations.",
         epilog="`python -m vidsindy_lite discover --help` says more, and so do the others.",
@@ -47,7 +52,7 @@ def _parser() -> argparse.ArgumentParser:
         )
         for option, settings in command.options.items():
             one.add_argument(option, **settings)
-        one.set_defaults(command=command.work)
+        one.set_defaults(command=command.work, typed=command.typed)
     return parser
 
 
@@ -230,9 +235,11 @@ def _demo(options: argparse.Namespace) -> int:
     Two of the cameras are forgotten, too, and learned from the video files: this is the whole
     pipeline in less than a minute.
     """
+    from .checks import check_integer
     from .pipeline import discover_from_videos
     from .study import film, score
 
+    check_integer("frames", options.frames, 2)
     with tempfile.TemporaryDirectory() as folder:
         print(f"filming {options.system}: three videos of {options.frames} frames ...", flush=True)
         shot = film(options.system, folder, options.frames, options.seed)
@@ -290,156 +297,119 @@ def _compare(options: argparse.Namespace) -> int:
 # ------------------------------------------------------------------------------------ their options
 
 
-def _numbers(text: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"must be numbers with commas between them, got {text!r:.60}"
-        ) from None
-
-
-def _library(text: str) -> Any:
-    from .dynamics import Library
-
-    try:
-        return Library.parse(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error).removeprefix("library: ")) from None
-
-
-def _size(text: str) -> tuple[int, int]:
-    try:
-        width, height = text.split("x")
-        return int(width), int(height)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"must be two integers like 1920x1080, got {text!r:.60}"
-        ) from None
-
-
-def _choice(default: str, known: Sequence[str], what: str) -> dict[str, Any]:
-    """An option that has one of a few values."""
-    return {"default": default, "choices": known, "help": what}
-
-
-def _count(default: int | None, what: str) -> dict[str, Any]:
-    """An option that is an integer."""
-    return {"default": default, "type": int, "help": what}
-
-
-def _text(metavar: str, what: str, **more: object) -> dict[str, Any]:
-    """An argument or an option that is text, or is made of it."""
-    return {"metavar": metavar, "help": what, **more}
-
-
 class _Command(NamedTuple):
-    """What a command does, a line on it, and what `add_argument` takes for each of its options."""
+    """What a command does, a line on it, and what `add_argument` takes for each of its options.
+
+    What messages call by its name in the package, ``typed`` calls as the user does.
+    """
 
     work: Callable[[argparse.Namespace], int]
     help: str
     options: dict[str, dict[str, Any]]
+    typed: dict[str, str] = {}
 
 
 COMMANDS = {
     "discover": _Command(_discover, "from your own videos and a rig file to a report on the law", {
-        "videos": _text("VIDEO", "one per camera of the rig", nargs="*"),
-        "--tracks": _text(
+        "videos": words("VIDEO", "one per camera of the rig", nargs="*"),
+        "--tracks": words(
             "FILE", "text files of tracks, one per camera of the rig or one of all, in place of "
             "videos", nargs="+"
         ),
-        "--rig": _text("FILE", "where the cameras stand", required=True),
-        "--out": _text("DIR", "folder of the report (default: report)", default="report"),
-        "--lag": _text(
+        "--rig": words("FILE", "where the cameras stand", required=True),
+        "--out": words("DIR", "folder of the report (default: report)", default="report"),
+        "--lag": words(
             "0,L2,L3", "by how many frames of the first video each one starts later; the default "
-            "is to learn it (a first number below zero needs the form --lag=-7,0,0)", type=_numbers
+            "is to learn it (a first number below zero needs the form --lag=-7,0,0)",
+            type=as_numbers
         ),
-        "--fps": _text(
+        "--fps": words(
             "RATE", "frames of each video in one unit of time of the equations (default: as the "
-            "files say, which makes it a second of video)", type=float
+            "files say, which makes it a second of video)", type=as_number(float, "a number")
         ),
-        "--degree": _count(None, "highest degree of the polynomials (default: 3)"),
-        "--library": _text(
+        "--degree": count(None, "highest degree of the polynomials (default: 3)"),
+        "--library": words(
             "TERMS", "in place of --degree: polynomial(N), fourier(N) with the sines and cosines "
             "of the coordinates, rational(N) with denominators, or a sum such as "
             "'polynomial(1) + fourier(1)'; then what is known, as in "
-            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)", type=_library
+            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)", type=as_library
         ),
-        "--order": _choice(
+        "--order": choice(
             "auto", ("1", "2", "auto"),
             "1 for x' = f(x), 2 for laws of motion, x'' = f(x, x'), auto (default) for the one to "
             "be trusted"
         ),
-        "--origin": _choice(
+        "--origin": choice(
             "learn", ("learn", "data"),
             "whether the law's own origin is sought (default) or is that of the data"
         ),
-        "--detector": _text(
+        "--detector": words(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "
             "ONNX file (default: auto)", default="auto"
         ),
-        "--targets": _count(
+        "--targets": count(
             1, "how many targets to follow and to find one law for (default: 1); several are told "
             "from each other by geometry"
         ),
-        "--seed": _count(0, "of the search (default: 0)"),
-    }),
+        "--seed": count(0, "of the search (default: 0)"),
+    }, {"path": "videos", "paths": "videos", "lags": "lag"}),
     "pick": _Command(_pick, "a page on which you show the target in your videos", {
-        "videos": _text("VIDEO", "a file, a folder of images, or a pattern", nargs="+"),
-        "--out": _text("FILE", "the page (default: pick.html)", default="pick.html"),
-    }),
+        "videos": words("VIDEO", "a file, a folder of images, or a pattern", nargs="+"),
+        "--out": words("FILE", "the page (default: pick.html)", default="pick.html"),
+    }, {"path": "videos", "paths": "videos"}),
     "rig-template": _Command(_rig_template, "print a rig file to fill in", {
-        "--cameras": _count(3, "how many (default: 3)"),
-        "--model": _choice(
+        "--cameras": count(3, "how many (default: 3)"),
+        "--model": choice(
             "perspective", ("perspective", "orthographic"),
             "perspective (default), or orthographic for far cameras with long lenses"
         ),
-        "--size": _text(
-            "WxH", "of the videos in pixels (default: 1920x1080)", type=_size, default=(1920, 1080)
+        "--size": words(
+            "WxH", "of the videos in pixels (default: 1920x1080)", type=as_size,
+            default=(1920, 1080)
         ),
-        "--output": _text("FILE", "write it there, in UTF-8 (default: print it)"),
-    }),
+        "--output": words("FILE", "write it there, in UTF-8 (default: print it)"),
+    }, {"image_size": "size"}),
     "rig-import": _Command(_rig_import, "a rig file from the calibration of another tool", {
-        "files": _text("FILE", "calibrations, in the order of the videos", nargs="+"),
-        "--size": _text("WxH", "of the videos in pixels, if the files do not say", type=_size),
-        "--output": _text("FILE", "write it there, in UTF-8 (default: print it)"),
-    }),
+        "files": words("FILE", "calibrations, in the order of the videos", nargs="+"),
+        "--size": words("WxH", "of the videos in pixels, if the files do not say", type=as_size),
+        "--output": words("FILE", "write it there, in UTF-8 (default: print it)"),
+    }, {"image_size": "size", "paths": "files"}),
     "rig-export": _Command(_rig_export, "a rig file as a calibration for other tools", {
-        "rig": _text("RIG", "a rig file of perspective cameras, all calibrated"),
-        "file": _text("FILE", "to write: .toml, .yaml, .xml, .json, .npz or .csv"),
-    }),
+        "rig": words("RIG", "a rig file of perspective cameras, all calibrated"),
+        "file": words("FILE", "to write: .toml, .yaml, .xml, .json, .npz or .csv"),
+    }, {"path": "file"}),
     "run": _Command(_run, "execute the notebooks, regenerate figures and tables", {
-        "notebooks": _text("NOTEBOOK", "number, name or path (default: all)", nargs="*"),
-        "--profile": _choice("full", ("full", "quick"), "size (default: full)"),
-        "--output": _text(
+        "notebooks": words("NOTEBOOK", "number, name or path (default: all)", nargs="*"),
+        "--profile": choice("full", ("full", "quick"), "size (default: full)"),
+        "--output": words(
             "DIR", "folder for notebooks/ and figures/ (default: the repository, or build/quick)"
         ),
         "--force": {
             "action": "store_true",
             "help": "execute also what is up to date: same code, executed here, outputs in place",
         },
-        "--dask": _text(
+        "--dask": words(
             "ADDRESS",
             "scheduler of a Dask cluster, e.g. tcp://10.0.0.1:8786, that the sweeps run on"
         ),
     }),
     "demo": _Command(_demo, "from three videos to the first equation, in a minute", {
-        "--system": _choice("Lorenz", tuple(SYSTEMS), "default: Lorenz"),
-        "--frames": _count(500, "per camera (default: 500)"),
-        "--seed": _count(0, "of scenes and noise (default: 0)"),
+        "--system": choice("Lorenz", tuple(SYSTEMS), "default: Lorenz"),
+        "--frames": count(500, "per camera (default: 500)"),
+        "--seed": count(0, "of scenes and noise (default: 0)"),
     }),
     "train-detector": _Command(_train, "train the learned detector from scratch", {
-        "--seed": _count(0, "of weights and frames (default: 0)"),
-        "--steps": _count(None, "batches of 16 frames (default: as shipped)"),
-        "--output": _text("FILE", "weights (default: those of the package)"),
+        "--seed": count(0, "of weights and frames (default: 0)"),
+        "--steps": count(None, "batches of 16 frames (default: as shipped)"),
+        "--output": words("FILE", "weights (default: those of the package)"),
     }),
     "site": _Command(_site, "README, notebooks, figures and reference as web pages", {
-        "--output": _text("DIR", "folder (default: build/site)", default="build/site"),
+        "--output": words("DIR", "folder (default: build/site)", default="build/site"),
     }),
     "compare": _Command(_compare, "two folders of figures, by their numbers", {
-        "committed": _text("COMMITTED", "a folder like figures/"),
-        "regenerated": _text("REGENERATED", "the same from another run"),
-        "--output": _text(
+        "committed": words("COMMITTED", "a folder like figures/"),
+        "regenerated": words("REGENERATED", "the same from another run"),
+        "--output": words(
             "DIR", "for both sides, with a page; an earlier comparison there is replaced",
             required=True
         ),

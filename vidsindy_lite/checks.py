@@ -19,25 +19,32 @@ from .arrays import Floats
 
 FARTHEST_PIXEL = 1e100
 """Largest coordinate of a track: the squares of larger ones are no numbers any more."""
+FARTHEST = 1e100
+"""Largest value of a state, for the same reason."""
 LARGEST_SIDE = 32768
 """Pixels of a camera's image, in width and in height: no sensor has more."""
+
+
+def shown(value: object) -> str:
+    """A value as a message shows it: the start of it, in one line."""
+    return " ".join(repr(value).split())[:60]
 
 
 def check_instance(name: str, value: object, kind: type) -> None:
     """An object of a type of ours, not e.g. the name of its file."""
     if not isinstance(value, kind):
-        raise ValueError(f"{name}: must be of type {kind.__name__}, got {value!r:.60}")
+        raise ValueError(f"{name}: must be of type {kind.__name__}, got {shown(value)}")
 
 
 def check_path(name: str, value: str | os.PathLike) -> Path:
     """The name of one file or folder, which can be shown."""
     if not isinstance(value, str | os.PathLike):
-        raise ValueError(f"{name}: must be the name of a file, got {value!r:.60}")
+        raise ValueError(f"{name}: must be the name of a file, got {shown(value)}")
     path = Path(value)
     try:
         str(path).encode()
     except UnicodeEncodeError:
-        raise ValueError(f"{name}: must be made of characters, got {value!r:.60}") from None
+        raise ValueError(f"{name}: must be made of characters, got {shown(value)}") from None
     return path
 
 
@@ -52,20 +59,20 @@ def check_output(name: str, value: str | os.PathLike) -> Path:
 def check_choice(name: str, value: str, known: Iterable[str]) -> None:
     """One of the known names."""
     if value not in known:
-        raise ValueError(f"{name}: must be one of {', '.join(known)}, got {value!r:.60}")
+        raise ValueError(f"{name}: must be one of {', '.join(known)}, got {shown(value)}")
 
 
 def check_integer(name: str, value: int, least: int = 0) -> int:
     """An integer of at least ``least``; with the default, a seed or an index."""
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
-        raise ValueError(f"{name}: must be an integer of at least {least}, got {value!r:.60}")
+        raise ValueError(f"{name}: must be an integer of at least {least}, got {shown(value)}")
     return int(value)
 
 
 def check_number(name: str, value: float | Fraction) -> float:
     """A finite real number."""
     if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
-        raise ValueError(f"{name}: must be a finite number, got {value!r:.60}")
+        raise ValueError(f"{name}: must be a finite number, got {shown(value)}")
     return float(value)
 
 
@@ -84,14 +91,14 @@ def check_array(name: str, values: ArrayLike) -> Floats:
             raise TypeError
         return np.ma.filled(array.astype(float, copy=False), np.nan)
     except (TypeError, ValueError):
-        raise ValueError(f"{name}: must be an array of real numbers, got {values!r:.60}") from None
+        raise ValueError(f"{name}: must be an array of real numbers, got {shown(values)}") from None
 
 
 def check_vector(name: str, values: ArrayLike, size: int) -> Floats:
     """So many finite numbers, shape (size,); a copy."""
     vector = check_array(name, values).copy()
     if vector.shape != (size,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name}: must be {size} finite numbers, got {values!r:.60}")
+        raise ValueError(f"{name}: must be {size} finite numbers, got {shown(values)}")
     return vector
 
 
@@ -112,7 +119,7 @@ def check_tracks(tracks: Sequence[ArrayLike], cameras: int | None = None) -> lis
     is_array = isinstance(tracks, np.ndarray) and tracks.ndim
     if not (is_array or isinstance(tracks, list | tuple)) or not len(tracks):
         raise ValueError(
-            f"tracks: must be a list of arrays (n, 2), one per camera, got {tracks!r:.60}"
+            f"tracks: must be a list of arrays (n, 2), one per camera, got {shown(tracks)}"
         )
     if cameras is not None and len(tracks) != cameras:
         raise ValueError(f"tracks: must be one per camera, got {len(tracks)} for {cameras} cameras")
@@ -148,8 +155,8 @@ def check_image_size(size: tuple[int, int], least: int = 1) -> tuple[int, int]:
         sides = check_integer("", width, least), check_integer("", height, least)
     except (TypeError, ValueError):
         raise ValueError(
-            f"image_size: must be two integers of at least {least}, got {size!r:.60}"
+            f"image_size: must be two integers of at least {least}, got {shown(size)}"
         ) from None
     if max(sides) > LARGEST_SIDE:
-        raise ValueError(f"image_size: must be at most {LARGEST_SIDE} a side, got {size!r:.60}")
+        raise ValueError(f"image_size: must be at most {LARGEST_SIDE} a side, got {shown(size)}")
     return sides

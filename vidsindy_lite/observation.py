@@ -221,6 +221,8 @@ def observe_tracks(
     """
     check_learnable(rig)
     raw = check_tracks(tracks, len(rig.cameras))
+    if min(map(len, raw)) < 2:
+        raise ValueError(f"tracks: must have two frames or more, got {[*map(len, raw)]}")
     clock = Clock.of_tracks(t, raw)
     names = names or [f"tracks[{i}]" for i in range(len(raw))]
     given = _check_lags(lags, clock, names)

@@ -303,6 +303,8 @@ class TestRig:
     def test_around_needs_a_scene(self):
         with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
             Rig.around(np.ones((5, 3)))
+        with pytest.raises(ValueError, match=r"got 1 without NaN in shape \(99, 3\)$"):
+            Rig.around(np.ones((99, 3)))
         for none in (np.zeros((0, 3)), np.full((5, 3), np.nan), [[1, 2, 3]]):
             with pytest.raises(ValueError, match="x: must hold at least two different points, got"):
                 Rig.around(none)
@@ -712,7 +714,7 @@ class TestPosition:
         with pytest.raises(ValueError, match=message):
             learn_cameras(still, self.without(rig.uncalibrated(), 2))
         loose = self.without(rig, 1)
-        with pytest.raises(ValueError, match=r"got cameras\[1\] without position; use"):
+        with pytest.raises(ValueError, match=r"got cameras\[1\] without position; learn_cameras"):
             reconstruct(tracks, loose)
         with pytest.raises(ValueError, match="camera: position must be known, got None"):
             loose.cameras[1].project(x)

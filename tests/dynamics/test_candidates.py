@@ -324,7 +324,8 @@ def test_a_library_that_does_not_suit_is_refused_in_one_line(library, words):
         (lambda: Library.fourier(0), "harmonics: must be an integer of at least 1, got 0"),
         (lambda: Library.polynomial(-1), "degree: must be an integer of at least 0, got -1"),
         (lambda: Library.terms({}), "functions: must map names to functions"),
-        (lambda: Library.terms({"a": 1}), "functions: must map a name to a function, got 'a'"),
+        (lambda: Library.parse(3), "text: must be of type str, got 3"),
+        (lambda: Library.terms({"a": 1}), "functions: must map names to functions, got 'a': 1"),
         (
             lambda: Library.terms({"a": np.sin}) + Library.terms({"a": np.cos}),
             "library: a name may stand for one function, got 'a' twice",

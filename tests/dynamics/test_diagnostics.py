@@ -1,5 +1,6 @@
 """The warnings, on fits whose support is set by hand."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +9,8 @@ from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import discover
 from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.collocation import Collocation, Status
-from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
+from vidsindy_lite.dynamics.collocation import CLEANEST, Collocation, Status
+from vidsindy_lite.dynamics.diagnostics import diagnose, outliers, untold_origins
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.integrate import runge_kutta_4
 from vidsindy_lite.dynamics.persistence import Plateau, follow
@@ -81,14 +82,15 @@ def test_a_narrow_decision_in_the_frame_of_the_data_is_told(duffing):
     assert diagnose(problem, fit, model, path, law, margins) == ()
     margins[[law.terms.index("1"), len(law.terms) + law.terms.index("x^3")]] = 3.0, 1.5
     (warning,) = diagnose(problem, fit, model, path, law, margins)
-    assert "with 1 in dx/dt, without x^3 in dy/dt (criterion +1.5)" in warning
+    assert "with a constant in dx/dt, without x^3 in dy/dt (criterion +1.5)" in warning
 
 
 def test_a_coordinate_that_lost_its_law_is_told(duffing):
     problem, fit, model, path, _, _ = fitted(duffing)
     law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {}}, degree=3)
     told = diagnose(problem, fit, model, path, law, np.full(law.coefficients.size, 100.0))
-    assert any("no term was found for dy/dt" in warning for warning in told)
+    (warning,) = [warning for warning in told if "no term was found for dy/dt" in warning]
+    assert warning.endswith("use cleaner samples or a longer trajectory")
 
 
 def test_a_law_in_the_data_that_is_not_the_native_one_is_told(duffing):
@@ -153,7 +155,7 @@ def test_noise_and_gaps_are_no_outliers(law):
 
 @pytest.mark.parametrize(
     ("status", "words"),
-    [(Status.MAX_STEPS, "use cleaner samples"), (Status.STALLED, "may be indistinguishable")],
+    [(Status.MAX_STEPS, "may be off by more"), (Status.STALLED, "may be indistinguishable")],
 )
 def test_a_fit_that_did_not_converge_is_named_with_advice(duffing, status, words):
     problem, fit, model, path, law, margins = fitted(duffing)
@@ -161,6 +163,36 @@ def test_a_fit_that_did_not_converge_is_named_with_advice(duffing, status, words
     (warning,) = diagnose(problem, replace(fit, status=status), model, path, law, margins)
     assert warning.startswith(f"the last fit did not converge ({status.value})")
     assert words in warning
+    assert warning.endswith("use cleaner samples or a longer trajectory, or a lower degree")
+
+
+def test_clean_data_need_not_be_cleaner(duffing):
+    problem, fit, model, path, law, margins = fitted(duffing)
+    collocation = replace(fit.collocation, data_weights=np.full(2, CLEANEST**-2))
+    clean = replace(fit, collocation=collocation, status=Status.STALLED)
+    told = diagnose(problem, clean, model, path, law, margins)
+    (warning,) = [one for one in told if "did not converge" in one]
+    assert "use a longer trajectory, denser samples or other starts" in warning
+    assert not any("clean" in one for one in told)
+
+
+@pytest.mark.parametrize(
+    ("noise", "times"),
+    [(0.02, r"\d+\.\d times"), (1e-9, "more than 100 times")],
+)
+def test_a_misfit_has_a_size_in_units_of_the_data_and_of_their_spread(noise, times):
+    # The constant of a decay changes after half of the time: the curve of no law meets both.
+    t = np.linspace(0, 40, 800)
+    drive = np.cos(t) + 0.1 * np.cos(2.3 * t), -np.sin(t) - 0.23 * np.sin(2.3 * t)
+    x = 50 * np.stack(drive, axis=1)
+    x += noise * x.std() * np.random.default_rng(3).standard_normal(x.shape)
+    told = " ".join(discover(t, x, order=1).warnings)
+    number = r"(\d\S*)"
+    pattern = f"data of ([xy]) by {number} \\({number} % of its spread, {times} the noise estimated"
+    found = re.search(pattern, told)
+    assert found, told
+    spread = x[:, "xy".index(found[1])].std()
+    assert float(found[2]) == pytest.approx(float(found[3]) / 100 * spread, rel=0.02)
 
 
 def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
@@ -173,6 +205,29 @@ def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
     (warning,) = diagnose(problem, fit, model, replace(path, plateaus=plateaus), law, margins)
     assert "dy/dt is settled by how large an error is tolerated" in warning
     assert "with x^2, without x^3" in warning
+    assert "without the constant" not in warning
+
+
+def test_the_constant_is_a_word_and_the_ends_of_a_range_differ(duffing):
+    problem, fit, model, path, law, margins = fitted(duffing)
+    (own,) = path.of(fit.state.active)[1:]
+    terms = own.terms.copy()
+    terms[law.terms.index("1")] = True
+    rival, first = Plateau(1, 0.0301, 0.0314, terms), replace(own, low=0.03, high=0.030001)
+    plateaus = (path.plateaus[0], (rival, first))
+    path = replace(path, plateaus=plateaus, level=0.1)
+    told = diagnose(problem, fit, model, path, law, margins)
+    (warning,) = [one for one in told if "is settled by" in one]
+    assert "stays the same at 0.03 of the spread of the data" in warning
+    assert "with a constant from 0.03 to 0.031;" in warning
+
+
+def test_axes_whose_origin_the_data_do_not_tell_share_a_line():
+    found = [("another origin", name, cost) for name, cost in (("x", 0.4), ("x", -0.2), ("z", 3))]
+    first, second = untold_origins([*found, ("the origin of the data", "y", 1)], "longer ones")
+    assert "origin is in x and in z: other terms around another origin" in first
+    assert "(criterion -0.2); use longer ones" in first
+    assert "origin is in y: other terms around the origin of the data" in second
 
 
 @pytest.mark.parametrize("seed", [2, 3, 5, 6, 8])  # all but 5: the next law at home, not the first

@@ -176,3 +176,18 @@ def test_a_law_on_a_shape_is_never_simply_ok(name, order):
     noisy = x + 0.01 * x.std() * np.random.default_rng(0).standard_normal(x.shape)
     found = discover(TIMES, noisy, order=order, degree=2 if name == "bob" else 3)
     assert any(words in warning for warning in found.warnings)
+
+
+def test_a_coordinate_that_is_given_twice_is_named_without_a_factor_of_one():
+    t = np.linspace(0, 20, 300)
+    x = np.stack([np.cos(t), np.sin(t), np.cos(t)], axis=1)
+    told = " ".join(shapes([(t, x)], np.full(3, 1e-6), ("x", "y", "z"), np.zeros(3, dtype=int)))
+    assert "(x - z = 0)" in told or "(z - x = 0)" in told
+
+
+def test_terms_that_cancel_beyond_counting_are_told_in_few_digits():
+    law = PolynomialSystem.from_terms({"x": {"x": 1, "y": -1}, "y": {"x": 1}}, degree=1)
+    line = np.linspace(-1, 1, 50)
+    (told,) = cancelling(law, np.stack([line, line], axis=1))
+    assert "times their sum)" in told
+    assert max(map(len, told.split())) < 20

@@ -33,6 +33,7 @@ def with_value(row, value):
         (np.array([0, 1, 1, 3, 4]), X, r"t: must increase, got t\[1\] = 1 before t\[2\] = 1"),
         (T[::-1], X, "t: must increase"),
         (T, with_value(3, np.inf), "x: must not be infinite .* got infinity in row 3"),
+        (T, with_value(3, -1e150), r"x: must be at most 1e\+100, got 1e\+150: take another unit"),
         (T, np.diag(np.full(5, np.nan)) + 1, "x: must hold at least one row without NaN, got 5"),
         (T, np.full((5, 2), np.nan), "x: every coordinate must be seen, got 5 rows .* in column 0"),
         (np.empty(0), np.empty((0, 2)), "t: must hold at least one time"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.dynamics import PolynomialSystem, runge_kutta_4
-from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
+from vidsindy_lite.study.systems import FLOWS, REFERENCE_OFFSET, SYSTEMS, Benchmark
 
 TERMS = {
     "Lorenz": 12, "SprottE": 8, "RayleighBenard": 11, "SprottF": 10, "NoseHoover": 9,
@@ -55,6 +55,17 @@ def test_runge_kutta_is_of_fourth_order():
         abs(runge_kutta_4(law, np.array([0.0, 1.0]), [1.0], n)[-1, 0] - np.exp(-1)) for n in (4, 8)
     ]
     assert 14 < errors[0] / errors[1] < 18
+
+
+@pytest.mark.parametrize(("systems", "count"), [(SYSTEMS, 7), (FLOWS, 12)])
+def test_a_system_that_there_is_not_is_told_with_those_that_there_are(systems, count):
+    with pytest.raises(KeyError, match="system: must be one of Lorenz, .*, got 'Lorentz'"):
+        systems["Lorentz"]
+    with pytest.raises(KeyError, match="got 3"):
+        systems[3]
+    assert "Lorentz" not in systems
+    assert systems.get("Lorentz") is None
+    assert len(systems) == len({**systems}) == count
 
 
 def test_bad_benchmarks_are_refused():

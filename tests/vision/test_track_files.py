@@ -105,6 +105,13 @@ def test_files_that_hold_no_track(tmp_path, text, message):
         read(tmp_path, text)
 
 
+@pytest.mark.parametrize("content", [b"RIFF\0\0AVI u,v\n1,2\n" * 9, b"\x89PNG\r\n\x1a\n\xff1,2\n"])
+def test_a_file_that_is_no_text_is_not_printed(tmp_path, content):
+    (tmp_path / "a.avi").write_bytes(content)
+    with pytest.raises(ValueError, match=r"got 'a\.avi', which is no table of numbers$"):
+        read_tracks(tmp_path / "a.avi")
+
+
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(FileNotFoundError, match="tracks: no such file"):
         read_tracks(tmp_path / "none.csv")

@@ -23,9 +23,10 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import cv2
 import numpy as np
@@ -82,16 +83,20 @@ def read_calibration(
     size = None if image_size is None else check_image_size(image_size)
     cameras: list[PerspectiveCamera] = []
     warnings: list[str] = []
+    if isinstance(paths, str | os.PathLike) or not isinstance(paths, Iterable):
+        raise ValueError(f"paths: must be a list of files, got {paths!r:.60}")
     for given in paths:
         path = check_path("paths", given)
         if not path.is_file():
-            raise FileNotFoundError(f"{path}: no such calibration file")
+            raise FileNotFoundError(f"paths: no such calibration file, got '{path}'")
         try:
             found = list(_cameras(path, size))
         except (ValueError, KeyError, TypeError, OSError) as error:
-            raise ValueError(f"{path}: {error}") from error
+            raise ValueError(f"paths: in '{path}', {error}") from error
         if not found:
-            raise ValueError(f"{path}: must hold a camera matrix (K), DLT coefficients or P")
+            raise ValueError(
+                f"paths: must hold a camera matrix (K), DLT coefficients or P, got none in '{path}'"
+            )
         for camera, skew in found:
             if skew > _SKEW:
                 warnings.append(
@@ -138,7 +143,7 @@ def write_calibration(rig: Rig, path: str | os.PathLike) -> None:
         np.savetxt(file, np.column_stack(columns), delimiter=",", fmt="%.17g")
     else:
         known = ", ".join((".toml", *_STORAGE, ".npz"))
-        raise ValueError(f"path: must end in {known} or .csv, got {file.name}")
+        raise ValueError(f"path: must end in {known} or .csv, got '{file.name}'")
 
 
 def _cameras(path: Path, size: tuple[int, int] | None) -> Iterator[tuple[PerspectiveCamera, float]]:
@@ -151,7 +156,7 @@ def _cameras(path: Path, size: tuple[int, int] | None) -> Iterator[tuple[Perspec
         if "K" in table:
             yield _from_opencv(table, size), 0.0
         else:
-            yield from _from_matrices(np.asarray(table["P"], float), size)
+            yield from _from_matrices(check_array("P", table["P"]), size)
 
 
 def _content(path: Path, suffix: str) -> object:
@@ -170,11 +175,11 @@ def _content(path: Path, suffix: str) -> object:
                 return _plain(storage.root())
             finally:
                 storage.release()
-    except (ValueError, cv2.error, SystemError, EOFError) as error:
+    except (ValueError, cv2.error, SystemError, EOFError, BadZipFile) as error:
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ValueError(f"must be a {suffix} file of its kind: {first}") from None
     raise ValueError(
-        f"must end in .toml, .yaml, .yml, .xml, .json, .npz, .npy, .csv or .txt, got {path.name}"
+        f"must end in .toml, .yaml, .yml, .xml, .json, .npz, .npy, .csv or .txt, got '{path.name}'"
     )
 
 
@@ -291,7 +296,7 @@ def _from_opencv(table: dict[str, Any], given: tuple[int, int] | None) -> Perspe
     skew = abs(inner[0, 1] / inner[1, 1]) * inner[1, 2]
     if skew > _SKEW:
         raise ValueError(f"K: must have no skew, got {inner[0, 1]:g}")
-    turned = np.asarray(table["R"], float)
+    turned = check_array("R", table["R"])
     if turned.size == 3:
         rotation = Rotation.from_rotvec(_shaped("R", turned, (3,))).as_matrix()
     else:
@@ -303,8 +308,8 @@ def _from_opencv(table: dict[str, Any], given: tuple[int, int] | None) -> Perspe
         size = given
     if size is None:
         raise ValueError("image_size: must be given (--size WxH), as this file does not say")
-    width, height = (float(value) for value in np.ravel(size))
-    dist = np.ravel(np.asarray(table.get("dist", []), float))
+    width, height = _shaped("size", size, (2,))
+    dist = check_array("dist", table.get("dist", [])).ravel()
     if dist.size > 5 and not dist[5:].any():
         dist = dist[:5]
     if dist.size > 5:

@@ -166,8 +166,10 @@ class Rig:
         points = check_rows("x", x, 3)
         points = points[~np.isnan(points).any(axis=1)]
         if len(np.unique(points, axis=0)) < 2:
-            got = f"{points.tolist()!r:.60}" if len(points) else "only rows with NaN"
-            raise ValueError(f"x: must hold at least two different points, got {got}")
+            raise ValueError(
+                "x: must hold at least two different points, got "
+                f"{len(np.unique(points, axis=0))} without NaN in shape {np.shape(x)}"
+            )
         low, high = points.min(axis=0), points.max(axis=0)
         middle, reach = (low + high) / 2, np.linalg.norm(high - low)
         half = (np.array(check_image_size(image_size, least=2)) - 1) / 2

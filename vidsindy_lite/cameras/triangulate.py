@@ -178,7 +178,8 @@ def check_calibrated(name: str, rig: Rig) -> None:
             if not given:
                 raise ValueError(
                     f"{name}: all cameras must be calibrated and placed, got cameras[{i}] without "
-                    f"{what}; use learn_cameras first"
+                    f"{what}; learn_cameras finds them, as the command discover does, which writes "
+                    "them to rig.toml in its report"
                 )
 
 

@@ -224,7 +224,13 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
 def place(law: PolynomialSystem, entry: int) -> str:
     """Name of an entry of the coefficients, counted equation by equation."""
     equation, term = divmod(int(entry), len(law.terms))
-    return f"{law.terms[term]} in d{law.names[equation]}/dt"
+    return f"{spoken(law, term, equation)} in d{law.names[equation]}/dt"
+
+
+def spoken(law: PolynomialSystem, term: int, equation: int) -> str:
+    """A term within a sentence, where a 1 would be read as a number."""
+    constant = "the constant" if law.support[term, equation] else "a constant"
+    return constant if law.terms[term] == "1" else law.terms[term]
 
 
 def beyond_the_library(wider: Wider, noisy: bool) -> Iterator[str]:
@@ -238,7 +244,7 @@ def beyond_the_library(wider: Wider, noisy: bool) -> Iterator[str]:
     if found.decisive or (noisy and found.significant):
         yield (
             f"terms that the law has not explain what it leaves ({found.term}: chi-square "
-            f"{found.best:.0f}, all {found.count} of higher degree together {found.gain:.0f}): it "
+            f"{found.best:.4g}, all {found.count} of higher degree together {found.gain:.4g}): it "
             "may be an approximation along these data, as of a sine or a drag; raise the degree, "
             "or name its terms with library="
         )

@@ -106,7 +106,9 @@ class Library:
             )
         for name, rule in functions.items():
             if not isinstance(name, str) or not name.strip() or not callable(rule):
-                raise ValueError(f"functions: must map a name to a function, got {name!r:.60}")
+                raise ValueError(
+                    f"functions: must map names to functions, got {name!r:.60}: {rule!r:.60}"
+                )
         return cls(functions=tuple(functions.items()))
 
     @classmethod
@@ -191,6 +193,7 @@ class Library:
         ValueError
             If it names an unknown family, or what follows is no such list.
         """
+        check_instance("text", text, str)
         total, (families, *equations) = cls(), text.split(";")
         for part in families.split("+"):
             match = re.fullmatch(r"\s*(polynomial|fourier|rational)\s*\(\s*(\d+)\s*\)\s*", part)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import Floats
-from .beyond import Wider, beyond_the_library, place, widened
+from .beyond import Wider, beyond_the_library, place, spoken, widened
 from .collocation import CLEANEST, Fit, Linearisation, Status
 from .errors import passing, residual_noise
 from .library import shift_generators, shift_matrix
@@ -54,13 +54,13 @@ APART = 0.2
 than terms that cannot be told from zero make."""
 VANISHED = 1e-6
 """What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
-ADVICE = {
-    Status.MAX_STEPS: "its coefficients may be off by more than their errors; use cleaner samples, "
-    "or a lower degree",
-    Status.STALLED: "terms may be indistinguishable on these data; record longer, or lower the "
-    "degree",
+MEANING = {
+    Status.MAX_STEPS: "its coefficients may be off by more than their errors",
+    Status.STALLED: "terms may be indistinguishable on these data",
 }
-"""What to do about a fit that ended so."""
+"""What a fit that ended so may mean."""
+BEYOND_COUNTING = 100.0
+"""Times a noise beyond which it was all but none, and its multiples say nothing."""
 
 
 def diagnose(
@@ -100,7 +100,7 @@ def diagnose(
         *_another_in_the_data(problem, fit, law),
         *_selection(problem, fit, model, wider, path, law),
         *_sampling(problem),
-        *_standstill(law),
+        *_standstill(law, _remedy(fit)),
         *_narrow(law, margins),
     )
 
@@ -174,10 +174,14 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     if misses.any():
         j = int(np.where(misses, ratio, 0.0).argmax())
         told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
+        times = (
+            f"{ratio[j]:.1f}" if ratio[j] < BEYOND_COUNTING else f"more than {BEYOND_COUNTING:g}"
+        )
         yield (
-            f"the curve misses the data of {problem.form.names[j]} by {ratio[j]:.1f} times "
-            f"{told}: the law may lie outside the library (raise the "
-            "degree), the motion may not be autonomous, or errors last for several samples"
+            f"the curve misses the data of {problem.form.names[j]} by "
+            f"{residual[j] * problem.units.scale[j]:.3g} ({100 * residual[j]:.3g} % of its spread, "
+            f"{times} times {told}): the law may lie outside the library (raise the degree), the "
+            "motion may not be autonomous, or errors last for several samples"
         )
 
 
@@ -187,7 +191,7 @@ def _doubtful_sigma(problem: Problem, fit: Fit) -> Iterator[str]:
     j = int(ratio.argmax())
     if ratio[j] > MISFIT:
         yield (
-            f"sigma of {problem.form.names[j]} is {ratio[j]:.1f} times the errors that the law "
+            f"sigma of {problem.form.names[j]} is {ratio[j]:.3g} times the errors that the law "
             "leaves: the error bars are too wide, and terms may be lost; leave it out, and the "
             "errors are estimated"
         )
@@ -195,7 +199,10 @@ def _doubtful_sigma(problem: Problem, fit: Fit) -> Iterator[str]:
 
 def _unfinished(fit: Fit) -> Iterator[str]:
     if fit.status is not Status.CONVERGED:
-        yield f"the last fit did not converge ({fit.status.value}): {ADVICE[fit.status]}"
+        yield (
+            f"the last fit did not converge ({fit.status.value}): {MEANING[fit.status]}; use "
+            f"{_remedy(fit)}, or a lower degree"
+        )
 
 
 def _unmet(problem: Problem, fit: Fit) -> Iterator[str]:
@@ -203,7 +210,7 @@ def _unmet(problem: Problem, fit: Fit) -> Iterator[str]:
     if not residual < max(UNMET, WILD * float(problem.process_noise.max())):
         yield (
             f"the law is not met along the curve (residual {residual:.2g} of the speed): the fit "
-            "did not converge; use more or cleaner samples, or another degree"
+            f"did not converge; use {_remedy(fit)}, or another degree"
         )
 
 
@@ -227,8 +234,8 @@ def _selection(
     path: Path,
     law: PolynomialSystem,
 ) -> Iterator[str]:
-    yield from _contested(problem.law(fit.state), fit.state, path)
-    clean = (fit.collocation.data_weights**-0.5 <= CLEANEST).all()
+    remedy, clean = _remedy(fit), _is_clean(fit)
+    yield from _contested(problem.law(fit.state), fit.state, path, remedy)
     if clean and not problem.kicked:
         return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
@@ -238,13 +245,34 @@ def _selection(
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = model.of(problem.form.searched)
     yield from _left_over(model, fit.state)
-    yield from _near_tie(wider)
-    yield from _elsewhere(problem, fit.state, model, law)
+    yield from _near_tie(wider, remedy)
+    yield from _elsewhere(problem, fit.state, model, law, remedy)
 
 
-def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]:
+def _is_clean(fit: Fit) -> bool:
+    """Whether the data have no errors that the splines could tell from their own."""
+    return bool((fit.collocation.data_weights**-0.5 <= CLEANEST).all())
+
+
+def _remedy(fit: Fit) -> str:
+    """What data would settle it: what is clean cannot be cleaner."""
+    if _is_clean(fit):
+        return "a longer trajectory, denser samples or other starts"
+    return "cleaner samples or a longer trajectory"
+
+
+def _range(low: float, high: float) -> str:
+    """Two ends with as many digits as tell them apart."""
+    for digits in range(1, 4):
+        ends = f"{low:.{digits}g}", f"{high:.{digits}g}"
+        if ends[0] != ends[1]:
+            return f"from {ends[0]} to {ends[1]}"
+    return f"at {ends[0]}"
+
+
+def _contested(law: PolynomialSystem, state: State, path: Path, remedy: str) -> Iterator[str]:
     """Is there another plateau nearly as wide as that of an equation's law?"""
-    names, terms = law.names, law.terms
+    names = law.names
     for own, ranked in zip(path.of(state.active), path.ranked(), strict=True):
         others = [plateau for plateau in ranked if (plateau.terms != own.terms).any()]
         same = [plateau for plateau in ranked if (plateau.terms == own.terms).all()]
@@ -253,13 +281,13 @@ def _contested(law: PolynomialSystem, state: State, path: Path) -> Iterator[str]
             rival = others[0]
             changed = np.flatnonzero(rival.terms != own.terms).tolist()
             change = ", ".join(
-                f"{'with' if rival.terms[k] else 'without'} {terms[k]}" for k in changed
+                f"{'with' if rival.terms[k] else 'without'} {spoken(law, k, own.equation)}"
+                for k in changed
             )
             yield (
                 f"d{names[own.equation]}/dt is settled by how large an error is tolerated: "
-                f"it stays the same from {own.low:.1g} to {own.high:.1g} of the spread of the "
-                f"data, and {change} from {rival.low:.1g} to {rival.high:.1g}; use cleaner "
-                "samples or a longer trajectory"
+                f"it stays the same {_range(own.low, own.high)} of the spread of the data, and "
+                f"{change} {_range(rival.low, rival.high)}; use {remedy}"
             )
 
 
@@ -269,12 +297,12 @@ def _left_over(model: Linearisation, state: State) -> Iterator[str]:
     unused = len(model.columns) - int(state.free()[model.columns].sum())
     if unused and not chi2.sf(gain, unused) > CHANCE:
         yield (
-            f"the terms left out explain more than chance (chi-square {gain:.0f} for {unused}): a "
+            f"the terms left out explain more than chance (chi-square {gain:.4g} for {unused}): a "
             "term may be missing, or the errors of the measurements depend on each other"
         )
 
 
-def _near_tie(wider: Wider) -> Iterator[str]:
+def _near_tie(wider: Wider, remedy: str) -> Iterator[str]:
     """Would another law fit almost as well, of the library or of a higher degree?"""
     model, law = wider.candidates, wider.law
     cost, dropped, added = closest_rival(
@@ -295,15 +323,16 @@ def _near_tie(wider: Wider) -> Iterator[str]:
     frame = "in its own frame, " if wider.state.moving.any() else ""
     yield (
         f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
-        "do not settle it: use a longer or cleaner trajectory"
+        f"do not settle it: use {remedy}"
     )
 
 
 def _elsewhere(
-    problem: Problem, state: State, model: Linearisation, law: PolynomialSystem
+    problem: Problem, state: State, model: Linearisation, law: PolynomialSystem, remedy: str
 ) -> Iterator[str]:
     """Would another law fit almost as well, one axis nearer home or one away from it?"""
     exponents = problem.exponents
+    found: list[tuple[str, str, float]] = []
     own = problem.price(state)
     for axis, there in _neighbours(problem, state):
         for value, rival in _cheapest_two(problem, state, model, there):
@@ -315,12 +344,28 @@ def _elsewhere(
             terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
             if (terms != law.support).any():
                 where = "another origin" if there.moving[axis] else "the origin of the data"
-                yield (
-                    f"the data hardly tell where the law's origin is in {problem.form.names[axis]}:"
-                    f" other terms around {where} fit almost as well (criterion {cost:+.1f}); use a"
-                    " longer or cleaner trajectory"
-                )
+                found.append((where, problem.form.names[axis], cost))
                 break
+    yield from untold_origins(found, remedy)
+
+
+def untold_origins(found: Sequence[tuple[str, str, float]], remedy: str) -> Iterator[str]:
+    """One line for all axes along which other terms fit almost as well around another origin.
+
+    Parameters
+    ----------
+    found : sequence of (str, str, float)
+        Which other origin, along which axis, and by how much the criterion rises there.
+    remedy : str
+        What to do about it.
+    """
+    for where in dict.fromkeys(where for where, _, _ in found):
+        axes = dict.fromkeys(name for other, name, _ in found if other == where)
+        least = min(cost for other, _, cost in found if other == where)
+        yield (
+            f"the data hardly tell where the law's origin is in {' and in '.join(axes)}: other "
+            f"terms around {where} fit almost as well (criterion {least:+.1f}); use {remedy}"
+        )
 
 
 def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
@@ -362,12 +407,12 @@ def _cheapest_two(
     yield risen + value + cost, there.moved(there.control_points, flat)
 
 
-def _standstill(law: PolynomialSystem) -> Iterator[str]:
+def _standstill(law: PolynomialSystem, remedy: str) -> Iterator[str]:
     if law.order == 2:
         return  # what moves without a force moves evenly
     for j in np.flatnonzero(~law.support.any(axis=0)):
         name = law.names[j]
-        yield f"no term was found for d{name}/dt although {name} moves: use more or cleaner samples"
+        yield f"no term was found for d{name}/dt although {name} moves: use {remedy}"
 
 
 def _narrow(law: PolynomialSystem, margins: Floats) -> Iterator[str]:

@@ -122,7 +122,8 @@ def _relation(normal: Floats, x: Floats, names: Sequence[str]) -> str:
     sides = " ".join(f"{'-' if a < 0 else '+'} {abs(a):.4g} {name}" for a, name in named if a)
     constant = float(normal @ x.mean(axis=0))
     nil = abs(constant) < 1e-3 * float(np.linalg.norm(normal * x.std(axis=0)))
-    return f"{sides.removeprefix('+ 1 ')} = {0 if nil else constant:.4g}"
+    plain = sides.replace(" 1 ", " ").removeprefix("+ ")
+    return f"{plain} = {0 if nil else constant:.4g}"
 
 
 def _round(x: Floats, noise: Floats, planar: bool) -> str:
@@ -283,7 +284,7 @@ def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
         times = float(np.sqrt((parts**2).mean() / max((sums[:, j] ** 2).mean(), LEAST)))
         if times > CANCELLED:
             yield (
-                f"the terms of d{name}/dt cancel (their sizes add up to {times:.0f} times their "
+                f"the terms of d{name}/dt cancel (their sizes add up to {times:.3g} times their "
                 "sum): something is constant on these data; look for it, or add runs from other "
                 "starts"
             )

@@ -44,15 +44,16 @@ def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
         If the file holds none, or the library not all functions of the law.
     """
     file = check_path("path", path)
+    message = f"path: must be a file that Discovery.save has written, got '{file}'"
     if not file.is_file():
-        raise FileNotFoundError(f"path: must be a file that `save` has written, none at '{file}'")
+        raise FileNotFoundError(f"{message}, which does not exist")
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         found = _decoded(content["discovery"]) if content["format"] == FORMAT else None
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"path: must be a file that `save` has written, got {file}") from error
+        raise ValueError(message) from error
     if not isinstance(found, Discovery):
-        raise ValueError(f"path: must be a file that `save` has written, got {file}")
+        raise ValueError(message)
     system, native = found.system, found.native
     written = cast("tuple[str, ...]", system.functions)  # of which a file holds the names
     functions = restored(system.names, system.d // system.order, written, library)

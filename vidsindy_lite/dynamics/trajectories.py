@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats
-from ..checks import check_array, check_times
+from ..checks import FARTHEST, check_array, check_times
 from .library import variable_names
 
 Trajectory = tuple[Floats, Floats]
@@ -55,6 +55,9 @@ def _check_samples(t: Floats, x: Floats) -> Trajectory:
             f"x: must not be infinite (NaN marks what was not seen), "
             f"got infinity in row {int(np.flatnonzero(np.isinf(x).any(axis=1))[0])}"
         )
+    largest = np.nanmax(np.abs(x), initial=0.0)
+    if largest > FARTHEST:
+        raise ValueError(f"x: must be at most {FARTHEST:g}, got {largest:g}: take another unit")
     seen = ~np.isnan(x)
     if not seen.any(axis=0).all():
         column = int(np.argmin(seen.any(axis=0)))

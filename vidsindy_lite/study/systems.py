@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 from pathlib import Path
 
 import numpy as np
@@ -70,25 +71,34 @@ PERIODS = {
 """Characteristic periods, as in ``dysts``."""
 
 
-def _benchmark(
-    name: str, law: PolynomialSystem, x0: Sequence[float], period: float
-) -> Benchmark:
+def _benchmark(name: str, law: PolynomialSystem, x0: Sequence[float], period: float) -> Benchmark:
     """A system in the library of degree 3."""
     library = monomial_exponents(3, degree=3)
     coefficients = coefficients_in(law, library)
     return Benchmark(law.names, library, coefficients, name, tuple(x0), period)
 
 
-SYSTEMS: dict[str, Benchmark] = {
-    name: _benchmark(name, SYSTEMS_S1[name].law, SYSTEMS_S1[name].x0, period)
+class _Benchmarks(dict[str, Benchmark]):
+    """Systems by name, which say which there are if one is asked for that is none of them."""
+
+    def __missing__(self, name: object) -> Benchmark:
+        known = sorted(self, key=lambda one: SequenceMatcher(None, str(name), one).ratio())
+        raise KeyError(f"system: must be one of {', '.join(known[::-1])}, got {name!r:.60}")
+
+
+SYSTEMS: dict[str, Benchmark] = _Benchmarks(
+    (name, _benchmark(name, SYSTEMS_S1[name].law, SYSTEMS_S1[name].x0, period))
     for name, period in PERIODS.items()
-}
+)
 """The systems of Table S1 in their native frame, by name."""
 
-FLOWS: dict[str, Benchmark] = SYSTEMS | {
-    name: _benchmark(name, PolynomialSystem.from_terms(flow["law"]), flow["x0"], flow["period"])
-    for name, flow in tomllib.loads(
-        Path(__file__).with_name("flows.toml").read_text("utf-8")
-    ).items()
-}
+FLOWS: dict[str, Benchmark] = _Benchmarks(
+    SYSTEMS
+    | {
+        name: _benchmark(name, PolynomialSystem.from_terms(flow["law"]), flow["x0"], flow["period"])
+        for name, flow in tomllib.loads(
+            Path(__file__).with_name("flows.toml").read_text("utf-8")
+        ).items()
+    }
+)
 """The same and five other chaotic flows; ``flows.toml`` says where they come from."""

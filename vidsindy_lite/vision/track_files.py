@@ -34,6 +34,7 @@ from ..checks import check_path
 SUFFIXES = frozenset({".csv", ".tsv", ".txt", ".dat"})
 
 _SURE = 0.6  # DeepLabCut's own limit of the likelihood
+_HEAD = 4096  # characters that tell text from what is none
 _MOST_FRAMES = 10_000_000  # a larger number of a frame is none
 _DLTDV = re.compile(r"pt(\d+)_cam(\d+)_([xy])")
 _OURS = re.compile(r"([uv])_?(\d+)")
@@ -117,6 +118,10 @@ def _cells(path: Path) -> list[list[str]]:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
+    if any(mark < " " and not mark.isspace() for mark in text[:_HEAD]):
+        raise ValueError(
+            f"tracks: must be tables in UTF-8, got '{path.name}', which is no table of numbers"
+        )
     lines = [line for line in text.splitlines() if line.strip(" ")]
     separator = next((mark for mark in "\t;," if any(mark in line for line in lines[-3:])), " ")
     if separator == " ":
