@@ -104,7 +104,8 @@ def discover_from_videos(
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
     check_integer("targets", targets, least=1)
-    how = _checked(degree, library, order, origin, orientation, seed, targets) | {"progress": progress}
+    how = _checked(degree, library, order, origin, orientation, seed, targets)
+    how |= {"progress": progress}
     seen = observe(
         paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
         progress=progress,

@@ -146,7 +146,8 @@ def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Float
     """Orientations in which fits of all terms up to a degree look sparse, for degrees as needed."""
     collocation = problem.collocation(problem.segments())
     control, history = fit_curves(collocation, problem.curves), History()
-    degrees, found = problem.exponents.sum(axis=1), []
+    degrees = problem.exponents.sum(axis=1)
+    found: list[Floats] = []
     for degree in range(1, problem.form.degree + 1):
         stage = f"unpruned, degree {degree}"
         fit, weight = unpruned(problem, collocation, control, degrees <= degree, stage, history)

@@ -40,7 +40,7 @@ from .trajectories import (
     check_trajectories,
     coordinate_names,
 )
-from .turning import Measured, check_orientation, in_axes, in_sparsest_axes
+from .turning import Measured, Solved, check_orientation, in_axes, in_sparsest_axes
 
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
@@ -149,7 +149,7 @@ def discover(
         paths, modes, errors = in_axes(measured, turn)
         return foreseen(pose(paths, modes, form, probes, errors))
 
-    def solved(turn: Floats) -> tuple[Discovery, Problem, Fit]:
+    def solved(turn: Floats) -> Solved:
         return _solved(in_axes(measured, turn), seed, progress, form)
 
     return in_sparsest_axes(found, posed, solved, np.random.default_rng(seed))
@@ -182,7 +182,7 @@ def _of_order(
     return better(found, second)
 
 
-def _solved(measured: Measured, seed: int, progress: bool, form: Form) -> tuple[Discovery, Problem, Fit]:
+def _solved(measured: Measured, seed: int, progress: bool, form: Form) -> Solved:
     """The law of a form, the problem that it solves, and the last fit."""
     trajectories, shared, sigma = measured
     starts, probes = (
