@@ -54,6 +54,19 @@ def test_a_turn_of_the_data_changes_nothing_in_the_law(lorenz):
     assert apart(again.orientation, found.orientation @ more.T) < np.deg2rad(0.3)
 
 
+def test_springs_that_stand_askew_are_found_along_themselves():
+    names = {"x": "vx", "y": "vy", "z": "vz"}
+    springs = {f"v{name}": {name: -k} for name, k in zip(names, (1.0, 1.7, 2.3), strict=True)}
+    law = vl.PolynomialSystem.from_terms({n: {v: 1} for n, v in names.items()} | springs)
+    t, rng = np.linspace(0, 40, 800), np.random.default_rng(0)
+    x = law.simulate(t, [1, 0.2, 0.5, 0.1, 0.8, -0.5])[:, :3]
+    axes = Rotation.random(random_state=rng).as_matrix()
+    seen = x @ axes + 0.02 * x.std() * rng.normal(size=x.shape)
+    found = vl.discover(t, seen, degree=1, order=2, orientation="learn")
+    assert found.native.support[:, 3:].sum() == 3
+    assert apart(found.orientation, axes) < np.deg2rad(1)
+
+
 def test_where_no_axes_are_better_those_of_the_data_stay():
     t = np.linspace(0, 20, 400)
     law = vl.PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})  # alike in all axes
