@@ -208,6 +208,8 @@ def test_a_target_that_never_moves_is_named(shot, tmp_path):
         ({}, {"degree": True}, "degree: must be an integer of at least 1, got True"),
         ({}, {"library": "fourier(1)"}, "library: must be of type Library, got 'fourier"),
         ({}, {"origin": "home"}, "origin: must be one of learn, data, got 'home'"),
+        ({}, {"orientation": "mine"}, "orientation: must be one of data, learn, got 'mine'"),
+        ({}, {"orientation": "learn", "targets": 2}, "orientation: can be learned of two or three"),
         ({}, {"lags": (0, 7)}, "lags: must be 3 finite numbers"),
         ({}, {"detector": "yolo"}, "detector: must be one of auto, background, learned, or"),
         ({}, {"seed": -1}, "seed: must be an integer of at least 0, got -1"),

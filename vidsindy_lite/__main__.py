@@ -98,6 +98,7 @@ def _discover(options: argparse.Namespace) -> int:
     library = check_library(options.degree, options.library)
     told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
     told |= {"order": options.order, "origin": options.origin}
+    told |= {"orientation": options.orientation}
     told |= {"lags": "learned" if options.lag is None else options.lag}
     told |= {"targets": options.targets} if options.targets != 1 else {}
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
@@ -126,6 +127,7 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     from .vision import frame_clock, load_hints
 
     shared = {name: getattr(options, name) for name in ("degree", "library", "origin", "seed")}
+    shared |= {"orientation": options.orientation}
     shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
     shared |= {"lags": options.lag, "progress": True}
     if options.tracks:
@@ -342,6 +344,11 @@ COMMANDS = {
         "--origin": choice(
             "learn", ("learn", "data"),
             "whether the law's own origin is sought (default) or is that of the data"
+        ),
+        "--orientation": choice(
+            "data", ("data", "learn"),
+            "whether the axes are those of the rig (default), or turned to where the law has "
+            "fewest terms: for rigs that nobody has measured"
         ),
         "--detector": words(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "

@@ -19,6 +19,7 @@ from .dynamics import (
     PolynomialSystem,
     check_library,
     check_order,
+    check_orientation,
     discover,
     variable_names,
 )
@@ -36,7 +37,8 @@ class VideoDiscovery(Observation):
     Parameters
     ----------
     discovery : Discovery
-        The law in the frame of the rig and in its own, sparsest frame.
+        The law in the frame of the rig and in its own, sparsest frame; in other axes if these were
+        learned.
     """
 
     discovery: Discovery
@@ -47,7 +49,9 @@ class VideoDiscovery(Observation):
 
         In gaps, too, that the law bridges; NaN elsewhere.
         """
-        return self.discovery.curve(self.t)[:, : self.x.shape[1]]
+        curve = self.discovery.curve(self.t)[:, : self.x.shape[1]]
+        turn = self.discovery.orientation
+        return curve if turn is None else curve @ turn
 
     @property
     def driven(self) -> str:
@@ -74,6 +78,7 @@ def discover_from_videos(
     library: Library | None = None,
     order: int | str = "auto",
     origin: str = "learn",
+    orientation: str = "data",
     seed: int = 0,
     progress: bool = False,
 ) -> VideoDiscovery:
@@ -86,7 +91,7 @@ def discover_from_videos(
     paths, rig, t, lags, detector, hints, targets, progress
         See `observe`. The unit of time is that of the equations. The law of several targets is one
         for all: x1, x2, x3 are the place of the first, x4, x5, x6 of the second, and so on.
-    degree, library, order, origin, seed
+    degree, library, order, origin, orientation, seed
         See `discover`.
 
     Returns
@@ -99,7 +104,8 @@ def discover_from_videos(
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
     check_integer("targets", targets, least=1)
-    how = _checked(degree, library, order, origin, seed, targets) | {"progress": progress}
+    how = _checked(degree, library, order, origin, orientation, seed, targets)
+    how |= {"progress": progress}
     seen = observe(
         paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
         progress=progress,
@@ -119,6 +125,7 @@ def discover_from_tracks(
     library: Library | None = None,
     order: int | str = "auto",
     origin: str = "learn",
+    orientation: str = "data",
     seed: int = 0,
     progress: bool = False,
 ) -> VideoDiscovery:
@@ -137,7 +144,7 @@ def discover_from_tracks(
     fps : float, optional
         Frames of every camera in one unit of time, in place of ``t``. Without either, files have
         to state the times of their rows.
-    degree, library, order, origin, seed, progress
+    degree, library, order, origin, orientation, seed, progress
         See `discover_from_videos`.
 
     Returns
@@ -150,7 +157,7 @@ def discover_from_tracks(
         If a file is missing or holds no track, if times are given twice or not at all, or as
         `observe_tracks` and `discover` do.
     """
-    how = _checked(degree, library, order, origin, seed) | {"progress": progress}
+    how = _checked(degree, library, order, origin, orientation, seed) | {"progress": progress}
     read = _read(tracks)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
     times, doubts = _times(read, t, fps)
@@ -165,15 +172,18 @@ def _checked(
     library: Library | None,
     order: int | str,
     origin: str,
+    orientation: str,
     seed: int,
     targets: int = 1,
 ) -> dict[str, Any]:
     """What `discover` takes beside the path, checked before anything is tracked."""
     terms = check_library(degree, library)
     check_order(order, origin, terms)
+    check_orientation(orientation, terms, 3 * targets, origin)
     Form.of(variable_names(3 * targets), terms, 2 if order == 2 else 1)
     check_integer("seed", seed)
-    return {"library": terms, "order": order, "origin": origin, "seed": seed}
+    chosen = {"order": order, "origin": origin, "orientation": orientation}
+    return {"library": terms, "seed": seed} | chosen
 
 
 def _driven(law: PolynomialSystem) -> str:

@@ -9,6 +9,7 @@ from helpers import aligned_error, room, walk
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import learn_cameras_eq4, posed, unmeasured
 from vidsindy_lite.observation import observe_tracks
+from vidsindy_lite.study import SYSTEMS
 
 FRAMES = 400
 
@@ -86,6 +87,26 @@ def test_a_known_distance_gives_the_unit_of_length():
     assert abs(spread[0] / spread[1] - 1) < 0.01
     assert seen.warnings == ()
     assert "the first camera is" in seen.rig.note
+
+
+@pytest.mark.slow
+def test_a_law_has_its_own_axes_though_nobody_has_measured_the_rig():
+    rng = np.random.default_rng(4)
+    rig = room(rng)
+    t, x = SYSTEMS["SprottF"].trajectory(1000)
+    shown = 0.25 * (x - x.mean(axis=0)) / x.std() + walk(np.arange(FRAMES)).mean(axis=0)
+    tracks = [c.project(shown) + 0.5 * rng.normal(size=(len(t), 2)) for c in rig.cameras]
+    found = vl.discover_from_tracks(
+        tracks, lenses(rng, rig), t, lags=[0, 0, 0], degree=2, order=1, orientation="learn"
+    )
+    assert found.status == "ok"
+    law = found.discovery
+    assert law.native.support.sum() == SYSTEMS["SprottF"].support.sum()
+    assert "axes: turned" in str(found)
+    # The law is in its own axes, what cameras see of it in those of the rig.
+    assert np.sqrt(np.nanmean((found.fitted - found.x) ** 2)) < 0.02 * np.nanstd(found.x)
+    states = law.curve(found.t)
+    np.testing.assert_allclose(states @ law.orientation, found.fitted)
 
 
 def test_small_lags_are_learned_beside():

@@ -256,6 +256,17 @@ def checked(folder):
     return data
 
 
+def test_a_law_in_turned_axes_says_so_and_its_curve_is_in_those_of_the_rig(case, tmp_path):
+    found, _ = case
+    turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    turned = replace(found, discovery=replace(found.discovery, orientation=turn))
+    told = checked(write_report(turned, None, tmp_path / "report").parent)
+    assert told["law"]["orientation"] == turn.tolist()
+    np.testing.assert_allclose(np.array(told["curve"], float), turned.fitted)
+    page = (tmp_path / "report" / "report.html").read_text("utf-8")
+    assert "its axes turned, x along (0.0000, 1.0000, 0.0000)" in page
+
+
 def test_the_schema_describes_the_data(page):
     data = checked(page.parent)
     with pytest.raises(jsonschema.ValidationError):

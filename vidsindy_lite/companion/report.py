@@ -247,17 +247,25 @@ def summary(
         "law": {
             "data": _law(law, "data", np.zeros(law.system.d), np.zeros(law.system.d)),
             "native": _law(law, "native", law.offset, law.offset_errors),
+            "orientation": law.orientation,
         },
         "noise": law.noise,
         "cameras": cameras,
         "options": dict(options or {}),
         "t": found.t,
         "x": found.x,
-        "curve": law.curve(found.t),
+        "curve": _in_rig_axes(law, law.curve(found.t)),
         "tracks": list(found.tracks),
         "residuals": missed,
     }
     return {key: as_json(value, f"found[{key!r}]") for key, value in content.items()}
+
+
+def _in_rig_axes(law: Discovery, curve: Floats) -> Floats:
+    """States of a law, (n, d), in the axes of the rig, its own being turned or not."""
+    if law.orientation is None:
+        return curve
+    return np.hstack([part @ law.orientation for part in np.split(curve, law.system.order, axis=1)])
 
 
 def _shot(found: VideoDiscovery, paths: Sequence[str | Path] | None, i: int) -> VideoInfo:
@@ -304,6 +312,7 @@ def _page(
         "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
     }  # fmt: skip
     law = found.discovery
+    about |= {"axes": law.axes}
     about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
     return page("report.html", figures=figures, film=film, **about, **content)

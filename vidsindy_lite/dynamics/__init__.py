@@ -18,6 +18,7 @@ law: polynomials, on a library of monomials, also of functions of the state; can
 libraries that a user asks for, inputs what is known of the time; integrate solves a law
 sindy: the same for code that is written for pysindy
 order: first or second, where that is left open
+turning: the same in the axes in which the law is sparsest (orientation), where these are unknown
 beside the way: cramer_rao, the least errors that any estimate could have
 """
 
@@ -41,4 +42,5 @@ from .solver import discover
 from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .state import State
 from .trajectories import Trajectory, check_trajectory, cut, typical_step
+from .turning import check_orientation
 from .units import Units

@@ -93,6 +93,10 @@ class Discovery:
         candidate. See `intervals` of the module ``absent`` for the formula.
     note : str
         Which order the law has and why, where both were looked for.
+    orientation : ndarray, shape (m, m), optional
+        Axes of a law whose orientation was learned, one a row, in those of the data: the law, its
+        curve and what it simulates are in them, a place of the data is ``x @ orientation.T`` there,
+        and one of theirs ``x @ orientation`` in the data. None where they are the data's own.
     """
 
     system: PolynomialSystem
@@ -109,11 +113,21 @@ class Discovery:
     curves: tuple[BSpline, ...]
     absent: Floats
     note: str = ""
+    orientation: Floats | None = None
 
     @property
     def status(self) -> str:
         """``"ok"``, or ``"suspect"`` if there is a warning."""
         return "suspect" if self.warnings else "ok"
+
+    @property
+    def axes(self) -> str:
+        """Where the axes of the law point in those of the data; empty if they are these."""
+        if self.orientation is None:
+            return ""
+        rows = (", ".join(f"{part:.4f}" for part in row) for row in self.orientation)
+        pairs = zip(self.system.names, rows, strict=False)
+        return "turned, " + ", ".join(f"{name} along ({row})" for name, row in pairs)
 
     @property
     def coefficients(self) -> Floats:
@@ -282,6 +296,8 @@ class Discovery:
                 f"not seen, though they may be as large as terms of the law: {frame}"
                 f"{', '.join(terms[:SHOWN])}{more}"
             )
+        if self.orientation is not None:
+            lines.append(f"axes: {self.axes}")
         if self.note:
             lines.append(f"note: {self.note}")
         return "\n".join(lines)

@@ -116,7 +116,7 @@ def candidates(problem: Problem, rng: np.random.Generator, history: History) -> 
             best = sorted(here, key=lambda candidate: candidate.criterion)[: REFINED - 1]
             here = _climbed(problem, [_at_home(problem, fit), *best], weight, history)
         found += here
-        if not _leaves_something_over(problem, fit):
+        if not leaves_something_over(problem, fit):
             break
     return found
 
@@ -169,7 +169,7 @@ def _climbed(problem: Problem, found: list[Fit], weight: float, history: History
     return found
 
 
-def _leaves_something_over(problem: Problem, fit: Fit) -> bool:
+def leaves_something_over(problem: Problem, fit: Fit) -> bool:
     """Would the other terms together explain more of the data than chance does?"""
     searched = problem.form.searched
     left_out = len(searched) - int(fit.state.free()[searched].sum())

@@ -35,12 +35,12 @@ from .process_noise import rebalanced, with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, leave_home, search
 from .selection import inverse
 from .trajectories import (
-    Trajectory,
     check_sigma,
     check_systematic,
     check_trajectories,
     coordinate_names,
 )
+from .turning import Measured, Solved, check_orientation, in_axes, in_sparsest_axes
 
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
@@ -69,6 +69,7 @@ def discover(
     library: Library | None = None,
     sigma: float | Floats | Sequence[float | Floats] | None = None,
     origin: str = "learn",
+    orientation: str = "data",
 ) -> Discovery:
     """Discover the law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -106,6 +107,11 @@ def discover(
         trajectories one for all, or a list with one for each.
     origin : {"learn", "data"}
         Whether the law's own origin is sought, or is that of the data: then no axis moves.
+    orientation : {"data", "learn"}
+        Whether the axes are those of the data, or turned to where the law has fewest terms, if
+        nobody knows how two or three coordinates of a place lie. Then all of the result is in the
+        axes that `Discovery.orientation` holds: a state of it is ``x @ orientation.T``. Rows in
+        which a coordinate was not seen do not count.
 
     Returns
     -------
@@ -128,14 +134,41 @@ def discover(
     library, seed = check_library(degree, library), check_integer("seed", seed)
     check_order(order, origin, library)
     trajectories = check_trajectories(t, x)
+    check_orientation(orientation, library, trajectories[0][1].shape[1], origin)
     names = coordinate_names(t, x)
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
-    errors = check_sigma(sigma, times, trajectories)
-    solved = partial(_solved, trajectories, shared, errors, seed, progress)
+    measured = trajectories, shared, check_sigma(sigma, times, trajectories)
+    found = _of_order(measured, seed, progress, names, library, origin, order)
+    if orientation == "data":
+        return found
+    form = Form.of(names, library, found.system.order, origin)
+
+    def posed(turn: Floats) -> Problem:
+        probes = np.random.default_rng(seed)
+        paths, modes, errors = in_axes(measured, turn)
+        return foreseen(pose(paths, modes, form, probes, errors))
+
+    def solved(turn: Floats) -> Solved:
+        return _solved(in_axes(measured, turn), seed, progress, form)
+
+    return in_sparsest_axes(found, posed, solved, np.random.default_rng(seed))
+
+
+def _of_order(
+    measured: Measured,
+    seed: int,
+    progress: bool,
+    names: tuple[str, ...],
+    library: Library,
+    origin: str,
+    order: int | str,
+) -> Discovery:
+    """The law of an order, or of the one that is to be trusted."""
+    solved = partial(_solved, measured, seed, progress)
     if order == 2:
         return solved(Form.of(names, library, 2, origin))[0]
-    found, problem = solved(Form.of(names, library, 1, origin))
+    found, problem, _ = solved(Form.of(names, library, 1, origin))
     settled = order == 1 or library.given or not found.warnings
     drowned = problem.noise.max() > DROWNED
     # With inputs a place is passed with several velocities, whatever the order is.
@@ -143,21 +176,15 @@ def discover(
     if settled or drowned or not bodily:
         return found
     try:
-        second, _ = solved(Form.of(names, library, 2, origin))
+        second, *_ = solved(Form.of(names, library, 2, origin))
     except ValueError:  # too few samples for a law of so many terms, or its names are taken
         return found
     return better(found, second)
 
 
-def _solved(
-    trajectories: list[Trajectory],
-    shared: list[Floats],
-    sigma: list[Floats] | None,
-    seed: int,
-    progress: bool,
-    form: Form,
-) -> tuple[Discovery, Problem]:
-    """The law of a form, and the problem that it solves."""
+def _solved(measured: Measured, seed: int, progress: bool, form: Form) -> Solved:
+    """The law of a form, the problem that it solves, and the last fit."""
+    trajectories, shared, sigma = measured
     starts, probes = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
@@ -184,7 +211,7 @@ def _solved(
             bar.update()
         fit, path = settle(problem, fit, history)
         bar.update()
-    return conclude(problem, fit, path, history), problem
+    return conclude(problem, fit, path, history), problem, fit
 
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:

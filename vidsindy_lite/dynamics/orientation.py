@@ -1,0 +1,237 @@
+"""The axes in which a polynomial law is sparsest, for paths of which nobody knows how they lie.
+
+A rotation of the axes, like a shift of their origin, maps polynomials of one degree onto each
+other, exactly. So all terms are fitted once, and the estimate, with its covariance, is looked at in
+other axes, where the number of terms that differ from zero is minimised; see `origin`, which does
+the same for shifts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from ..arrays import Bools, Floats, Ints
+from .collocation import Fit
+from .history import History
+from .library import monomials
+from .problem import Problem, fit_curves
+from .search import FIRST_WEIGHTS, SEARCH_WEIGHTS, leaves_something_over, unpruned
+from .selection import inverse
+
+STARTS = 20
+"""Random orientations from which the sparsest is sought."""
+KEPT = 3
+"""Most orientations that are worth a discovery."""
+COARSE, FINE = 0.1, 0.01
+"""Sizes of a standard coefficient at which it counts: while seeking, and at the end."""
+LEFT_OVER = 0.05
+"""Standard coefficients below this may be what axes that are not quite right leave."""
+ALIKE = np.deg2rad(2.0)
+"""Orientations that differ by less are one."""
+MODES = 40
+"""Most directions of uncertainty that are looked at: the largest."""
+LEAST = 1e-10
+"""Least variance over the largest, in units of their own, that is no rounding."""
+POINTS = 3
+"""Points at which two polynomials are compared, over the number of their terms."""
+
+
+@dataclass(frozen=True, eq=False)
+class TurnedLaw:
+    """An estimate of all terms of a law of m coordinates, to be looked at in other axes.
+
+    Parameters
+    ----------
+    exponents : ndarray of int, shape (l, m) or (l, 2 m)
+        All monomials up to a degree, of places, or of places and velocities.
+    estimates : ndarray, shape (1 + k, l, m)
+        Coefficients in axes of one unit, and the directions in which they are uncertain, each one
+        standard error long.
+    origin : ndarray, shape (m,)
+        Where the fit had its origin, in these axes, around the middle of the data.
+    """
+
+    exponents: Ints
+    estimates: Floats
+    origin: Floats
+
+    @classmethod
+    def of(cls, problem: Problem, fit: Fit) -> TurnedLaw:
+        """The quadratic model around a fit, in all terms; the unit is the spread of the data."""
+        state, m = fit.state, problem.measured[0][1].shape[1]
+        rows = _rows(fit)
+        columns = np.flatnonzero((problem.form.candidates & rows[:, None]).T)
+        model = fit.collocation.linearise(state, columns)
+        flat = state.flat()[columns] + model.newton()[0]
+        values, axes = np.linalg.eigh(inverse(model.information))
+        directions = (axes * np.sqrt(np.maximum(values, 0.0))).T
+        stacked = np.vstack([flat, directions]).reshape(-1, m, rows.sum())
+        scale, unit = problem.units.scale, _unit(problem)
+        origin = (state.offset * scale / unit)[:m]
+        law = cls(problem.exponents[rows], np.moveaxis(stacked, 1, 2), origin)
+        law = law._mapped(np.diag(unit / scale), -state.offset, np.diag((scale / unit)[-m:]))
+        flat = law.estimates[1:].reshape(len(directions), -1)
+        _, sizes, largest = np.linalg.svd(flat, full_matrices=False)
+        modes = (sizes[:, None] * largest).reshape(-1, *law.estimates.shape[1:])
+        return replace(law, estimates=np.concatenate([law.estimates[:1], modes]))
+
+    def _mapped(self, inward: Floats, origin: Floats, outward: Floats) -> TurnedLaw:
+        """The law of ``outward f(inward y + origin)``, compared at points enough."""
+        count, d = self.exponents.shape
+        y = np.random.default_rng(0).uniform(-1, 1, (POINTS * count, d))
+        values = monomials(y @ inward.T + origin, self.exponents) @ self.estimates @ outward.T
+        fitted = np.linalg.pinv(monomials(y, self.exponents)) @ values
+        return replace(self, estimates=fitted)
+
+    def _places(self, origin: Floats) -> Floats:
+        """An origin in space as one of the state: velocities have none."""
+        return np.append(origin, np.zeros(self.exponents.shape[1] - len(origin)))
+
+    def seen(self, turn: Floats, origin: Floats) -> tuple[Floats, Floats]:
+        """Coefficients and their variances, (l, m), in axes that are the rows of ``turn``, (m, m).
+
+        Around an origin, (m,), in the axes of the estimate.
+        """
+        m = len(turn)
+        copies = self.exponents.shape[1] // m
+        law = self._mapped(block_diag(*[turn.T] * copies), self._places(origin), turn)
+        return law.estimates[0], (law.estimates[1:] ** 2).sum(axis=0)
+
+    def descended(
+        self, turn: Floats, origin: Floats, size: float
+    ) -> tuple[float, Floats, Floats]:
+        """The nearest orientation and origin with fewest terms, and their smoothed number.
+
+        A coefficient counts ``log(1 + z^2)``, with ``z`` over its standard error and a size.
+        """
+        m = len(turn)
+
+        def scores(step: Floats) -> Floats:
+            estimate, variance = self.seen(turned(step[:-m], m) @ turn, origin + step[-m:])
+            return (estimate / np.sqrt(variance + size**2)).ravel()
+
+        free = m * (m - 1) // 2 + m
+        best = least_squares(scores, np.zeros(free), loss="cauchy", max_nfev=60)
+        return float(best.cost), turned(best.x[:-m], m) @ turn, origin + best.x[-m:]
+
+
+    def freed(self, support: Bools) -> Floats:
+        """The small turn, (m, m), after which only these terms, (l, m), are left, if they are all.
+
+        The others are made as small as their covariance asks for, while the origin gives way.
+        """
+        m, home = len(self.origin), self.origin
+        law = self._mapped(np.eye(self.exponents.shape[1]), self._places(home), np.eye(m))
+        others = ~support
+        directions = law.estimates[1:][:, others]
+        sizes = np.maximum(np.linalg.norm(directions, axis=0), np.finfo(float).tiny)
+        values, axes = np.linalg.eigh((directions / sizes).T @ (directions / sizes))
+        whiten = axes / np.sqrt(np.maximum(values, LEAST * values[-1]))
+
+        def scores(step: Floats) -> Floats:
+            estimate, _ = self.seen(turned(step[:-m], m), home + step[-m:])
+            return (estimate[others] / sizes) @ whiten
+
+        best = least_squares(scores, np.zeros(m * (m - 1) // 2 + m), x_scale="jac", max_nfev=60)
+        return turned(best.x[:-m], m)
+
+
+def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Floats]:
+    """Orientations in which fits of all terms up to a degree look sparse, for degrees as needed."""
+    collocation = problem.collocation(problem.segments())
+    control, history = fit_curves(collocation, problem.curves), History()
+    degrees = problem.exponents.sum(axis=1)
+    found: list[Floats] = []
+    for degree in range(1, problem.form.degree + 1):
+        stage = f"unpruned, degree {degree}"
+        fit, weight = unpruned(problem, collocation, control, degrees <= degree, stage, history)
+        if weight < FIRST_WEIGHTS[-1]:  # too many terms for these data
+            continue
+        for turn in sparse_orientations(TurnedLaw.of(problem, fit), rng):
+            if all(apart(turn, other) > ALIKE for other in found):
+                found.append(turn)
+        if not leaves_something_over(problem, fit):
+            break
+    return found
+
+
+def refined(problem: Problem, fit: Fit) -> Floats:
+    """The small turn, (m, m), after which the small terms of a law are not needed any more.
+
+    Axes that are off by a fraction of a degree leave small terms, which clean data tell. The law is
+    fitted without them, and the axes are those in which all that it lacks is nothing.
+    """
+    state, units = fit.state, problem.units
+    unit = replace(units, scale=_unit(problem))
+    sizes = state.coefficients * units.factors(problem.exponents) / unit.factors(problem.exponents)
+    state, collocation = state.of_terms(state.active & (np.abs(sizes) > LEFT_OVER)), fit.collocation
+    if not state.active.any():
+        return np.eye(problem.measured[0][1].shape[1])
+    for weight in SEARCH_WEIGHTS:
+        collocation = problem.weighted(collocation, weight)
+        fit = collocation.solve(state, tolerance=1.0, max_steps=10)
+        state = fit.state
+    law = TurnedLaw.of(problem, fit)
+    return law.freed(state.active[_rows(fit)][:, -len(law.origin) :])
+
+
+def _rows(fit: Fit) -> Bools:
+    """Terms, (l,), up to the highest degree of a law: these are mixed by turns and shifts."""
+    degrees = fit.collocation.exponents.sum(axis=1)
+    return np.asarray(degrees <= degrees[fit.state.active.any(axis=1)].max())
+
+
+def _unit(problem: Problem) -> Floats:
+    """One unit of length for all coordinates, and one for all velocities, (d,)."""
+    m, scale = problem.measured[0][1].shape[1], problem.units.scale
+    return np.repeat(np.sqrt(np.mean(scale.reshape(-1, m) ** 2, axis=1)), m)
+
+
+def turned(angles: Floats, m: int) -> Floats:
+    """A rotation of m axes, (m, m), by an angle, or by a vector of three."""
+    vector = angles if m == 3 else np.append([0, 0], angles)
+    return Rotation.from_rotvec(vector).as_matrix()[:m, :m]
+
+
+def sparse_orientations(law: TurnedLaw, rng: np.random.Generator) -> list[Floats]:
+    """Orientations, (m, m), in which a law has fewest terms, distinct, best first."""
+    law, m = replace(law, estimates=law.estimates[: 1 + MODES]), law.estimates.shape[2]
+    home = np.zeros(m)
+    starts = [np.eye(m), *(random_turn(m, rng) for _ in range(STARTS))]
+    coarse = sorted((law.descended(turn, home, COARSE) for turn in starts), key=lambda f: f[0])
+    found: list[Floats] = []
+    fine = [law.descended(turn, origin, FINE) for _, turn, origin in coarse[: 2 * KEPT]]
+    for _, turn, _ in sorted(fine, key=lambda f: f[0]):
+        near = nearest(turn)
+        if all(apart(near, other) > ALIKE for other in found):
+            found.append(near)
+    return found[:KEPT]
+
+
+def random_turn(m: int, rng: np.random.Generator) -> Floats:
+    """A rotation of two or three axes, (m, m), any as likely."""
+    if m == 3:
+        return Rotation.random(random_state=rng).as_matrix()
+    return Rotation.from_euler("z", rng.uniform(0, 2 * np.pi)).as_matrix()[:2, :2]
+
+
+def apart(turn: Floats, other: Floats) -> float:
+    """Largest angle between the axes of two orientations, by whatever name and sign."""
+    return float(np.arccos(np.clip(np.abs(turn @ other.T).max(axis=1), 0, 1)).max())
+
+
+def nearest(turn: Floats) -> Floats:
+    """The same axes in the order and with the signs that are nearest to the data's own."""
+    m = len(turn)
+    rows = (
+        np.array(signs)[:, None] * turn[list(order)]
+        for order in permutations(range(m))
+        for signs in product([1.0, -1.0], repeat=m)
+    )
+    return max((axes for axes in rows if np.linalg.det(axes) > 0), key=np.trace)
