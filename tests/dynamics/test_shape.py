@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.shape import cancelling, shapes, tied
+from vidsindy_lite.dynamics.shape import LAPS, _periods, cancelling, shapes, tied
 from vidsindy_lite.study import SYSTEMS
 
 TIMES = np.linspace(0, 12, 600)
@@ -176,3 +176,11 @@ def test_a_law_on_a_shape_is_never_simply_ok(name, order):
     noisy = x + 0.01 * x.std() * np.random.default_rng(0).standard_normal(x.shape)
     found = discover(TIMES, noisy, order=order, degree=2 if name == "bob" else 3)
     assert any(words in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize("wave", [np.sin, lambda angle: np.sin(angle) + np.sin(2 * angle + 1)])
+def test_periods_are_the_laps_whose_second_half_is_seen(wave):
+    t = 3 + 0.02 * np.arange(1000)  # four laps of 5
+    x = wave(2 * np.pi / 5 * t)[:, None]
+    np.testing.assert_allclose(_periods(t, x / x.std(), 0.0), [5.0, 10.0], atol=1e-9)
+    assert 10 < 20 / LAPS < 15
