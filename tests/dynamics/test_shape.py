@@ -184,3 +184,10 @@ def test_periods_are_the_laps_whose_second_half_is_seen(wave):
     x = wave(2 * np.pi / 5 * t)[:, None]
     np.testing.assert_allclose(_periods(t, x / x.std(), 0.0), [5.0, 10.0], atol=1e-9)
     assert 10 < 20 / LAPS < 15
+
+
+def test_laps_that_differ_by_their_noise_are_laps():
+    t, rng = 0.02 * np.arange(3000), np.random.default_rng(0)
+    x = np.sqrt(2) * np.sin(2 * np.pi / 5 * t)[:, None] + 0.5 * rng.standard_normal((3000, 1))
+    assert _periods(t, x / x.std(), 0.5)[0] == pytest.approx(5, abs=0.3)
+    assert _periods(t, x / x.std(), 0.1) == []  # of a motion that is better known, they are none
