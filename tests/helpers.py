@@ -1,4 +1,4 @@
-"""Random curves, a room with cameras, and a repository of tiny notebooks."""
+"""Random curves, a posed problem, a room with cameras, and a repository of tiny notebooks."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,6 +6,9 @@ from pathlib import Path
 import numpy as np
 
 import vidsindy_lite as vl
+from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.posing import pose
 
 HEADER = """\
 # ---
@@ -39,6 +42,16 @@ def trajectory(rng, n):
         rng.normal(size=3) / k * np.sin(k * t + rng.uniform(0, 2 * np.pi, 3)) for k in range(1, 6)
     )
     return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
+
+
+def posed(noise=0.0, seen=slice(None)):
+    """A small wave about (3, 0), as a discovery's problem; noise in parts of its amplitudes."""
+    t = np.linspace(0, 20, 401)
+    x = np.stack([3 + 2 * np.sin(t), 0.1 * np.cos(t)], axis=1)
+    x += noise * np.array([2, 0.1]) * np.random.default_rng(0).normal(size=x.shape)
+    t, x = t[seen], x[seen]
+    form = Form.of(("x", "y"), Library.polynomial(2))
+    return pose([(t, x)], [np.ones((len(t), 2, 1))], form, rng=np.random.default_rng(0))
 
 
 HAND = {"normal_error": 2.0, "position_error": 0.03, "scale_error": 0.03}

@@ -8,6 +8,7 @@ import re
 
 import jupytext
 import nbformat
+import papermill
 import pytest
 from disturbed.undisplayed import FigureCanvas
 from matplotlib.figure import Figure
@@ -15,6 +16,7 @@ from matplotlib.figure import Figure
 from vidsindy_lite.companion import run as runner
 from vidsindy_lite.companion.clean import clean
 from vidsindy_lite.companion.compare import differences
+from vidsindy_lite.companion.execute import execute
 from vidsindy_lite.companion.registry import check_folder
 from vidsindy_lite.stamp import PACKAGE
 
@@ -225,6 +227,12 @@ def test_figures_are_complete_and_of_this_code():
     assert check_folder(ROOT / "figures", stamps) == []
 
 
+def execute_in_one_process(path, parameters, **options):
+    """The cores are busy with other tests: a sweep works in the kernel itself."""
+    alone = {"jobs": 1} if "jobs" in papermill.inspect_notebook(jupytext.read(path)) else {}
+    return execute(path, parameters | alone, **options)
+
+
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory, undisplayed):
     """Where all quick runs go, one after the other, so that one may read another's tables.
@@ -236,6 +244,7 @@ def quick(tmp_path_factory, undisplayed):
         patch.setenv("VIDSINDY_DISTURB", "1e-9:1")
         patch.setenv("VIDSINDY_CACHE", str(tmp_path_factory.mktemp("cache")))
         patch.setenv("PYTHONPATH", str(ROOT / "tests" / "disturbed"), prepend=os.pathsep)
+        patch.setattr(runner, "execute", execute_in_one_process)
         yield tmp_path_factory.mktemp("quick")
 
 

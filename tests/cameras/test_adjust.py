@@ -248,3 +248,21 @@ def test_a_tilt_leads_the_normal_along_the_axes_of_the_image(tilt):
     np.testing.assert_allclose(across / along, tilt, atol=1e-12)
     assert along > 0
     np.testing.assert_allclose(np.linalg.norm(normal), 1)
+
+
+def test_the_unit_of_length_does_not_matter():
+    rng = np.random.default_rng(13)
+    rig = room(rng)
+    _, tracks = film(rng, rig, n=100)
+    changes = []
+    for unit in (1.0, 1e9):
+        cameras = [
+            replace(c, position=unit * c.position, position_error=unit * c.position_error)
+            for c in by_hand(np.random.default_rng(1), rig).cameras
+        ]
+        errors = np.array([known_to(camera) for camera in cameras])
+        change = adjust(Footage.of(tracks), cameras, errors).change
+        change[:, PARTS["position"]] /= unit
+        changes.append(change)
+    assert np.abs(changes[0]).max() > 0.01
+    np.testing.assert_allclose(changes[1], changes[0], rtol=0, atol=1e-5)

@@ -135,6 +135,21 @@ def test_a_slider_moves_its_frames_and_says_where_it_is(browser, tmp_path, monke
 
 
 @pytest.mark.slow
+def test_the_contents_beside_the_pages_lead_to_every_page(site):
+    reached, ahead = set(), {site / "index.html"}
+    while ahead:
+        page = ahead.pop()
+        reached.add(page)
+        (contents,) = re.findall(
+            r'class="sidebar-tree">(.*?)</aside>', page.read_text("utf-8"), re.S
+        )
+        links = re.findall(r'href="([^"#:]+)', contents)
+        ahead |= {(page.parent / link).resolve() for link in links} - reached
+    pages = {page.resolve() for page in site.rglob("*.html") if "_static" not in page.parts}
+    assert pages - reached == {site / "search.html"}
+
+
+@pytest.mark.slow
 def test_every_link_leads_to_a_file(site):
     assert dead_links(site) == []
 
@@ -246,6 +261,9 @@ def test_what_is_left_of_an_interrupted_site_may_be_replaced(tmp_path, monkeypat
     class Interrupted:
         def __init__(self, pages, settings, output, *_, **__):
             self.output = output
+
+        def connect(self, *_, **__):
+            pass
 
         def build(self):
             write_file(self.output / "half.html", b"")

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.physics import Quantity, physics_of
+from vidsindy_lite.dynamics.physics import Quantity, _diagonal, physics_of
 
 TIMES = np.linspace(0, 6, 300)
 DRAG = Library.terms({"|v|v": lambda vx, vy: np.hypot(vx, vy) * np.array([vx, vy])})
@@ -171,3 +171,11 @@ def test_the_error_bars_of_a_discovery_cover():
         scores += [(said[name].value - value) / said[name].error for name, value in truth.items()]
     assert (np.abs(scores) < 1.96).mean() > 0.85
     assert 0.7 < np.std(scores) < 1.3
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+def test_coordinates_are_alone_if_only_rounding_ties_them(unit):
+    alone = np.array([[4.0, 1e-9], [-1e-9, 2.0]])
+    assert _diagonal(unit * alone)
+    assert not _diagonal(unit * (alone + [[0, 1e-3], [0, 0]]))
+    assert not _diagonal(unit * np.array([[0, 1.0], [1.0, 0]]))

@@ -1,28 +1,17 @@
-"""A posed problem: standard units, gaps, prices, weights."""
+"""A posed problem: its knots, prices, weights, and what a candidate for its law costs."""
 
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
+from helpers import posed
 
-from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.errors import residual_noise
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.posing import GAP, pose
 from vidsindy_lite.dynamics.problem import NARROW, OFFSET_PENALTY, WIDE, fit_curves
 from vidsindy_lite.dynamics.search import _as_shifted, _candidate, _closed, _variants
 from vidsindy_lite.dynamics.state import State
-
-
-def posed(noise=0.0, seen=slice(None)):
-    t = np.linspace(0, 20, 401)
-    x = np.stack([3 + 2 * np.sin(t), 0.1 * np.cos(t)], axis=1)
-    x += noise * np.array([2, 0.1]) * np.random.default_rng(0).normal(size=x.shape)
-    t, x = t[seen], x[seen]
-    form = Form.of(("x", "y"), Library.polynomial(2))
-    return pose([(t, x)], [np.ones((len(t), 2, 1))], form, rng=np.random.default_rng(0))
 
 
 def fit_of(problem, moving=(True, False)):
@@ -36,31 +25,9 @@ def fit_of(problem, moving=(True, False)):
     return Fit(state, collocation, Status.CONVERGED)
 
 
-def test_data_are_in_standard_units():
-    problem = posed()
-    ((t, x),) = problem.trajectories
-    np.testing.assert_allclose(x.mean(axis=0), 0, atol=1e-12)
-    np.testing.assert_allclose(x.std(axis=0), 1)
-    (measured,) = problem.measured
-    np.testing.assert_allclose(problem.units.point(x), measured[1])
-    np.testing.assert_allclose(problem.units.standard(measured[1]), x, atol=1e-12)
-    np.testing.assert_allclose(t * problem.units.time, measured[0])
-    speed = np.sqrt((np.gradient(x, t, axis=0) ** 2).mean())
-    assert speed == pytest.approx(1, rel=0.02)
-    np.testing.assert_allclose(problem.systematic[0][0, :, 0], 1 / measured[1].std(axis=0))
-    np.testing.assert_allclose(problem.home, -measured[1].mean(axis=0) / measured[1].std(axis=0))
-
-
 @pytest.mark.parametrize(("noise", "spacing"), [(0.0, NARROW), (0.005, NARROW), (0.1, WIDE)])
 def test_knots_are_wider_where_there_is_noise(noise, spacing):
     assert posed(noise).spacing == spacing
-
-
-def test_a_pause_is_a_gap_if_the_target_moves_far_in_it():
-    step = posed().units.time * GAP / 0.05  # samples in the longest pause that is none
-    for missing, stretches in ((int(step) - 2, 1), (int(step) + 2, 2)):
-        seen = np.r_[0:150, 150 + missing : 401]
-        assert len(posed(seen=seen).stretches) == stretches
 
 
 @pytest.mark.parametrize("moving", [(False, False), (True, False), (True, True)])

@@ -1,11 +1,15 @@
 """A kicked motion is told from a badly measured one, and its law is found all the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from helpers import posed
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
+from vidsindy_lite.dynamics.discovery import _kicks
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.process_noise import OCTAVE, _bands, evidence
 from vidsindy_lite.dynamics.splines import Segment
@@ -49,6 +53,20 @@ def test_kicks_are_as_large_as_they_were(found_kicked):
     np.testing.assert_allclose(found_kicked.model_error, 0.05, rtol=0.3)
     # Between two knots a kick cannot be told from noise: it is at most that of one sample.
     assert (found_kicked.noise < 0.05 * np.sqrt(TIMES[1])).all()
+
+
+def test_kicks_add_up_over_the_samples_of_a_unit_of_time():
+    """What a sample misses is a rate; over its step that is a kick, and kicks add in squares."""
+    problem = replace(posed(seen=slice(100, None)), process_noise=np.array([0.2, 0.03]))
+    collocation = problem.collocation(problem.segments())
+    nothing = np.zeros((6, 2))
+    state = State(
+        np.zeros((collocation.grid.r, 2)), nothing, nothing != 0, np.zeros(2), np.zeros(2, bool)
+    )
+    kicks = _kicks(problem, Fit(state, collocation, Status.CONVERGED))
+    units, step = problem.units, 15 / 301  # the data last from 5 to 20
+    of_a_step = problem.process_noise * units.scale / units.time * step
+    np.testing.assert_allclose(kicks, of_a_step * np.sqrt(1 / step))
 
 
 def test_error_bars_count_the_kicks_in(found_kicked):

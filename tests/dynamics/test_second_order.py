@@ -165,7 +165,7 @@ def test_an_anharmonic_damped_spring_in_space(share):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.thorough)])
 def test_the_place_where_a_spring_rests_is_found(seed):
     t, rest = np.linspace(0, 12, 1500), np.array([3.0, -2.0, 5.0])
     found = discover(t, noisy(anharmonic_spring(t), 0.01, seed) + rest, order=2)

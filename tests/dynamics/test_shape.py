@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.shape import cancelling, shapes, tied
+from vidsindy_lite.dynamics.shape import LAPS, _periods, cancelling, shapes, tied
 from vidsindy_lite.study import SYSTEMS
 
 TIMES = np.linspace(0, 12, 600)
@@ -191,3 +191,18 @@ def test_terms_that_cancel_beyond_counting_are_told_in_few_digits():
     (told,) = cancelling(law, np.stack([line, line], axis=1))
     assert "times their sum)" in told
     assert max(map(len, told.split())) < 20
+
+
+@pytest.mark.parametrize("wave", [np.sin, lambda angle: np.sin(angle) + np.sin(2 * angle + 1)])
+def test_periods_are_the_laps_whose_second_half_is_seen(wave):
+    t = 3 + 0.02 * np.arange(1000)  # four laps of 5
+    x = wave(2 * np.pi / 5 * t)[:, None]
+    np.testing.assert_allclose(_periods(t, x / x.std(), 0.0), [5.0, 10.0], atol=1e-9)
+    assert 10 < 20 / LAPS < 15
+
+
+def test_laps_that_differ_by_their_noise_are_laps():
+    t, rng = 0.02 * np.arange(3000), np.random.default_rng(0)
+    x = np.sqrt(2) * np.sin(2 * np.pi / 5 * t)[:, None] + 0.5 * rng.standard_normal((3000, 1))
+    assert _periods(t, x / x.std(), 0.5)[0] == pytest.approx(5, abs=0.3)
+    assert _periods(t, x / x.std(), 0.1) == []  # of a motion that is better known, they are none

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.steadying import Steadying, carry
+from vidsindy_lite.vision.steadying import Steadying, carry, stands_still
 
 SIZE = 960, 720
 
@@ -42,3 +42,13 @@ def test_what_only_half_of_the_corners_obey_is_no_reason_for_more_than_four_numb
     found = followed(before, after)
     (a, b, _), (c, d, _), (e, f, _) = found
     np.testing.assert_allclose((d, c, e, f), (a, -b, 0, 0), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("share", "still"), [(0.0, False), (0.2, False), (0.45, True), (1, True)])
+def test_a_camera_moves_if_clearly_more_corners_share_a_motion_than_stay(seed, share, still):
+    before = grains(seed)
+    after = cv2.warpAffine(before, np.array([[1, 0, 1.8], [0, 1, 0]]), SIZE)
+    stays = np.s_[:, : int(share * SIZE[0])]
+    after[stays] = before[stays]
+    assert stands_still([before, after]) is still

@@ -1,0 +1,45 @@
+"""What differs from the background: how often it does in one place, and what that is worth."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.vision.candidates import Difference, Plate
+
+WIDTH, HEIGHT, FRAMES = 160, 120, 12
+SWAYING = np.array([70, 60])  # a place of the scene
+RNG = np.random.default_rng(0)
+SCENE = RNG.integers(90, 110, (HEIGHT + 40, WIDTH + 40, 1)).astype(np.uint8).repeat(3, axis=2)
+
+
+def filmed(shifts):
+    """Frames with something that is always there and something that travels; their maps."""
+    plain, frames, maps = [], [], []
+    for k, (u, v) in enumerate(shifts):
+        window = np.s_[v : v + HEIGHT, u : u + WIDTH]
+        plain.append(SCENE[window])
+        marked = SCENE.copy()
+        for left, top in (SWAYING, (30 + 10 * k, 90)):
+            marked[top : top + 6, left : left + 6] = 250
+        frames.append(marked[window])
+        maps.append(np.array([[1, 0, u], [0, 1, v], [0, 0, 1.0]]))
+    return np.array(plain), np.array(frames), np.array(maps)
+
+
+@pytest.mark.parametrize(
+    "shifts", [[(0, 0)] * FRAMES, [(k, 2 * k % 7) for k in range(FRAMES)]], ids=["still", "moving"]
+)
+def test_what_differs_in_the_same_place_all_the_time_is_worth_less(shifts):
+    plain, frames, maps = filmed(shifts)
+    plate = Plate(plain, maps, np.ones(FRAMES, bool))
+    assert plate.moves == (shifts[1] != (0, 0))
+    difference = Difference(plate, noise=1.0)
+    found = [difference.candidates(*each) for each in zip(frames, maps, strict=True)]
+    for k, (each, here) in enumerate(zip(found, maps, strict=True)):
+        # In the frame, the middles of what sways and of what travels.
+        sways, travels = np.array([SWAYING, (30 + 10 * k, 90)]) + 2.5 - here[:2, 2]
+        (swaying,) = (one for one in each if np.hypot(*(one.centre - sways)) < 1)
+        (travelling,) = (one for one in each if np.hypot(*(one.centre - travels)) < 1)
+        first, second = difference.travelling(each, here)
+        np.testing.assert_array_equal(first.centre, travelling.centre)
+        assert first.quality == pytest.approx(travelling.quality * (1 - 1 / FRAMES))
+        assert second.quality == pytest.approx(0.4 * swaying.quality)
