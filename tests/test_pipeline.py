@@ -136,9 +136,7 @@ def test_a_lag_that_is_slightly_wrong_is_not_blamed_on_the_rig(shot):
     assert found.warnings[0].startswith(
         "the rig does not agree with the tracks at the lags that are given: in one frame of ten, "
     )
-    assert found.warnings[0].endswith(
-        "apart: the lags (0, 0, 0) would explain it best"
-    )
+    assert found.warnings[0].endswith("apart: the lags (0, 0, 0) would explain it best")
 
 
 def test_different_frame_rates(shot, tmp_path):

@@ -213,8 +213,11 @@ def test_the_command_line_names_what_cannot_be_written(tmp_path, capsys, name):
         ('name = "1"', "fisheye = true", "fisheye: must be False, got True"),
         ('name = "1"', "rotation_count = 1", "rotation_count: must be 0, got 1"),
         ("distortions = [", "distortions = [1, 1, 1, 1, 1, ", "dist: must be k1, k2, p1, p2, k3"),
-        ("size = [ 1280, 720,]", "size = [ 1280 ]",
-         r"size: must be .* of shape \(2,\), got \[1280\]"),
+        (
+            "size = [ 1280, 720,]",
+            "size = [ 1280 ]",
+            r"size: must be .* of shape \(2,\), got \[1280\]",
+        ),
         ("rotation = [", "rotation = ['a', ", "R: must be an array of real numbers, got"),
     ],
 )

@@ -352,9 +352,7 @@ def _downhill(
     return None, 0.0
 
 
-def _cost(
-    problem: _Problem, state: _State, before: _State, weights: Floats, noise: float
-) -> float:
+def _cost(problem: _Problem, state: _State, before: _State, weights: Floats, noise: float) -> float:
     """What is to be smallest; infinite if points that were seen before would not be."""
     seen = np.isfinite(before.misses)
     lost = ~np.isfinite(state.misses[seen])

@@ -103,9 +103,7 @@ class TurnedLaw:
         law = self._mapped(block_diag(*[turn.T] * copies), self._places(origin), turn)
         return law.estimates[0], (law.estimates[1:] ** 2).sum(axis=0)
 
-    def descended(
-        self, turn: Floats, origin: Floats, size: float
-    ) -> tuple[float, Floats, Floats]:
+    def descended(self, turn: Floats, origin: Floats, size: float) -> tuple[float, Floats, Floats]:
         """The nearest orientation and origin with fewest terms, and their smoothed number.
 
         A coefficient counts ``log(1 + z^2)``, with ``z`` over its standard error and a size.
@@ -119,7 +117,6 @@ class TurnedLaw:
         free = m * (m - 1) // 2 + m
         best = least_squares(scores, np.zeros(free), loss="cauchy", max_nfev=60)
         return float(best.cost), turned(best.x[:-m], m) @ turn, origin + best.x[-m:]
-
 
     def freed(self, support: Bools) -> Floats:
         """The small turn, (m, m), after which only these terms, (l, m), are left, if they are all.
