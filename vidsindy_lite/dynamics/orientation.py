@@ -8,6 +8,7 @@ the same for shifts.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 
@@ -150,7 +151,7 @@ def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Float
         fit, weight = unpruned(problem, collocation, control, degrees <= degree, stage, history)
         if weight < FIRST_WEIGHTS[-1]:  # too many terms for these data
             continue
-        for turn in sparse_orientations(TurnedLaw.of(problem, fit), rng):
+        for turn in sparse_orientations(TurnedLaw.of(problem, fit), found, rng):
             if all(apart(turn, other) > ALIKE for other in found):
                 found.append(turn)
         if not leaves_something_over(problem, fit):
@@ -196,11 +197,16 @@ def turned(angles: Floats, m: int) -> Floats:
     return Rotation.from_rotvec(vector).as_matrix()[:m, :m]
 
 
-def sparse_orientations(law: TurnedLaw, rng: np.random.Generator) -> list[Floats]:
-    """Orientations, (m, m), in which a law has fewest terms, distinct, best first."""
+def sparse_orientations(
+    law: TurnedLaw, known: Sequence[Floats], rng: np.random.Generator
+) -> list[Floats]:
+    """Orientations, (m, m), in which a law has fewest terms, distinct, best first.
+
+    Sought from those that are known, from the data's own, and from random ones.
+    """
     law, m = replace(law, estimates=law.estimates[: 1 + MODES]), law.estimates.shape[2]
     home = np.zeros(m)
-    starts = [np.eye(m), *(random_turn(m, rng) for _ in range(STARTS))]
+    starts = [*known, np.eye(m), *(random_turn(m, rng) for _ in range(STARTS))]
     coarse = sorted((law.descended(turn, home, COARSE) for turn in starts), key=lambda f: f[0])
     found: list[Floats] = []
     fine = [law.descended(turn, origin, FINE) for _, turn, origin in coarse[: 2 * KEPT]]
