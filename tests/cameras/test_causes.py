@@ -77,6 +77,17 @@ def test_the_cause_is_named(what, seed):
     assert found.left < 1.5  # what half a pixel of noise leaves
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("part", [{"distortion": (-0.15,)}, {"readout": 0.4}])
+def test_one_camera_is_blamed_where_all_would_explain_as_much(part, seed):
+    rng = np.random.default_rng([seed, 7])
+    rig = room(rng, 4)
+    *others, last = rig.cameras
+    tracks = seen(rng, vl.Rig((*others, replace(last, **part))))
+    cause = explain(tracks, rig, learn_cameras(tracks, rig)).cause
+    assert (cause.what, cause.cameras) == (*part, (3,))
+
+
 def slow_noise(rng, size, rho):
     """Errors of a track that are similar from frame to frame."""
     errors = rng.normal(size=(len(FRAMES), 2))
