@@ -208,6 +208,18 @@ def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
     assert "without the constant" not in warning
 
 
+@pytest.mark.parametrize(("decades", "contested"), [(0.9, False), (1.1, True)])
+def test_a_wider_plateau_of_larger_errors_contests_a_law(duffing, decades, contested):
+    problem, fit, model, path, law, margins = fitted(duffing)
+    simpler = np.arange(len(law.terms)) == law.terms.index("x")
+    (own,) = path.of(fit.state.active)[1:]
+    own = replace(own, low=0.01, high=0.1)
+    rival = Plateau(1, 0.1, 0.1 * 10**decades, simpler)
+    path = replace(path, plateaus=(path.plateaus[0], (own, rival)), level=0.02)
+    told = diagnose(problem, fit, model, path, law, margins)
+    assert any("dy/dt is settled by how large an error" in one for one in told) is contested
+
+
 def test_the_constant_is_a_word_and_the_ends_of_a_range_differ(duffing):
     problem, fit, model, path, law, margins = fitted(duffing)
     (own,) = path.of(fit.state.active)[1:]

@@ -271,14 +271,21 @@ def _range(low: float, high: float) -> str:
 
 
 def _contested(law: PolynomialSystem, state: State, path: Path, remedy: str) -> Iterator[str]:
-    """Is there another plateau nearly as wide as that of an equation's law?"""
+    """Is another plateau nearly as wide as that of a law, or one of larger errors wider?"""
     names = law.names
-    for own, ranked in zip(path.of(state.active), path.ranked(), strict=True):
-        others = [plateau for plateau in ranked if (plateau.terms != own.terms).any()]
-        same = [plateau for plateau in ranked if (plateau.terms == own.terms).all()]
-        own = same[0] if same else own
-        if others and others[0].decades > RIVAL * own.decades:
-            rival = others[0]
+    for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
+        near = [plateau for plateau in plateaus if plateau.low <= path.level]
+        same = [plateau for plateau in near if (plateau.terms == own.terms).all()]
+        own = max(same, key=lambda plateau: plateau.decades, default=own)
+        # Of errors larger than there are, a plateau tells less.
+        weights = [(1.0 if plateau in near else RIVAL) * plateau.decades for plateau in plateaus]
+        others = [
+            (weight, plateau)
+            for weight, plateau in zip(weights, plateaus, strict=True)
+            if (plateau.terms != own.terms).any() and (same or plateau in near)
+        ]
+        standing, rival = max(others, key=lambda other: other[0], default=(0.0, own))
+        if standing > RIVAL * own.decades:
             changed = np.flatnonzero(rival.terms != own.terms).tolist()
             change = ", ".join(
                 f"{'with' if rival.terms[k] else 'without'} {spoken(law, k, own.equation)}"
