@@ -297,7 +297,7 @@ class Discovery:
                 f"{', '.join(terms[:SHOWN])}{more}"
             )
         if self.orientation is not None:
-            lines.append(f"axes: {self.axes}")
+            lines.append(f"axes: {self.axes}; the error bars take them as known")
         if self.note:
             lines.append(f"note: {self.note}")
         return "\n".join(lines)
