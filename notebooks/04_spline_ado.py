@@ -315,7 +315,6 @@ asked = [
     for place in places.values() for share in tolerated for trial in range(3 if full else 1)
 ]  # fmt: skip
 l2 = np.median(np.reshape(sweep(law_error, asked, jobs=jobs, desc="fits"), (len(places), len(tolerated), -1)), axis=2)
-errors = {name: dict(zip(tolerated, row.tolist(), strict=True)) for name, row in zip(places, l2, strict=True)}
 middles, *others = l2
 if full:
     assert middles[-1] < 0.5 * middles[0]
@@ -323,6 +322,7 @@ if full:
 assert all(row[-1] > 30 * middles[-1] for row in others[1:])
 
 # %%
+errors = {name: dict(zip(tolerated, row.tolist(), strict=True)) for name, row in zip(places, l2, strict=True)}
 fig = plots.plot_asked(errors)
 caption = "Error of Lorenz' coefficients at 10 % noise against the physics weight, by the times at which the law has to hold."
 save_figure("solver_nodes", fig, caption=caption, numbers=errors)

@@ -693,6 +693,8 @@ for _ in range(10):
     for j, kept in enumerate(regressed.T != 0):
         regressed[kept, j] = np.linalg.lstsq(library[:, kept], slope[:, j])[0]
 apart = PolynomialSystem(film.truth.names, exponents, regressed)
+
+# %% tags=["hide-cell"]
 together = discover(film.t, noisy, systematic=film.systematic)
 print("apart:", score(apart, film.truth), "together:", score(together, film.truth), sep="\n")
 assert score(together, film.truth).max_coefficient_error < score(apart, film.truth).max_coefficient_error
