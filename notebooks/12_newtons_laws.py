@@ -25,7 +25,7 @@
 # * what a first-order law says of the same data, and that it is not believed;
 # * gravity and drag from four throws, and why one throw is not enough;
 # * a motion that is kicked at random, and how strong the kicks are;
-# * a pendulum at a large amplitude, whose law is no polynomial.
+# * a pendulum at a large amplitude, whose law is no polynomial, and its bob in space, whose angle has a law.
 #
 # **Afterwards you can** find a law of motion from positions alone: gravity, drag, springs, and when to doubt them.
 #
@@ -303,6 +303,27 @@ assert miss < 0.1
 assert "diverges" in outcome
 
 # %% [markdown]
+# ### The same bob, seen in space
+#
+# A camera sees no angle. The bob's three coordinates depend on each other, as it stays on a circle, so that no law of
+# theirs can be trusted. That is said; the circle is found, and the law of the angle on it by itself, counted from where the bob would rest.
+
+# %%
+aside, down = np.array([0.6, 0.8, 0.0]), np.array([0.0, 0.0, -1.0])
+string = 1.0 * (np.sin(theta) * aside + np.cos(theta) * down)
+positions = string + 0.005 * rng.standard_normal(string.shape)
+seen_bob = discover(u, positions)
+swing = seen_bob.swing
+print(swing)
+
+# %%
+pulls = {swing.law.terms[row] for row in np.flatnonzero(swing.law.system.support[:, 1])}
+assert seen_bob.status == "suspect"
+assert pulls == {"sin(angle)", "vangle"}
+assert abs(swing.circle.radius - 1) < 5 * swing.circle.radius_error
+assert abs(swing.g.value - 9.81) < 5 * swing.g.error
+
+# %% [markdown]
 # ## All laws of this page
 
 # %%
@@ -340,6 +361,8 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 #   <!-- by: set(names) == {"x", "vx", "x^3"}; abs(kicked.model_error[1] / gust - 1) < 0.4 -->
 # * A law that is no polynomial is found when its terms are among the candidates, and then holds at other amplitudes, too.
 #   <!-- by: (swung.system.support == pendulum.support).all(); miss < 0.1 -->
+# * From a bob's positions its circle is found, and on it the law of the angle, with the length and $g$.
+#   <!-- by: pulls == {"sin(angle)", "vangle"}; abs(swing.circle.radius - 1); abs(swing.g.value - 9.81) < 5 * swing.g.error -->
 #
 # **What the paper says and what we found.**
 #

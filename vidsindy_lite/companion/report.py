@@ -27,7 +27,7 @@ from tqdm import tqdm
 from ..arrays import Floats
 from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_path
-from ..dynamics import Discovery
+from ..dynamics import Discovery, Swing
 from ..pipeline import VideoDiscovery
 from ..refusal import Refused
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
@@ -248,6 +248,7 @@ def summary(
             "data": _law(law, "data", np.zeros(law.system.d), np.zeros(law.system.d)),
             "native": _law(law, "native", law.offset, law.offset_errors),
             "orientation": law.orientation,
+            "swing": None if law.swing is None else _swing(law.swing),
         },
         "noise": law.noise,
         "cameras": cameras,
@@ -295,6 +296,18 @@ def _law(found: Discovery, frame: str, origin: Floats, errors: Floats) -> dict[s
     return {"equations": equations, "origin": origin, "origin_errors": errors, "terms": terms}
 
 
+def _swing(swing: Swing) -> dict[str, object]:
+    """A circle and the law of the angle on it."""
+    circle, g = swing.circle, swing.g
+    return {
+        "centre": circle.centre, "centre_errors": circle.centre_errors,
+        "radius": circle.radius, "radius_error": circle.radius_error,
+        "equations": swing.law.equations(),
+        "g": None if g is None else g.value, "g_error": None if g is None else g.error,
+        "warnings": [*circle.warnings, *swing.law.warnings],
+    }  # fmt: skip
+
+
 # ---------------------------------------------------------------------------------------- the page
 
 
@@ -312,7 +325,7 @@ def _page(
         "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
     }  # fmt: skip
     law = found.discovery
-    about |= {"axes": law.axes}
+    about |= {"axes": law.axes, "swing": "" if law.swing is None else str(law.swing)}
     about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
     return page("report.html", figures=figures, film=film, **about, **content)

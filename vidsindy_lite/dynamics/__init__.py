@@ -12,7 +12,7 @@ shape looks at where the motion takes place and beyond at terms that the library
 what candidates that are not in the law could be
 physics: what a law of motion says of a body, in named numbers
 history: how a discovery went
-rounds: circles and spheres, whose angles are coordinates
+rounds: circles and spheres, whose angles are coordinates; swing: the law of the angle, by itself
 storage: the result as a file; drawing: its path of laws as a picture
 law: polynomials, on a library of monomials, also of functions of the state; candidates are the
 libraries that a user asks for, inputs what is known of the time; integrate solves a law
@@ -41,6 +41,7 @@ from .smoothing import smooth
 from .solver import discover
 from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .state import State
+from .swing import Swing
 from .trajectories import Trajectory, check_trajectory, cut, typical_step
 from .turning import check_orientation
 from .units import Units

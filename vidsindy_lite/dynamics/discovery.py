@@ -30,6 +30,8 @@ from .units import Units
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from .swing import Swing
+
 
 SHOWN = 3
 """Most absent terms that are printed."""
@@ -97,6 +99,9 @@ class Discovery:
         Axes of a law whose orientation was learned, one a row, in those of the data: the law, its
         curve and what it simulates are in them, a place of the data is ``x @ orientation.T`` there,
         and one of theirs ``x @ orientation`` in the data. None where they are the data's own.
+    swing : Swing, optional
+        Where positions are bound to a circle, and no law of theirs is beyond doubt: the circle, as
+        ``swing.circle``, and the law of the angle on it, ``swing.law``. None elsewhere.
     """
 
     system: PolynomialSystem
@@ -114,6 +119,7 @@ class Discovery:
     absent: Floats
     note: str = ""
     orientation: Floats | None = None
+    swing: Swing | None = None
 
     @property
     def status(self) -> str:
@@ -289,6 +295,8 @@ class Discovery:
             lines.append(f"kicked at random, by {kicks} over a unit of time")
         if said := self.physics().headline:
             lines.append(said)
+        if self.swing is not None:
+            lines.append(str(self.swing))
         if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
             frame = "in its own frame, " if self.offset.any() else ""
             more = f" and {len(terms) - SHOWN} more" if len(terms) > SHOWN else ""

@@ -32,8 +32,8 @@ class Round:
     centre : ndarray, shape (d,)
     radius : float
         In units of the data: the length of a pendulum.
-    centre_errors : ndarray, shape (d,)
-        Standard errors of the centre.
+    centre_covariance : ndarray, shape (d, d)
+        Of the errors of the centre.
     radius_error : float
         Standard error of the radius.
     distance : float
@@ -52,13 +52,18 @@ class Round:
 
     centre: Floats
     radius: float
-    centre_errors: Floats
+    centre_covariance: Floats
     radius_error: float
     distance: float
     axes: Floats
     angle: Floats
     warnings: tuple[str, ...]
     systematic: Floats | None = None
+
+    @property
+    def centre_errors(self) -> Floats:
+        """Standard errors of the centre, shape (d,)."""
+        return np.sqrt(np.diag(self.centre_covariance))
 
     def __str__(self) -> str:
         shape = "circle" if len(self.axes) == 2 else "sphere"
@@ -195,14 +200,13 @@ def _with_shared(
             f"systematic: must be finite, of shape (k, {len(x)}, {x.shape[1]}), got {errors.shape}"
         )
     moved = [fit(x + error, found.axes[0] if zero is None else zero) for error in errors]
-    turned = np.array([other.angle - found.angle for other in moved]).reshape(
-        len(moved), len(x), -1
-    )
+    shape = (len(moved), len(x), found.angle.size // len(x))
+    turned = np.array([other.angle - found.angle for other in moved]).reshape(shape)
     centres = np.array([other.centre - found.centre for other in moved]).reshape(-1, x.shape[1])
     radii = np.array([other.radius - found.radius for other in moved])
     return replace(
         found,
-        centre_errors=np.sqrt(found.centre_errors**2 + (centres**2).sum(axis=0)),
+        centre_covariance=found.centre_covariance + centres.T @ centres,
         radius_error=float(np.sqrt(found.radius_error**2 + (radii**2).sum())),
         systematic=turned - 2 * np.pi * np.round(turned / (2 * np.pi)),
     )
@@ -230,7 +234,7 @@ def _round(
     return Round(
         centre=centre,
         radius=float(radius),
-        centre_errors=np.sqrt(np.diag(errors)),
+        centre_covariance=errors,
         radius_error=radius_error,
         distance=distance,
         axes=axes,

@@ -91,27 +91,40 @@ def shapes(
 
 def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[str]:
     """What there is to say of a line, a plane, a circle or a sphere."""
-    d, scale = x.shape[1], x.std(axis=0)
-    standard = (x - x.mean(axis=0)) / scale
-    _, directions = np.linalg.eigh(standard.T @ standard)  # the narrowest first
-    across = [
-        _on(standard @ normal[:, None], float(np.linalg.norm(normal * noise / scale)), 1.0)
-        for normal in directions.T[: d - 1]
-    ]
-    flat = across.index(False) if False in across else d - 1
-    if (d - flat == 2 and d <= 3) or (d == 3 and not flat):
-        told = _round(x, noise, planar=d - flat == 2)
-        if told:
-            yield told
-            return
+    directions, flat = _across(x, noise)
+    where = _round(x, noise, flat)
+    if where is not None:
+        yield _told(where)
+        return
     if flat:
+        d = x.shape[1]
         shape = {1: "on a line", 2: "in a plane"}.get(d - flat, f"in {d - flat} of {d} dimensions")
-        relations = [_relation(row, x, names) for row in directions[:, :flat].T / scale]
+        relations = [_relation(row, x, names) for row in directions[:flat]]
         yield (
             f"the motion stays {shape} ({'; '.join(relations)}): there its coordinates depend "
             f"on each other and many laws fit alike; give {d - flat} of them, or add runs that "
             "leave it"
         )
+
+
+def is_on_circle(x: Floats, noise: Floats) -> bool:
+    """Whether positions, (n, d), are bound to a circle, if their errors, (d,), are so large."""
+    if x.shape[1] not in (2, 3):
+        return False
+    where = _round(x, noise, _across(x, noise)[1])
+    return where is not None and len(where.axes) == 2
+
+
+def _across(x: Floats, noise: Floats) -> tuple[Floats, int]:
+    """Normals of a motion, (d, d), the narrowest first, and across how many of them it is flat."""
+    d, scale = x.shape[1], x.std(axis=0)
+    standard = (x - x.mean(axis=0)) / scale
+    _, directions = np.linalg.eigh(standard.T @ standard)
+    wide = [
+        _on(standard @ normal[:, None], float(np.linalg.norm(normal * noise / scale)), 1.0)
+        for normal in directions.T[: d - 1]
+    ]
+    return directions.T / scale, wide.index(False) if False in wide else d - 1
 
 
 def _relation(normal: Floats, x: Floats, names: Sequence[str]) -> str:
@@ -126,29 +139,32 @@ def _relation(normal: Floats, x: Floats, names: Sequence[str]) -> str:
     return f"{plain} = {0 if nil else constant:.4g}"
 
 
-def _round(x: Floats, noise: Floats, planar: bool) -> str:
-    """What there is to say of a motion on a circle or a sphere; nothing if it is on none.
+def _round(x: Floats, noise: Floats, flat: int) -> Round | None:
+    """The circle or sphere of a motion that is flat across so many directions, if it is on one.
 
     Of two coordinates that go round, one may be the speed of the other, or hunt it: only what turns
     back on its arc is a bob.
     """
+    d = x.shape[1]
+    planar = d - flat == 2
+    if not (planar and d <= 3 or d == 3 and not flat):
+        return None
     try:
         where = on_circle(x) if planar else on_sphere(x)
     except ValueError:  # nothing round is closer than what is flat
-        return ""
+        return None
     widths = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(x.T)), 0.0))
     toward = x - where.centre
     reach = np.linalg.norm(toward, axis=1)
     outward = (toward / reach[:, None]) ** 2
     size = widths[-2 if planar else 0]
     if not _on((reach - where.radius)[:, None], float(np.sqrt((outward @ noise**2).mean())), size):
-        return ""
-    bound = not planar or _bound(where.angle, whole=x.shape[1] > 2)
-    return _told(where, planar) if bound else ""
+        return None
+    return where if not planar or _bound(where.angle, whole=d > 2) else None
 
 
-def _told(where: Round, planar: bool) -> str:
-    shape, angles = ("circle", "angle") if planar else ("sphere", "angles")
+def _told(where: Round) -> str:
+    shape, angles = ("circle", "angle") if len(where.axes) == 2 else ("sphere", "angles")
     centre = ", ".join(
         f"{c:.4g} +- {e:.1g}" for c, e in zip(where.centre, where.centre_errors, strict=True)
     )

@@ -34,7 +34,10 @@ from .problem import Problem, fit_curves
 from .process_noise import rebalanced, with_process_noise
 from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, leave_home, search
 from .selection import inverse
+from .shape import is_on_circle
+from .swing import LIBRARY, NAME, Swing, swinging
 from .trajectories import (
+    Trajectory,
     check_sigma,
     check_systematic,
     check_trajectories,
@@ -166,20 +169,41 @@ def _of_order(
 ) -> Discovery:
     """The law of an order, or of the one that is to be trusted."""
     solved = partial(_solved, measured, seed, progress)
-    if order == 2:
-        return solved(Form.of(names, library, 2, origin))[0]
-    found, problem, _ = solved(Form.of(names, library, 1, origin))
-    settled = order == 1 or library.given or not found.warnings
+    found, problem, _ = solved(Form.of(names, library, 2 if order == 2 else 1, origin))
+    if order == 1 or library.given or not found.warnings:
+        return found
+    swing = _swing(measured, problem, seed, progress)
     drowned = problem.noise.max() > DROWNED
+    if swing or order == 2 or drowned:
+        return replace(found, swing=swing)
     # With inputs a place is passed with several velocities, whatever the order is.
-    bodily = found.system.timed or accelerated(problem.curves)
-    if settled or drowned or not bodily:
+    if not (found.system.timed or accelerated(problem.curves)):
         return found
     try:
         second, *_ = solved(Form.of(names, library, 2, origin))
     except ValueError:  # too few samples for a law of so many terms, or its names are taken
         return found
     return better(found, second)
+
+
+def _swing(measured: Measured, problem: Problem, seed: int, progress: bool) -> Swing | None:
+    """The law of the angle of positions that are on a circle, if nothing but polynomials is given.
+
+    None elsewhere, or if there is too little of it.
+    """
+    trajectories, shared, _ = measured
+    x = np.concatenate([values for _, values in trajectories])
+    noise = (problem.noise * problem.units.scale)[: x.shape[1]]
+    if problem.form.functions or not is_on_circle(x[np.isfinite(x).all(axis=1)], noise):
+        return None
+
+    def solved(angles: list[Trajectory], errors: list[Floats]) -> Discovery:
+        return _solved((angles, errors, None), seed, progress, Form.of((NAME,), LIBRARY, 2))[0]
+
+    try:
+        return swinging(trajectories, shared, solved)
+    except ValueError:
+        return None
 
 
 def _solved(measured: Measured, seed: int, progress: bool, form: Form) -> Solved:

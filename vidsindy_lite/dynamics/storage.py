@@ -17,10 +17,12 @@ from .history import Step
 from .library import Function
 from .persistence import Plateau
 from .polynomials import PolynomialSystem
+from .rounds import Round
+from .swing import Swing
 
 FORMAT = "vidsindy_lite discovery, version 1"
 TYPES: dict[str, Any] = {
-    kind.__name__: kind for kind in (Discovery, PolynomialSystem, Plateau, Step)
+    kind.__name__: kind for kind in (Discovery, PolynomialSystem, Plateau, Step, Swing, Round)
 }
 
 
@@ -54,8 +56,16 @@ def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
         raise ValueError(message) from error
     if not isinstance(found, Discovery):
         raise ValueError(message)
+    found = _with_functions(found, library)
+    if found.swing is None:
+        return found
+    return replace(found, swing=replace(found.swing, law=_with_functions(found.swing.law, None)))
+
+
+def _with_functions(found: Discovery, library: Library | None) -> Discovery:
+    """A discovery with the functions of which a file holds the names."""
     system, native = found.system, found.native
-    written = cast("tuple[str, ...]", system.functions)  # of which a file holds the names
+    written = cast("tuple[str, ...]", system.functions)
     functions = restored(system.names, system.d // system.order, written, library)
     return replace(
         found,
