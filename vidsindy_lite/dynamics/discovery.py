@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 SHOWN = 3
 """Most absent terms that are printed."""
-KEPT = 1e-300
+KEPT = 1e-12
 """Price of a term that stays whatever its error."""
 
 

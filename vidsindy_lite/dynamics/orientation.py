@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -43,7 +43,7 @@ LEAST = 1e-10
 POINTS = 3
 """Points at which two polynomials are compared, over the number of their terms."""
 CHOSEN = 1e-8
-"""Information on a turn, over the largest, below which the axes are a choice, and not learned."""
+"""Share of what a turn changes that a law's terms cannot make up for: if less, it is a choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +194,10 @@ def with_turns(problem: Problem, fit: Fit) -> Linearisation:
     own = np.flatnonzero(fit.state.free()[model.columns])
     told = model.information @ turns
     gain = inverse(model.information[np.ix_(own, own)]) @ told[own]
-    sizes, directions = np.linalg.eigh(turns.T @ told - told[own].T @ gain)
-    turns = turns @ directions[:, sizes > CHOSEN * np.max(sizes)]
+    whole = turns.T @ told
+    least = CHOSEN * np.trace(whole) * np.eye(len(whole))  # turns that change nothing have a share
+    shares, directions = eigh(whole - told[own].T @ gain, whole + least)
+    turns = turns @ directions[:, shares > CHOSEN]
     told = model.information @ turns
     share = told @ np.linalg.pinv(turns.T @ told, hermitian=True)
     return replace(
