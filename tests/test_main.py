@@ -104,8 +104,8 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--rig", "none.toml"], "none.toml"),
-        (["--rig", "a.avi"], "a.avi: must be a TOML file"),
+        (["--rig", "none.toml"], "rig: no such file, got 'none.toml'"),
+        (["--rig", "a.avi"], "rig: must be a TOML file, got 'a.avi': "),
         (["--rig", "rig.toml", "--lag", "0,7"], "lag: must be 3 finite numbers"),
         (
             ["--rig", "rig.toml", "--lag", "0,9999,0"],

@@ -216,7 +216,7 @@ class TestRig:
             ("[[camera]", "must be a TOML file"),
             ("", r"must hold \[\[camera\]\] tables and at most a distance, got \[\]"),
             ("[camera]\nnormal = [0, 0, 1]", r"must hold \[\[camera\]\] tables"),
-            ("unit = 'mm'\n[[camera]]", r"at most a distance, got \['camera', 'unit'\]"),
+            ("unit = 'mm'\n[[camera]]", r".* at most a distance, got \['camera', 'unit'\]"),
             ("camera = [1, 2]", "camera 0: must be a table"),
             ("[[camera]]\nposition = [0, 0, 1]", "camera 0: normal: must be given, got keys posi"),
             (
@@ -246,11 +246,11 @@ class TestRig:
     def test_bad_file_names_file_camera_and_key(self, tmp_path, text, message):
         path = tmp_path / "broken.toml"
         path.write_text(text)
-        with pytest.raises(ValueError, match=rf"broken\.toml: .*{message}"):
+        with pytest.raises(ValueError, match=rf"^rig: {message}.*broken\.toml'"):
             Rig.load(path)
 
     def test_missing_file(self, tmp_path):
-        with pytest.raises(FileNotFoundError, match=r"nowhere\.toml"):
+        with pytest.raises(FileNotFoundError, match=r"^rig: no such file, got '.*nowhere\.toml'$"):
             Rig.load(tmp_path / "nowhere.toml")
 
     @pytest.mark.parametrize("second", [(0, 0, 1), (0, 0, -1), (1e-9, 0, 1)])
@@ -281,8 +281,8 @@ class TestRig:
                 rig.uncalibrated(keep)
 
     def test_files_have_names(self, small):
-        for use in (Rig.load, small[1].save):
-            with pytest.raises(ValueError, match="path: must be the name of a file, got None"):
+        for name, use in (("rig", Rig.load), ("path", small[1].save)):
+            with pytest.raises(ValueError, match=f"{name}: must be the name of a file, got None"):
                 use(None)
 
     @given(SEEDS, st.sampled_from([(512, 512), (640, 480), (100, 300)]))

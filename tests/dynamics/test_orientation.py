@@ -5,12 +5,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics.orientation import apart, nearest
+from vidsindy_lite.dynamics import solver, turning
+from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.orientation import _turns, apart, nearest, turned, with_turns
+from vidsindy_lite.dynamics.selection import inverse
+from vidsindy_lite.dynamics.solver import _solved
 from vidsindy_lite.dynamics.turning import in_axes
 from vidsindy_lite.study import SYSTEMS
 
 
-def turned(name, seed, noise=0.0, n=600):
+def askew(name, seed, noise=0.0, n=600):
     """A path in axes turned at random: times, places, and the law's axes in those."""
     t, x = SYSTEMS[name].trajectory(n, 50)
     rng = np.random.default_rng(seed)
@@ -20,7 +25,7 @@ def turned(name, seed, noise=0.0, n=600):
 
 @pytest.fixture(scope="module")
 def lorenz():
-    t, x, axes = turned("Lorenz", 1, 0.01)
+    t, x, axes = askew("Lorenz", 1, 0.01)
     return t, x, axes, vl.discover(t, x, degree=2, order=1, orientation="learn")
 
 
@@ -39,6 +44,7 @@ def test_its_curve_is_in_its_own_axes_and_it_is_kept(lorenz, tmp_path):
     missed = found.curve(t) @ found.orientation - x
     assert np.sqrt(np.mean(missed**2)) < 0.02 * x.std()
     assert "axes: turned, x along (" in str(found)
+    assert "the error bars hold theirs" in str(found)
     found.save(tmp_path / "law.json")
     np.testing.assert_array_equal(
         vl.Discovery.load(tmp_path / "law.json").orientation, found.orientation
@@ -65,6 +71,101 @@ def test_springs_that_stand_askew_are_found_along_themselves():
     found = vl.discover(t, seen, degree=1, order=2, orientation="learn")
     assert found.native.support[:, 3:].sum() == 3
     assert apart(found.orientation, axes) < np.deg2rad(1)
+
+
+# ------------------------------------------------------------------------------- errors of the axes
+
+DUFFING = {"x": {"y": 1}, "y": {"x": 1, "x^3": -1, "y": -0.1}}
+LORENZ = {
+    "x": {"x": -10, "y": 10},
+    "y": {"x": 28, "x z": -1, "y": -1},
+    "z": {"x y": 1, "z": -8 / 3},
+}
+FULL = {"x": {"x": -0.1, "y": 1}, "y": {"x": -1.5, "y": 0.05}}  # has all terms in all axes
+
+
+def solved(terms, degree, start, span=20.0, noise=0.01):
+    """What was found of a law in its own axes, its problem and its fit."""
+    law, t = vl.PolynomialSystem.from_terms(terms), np.linspace(0, span, 300)
+    x = law.simulate(t, start)
+    x += noise * x.std() * np.random.default_rng(0).normal(size=x.shape)
+    form = Form.of(law.names, Library.polynomial(degree))
+    return _solved(([(t, x)], [np.zeros((*x.shape, 0))], None), 0, False, form)
+
+
+def own_errors(fit, model):
+    """Standard errors of what is free, by a quadratic model, in standard units."""
+    return np.sqrt(np.diag(inverse(model.of(np.flatnonzero(fit.state.free())).information)))
+
+
+def test_what_a_small_turn_changes_is_what_is_left_of_turned_laws():
+    _, problem, fit = solved(DUFFING, 3, [1.5, 0.4])
+    law, units, step = problem.law(fit.state), problem.units, 1e-5
+    y = np.random.default_rng(1).normal(size=(50, 2))  # standard points, from the law's own origin
+
+    def slopes(angle):
+        turn = turned(np.array([angle]), 2)
+        inward = (turn.T @ units.point(y + fit.state.offset).T).T
+        return law(units.standard(inward) - fit.state.offset) * units.scale @ turn.T / units.scale
+
+    change = _turns(problem, fit.state)[: law.coefficients.size, 0].reshape(2, -1).T
+    expected = (slopes(step) - slopes(-step)) / (2 * step)
+    found = law.library(y) @ change
+    sign = np.sign(np.sum(found * expected))  # which way is positive does not matter
+    np.testing.assert_allclose(sign * found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_axes_that_are_not_known_make_errors_larger():
+    found, problem, fit = solved(LORENZ, 2, [-8.0, 7.0, 27.0], span=10)
+    assert found.native.support.sum() == 7
+    known, learned = own_errors(fit, problem.model(fit)), own_errors(fit, with_turns(problem, fit))
+    assert (learned > known * (1 - 1e-9)).all()
+    assert (learned > 1.1 * known).any()
+
+
+def test_axes_that_the_terms_leave_open_are_a_choice_and_no_error():
+    found, problem, fit = solved(FULL, 1, [1.5, 0.4])
+    assert found.native.support.sum() == 4
+    known, learned = own_errors(fit, problem.model(fit)), own_errors(fit, with_turns(problem, fit))
+    np.testing.assert_allclose(learned, known, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_error_bars_of_a_turned_law_are_honest():
+    """95 % intervals of its coefficients hold the truth nine times in ten."""
+    law, pulls = SYSTEMS["Lorenz"], []
+    for seed in range(8):
+        t, x, axes = askew("Lorenz", seed, 0.01)
+        found = vl.discover(t, x, degree=2, order=1, orientation="learn")
+        turn = np.rint(found.orientation @ axes.T)  # which of the law's axes they are
+        y = 10 * np.random.default_rng(seed).normal(size=(50, 3))
+        truth = np.linalg.lstsq(found.system.library(y), law(y @ turn) @ turn.T)[0]
+        wanted = np.abs(truth) > 1e-6
+        np.testing.assert_array_equal(found.system.support, wanted)
+        missed = (found.coefficients - truth)[wanted]
+        pulls += np.abs(missed / found.standard_errors[wanted]).tolist()
+    assert np.mean(np.array(pulls) < 1.96) >= 0.9
+
+
+def test_axes_are_refined_only_for_a_law_that_is_then_sought(monkeypatch):
+    calls = []
+
+    def counted(module, name):
+        used = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given: calls.append(name) or used(*given))
+
+    starts = turning.rough_orientations
+    monkeypatch.setattr(
+        turning, "rough_orientations", lambda *given: calls.append("start") or starts(*given)[:1]
+    )
+    counted(turning, "refined")
+    counted(solver, "_solved")
+    law, t = vl.PolynomialSystem.from_terms(DUFFING), np.linspace(0, 20, 300)
+    x = law.simulate(t, [1.5, 0.4]) @ turned(np.array([0.5]), 2)
+    vl.discover(t, x, order=1, orientation="learn")
+    assert calls[:3] == ["_solved", "start", "_solved"]
+    assert calls[3:] == ["refined", "_solved"] * (len(calls) // 2 - 1)
+    assert len(calls) >= 5
 
 
 def test_where_no_axes_are_better_those_of_the_data_stay():

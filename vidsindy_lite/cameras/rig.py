@@ -207,23 +207,24 @@ class Rig:
         ValueError
             If the file is not TOML or does not describe a rig; names file, camera and key.
         """
-        path = check_path("path", path)
+        path = check_path("rig", path)
         if not path.is_file():
-            raise FileNotFoundError(f"{path}: no such rig file")
+            raise FileNotFoundError(f"rig: no such file, got '{path}'")
         try:
             content = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ValueError(f"{path}: must be a TOML file: {error}") from error
+            raise ValueError(f"rig: must be a TOML file, got '{path}': {error}") from error
         tables = content.get("camera")
         if not content.keys() <= {"camera", "distance"} or not isinstance(tables, list):
             raise ValueError(
-                f"{path}: must hold [[camera]] tables and at most a distance, got {sorted(content)}"
+                "rig: must hold [[camera]] tables and at most a distance, got "
+                f"{sorted(content)} in '{path}'"
             )
         try:
             cameras = tuple(_from_table(i, table) for i, table in enumerate(tables))
             return cls(cameras, distance=content.get("distance"))
         except ValueError as error:
-            raise ValueError(f"{path}: {error}") from error
+            raise ValueError(f"rig: {error}, in '{path}'") from error
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the rig to a TOML file, from which `load` gives back exactly this rig.

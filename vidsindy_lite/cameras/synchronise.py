@@ -190,6 +190,8 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
     found = sorted(_different([f for f in every if f]), key=lambda f: f.score)
     if not found:
         return _untold(videos, first, False)
+    if not found[0].agrees:  # as no lag does, where clocks drift by more than a part of a frame
+        found = sorted((f.drifted() for f in found), key=lambda f: f.score)
     alike = [f for f in found if f.score <= max(ALIKE * found[0].score, FINE)]
     if len(alike) > 1 and found[0].score > DISAGREEMENT:
         return _untold(videos, first, False)

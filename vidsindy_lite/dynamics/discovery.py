@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 SHOWN = 3
 """Most absent terms that are printed."""
+KEPT = 1e-12
+"""Price of a term that stays whatever its error."""
 
 
 @dataclass(frozen=True)
@@ -305,7 +307,7 @@ class Discovery:
                 f"{', '.join(terms[:SHOWN])}{more}"
             )
         if self.orientation is not None:
-            lines.append(f"axes: {self.axes}; the error bars take them as known")
+            lines.append(f"axes: {self.axes}; the error bars hold theirs")
         if self.note:
             lines.append(f"note: {self.note}")
         return "\n".join(lines)
@@ -364,6 +366,23 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
             BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
             for s in collocation.grid.splines(state.control_points)
         ),
+    )
+
+
+def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisation) -> Discovery:
+    """The same law, its error bars those of another quadratic model around its fit."""
+    state, form = fit.state, problem.form
+    covariance, size = _covariance(problem.units, fit, model), state.coefficients.size
+    coefficients = state.coefficients * problem.units.factors(problem.exponents)
+    moved = _shifted(problem.exponents, coefficients, found.offset, covariance)
+    kept = (found.system.support & ~(form.known != 0)).T.ravel()
+    moved_coefficients, moved_covariance, _ = _pruned(*moved, np.where(kept, KEPT, np.inf))
+    return replace(
+        found,
+        system=form.law(moved_coefficients + form.known),
+        covariance=moved_covariance,
+        native_covariance=covariance[:size, :size],
+        offset_errors=np.sqrt(np.diag(covariance)[size:]),
     )
 
 

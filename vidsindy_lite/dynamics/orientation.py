@@ -10,20 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Bools, Floats, Ints
-from .collocation import Fit
+from .collocation import Fit, Linearisation
 from .history import History
-from .library import monomials
+from .library import monomial_gradients, monomials
 from .problem import Problem, fit_curves
 from .search import FIRST_WEIGHTS, SEARCH_WEIGHTS, leaves_something_over, unpruned
 from .selection import inverse
+from .state import State
 
 STARTS = 20
 """Random orientations from which the sparsest is sought."""
@@ -41,6 +42,8 @@ LEAST = 1e-10
 """Least variance over the largest, in units of their own, that is no rounding."""
 POINTS = 3
 """Points at which two polynomials are compared, over the number of their terms."""
+CHOSEN = 1e-8
+"""Share of what a turn changes that a law's terms cannot make up for: if less, it is a choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +180,51 @@ def refined(problem: Problem, fit: Fit) -> Floats:
         state = fit.state
     law = TurnedLaw.of(problem, fit)
     return law.freed(state.active[_rows(fit)][:, -len(law.origin) :])
+
+
+def with_turns(problem: Problem, fit: Fit) -> Linearisation:
+    """The quadratic model around a fit, with small turns of its axes eliminated.
+
+    Axes in which terms are absent were learned from these: so what a law with the same terms in
+    axes near by explains as well is not known. A turn that the law's own terms can make up for is
+    no unknown but a choice of axes, which stay.
+    """
+    model = problem.model(fit)
+    turns = _turns(problem, fit.state)[model.columns]
+    own = np.flatnonzero(fit.state.free()[model.columns])
+    told = model.information @ turns
+    gain = inverse(model.information[np.ix_(own, own)]) @ told[own]
+    whole = turns.T @ told
+    least = CHOSEN * np.trace(whole) * np.eye(len(whole))  # turns that change nothing have a share
+    shares, directions = eigh(whole - told[own].T @ gain, whole + least)
+    turns = turns @ directions[:, shares > CHOSEN]
+    told = model.information @ turns
+    share = told @ np.linalg.pinv(turns.T @ told, hermitian=True)
+    return replace(
+        model,
+        information=model.information - share @ told.T,
+        gradient=model.gradient - share @ (turns.T @ model.gradient),
+    )
+
+
+def _turns(problem: Problem, state: State) -> Floats:
+    """What small turns about the origin of the data change in a law, along `State.flat`, (k, r).
+
+    With the generator K of a turn it is ``K f(x) - f'(x) K x``.
+    """
+    m, scale, exponents = problem.measured[0][1].shape[1], problem.units.scale, problem.exponents
+    y = np.random.default_rng(0).uniform(-1, 1, (POINTS * len(exponents), problem.d))
+    values, law = monomials(y, exponents), state.coefficients + problem.known
+    slopes = np.einsum("nlk,lj->njk", monomial_gradients(y, exponents), law)
+    changes = []
+    for i, j in combinations(range(m), 2):
+        generator = np.zeros((m, m))
+        generator[[i, j], [j, i]] = 1.0, -1.0
+        turn = np.kron(np.eye(problem.d // m), generator) * scale / scale[:, None]
+        moved = np.einsum("njk,nk->nj", slopes, (y + state.offset - problem.home) @ turn.T)
+        change = np.linalg.pinv(values) @ (values @ law @ turn.T - moved)
+        changes.append(np.append(change.T, np.zeros(problem.d)))
+    return np.column_stack(changes)
 
 
 def _rows(fit: Fit) -> Bools:

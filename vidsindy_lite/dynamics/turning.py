@@ -12,15 +12,15 @@ from ..arrays import Floats
 from ..checks import check_choice
 from .candidates import Library
 from .collocation import Fit
-from .discovery import Discovery
+from .discovery import Discovery, with_errors
 from .form import Form
 from .library import variable_names
-from .orientation import refined, rough_orientations
+from .orientation import refined, rough_orientations, with_turns
 from .problem import Problem
 from .trajectories import Trajectory
 
-ROUNDS = 4
-"""Most discoveries in one orientation, each of which tells the axes better."""
+ROUNDS = 3
+"""Most times that a discovery tells the axes better, in which the next is made."""
 
 Solved = tuple[Discovery, Problem, Fit]
 Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
@@ -62,21 +62,32 @@ def in_sparsest_axes(
     rng : numpy.random.Generator
         For the starts of the search.
     """
-    found: list[Discovery] = []
-    for turn in rough_orientations(pose(np.eye(own.system.states // own.system.order)), rng):
-        terms = np.inf
-        for _ in range(ROUNDS):
-            law, problem, fit = solve(turn)
-            found.append(replace(law, orientation=turn, note=own.note))
-            if _terms(law) >= terms:
-                break
-            terms = _terms(law)
-            turn = refined(problem, fit) @ turn
-    best = min(found, key=lambda law: (bool(law.warnings), _terms(law)), default=own)
+    starts = rough_orientations(pose(np.eye(own.system.states // own.system.order)), rng)
+    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=own)
     if _terms(best) < _terms(own):
-        return best
+        return replace(best, note=own.note)
     said = "orientation: the data's own axes, as the law has no fewer terms in any others"
     return replace(own, note="; ".join(filter(None, (own.note, said))))
+
+
+def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Discovery:
+    """The law in the best axes near some; of laws alike, the one in the axes that were refined."""
+    found, problem, fit = solve(turn)
+    best = replace(found, orientation=turn), problem, fit
+    for _ in range(ROUNDS):
+        turn, before = refined(problem, fit) @ turn, _rank(found)
+        found, problem, fit = solve(turn)
+        if _rank(found) <= _rank(best[0]):
+            best = replace(found, orientation=turn), problem, fit
+        if _rank(found) >= before:
+            break
+    found, problem, fit = best
+    return with_errors(found, problem, fit, with_turns(problem, fit))
+
+
+def _rank(found: Discovery) -> tuple[bool, int]:
+    """What is to be smallest: no warnings, then few terms."""
+    return bool(found.warnings), _terms(found)
 
 
 def _terms(found: Discovery) -> int:
