@@ -13,7 +13,16 @@ import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
 from .background import SAMPLES, light
-from .candidates import Candidate, Difference, Plate, enlarged, reduce, reduction, tolerance
+from .candidates import (
+    Candidate,
+    Difference,
+    Plate,
+    enlarged,
+    reduce,
+    reduction,
+    tolerance,
+    uncommon,
+)
 from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
@@ -233,6 +242,8 @@ def sighted(
     ]
     if hint is not None:
         return hinted(found, hint, film.factor, path), difference.lights
+    if not film.sure:
+        found = [uncommon(some) for some in found]
     kept = [difference.travelling(f, here) for f, here in zip(found, film.maps, strict=False)]
     return kept, difference.lights
 

@@ -29,6 +29,7 @@ PLAINLY = 10.0  # standard errors of a displacement that is one
 _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
 _SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
 _TELLING = 10  # corners that must share a motion, if it is to be the camera's
+_MOST = 0.5  # share of the corners found that must do so: of those of mere noise a few always agree
 # Share of a key frame that is left, below which there must be a new one. Each adds its error to all
 # that follow, so late: a little above the 0.3 that `align` needs. From 0.3 to 0.6 nothing changes.
 _LEFT = 0.4
@@ -130,7 +131,7 @@ def _moved(before: _Relief, after: _Relief) -> bool | None:
         return _drifted(before, after)
     still = np.linalg.norm(b - a, axis=1) < _STILL
     share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
-    if share.sum() < _TELLING:
+    if share.sum() < max(_TELLING, _MOST * len(a)):
         return _drifted(before, after)
     return bool(still.sum() < 0.7 * share.sum())
 
@@ -184,7 +185,7 @@ class Steadying:
         ends, found = _follow(self.key.fine, relief.fine, self.points, guess)
         a, b = self.points[found], ends[found]
         best, good = _similar(a, b, 2 * _EXACT)
-        if best is None or good.sum() < _SOME:
+        if best is None or good.sum() < max(_SOME, _MOST * len(a)):
             return None, 0
         if good.sum() >= _MANY:
             full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
