@@ -29,7 +29,6 @@ _KEPT = 12  # and that are kept, once it is known which of them stay where they 
 _STAYS = 1.0  # by how much of its quality a candidate loses that is there in all frames
 _WORTH = 0.4  # share of its quality that it keeps at least
 _ALIKE = 40.0, 2.0  # grey levels of colour and factor of size between two that look alike
-_PAIR = 2.0  # that look alike: no crowd yet
 
 
 def reduction(size: tuple[int, int]) -> int:
@@ -278,17 +277,17 @@ def blobs(
     return found
 
 
-def uncommon(found: list[Candidate]) -> list[Candidate]:
-    """The candidates of a frame, worth the less the more of them look alike.
+def uncommon(found: list[Candidate], targets: int) -> list[Candidate]:
+    """The candidates of a frame, worth the less the more of them look alike than there are targets.
 
     Before a plain wall that does not tell the camera's motion all that is at rest seems to move,
-    and the leaves of a tree hardly leave their places. But they are many, and the target is one.
+    and the leaves of a tree hardly leave their places. But they are many, the targets few.
     """
     colour = np.array([one.colour for one in found]).reshape(-1, 3)
     size = np.log([np.sqrt(one.area) for one in found])
     like = np.linalg.norm(colour[:, None] - colour, axis=2) < _ALIKE[0]
     like &= np.abs(size[:, None] - size) < np.log(_ALIKE[1])
-    worth = np.minimum(_PAIR / np.maximum(like.sum(axis=1), 1), 1)
+    worth = np.minimum((targets + 1) / np.maximum(like.sum(axis=1), 1), 1)  # two are no crowd
     return [replace(one, quality=one.quality * w) for one, w in zip(found, worth, strict=True)]
 
 

@@ -26,12 +26,11 @@ _EXACT = 1.0  # reduced pixels by which a corner may miss its place
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
 _AS_SURE = 3.0  # times the error of another map that is about as good
-_FIRM = 1.0  # reduced pixels to which a frame must be known to become a key frame
 PLAINLY = 10.0  # standard errors of a displacement that is one
 _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
 _SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
 _TELLING = 10  # corners that must share a motion, if it is to be the camera's
-_AGREE = 0.5  # share of the corners found that must do so: of those of mere noise, .2 do by chance
+_AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 # Share of a key frame that is left, below which there must be a new one. Each adds its error to all
 # that follow, so late: a little above the 0.3 that `align` needs. From 0.3 to 0.6 nothing changes.
 _LEFT = 0.4
@@ -242,8 +241,7 @@ class Steadying:
         self.last = located.map
         self.maps.append(self.base @ np.linalg.inv(self.last))
         self.errors.append(float(np.hypot(self.drift, located.error)))
-        if located.error < _FIRM:
-            self.before = relief, self.maps[-1], self.errors[-1]
+        self.before = relief, self.maps[-1], self.errors[-1]
         if self._shared(self.last) < _LEFT:
             self._start(*self.before)
 
