@@ -132,9 +132,10 @@ def _moved(before: _Relief, after: _Relief) -> bool | None:
         return _drifted(before, after)
     still = np.linalg.norm(b - a, axis=1) < _STILL
     share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
-    if share.sum() < max(_TELLING, _AGREE * len(a)):
+    moves = bool(still.sum() < 0.7 * share.sum())
+    if share.sum() < max(_TELLING, moves * _AGREE * len(a)):
         return _drifted(before, after)
-    return bool(still.sum() < 0.7 * share.sum())
+    return moves
 
 
 def _drifted(before: _Relief, after: _Relief) -> bool | None:
