@@ -7,6 +7,7 @@ from footage import Phone, write_phone
 
 from vidsindy_lite import track
 from vidsindy_lite.vision.aligning import align, pyramid
+from vidsindy_lite.vision.steadying import Steadying
 
 SIZE = 320, 240
 
@@ -88,6 +89,23 @@ def test_noise_and_a_few_things_tell_nothing(things):
             wall[v : v + 12, u : u + 12] = 40
         views.append(np.clip(wall + rng.normal(0, 3, wall.shape), 0, 255).astype(np.uint8))
     assert align(*map(pyramid, views), np.eye(3)).error > 3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_clouds_tell_a_motion_better_than_leaves_that_sway(seed):
+    rng = np.random.default_rng(seed)
+    shift = np.array([5, -4])
+    views = [sight(seed, noise=1), sight(seed, similar(*shift), noise=1)]
+    for _ in range(30):
+        leaf = rng.uniform(30, [290, 210])
+        for view, here in zip(views, (leaf, leaf + shift + rng.uniform(-2.5, 2.5, 2)), strict=True):
+            cv2.circle(view, tuple(np.rint(16 * here).astype(int)), 48, (90, 90, 90), -1, 8, 4)
+    steadying = Steadying(1)
+    for view in views:
+        steadying.add(view)
+    motion = steadying.motion()
+    assert motion.errors[1] < 0.15
+    assert np.linalg.norm(np.linalg.inv(motion.maps[1])[:2, 2] - shift) < 0.5
 
 
 def test_a_camera_held_before_a_plain_wall_is_doubted(tmp_path):

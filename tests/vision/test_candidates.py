@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.candidates import Difference, Plate
+from vidsindy_lite.vision.candidates import Candidate, Difference, Plate, uncommon
 
 WIDTH, HEIGHT, FRAMES = 160, 120, 12
 SWAYING = np.array([70, 60])  # a place of the scene
@@ -43,3 +43,15 @@ def test_what_differs_in_the_same_place_all_the_time_is_worth_less(shifts):
         np.testing.assert_array_equal(first.centre, travelling.centre)
         assert first.quality == pytest.approx(travelling.quality * (1 - 1 / FRAMES))
         assert second.quality == pytest.approx(0.4 * swaying.quality)
+
+
+def test_of_a_crowd_of_like_things_none_is_worth_much():
+    def one(colour, area=50.0):
+        return Candidate(np.zeros(2), np.array([0, 0, 8, 8.0]), area, np.array(colour, float), 0.8)
+
+    leaves = [one((50 + k, 70, 60)) for k in range(8)]
+    others = [one((30, 30, 210)), one((35, 30, 210)), one((50, 70, 60), 500.0)]
+    worth = [each.quality for each in uncommon(leaves + others, 1)]
+    assert worth == pytest.approx([0.8 * 2 / 8] * 8 + [0.8] * 3)
+    assert [each.quality for each in uncommon(leaves, 7)] == pytest.approx([0.8] * 8)
+    assert uncommon([], 1) == []

@@ -14,9 +14,9 @@ from vidsindy_lite.vision.candidates import Candidate, Plate, reduce, tolerance
 from vidsindy_lite.vision.hints import load_hints
 from vidsindy_lite.vision.lingering import lingering, uncover
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import _learned, rate
-from vidsindy_lite.vision.refining import _nearest, fitting, joined, scatter
-from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, stands_still
+from vidsindy_lite.vision.moving import _learned, finished, rate
+from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
+from vidsindy_lite.vision.steadying import CameraMotion, Steadying, _Relief, carry, stands_still
 
 REAL = Path(vidsindy_lite.__file__).parents[2] / "shared" / "real"
 SMALL = {"image_size": (320, 240), "frames": 60}
@@ -256,6 +256,19 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     areas = np.full(40, 100.0)
     areas[[10, 11, 30, 31]] = 30
     assert not joined(areas).any()
+
+
+def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
+    views = [View(np.array([20.0 + 3 * k, 50]), 100.0, np.zeros(3), True) for k in range(20)]
+    errors = np.zeros(20)
+    maps = np.tile(np.eye(3), (20, 1, 1))
+    assert finished(views, CameraMotion(maps, errors), ()).doubts == ()
+    errors[16:] = np.inf
+    found = finished(views, CameraMotion(maps, errors), ())
+    assert np.isfinite(found.pixels[:, 0]).sum() == 16
+    (doubt,) = found.doubts
+    assert doubt.startswith("in 4 frames of 20 the target is seen")
+    assert "16 to 19" in doubt
 
 
 def dashing(frames, turn, width):

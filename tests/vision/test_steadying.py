@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.steadying import Steadying, carry, stands_still
+from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, stands_still
 
 SIZE = 960, 720
 
@@ -52,3 +52,21 @@ def test_a_camera_moves_if_clearly_more_corners_share_a_motion_than_stay(seed, s
     stays = np.s_[:, : int(share * SIZE[0])]
     after[stays] = before[stays]
     assert stands_still([before, after]) is still
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.1, False), (0.5, True)])
+def test_what_a_few_of_the_corners_share_is_chance_and_tells_no_motion(share, told):
+    rng = np.random.default_rng(0)
+    before = grains()
+    after = before.copy()
+    for v in range(0, SIZE[1], 60):
+        for u in range(0, SIZE[0], 80):
+            move = [3.0, 0] if rng.uniform() < share else rng.uniform(-8, 8, 2)
+            here = np.array([[1, 0, move[0]], [0, 1, move[1]]])
+            moved = cv2.warpAffine(before, here, SIZE)
+            after[v : v + 60, u : u + 80] = moved[v : v + 60, u : u + 80]
+    steadying = Steadying(1)
+    steadying.add(before)
+    found, count = steadying._by_corners(_Relief.of(after))
+    assert (found is not None) is told
+    assert (count > 0) is told

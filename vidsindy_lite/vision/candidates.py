@@ -28,6 +28,7 @@ _MOST = 40  # candidates of a frame that are looked at
 _KEPT = 12  # and that are kept, once it is known which of them stay where they are
 _STAYS = 1.0  # by how much of its quality a candidate loses that is there in all frames
 _WORTH = 0.4  # share of its quality that it keeps at least
+_ALIKE = 40.0, 2.0  # grey levels of colour and factor of size between two that look alike
 
 
 def reduction(size: tuple[int, int]) -> int:
@@ -274,6 +275,20 @@ def blobs(
             Candidate(centre + [left, top], box, float(area), colour.astype(float), float(quality))
         )
     return found
+
+
+def uncommon(found: list[Candidate], targets: int) -> list[Candidate]:
+    """The candidates of a frame, worth the less the more of them look alike than there are targets.
+
+    Before a plain wall that does not tell the camera's motion all that is at rest seems to move,
+    and the leaves of a tree hardly leave their places. But they are many, the targets few.
+    """
+    colour = np.array([one.colour for one in found]).reshape(-1, 3)
+    size = np.log([np.sqrt(one.area) for one in found])
+    like = np.linalg.norm(colour[:, None] - colour, axis=2) < _ALIKE[0]
+    like &= np.abs(size[:, None] - size) < np.log(_ALIKE[1])
+    worth = np.minimum((targets + 1) / np.maximum(like.sum(axis=1), 1), 1)  # two are no crowd
+    return [replace(one, quality=one.quality * w) for one, w in zip(found, worth, strict=True)]
 
 
 def _is_shadow(colour: Floats32, ground: Floats32) -> bool:

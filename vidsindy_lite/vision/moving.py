@@ -13,7 +13,16 @@ import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
 from .background import SAMPLES, light
-from .candidates import Candidate, Difference, Plate, enlarged, reduce, reduction, tolerance
+from .candidates import (
+    Candidate,
+    Difference,
+    Plate,
+    enlarged,
+    reduce,
+    reduction,
+    tolerance,
+    uncommon,
+)
 from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
@@ -223,7 +232,7 @@ class Film(NamedTuple):
 
 
 def sighted(
-    path: str | os.PathLike, film: Film, hint: Hint | None
+    path: str | os.PathLike, film: Film, hint: Hint | None, targets: int = 1
 ) -> tuple[list[list[Candidate]], list[Floats32]]:
     """What may be the target in each frame, and how bright the frame is."""
     difference = Difference(film.plate, film.noise)
@@ -233,6 +242,8 @@ def sighted(
     ]
     if hint is not None:
         return hinted(found, hint, film.factor, path), difference.lights
+    if not film.sure:
+        found = [uncommon(some, targets) for some in found]
     kept = [difference.travelling(f, here) for f, here in zip(found, film.maps, strict=False)]
     return kept, difference.lights
 
@@ -370,6 +381,10 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     good = fitting(at, steady, areas, inside)
+    untold = at[~np.isfinite(motion.errors[at])]
+    if len(untold):
+        doubts += (f"in {len(untold)} frames of {n} the target is seen, but not how the camera "
+                   f"moved, from {untold[0]} to {untold[-1]}: they are left out",)  # fmt: skip
     if good.sum() < max(_SHORTEST, _SCARCE * n):
         return nothing(motion, n)
     pixels[at[good]] = steady[good]

@@ -25,10 +25,12 @@ _FLAT = 2.0  # smallest eigenvalue of the gradient's covariance in a corner, gre
 _EXACT = 1.0  # reduced pixels by which a corner may miss its place
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
+_AS_SURE = 3.0  # times the error of another map that is about as good
 PLAINLY = 10.0  # standard errors of a displacement that is one
 _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
 _SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
 _TELLING = 10  # corners that must share a motion, if it is to be the camera's
+_AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 # Share of a key frame that is left, below which there must be a new one. Each adds its error to all
 # that follow, so late: a little above the 0.3 that `align` needs. From 0.3 to 0.6 nothing changes.
 _LEFT = 0.4
@@ -130,9 +132,10 @@ def _moved(before: _Relief, after: _Relief) -> bool | None:
         return _drifted(before, after)
     still = np.linalg.norm(b - a, axis=1) < _STILL
     share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
-    if share.sum() < _TELLING:
+    moves = bool(still.sum() < 0.7 * share.sum())
+    if share.sum() < max(_TELLING, moves * _AGREE * len(a)):
         return _drifted(before, after)
-    return bool(still.sum() < 0.7 * share.sum())
+    return moves
 
 
 def _drifted(before: _Relief, after: _Relief) -> bool | None:
@@ -184,7 +187,7 @@ class Steadying:
         ends, found = _follow(self.key.fine, relief.fine, self.points, guess)
         a, b = self.points[found], ends[found]
         best, good = _similar(a, b, 2 * _EXACT)
-        if best is None or good.sum() < _SOME:
+        if best is None or good.sum() < max(_SOME, _AGREE * len(a)):
             return None, 0
         if good.sum() >= _MANY:
             full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
@@ -201,7 +204,9 @@ class Steadying:
             return found
         direct = align(self.key.levels, relief.levels, self.last)
         both = [one for one in (found, direct) if one is not None and one.error < _VAGUE]
-        return min(both, key=lambda one: self._step(one.map), default=None)
+        best = min((one.error for one in both), default=0.0)
+        good = [one for one in both if one.error <= _AS_SURE * best]
+        return min(good, key=lambda one: self._step(one.map), default=None)
 
     def _step(self, here: Floats) -> float:
         """By how much a map differs from that of the frame before, where two are as good."""
