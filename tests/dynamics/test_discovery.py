@@ -5,7 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.discovery import Discovery, _pruned, _with_error
+from vidsindy_lite.dynamics.conclusion import _pruned
+from vidsindy_lite.dynamics.discovery import Discovery, _with_error
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover

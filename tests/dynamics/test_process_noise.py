@@ -9,7 +9,7 @@ from helpers import posed
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import PolynomialSystem
 from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
-from vidsindy_lite.dynamics.discovery import _kicks
+from vidsindy_lite.dynamics.conclusion import _kicks
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.process_noise import OCTAVE, _bands, evidence
 from vidsindy_lite.dynamics.splines import Segment

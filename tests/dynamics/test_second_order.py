@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Status
-from vidsindy_lite.dynamics.discovery import History
 from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.library import shift_matrix
 from vidsindy_lite.dynamics.order import accelerated, better, unexplained
 from vidsindy_lite.dynamics.posing import pose

@@ -23,7 +23,8 @@ from ..arrays import Floats
 from ..checks import check_integer
 from .candidates import Library, check_library
 from .collocation import Fit, Status
-from .discovery import Discovery, conclude
+from .conclusion import conclude
+from .discovery import Discovery
 from .form import Form
 from .history import History
 from .order import accelerated, better, check_order

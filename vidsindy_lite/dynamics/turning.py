@@ -12,7 +12,8 @@ from ..arrays import Floats
 from ..checks import check_choice
 from .candidates import Library
 from .collocation import Fit
-from .discovery import Discovery, with_errors
+from .conclusion import with_errors
+from .discovery import Discovery
 from .form import Form
 from .library import variable_names
 from .orientation import refined, rough_orientations, with_turns
