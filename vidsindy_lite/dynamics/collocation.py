@@ -223,9 +223,8 @@ class Collocation:
     def _shared(self) -> tuple[Floats, Floats]:
         """Weighted systematic errors, and the normal matrix of their sizes."""
         weighted = self.sample_weights[:, :, None] * self.systematic
-        information = np.einsum("nik,nil->kl", weighted, self.systematic)
-        information += np.eye(self.systematic.shape[-1])
-        return weighted, information
+        information = np.tensordot(weighted, self.systematic, axes=((0, 1), (0, 1)))
+        return weighted, information + np.eye(len(information))
 
     @cached_property
     def _pull(self) -> Floats:
