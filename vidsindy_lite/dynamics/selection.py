@@ -245,7 +245,7 @@ def _moved_by_newcomers(model: _Quadratic, tableau: _Tableau) -> Bools:
     return moved
 
 
-def _changed(support: Bools, dropped: Ints, added: Ints) -> Bools:
+def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
     changed = support.copy()
     changed[dropped] = False
     changed[added] = True
