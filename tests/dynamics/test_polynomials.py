@@ -135,7 +135,9 @@ def test_shift_leaves_no_remainder_where_terms_cancel():
 
 def test_shift_matrix_of_a_line():
     exponents = monomial_exponents(1, 2)
-    np.testing.assert_allclose(shift_matrix(exponents, [2.0]), [[1, -2, 4], [0, 1, -4], [0, 0, 1]])
+    np.testing.assert_allclose(
+        shift_matrix(exponents, np.array([2.0])), [[1, -2, 4], [0, 1, -4], [0, 0, 1]]
+    )
 
 
 def test_generators_differentiate_monomials_and_shifts():

@@ -140,7 +140,7 @@ def test_evidence_is_that_of_the_gaussian_model():
         )
         # The curve alone is fitted: the law stays as it is.
         solved = collocation.linearise(state, np.array([], dtype=int))
-        state = state.moved(solved.curve_step, state.flat())
+        state = solved.along(state, np.zeros(0), 1.0)
         physics = grid.slopes.toarray() - coefficients[1] * grid.nodes.toarray()
         rows = np.vstack(
             [grid.samples.toarray() / noise, np.sqrt(grid.node_weights)[:, None] * physics / kick]

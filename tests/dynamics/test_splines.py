@@ -12,8 +12,6 @@ from vidsindy_lite.dynamics.splines import (
     clamped_knots,
     design_matrix,
     local_basis,
-    normal_band,
-    rows_from,
 )
 
 
@@ -103,13 +101,3 @@ def test_node_weights_are_the_lengths_that_nodes_stand_for():
     ]
     widths = np.array([0.5, 1, 2, 1, 1, 2, 1])
     np.testing.assert_allclose(Grid.of(segments).node_weights, 7 * widths / widths.sum())
-
-
-def test_the_band_is_that_of_the_normal_matrix():
-    rng = np.random.default_rng(1)
-    first = np.sort(rng.integers(0, 7, 20))
-    rows = rows_from(first, rng.normal(size=(20, 3)), 9)
-    assert (rows.toarray() != 0).sum() == 60
-    band, full = normal_band(rows), rows.toarray().T @ rows.toarray()
-    for lag in range(3):
-        np.testing.assert_allclose(band[lag, : 9 - lag], np.diag(full, -lag), atol=1e-12)

@@ -16,12 +16,13 @@ from functools import cached_property
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError, cholesky_banded
 
 from ..arrays import Floats, Ints
+from .banded import normal_band, solve_factored
 from .library import Function, along_state, law_variables, monomials, shift_generators
 from .selection import RIDGE, equilibrated
-from .splines import WIDTH, Grid, Segment, normal_band, rows_from
+from .splines import WIDTH, Grid, Segment, rows_from
 from .state import State
 
 CLEANEST = 1e-5
@@ -80,19 +81,12 @@ class Linearisation:
     columns: Ints
     information: Floats
     gradient: Floats
-    curve_step: Floats
-    curve_response: Floats
 
     def of(self, columns: Ints) -> Linearisation:
         """The same for some of the columns: the others stay as they are."""
         places = np.searchsorted(self.columns, columns)
-        return replace(
-            self,
-            columns=columns,
-            information=self.information[np.ix_(places, places)],
-            gradient=self.gradient[places],
-            curve_response=self.curve_response[:, :, places],
-        )
+        information = self.information[np.ix_(places, places)]
+        return Linearisation(self.fall, columns, information, self.gradient[places])
 
     def newton(self, damping: float = 0.0) -> tuple[Floats, float]:
         """The best step in the columns, and by how much it promises to lower the objective."""
@@ -102,11 +96,29 @@ class Linearisation:
         step = scale * np.linalg.solve(matrix, scale * self.gradient)
         return step, float(self.fall + self.gradient @ step)
 
+
+@dataclass(frozen=True)
+class WithCurve(Linearisation):
+    """A linearisation that knows what the curve does.
+
+    Parameters
+    ----------
+    response : ndarray, shape (r d, 1 + m + s)
+        What the control points do by themselves, with each column, and each systematic error.
+    shared : ndarray, shape (s, 1 + m)
+        What the sizes of the systematic errors do by themselves, and with each column.
+    """
+
+    response: Floats
+    shared: Floats
+
     def along(self, state: State, step: Floats, fraction: float) -> State:
         """The state after a fraction of a step, with the curve that goes with it."""
         flat = state.flat()
         flat[self.columns] += fraction * step
-        control = state.control_points + fraction * (self.curve_step + self.curve_response @ step)
+        moves = np.append(1.0, step)
+        change = self.response @ np.append(moves, self.shared @ moves)
+        control = state.control_points + fraction * change.reshape(state.control_points.shape)
         return state.moved(control, flat)
 
 
@@ -211,9 +223,15 @@ class Collocation:
     def _shared(self) -> tuple[Floats, Floats]:
         """Weighted systematic errors, and the normal matrix of their sizes."""
         weighted = self.sample_weights[:, :, None] * self.systematic
-        information = np.einsum("nik,nil->kl", weighted, self.systematic)
-        information += np.eye(self.systematic.shape[-1])
-        return weighted, information
+        information = np.tensordot(weighted, self.systematic, axes=((0, 1), (0, 1)))
+        return weighted, information + np.eye(len(information))
+
+    @cached_property
+    def _pull(self) -> Floats:
+        """How the systematic errors pull at the control points, (r d, k)."""
+        weighted, _ = self._shared
+        pull = self.grid.samples.T @ weighted.reshape(len(self.grid.x), -1)
+        return np.asarray(pull).reshape(self.grid.r * self.d, -1)
 
     def curve(self, control_points: Floats) -> Floats:
         """The curve at the samples, shape (n, d)."""
@@ -256,7 +274,7 @@ class Collocation:
         squares = self.grid.node_weights @ self.physics_residual(state) ** 2
         return self.data_loss(state.control_points) + float(squares @ self.physics_weights)
 
-    def linearise(self, state: State, columns: Ints, damping: float = 0.0) -> Linearisation:
+    def linearise(self, state: State, columns: Ints, damping: float = 0.0) -> WithCurve:
         """Linearise around a state and eliminate the control points.
 
         Parameters
@@ -277,33 +295,30 @@ class Collocation:
         data_residual, sizes = self.data_residual(state.control_points)
         factor = self._factor(physics, damping)
 
-        right = physics.T @ unknowns
-        right[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
-        pull = self.grid.samples.T @ self._shared[0].reshape(len(self.grid.x), -1)
-        right[:, 1 + len(columns) :] = pull.reshape(len(right), -1)
-        right *= -1
-        solved = cho_solve_banded((factor, True), right, check_finite=False)
-        solved = np.ascontiguousarray(solved)
+        response = physics.T @ unknowns
+        response[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
+        response[:, 1 + len(columns) :] = self._pull
+        response *= -1
+        solve_factored(factor, response)
 
         objective = (data_residual**2 * self.sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
-        unknowns += physics @ solved
-        gram = self._gram(unknowns, solved, data_residual, sizes)
-        solved = solved.reshape(-1, self.d, solved.shape[1])
-        gram, solved = _without_systematic(gram, solved, 1 + len(columns))
-        return Linearisation(
+        unknowns += physics @ response
+        gram = self._gram(unknowns, response, data_residual, sizes)
+        gram, shared = _without_systematic(gram, 1 + len(columns))
+        return WithCurve(
             fall=float(objective - gram[0, 0]),
             columns=columns,
             information=gram[1:, 1:],
             gradient=-gram[1:, 0],
-            curve_step=solved[:, :, 0],
-            curve_response=solved[:, :, 1:],
+            response=response,
+            shared=shared,
         )
 
     def _factor(self, physics: sparse.csr_array, damping: float = 0.0) -> Floats:
         """Cholesky factor of the normal matrix of the control points, in lower banded storage."""
-        band = self._data_band + normal_band(physics)
+        band = self._data_band + normal_band(physics, alike=self.d)
         band[0] += damping * band[0] + 1e-12 * band[0].max()
         return cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
 
@@ -426,11 +441,7 @@ class Collocation:
         return Fit(state, self, Status.CONVERGED if near else Status.MAX_STEPS)
 
 
-def _without_systematic(gram: Floats, solved: Floats, size: int) -> tuple[Floats, Floats]:
+def _without_systematic(gram: Floats, size: int) -> tuple[Floats, Floats]:
     """Eliminate the sizes of the systematic errors, which go with the law as the curve does."""
-    if len(gram) == size:
-        return gram, solved
-    shared = slice(size, len(gram))
-    response = np.linalg.solve(gram[shared, shared], gram[shared])
-    left = (gram - gram[:, shared] @ response)[:size, :size]
-    return left, (solved - solved[:, :, shared] @ response)[:, :, :size]
+    shared = -np.linalg.solve(gram[size:, size:], gram[size:, :size])
+    return gram[:size, :size] + gram[:size, size:] @ shared, np.asarray(shared, dtype=float)

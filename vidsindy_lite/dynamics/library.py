@@ -173,11 +173,12 @@ def shift_matrix(exponents: Ints, offset: Floats, rows: Ints | slice = slice(Non
     """Matrix ``S`` with ``phi(x - offset) = phi(x) S``, shape (l, l), or some rows of it.
 
     The library has to be closed: with every monomial it holds all its divisors. An offset (d,)
-    leaves the functions as they are.
+    leaves the functions as they are. Of several offsets, (n, d), one matrix each, of rows (n, k).
     """
-    still = np.zeros(exponents.shape[1] - len(offset))
+    still = np.zeros((*offset.shape[:-1], exponents.shape[1] - offset.shape[-1]))
+    moved = -np.concatenate([offset, still], axis=-1)[..., None, None, :]
     factors, lowered = _binomials(exponents.tobytes(), *exponents.shape)
-    return (factors[rows] * (-np.append(offset, still)) ** lowered[rows]).prod(axis=-1)
+    return (factors[rows] * moved ** lowered[rows]).prod(axis=-1)
 
 
 @lru_cache(maxsize=64)

@@ -77,29 +77,34 @@ class ShiftedLaw:
         pull = np.zeros(len(back)) if self.gradient is None else back.T @ self.gradient
         return forth @ self.coefficients, back.T @ self.information @ back, pull
 
-    def vanish(self, origin: Floats, entries: Ints) -> Floats:
-        """Move an origin as little as possible so that the given coefficients vanish.
+    def vanish(self, origins: Floats, entries: Ints) -> Floats:
+        """Move each origin as little as possible so that the given coefficients vanish.
 
         Parameters
         ----------
-        origin : ndarray, shape (d,)
+        origins : ndarray, shape (n, d)
             Where to start.
-        entries : ndarray of int, shape (k, 2)
+        entries : ndarray of int, shape (n, k, 2)
             Equation and term of each coefficient.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+            NaN where no origin was found.
         """
-        equations, terms = entries.T
-        here = self._with_rates[:, :, equations]
+        equations, terms = np.moveaxis(entries, -1, 0)
+        here, origins = self._with_rates[:, :, equations], origins.copy()
+        moving = np.arange(len(origins))
         for _ in range(6):
-            shift = shift_matrix(self.exponents, -origin, terms)
-            estimate, *rates = np.einsum("kl,alk->ak", shift, here)
-            step, *_ = np.linalg.lstsq(np.transpose(rates), -estimate, rcond=1e-6)
-            origin = origin.copy()
-            origin[self.axes] += step
-            if not np.abs(origin).max() < 1e6:
-                return np.full(self.d, np.nan)
-            if np.abs(step).max() < 1e-9:
-                break
-        return origin
+            shift = shift_matrix(self.exponents, -origins[moving], terms[moving])
+            values = np.einsum("nkl,alnk->nka", shift, here[:, :, moving])
+            back = np.linalg.pinv(values[:, :, 1:], rcond=1e-6)
+            step = -(back @ values[:, :, :1])[:, :, 0]
+            origins[np.ix_(moving, self.axes)] += step
+            lost = ~(np.abs(origins[moving]) < 1e6).all(axis=1)
+            origins[moving[lost]] = np.nan
+            moving = moving[~lost & (np.abs(step) >= 1e-9).any(axis=1)]
+        return origins
 
     def smooth_count(self, origin: Floats, active: Bools, penalty: float) -> tuple[float, Floats]:
         """Smoothed number of significant terms at an origin, and its gradient.
@@ -192,11 +197,12 @@ def _starts(
     # Only what divides another term of its equation can vanish by a shift.
     below = divides(law.exponents, law.movable) & ~np.eye(len(law.exponents), dtype=bool)
     droppable = np.argwhere((active & (below @ active)).T)
-    starts = []
+    origins, entries = [], []
     for draw in range(DRAWS if len(droppable) else 0):
-        origin = home if draw % 2 else rng.uniform(low, high)
+        origins.append(home if draw % 2 else rng.uniform(low, high))
         size = min(1 + draw % len(law.axes), len(droppable))
-        origin = law.vanish(origin, droppable[rng.permutation(len(droppable))[:size]])
-        if np.isfinite(origin).all():
-            starts.append(np.clip(origin, low, high))
-    return starts
+        entries.append(droppable[rng.permutation(len(droppable))[:size]])
+    for first in range(len(law.axes) if origins else 0):  # those of as many coefficients at once
+        alike = slice(first, None, len(law.axes))
+        origins[alike] = law.vanish(np.array(origins[alike]), np.array(entries[alike]))
+    return [np.clip(origin, low, high) for origin in origins if np.isfinite(origin).all()]

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats
-from .collocation import Fit, Linearisation
+from .collocation import Fit, WithCurve
 from .errors import effective_noise, residual_noise, time_inflation
 from .problem import Problem
 from .selection import minimiser, subset_search
@@ -72,7 +72,7 @@ class Path:
     ----------
     fit : Fit
         Around which the laws are found.
-    model : Linearisation
+    model : WithCurve
         Its quadratic model: `Problem.model`.
     own : float
         The errors that the fit was weighted with; those of the law, where kicks are larger.
@@ -83,7 +83,7 @@ class Path:
     """
 
     fit: Fit
-    model: Linearisation
+    model: WithCurve
     own: float
     level: float
     plateaus: tuple[tuple[Plateau, ...], ...]

@@ -15,12 +15,13 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.stats import chi2
 
 from ..arrays import Floats, Ints
-from .collocation import Collocation, Fit, Linearisation
+from .banded import normal_band
+from .collocation import Collocation, Fit, WithCurve
 from .errors import effective_noise, residual_noise
 from .form import Form
 from .library import Function, law_variables, monomials
 from .polynomials import PolynomialSystem
-from .splines import Segment, basis, clamped_knots, normal_band
+from .splines import Segment, basis, clamped_knots
 from .state import State
 from .trajectories import Trajectory
 from .units import Units
@@ -121,7 +122,7 @@ class Problem:
         size = self.form.candidates.size
         return np.concatenate([self.form.searched, size + np.flatnonzero(state.moving)])
 
-    def model(self, fit: Fit) -> Linearisation:
+    def model(self, fit: Fit) -> WithCurve:
         """The quadratic model around a fit, in all candidates and moving axes."""
         return fit.collocation.linearise(fit.state, self.columns(fit.state))
 

@@ -351,8 +351,8 @@ def away(problem: Problem, state: State) -> list[tuple[Floats, Bools]]:
     below = divides(exponents, home) & ~np.eye(len(exponents), dtype=bool)
     low, high = problem.box
     found: list[tuple[Floats, Bools]] = []
-    for entry in np.argwhere((state.active & (below @ state.active)).T):
-        step = frames.vanish(np.zeros(problem.d), entry[None])
+    entries = np.argwhere((state.active & (below @ state.active)).T)
+    for step in frames.vanish(np.zeros((len(entries), problem.d)), entries[:, None]):
         origin, moved = state.offset + step, np.abs(step) > ROUNDING
         known = any(np.allclose(origin, other) for other, _ in found)
         inside = ((low <= origin) & (origin <= high))[moved].all()  # not if it is infinite

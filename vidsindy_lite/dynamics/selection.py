@@ -97,16 +97,23 @@ def closest_rival(
     """
     model = _Quadratic.of(information, gradient, present, penalty)
     fit = model.fit(support)
-    tableau, rivals = _Tableau.of(model, fit), []
-    for entry in fit.inside[np.isfinite(penalty[fit.inside])]:
-        rivals.append(_descend(model.priced(entry, np.inf), _changed(support, entry, NONE)))
+    tableau = _Tableau.of(model, fit)
     moved = _moved_by_newcomers(model, tableau)
-    for entry, moves in zip(tableau.outside, moved, strict=True):
-        start = _changed(support, NONE, entry)
-        rivals.append(_descend(model.priced(entry, -np.inf), start) if moves else model.fit(start))
+    # Those that move no others cost what they cost alone.
+    alone = model.penalty[tableau.outside] - _gain(tableau.left, tableau.room)
+    alone[moved] = np.inf
+    joined = [tableau.outside[moved], tableau.outside[[alone.argmin()]] if len(alone) else NONE]
+    rivals = [_with_newcomer(model, support, entry) for entry in np.concatenate(joined)]
+    free = replace(model, penalty=np.where(np.isfinite(penalty), 0.0, penalty))
+    for entry in fit.inside[np.isfinite(penalty[fit.inside])]:
+        # No law without it is cheaper than all other entries were, if they cost nothing.
+        bound = free.fit(_changed(~np.isposinf(penalty), entry, NONE)).value
+        if bound < min((rival.value for rival in rivals), default=np.inf):
+            without = _changed(support, entry, NONE)
+            rivals.append(_descend(model.priced(entry, np.inf), without))
     if not rivals:
         return np.inf, NONE, NONE
-    rival = min((model.fit(rival.support) for rival in rivals), key=lambda rival: rival.value)
+    rival = min(rivals, key=lambda rival: rival.value)
     dropped, added = (
         np.flatnonzero(changed) for changed in (support & ~rival.support, rival.support & ~support)
     )
@@ -197,10 +204,16 @@ def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     tableau = _Tableau.of(model, best)
     promising = _moved_by_newcomers(model, tableau)
     for entry in tableau.outside[promising]:
-        trial = _descend(model.priced(entry, -np.inf), _changed(best.support, NONE, entry))
-        if trial.value + model.penalty[entry] < best.value - PLATEAU:
+        trial = _with_newcomer(model, best.support, entry)
+        if trial.value < best.value - PLATEAU:
             return _descend(model, trial.support)
     return None
+
+
+def _with_newcomer(model: _Quadratic, support: Bools, entry: int) -> _Fit:
+    """The fit that a descent reaches with an entry forced in, at its own price."""
+    trial = _descend(model.priced(entry, -np.inf), _changed(support, NONE, entry))
+    return replace(trial, value=trial.value + model.penalty[entry])
 
 
 def _moved_by_newcomers(model: _Quadratic, tableau: _Tableau) -> Bools:
@@ -232,7 +245,7 @@ def _moved_by_newcomers(model: _Quadratic, tableau: _Tableau) -> Bools:
     return moved
 
 
-def _changed(support: Bools, dropped: Ints, added: Ints) -> Bools:
+def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
     changed = support.copy()
     changed[dropped] = False
     changed[added] = True

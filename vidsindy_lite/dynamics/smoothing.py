@@ -15,7 +15,8 @@ from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..arrays import Floats
-from .splines import WIDTH, Grid, Segment, basis, normal_band
+from .banded import normal_band
+from .splines import WIDTH, Grid, Segment, basis
 from .trajectories import Trajectory
 
 PROBES = 24

@@ -207,19 +207,3 @@ def rows_from(first: Ints, values: Floats, size: int) -> sparse.csr_array:
     columns = first[:, None] + np.arange(width)
     starts = np.arange(0, n * width + 1, width)
     return sparse.csr_array((values.ravel(), columns.ravel(), starts), shape=(n, size))
-
-
-def normal_band(rows: sparse.csr_array, weights: Floats | None = None) -> Floats:
-    """Lower banded storage of ``rows' W rows``, for rows as `rows_from` makes them.
-
-    ``W`` is diagonal, with weights (n,) of the rows; by default the identity.
-    """
-    n, size = rows.shape
-    values, columns = rows.data.reshape(n, -1), rows.indices.reshape(n, -1)
-    weighted = values if weights is None else values * weights[:, None]
-    width = values.shape[1]
-    band = np.empty((width, size))
-    for lag in range(width):
-        products = weighted[:, lag:] * values[:, : width - lag]
-        band[lag] = np.bincount(columns[:, : width - lag].ravel(), products.ravel(), minlength=size)
-    return band
