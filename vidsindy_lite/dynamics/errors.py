@@ -51,20 +51,21 @@ def effective_noise(fit: Fit) -> Floats:
     Errors that last for several samples do not average out: their variance counts times the sum
     of their autocorrelations (`inflation`).
     """
-    pieces = [[piece[:, None] for piece in errors] for errors in _errors_seen(fit)]
-    lasting = np.concatenate([inflation(errors) for errors in pieces])
+    lasting = np.concatenate([inflation(errors) for errors in _errors_seen(fit)])
     return np.maximum(_spread(fit) * np.sqrt(lasting), CLEANEST)
 
 
 def _errors_seen(fit: Fit) -> list[list[Floats]]:
-    """Residuals of each coordinate, of precision 1, at the samples of it, stretch by stretch."""
+    """Residuals of each coordinate, of precision 1, where it was seen: a column a stretch."""
     collocation = fit.collocation
     residual, _ = collocation.data_residual(fit.state.control_points)
     residual *= np.sqrt(collocation.precision)
     seen = np.isfinite(collocation.grid.x)
     ends = np.cumsum([len(segment.t) for segment in collocation.segments])[:-1]
     stretches = list(zip(np.split(residual, ends), np.split(seen, ends), strict=True))
-    return [[errors[here[:, j], j] for errors, here in stretches] for j in range(collocation.d)]
+    return [
+        [errors[here[:, j], j, None] for errors, here in stretches] for j in range(collocation.d)
+    ]
 
 
 def time_inflation(fit: Fit) -> float:
@@ -124,7 +125,7 @@ def prediction_gain(fit: Fit) -> Floats:
     Minus twice the log likelihood of an autoregressive model of the residual over that of white
     noise (Levinson's recursion; its order by the Bayesian information criterion).
     """
-    errors = [np.concatenate(pieces) for pieces in _errors_seen(fit)]
+    errors = [np.concatenate(pieces)[:, 0] for pieces in _errors_seen(fit)]
     fewest = min((len(e) for e in errors if len(e)), default=0)
     lags = range(min(ORDER, fewest // 10) + 1)
     covariances = [np.array([e[k:] @ e[: len(e) - k] for k in lags]) for e in errors]
@@ -140,8 +141,8 @@ def passing(fit: Fit, tried: int) -> Bools:
     coordinate that was never observed, what is true of all others.
     """
     seen, errors = fit.collocation.counts > 0, _errors_seen(fit)
-    counts = np.array([sum(map(independent, pieces)) for pieces in errors])
-    lowest = np.array([swing([piece[:, None] for piece in pieces])[0] for pieces in errors])
+    counts = np.array([sum(independent(piece[:, 0]) for piece in pieces) for pieces in errors])
+    lowest = np.concatenate([swing(pieces) for pieces in errors])
     forgotten = (counts > tried) & (lowest > -SWING)
     return np.where(seen, forgotten, forgotten[seen].all())
 
