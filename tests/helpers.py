@@ -1,4 +1,4 @@
-"""Random curves, a posed problem, a room with cameras, and a repository of tiny notebooks."""
+"""Random curves, rigs and their tracks, a posed problem, and a repository of tiny notebooks."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +9,8 @@ import vidsindy_lite as vl
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.vision.candidates import Candidate
+from vidsindy_lite.vision.linking import Sightings
 
 HEADER = """\
 # ---
@@ -152,6 +154,16 @@ def aligned_error(found, x):
     s[2] *= (sign := np.sign(np.linalg.det(u @ v)))
     turned = a @ (u @ np.diag([1, 1, sign]) @ v).T * s.sum() / np.sum(a**2)
     return np.sqrt(np.mean(np.sum((turned - b) ** 2, axis=1)))
+
+
+def one_a_frame(places, qualities):
+    """One candidate in each frame, all alike but for their places and qualities."""
+    places = np.asarray(places, float)
+    found = [
+        [Candidate(place, np.array([*place - 4, 9, 9]), 60.0, np.array([30.0, 30, 200]), quality)]
+        for place, quality in zip(places, qualities, strict=True)
+    ]
+    return Sightings.of(found, list(places[:, None]), 1000.0)
 
 
 class TinyRepository:

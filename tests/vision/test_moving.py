@@ -7,12 +7,11 @@ import cv2
 import numpy as np
 import pytest
 from footage import Phone, camera_maps, write_phone
+from helpers import one_a_frame
 
 import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision.candidates import Candidate, Plate, reduce, tolerance
-from vidsindy_lite.vision.hints import load_hints
-from vidsindy_lite.vision.lingering import lingering, uncover
+from vidsindy_lite.vision.candidates import Candidate, Plate, reduce
 from vidsindy_lite.vision.linking import Sightings, best_path
 from vidsindy_lite.vision.moving import _learned, rate
 from vidsindy_lite.vision.refining import _nearest, fitting, joined, scatter
@@ -114,42 +113,6 @@ def test_the_camera_is_followed(camera):
     assert stands_still([views[0]] * 5)
 
 
-def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
-    def one(u, v, quality=0.9):
-        centre = np.array([u, v], float)
-        box = np.array([u - 4, v - 4, 9, 9])
-        return Candidate(centre, box, 60.0, np.array([30.0, 30, 200]), quality)
-
-    rng = np.random.default_rng(0)
-    found = [[one(10 + 5 * i, 50), one(*rng.uniform(0, 200, 2), 0.6)] for i in range(30)]
-    found[12] = found[13] = []
-    places = [np.array([c.centre for c in f]).reshape(-1, 2) for f in found]
-    seen = Sightings.of(found, places, 400.0)
-    rows, value = best_path(seen)
-    np.testing.assert_array_equal(seen.frame[rows], [i for i in range(30) if i not in (12, 13)])
-    np.testing.assert_array_equal(seen.which[rows], 0)
-    assert value > 15
-    assert best_path(seen.only(np.zeros(0, int)))[1] == 0
-
-
-def one_a_frame(places, qualities):
-    """One candidate in each frame, all alike but for their places and qualities."""
-    places = np.asarray(places, float)
-    found = [
-        [Candidate(place, np.array([*place - 4, 9, 9]), 60.0, np.array([30.0, 30, 200]), quality)]
-        for place, quality in zip(places, qualities, strict=True)
-    ]
-    return Sightings.of(found, list(places[:, None]), 1000.0)
-
-
-def test_a_path_ends_where_nothing_that_follows_is_worth_it():
-    places = np.column_stack([10 + 5 * np.arange(20), np.full(20, 50)])
-    for low, last in ((0.1, 11), (0.2, 19)):  # a candidate below a quality of .15 has no worth
-        rows, value = best_path(one_a_frame(places, np.where(np.arange(20) < 12, 0.9, low)))
-        assert rows[-1] == last
-        assert value == pytest.approx(12 * 0.75 + (last - 11) * 0.05, abs=0.1)
-
-
 def test_a_faint_target_is_followed_once_its_looks_are_known():
     # Where its size wavers as it moves off, that costs more than a faint look at it is worth.
     areas = np.where(np.arange(30) < 15, 60.0, np.where(np.arange(30) % 2, 60.0, 85.0))
@@ -164,30 +127,6 @@ def test_a_faint_target_is_followed_once_its_looks_are_known():
     assert seen.frame[rows[-1]] < 20
     known = Sightings.of(_learned(found, seen, rows), places, 400.0)
     np.testing.assert_array_equal(known.frame[best_path(known)[0]], np.arange(30))
-
-
-def test_the_faster_a_target_the_further_it_may_turn():
-    def price(step, turn):
-        places = np.column_stack([50 + step * np.arange(20), np.full(20, 100.0)])
-        straight = best_path(one_a_frame(places, np.full(20, 0.9)))[1]
-        places[10:, 1] += turn
-        rows, value = best_path(one_a_frame(places, np.full(20, 0.9)))
-        assert len(rows) == 20
-        return straight - value
-
-    assert price(40, 12) < 0.6
-    assert price(2, 12) > 1
-
-
-def test_the_longer_nothing_is_seen_the_less_it_is_worth_to_go_on():
-    values = []
-    for gap in (0, 1, 2, 5, 10):
-        places = np.column_stack([50 + 5 * np.arange(20 + gap), np.full(20 + gap, 100.0)])
-        kept = np.append(np.arange(10), np.arange(10 + gap, 20 + gap))
-        rows, value = best_path(one_a_frame(places, np.full(20 + gap, 0.9)).only(kept))
-        assert len(rows) == 20  # it does go on
-        values.append(value)
-    assert (np.diff(values) < -0.01).all()
 
 
 def test_what_travels_and_stays_what_it_is_is_plainest():
@@ -309,32 +248,6 @@ def test_the_plate_of_a_moving_camera():
     assert plate.seen_from(maps[4], np.array([40, 40]), (20, 20))[0].min() > 0
 
 
-@pytest.mark.parametrize("pan", [0, 2])
-@pytest.mark.parametrize(("radius", "lingers"), [(3, True), (6, True), (16, False)])
-def test_the_ground_beneath_what_lingers(pan, radius, lingers):
-    rng = np.random.default_rng(0)
-    scene = cv2.GaussianBlur(rng.uniform(0, 255, (200, 300, 3)).astype(np.float32), (0, 0), 4)
-    scene = np.clip(128 + 5 * (scene - 128), 60, 200).astype(np.uint8)
-    samples, maps = [], []
-    for k in range(21):
-        image, angle = scene.copy(), 2 * np.pi * k / 21
-        place = np.array([130, 90]) + radius * np.array([np.cos(angle), np.sin(angle)])
-        centre = tuple(np.rint(16 * place).astype(int).tolist())
-        cv2.circle(image, centre, 16 * 9, (20, 20, 240), -1, cv2.LINE_AA, 4)
-        samples.append(image[20:170, 20 + pan * k : 200 + pan * k])
-        maps.append([[1, 0, pan * k], [0, 1, 0], [0, 0, 1.0]])
-    samples, maps, known = np.array(samples), np.array(maps), np.ones(21, bool)
-    plate = Plate(samples, maps, known)
-    places = lingering(plate, samples, maps, known, tolerance(plate, 0.0))
-    assert [place.holds(np.array([110, 70])) for place in places] == [True] * lingers
-    uncover(plate, samples, maps, known, places)
-    view, _ = plate.seen_from(maps[0], np.zeros(2), (180, 150))
-    near, true = view[40:100, 80:140].astype(int), scene[60:120, 100:160]
-    assert np.median(np.abs(near - true)) == 0
-    # Of the target of 254 pixels no more is left than a trace where its middle meets its rim.
-    assert (np.abs(near - [20, 20, 240]).sum(axis=2) < 100).sum() <= 20
-
-
 def test_reduced_pixels_are_means():
     image = np.random.default_rng(0).integers(0, 256, (8, 12, 3), np.uint8)
     means = image.reshape(4, 2, 6, 2, 3).mean(axis=(1, 3))
@@ -343,38 +256,6 @@ def test_reduced_pixels_are_means():
 
 
 # ------------------------------------------------------------------------------------------- hints
-
-
-@pytest.mark.parametrize(
-    ("told", "message"),
-    [
-        ({}, "target: must be a frame and a box"),
-        ({"frame": 3}, "box: must come with its frame"),
-        ({"box": (1, 2, 3, 4)}, "box: must come with its frame"),
-        ({"frame": -1, "box": (1, 2, 3, 4)}, "frame: must be an integer of at least 0"),
-        ({"frame": 1, "box": (1, 2, 3)}, "box: must be"),
-        ({"frame": 1, "box": (1, 2, 0, 4)}, "box: must be two pixels"),
-        ({"colour": (1, 2)}, "colour: must be"),
-        ({"colour": (1, 2, 300)}, "colour: must be"),
-    ],
-)
-def test_bad_hints(told, message):
-    with pytest.raises(ValueError, match=message):
-        Hint(**told)
-
-
-def test_hints_of_a_rig_file(tmp_path):
-    file = tmp_path / "rig.toml"
-    file.write_text(
-        "[[camera]]\nnormal = [1, 0, 0]\ntarget = {frame = 10, box = [1, 2, 30, 40]}\n"
-        "[[camera]]\nnormal = [0, 1, 0]\n"
-        "[[camera]]\nnormal = [0, 0, 1]\ntarget = {colour = [255, 0, 0]}\n"
-    )
-    assert load_hints(file) == (Hint(10, (1, 2, 30, 40)), None, Hint(colour=(255, 0, 0)))
-    assert len(vidsindy_lite.Rig.load(file).cameras) == 3
-    file.write_text("[[camera]]\nnormal = [1, 0, 0]\ntarget = {place = 10}\n")
-    with pytest.raises(ValueError, match="camera 0: target: must be a table of frame, box, colour"):
-        load_hints(file)
 
 
 def test_a_hint_is_for_auto_and_must_be_one(tmp_path):

@@ -204,37 +204,6 @@ def test_render_video_writes_what_render_yields(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("background", "moon"),
-        ("shape", "cube"),
-        ("colour", "teal"),
-        ("size", 2),
-        ("size", np.nan),
-        ("turns", np.inf),
-        ("tumbling", -1),
-        ("size_variation", 0.9),
-        ("noise_variance", -0.1),
-        ("shape_seed", -1),
-        ("shape_seed", 1.5),
-        ("size", True),
-        ("turns", "many"),
-        ("image_size", 512),
-        ("image_size", (10, 10)),
-        ("image_size", (512,)),
-        ("occluders", ((1, 2, 3),)),
-        ("occluders", ((500, 0, 50, 50),)),
-        ("occluders", ((0, 0, 1, 50),)),
-        ("trees", ((1, 2, 3),)),
-        ("trees", ((0, 500, 50, 50),)),
-    ],
-)
-def test_scene_rejects(field, value):
-    with pytest.raises(ValueError, match=f"^{field}: must|^{field}: each must"):
-        Scene(**{field: value})
-
-
-@pytest.mark.parametrize(
     ("track", "message"),
     [
         (np.zeros((4, 3)), r"track: must have shape \(n, 2\)"),
