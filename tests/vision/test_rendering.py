@@ -103,6 +103,10 @@ def test_poses_turn_tumble_and_grow_as_the_scene_says():
     assert 25 * np.std(np.diff(angle)) == pytest.approx(0.5, rel=0.03)
     _, scale = _poses(Scene(size_variation=0.2), 1000, np.random.default_rng(0))
     np.testing.assert_allclose([scale.min(), scale.max()], [0.8, 1.2], atol=1e-3)
+    # A sine: its curvature is minus the square of its frequency, of one to three cycles, times it.
+    cycles = np.sqrt(-np.diff(scale, 2) / (scale[1:-1] - 1)) * 999 / (2 * np.pi)
+    np.testing.assert_allclose(cycles, np.median(cycles), rtol=1e-3)
+    assert 1 <= np.median(cycles) <= 3
 
 
 def test_shapes_map_the_outline_and_keep_the_centroid():
