@@ -332,7 +332,7 @@ def measured_by_hand(rig, seed):
 @pytest.mark.parametrize("seed", range(2))
 def test_lags_at_half_a_pixel_of_noise(seed):
     lags = (0, 31.4, -22.7)
-    rig, tracks = room(seed, 300, lags)
+    rig, tracks = room(seed, 200, lags)
     for known, limit in ((rig, 0.05), (rig.uncalibrated(), 0.05), (measured_by_hand(rig, 0), 0.3)):
         found = learn_lags(tracks, known)
         assert found.agree
@@ -352,9 +352,11 @@ def test_a_wrong_rig_does_not_spoil_the_lags(motion):
     np.testing.assert_allclose(found.frames, (0, 9.3, -4), atol=0.05)
 
 
-@pytest.mark.parametrize(("tilt", "noise", "doubted"), [(0.003, 0.05, True), (0, 0.5, False)])
+@pytest.mark.parametrize(
+    ("tilt", "noise", "doubted"), [(0.003, 0.05, True), (0, 0.5, False), (0, 3.0, False)]
+)
 def test_a_rig_is_doubted_if_it_leaves_more_than_the_tracks_do(motion, tilt, noise, doubted):
-    """Both leave less than a pixel, but cameras that may turn only take out what a tilt leaves."""
+    """However much that is: cameras that may turn only take out what a tilt leaves."""
     first, second, third = motion[1].cameras
     turned = replace(second, normal=second.normal + tilt * second.rows[0])
     tracks = filmed(motion, (80,) * 3, (0, 2, 0), noise=noise)
@@ -363,14 +365,14 @@ def test_a_rig_is_doubted_if_it_leaves_more_than_the_tracks_do(motion, tilt, noi
     videos = synchrony._Videos(curves, unknowns, np.ones(3), tqdm(disable=True))
     loose, (best, *_) = synchrony._searched(videos, np.zeros(3))
     assert loose is doubted
-    assert best.score < 1
-    np.testing.assert_allclose(best.lags, (0, 2, 0), atol=0.1)
+    assert best.score < max(1, 2 * noise)
+    np.testing.assert_allclose(best.lags, (0, 2, 0), atol=max(0.1, 0.2 * noise))
 
 
 @pytest.mark.slow
 def test_motions_that_have_nothing_in_common_have_no_lags():
-    rig, tracks = room(0, 300)
-    _, others = room(7, 300)
+    rig, tracks = room(0, 150)
+    _, others = room(7, 150)
     found = learn_lags([tracks[0], others[1], tracks[2]], rig)
     assert not found.agree
     assert found.frames.tolist() == [0, 0, 0]
@@ -381,9 +383,9 @@ def test_motions_that_have_nothing_in_common_have_no_lags():
 
 @pytest.mark.slow
 def test_the_drift_of_a_clock_is_found():
-    rig, tracks = room(3, 3000, (0, 12.4, -3.3), (0, 2e-4, 0))
+    rig, tracks = room(3, 1500, (0, 12.4, -3.3), (0, 4e-4, 0))
     found = learn_lags(tracks, rig)
-    np.testing.assert_allclose(found.rates, (1, 1 + 2e-4, 1), rtol=0, atol=6e-5)
+    np.testing.assert_allclose(found.rates, (1, 1 + 4e-4, 1), rtol=0, atol=1.2e-4)
     assert found.rates[2] == 1  # what is not clear is not changed
     np.testing.assert_allclose(found.frames, (0, 12.4, -3.3), atol=0.15)
 

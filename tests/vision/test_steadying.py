@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.steadying import Steadying, carry, stands_still
+from vidsindy_lite.vision.steadying import Steadying, carry, displacement, stands_still
 
 SIZE = 960, 720
 
@@ -52,3 +52,10 @@ def test_a_camera_moves_if_clearly_more_corners_share_a_motion_than_stay(seed, s
     stays = np.s_[:, : int(share * SIZE[0])]
     after[stays] = before[stays]
     assert stands_still([before, after]) is still
+
+
+def test_pixels_by_which_maps_move_an_image():
+    shift = np.array([[1, 0, 3], [0, 1, -4], [0, 0, 1.0]])
+    found = displacement(np.stack([np.eye(3), shift, np.diag([1.1, 1, 1])]), (200, 100))
+    # The rms of a tenth of 40, 100 and 160 pixels.
+    np.testing.assert_allclose(found, [0, 5, np.sqrt((16 + 100 + 256) / 3)])
