@@ -124,3 +124,13 @@ def test_no_path_is_worth_more_than_the_best(seed):
     rows, value = best_path(seen)
     assert value == pytest.approx(max(values.values()))
     assert tuple(rows.tolist()) == max(values, key=values.get)
+
+
+def test_a_speed_is_that_of_a_frame_also_behind_a_gap():
+    """Of an even motion that is not seen in two frames, only the start and the gap are paid."""
+    places = np.column_stack([20.0 * np.arange(12), np.full(12, 100.0)])
+    kept = np.delete(np.arange(12), [4, 5])
+    rows, value = best_path(one_a_frame(places, np.full(12, 0.9)).only(kept))
+    assert len(rows) == 10
+    start = 2 * (1 - np.exp(-0.5 * (20 / (60 + 2 * np.sqrt(60))) ** 2))
+    assert value == pytest.approx(10 * 0.75 - start - (0.3 + 3 * 0.04))
