@@ -1,4 +1,4 @@
-"""Random curves, a posed problem, a room with cameras, and a repository of tiny notebooks."""
+"""Random curves, rigs and their tracks, a posed problem, and a repository of tiny notebooks."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +9,8 @@ import vidsindy_lite as vl
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.vision.candidates import Candidate
+from vidsindy_lite.vision.linking import Sightings
 
 HEADER = """\
 # ---
@@ -44,6 +46,42 @@ def trajectory(rng, n):
     return rng.normal(scale=5, size=3) + rng.uniform(1, 100) * waves
 
 
+def dependent(rng, n, memory):
+    """A series of mean 0 and variance 1 in which each value keeps a share of the one before."""
+    series = rng.normal(size=(n, 2))
+    for k in range(1, n):
+        series[k] = memory * series[k - 1] + np.sqrt(1 - memory**2) * series[k]
+    return series
+
+
+def random_rig(rng, x, cameras=3):
+    """Cameras anywhere around x, facing so differently that no axis is poorly seen."""
+    low, high = x.min(axis=0), x.max(axis=0)
+    reach = np.linalg.norm(high - low) / 2
+    while True:
+        normals = rng.normal(size=(cameras, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        if np.linalg.eigvalsh(cameras * np.eye(3) - normals.T @ normals)[0] > cameras / 3:
+            break
+    return vl.Rig(
+        vl.OrthographicCamera(
+            position=(low + high) / 2 + reach * (rng.uniform(-2, 2) * n + 0.1 * rng.normal(size=3)),
+            normal=n,
+            scale=reach / rng.uniform(180, 230),
+            angle=rng.uniform(-np.pi, np.pi),
+        )
+        for n in normals
+    )
+
+
+def scene(seed, n=500, cameras=3):
+    """A random path, orthographic cameras around it, their exact tracks, and the generator."""
+    rng = np.random.default_rng(seed)
+    x = trajectory(rng, n)
+    rig = random_rig(rng, x, cameras)
+    return x, rig, [camera.project(x) for camera in rig.cameras], rng
+
+
 def posed(noise=0.0, seen=slice(None)):
     """A small wave about (3, 0), as a discovery's problem; noise in parts of its amplitudes."""
     t = np.linspace(0, 20, 401)
@@ -52,6 +90,17 @@ def posed(noise=0.0, seen=slice(None)):
     t, x = t[seen], x[seen]
     form = Form.of(("x", "y"), Library.polynomial(2))
     return pose([(t, x)], [np.ones((len(t), 2, 1))], form, rng=np.random.default_rng(0))
+
+
+def filmed(motion, frames, lags, rates=(1, 1, 1), noise=0.05):
+    """Tracks of a motion, (path, rig), by cameras that are late by these frames."""
+    path, rig = motion
+    rng = np.random.default_rng(0)
+    tracks = []
+    for camera, n, lag, rate in zip(rig.cameras, frames, lags, rates, strict=True):
+        pixels = camera.project(path(lag + np.arange(n) / rate))
+        tracks.append(pixels + noise * rng.normal(size=pixels.shape))
+    return tracks
 
 
 HAND = {"normal_error": 2.0, "position_error": 0.03, "scale_error": 0.03}
@@ -105,6 +154,16 @@ def aligned_error(found, x):
     s[2] *= (sign := np.sign(np.linalg.det(u @ v)))
     turned = a @ (u @ np.diag([1, 1, sign]) @ v).T * s.sum() / np.sum(a**2)
     return np.sqrt(np.mean(np.sum((turned - b) ** 2, axis=1)))
+
+
+def one_a_frame(places, qualities):
+    """One candidate in each frame, all alike but for their places and qualities."""
+    places = np.asarray(places, float)
+    found = [
+        [Candidate(place, np.array([*place - 4, 9, 9]), 60.0, np.array([30.0, 30, 200]), quality)]
+        for place, quality in zip(places, qualities, strict=True)
+    ]
+    return Sightings.of(found, list(places[:, None]), 1000.0)
 
 
 class TinyRepository:

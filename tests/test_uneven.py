@@ -7,7 +7,6 @@ from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras import Clock
 from vidsindy_lite.vision import render
 
 RATE = 30.0  # frames a second
@@ -71,20 +70,3 @@ def test_the_law_of_a_phones_films_is_exact(motion, tmp_path, dropped):
     step = np.median(np.diff(clocks[0]))
     np.testing.assert_allclose(found.lags.frames * step, LATER, atol=1e-3)
     assert in_own_time(found, motion).exact
-
-
-def test_times_that_a_file_contradicts_are_refused(tmp_path):
-    kept = np.delete(np.arange(30.0), [7, 8])
-    Clock.of_videos([30, 30], [kept, np.arange(30.0)], kept / 240)  # slow motion
-    with pytest.raises(ValueError, match="t: must fit the times that the first video's file"):
-        Clock.of_videos([30, 30], [kept, np.arange(30.0)], np.arange(28) / 30)
-
-
-def test_the_times_of_each_track_are_checked():
-    tracks = [np.zeros((4, 2)), np.zeros((5, 2))]
-    clock = Clock.of_tracks([[0, 1, 2, 4], [0, 0.5, 1.0, 1.5, 3]], tracks)
-    assert clock.rates.tolist() == [1, 2]
-    assert [frames.tolist() for frames in clock.frames] == [[0, 1, 2, 4], [0, 1, 2, 3, 6]]
-    assert Clock.of_tracks(np.arange(4) / 30, tracks).uneven is None
-    with pytest.raises(ValueError, match=r"t: must have shape \(5,\), one per row of tracks\[1\]"):
-        Clock.of_tracks([range(4), range(4)], tracks)

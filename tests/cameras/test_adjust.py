@@ -13,7 +13,6 @@ from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
 from vidsindy_lite.cameras.adjust import adjust, linearised
 from vidsindy_lite.cameras.alignment import Footage
 from vidsindy_lite.cameras.changes import PARTS, SIZE, changed, known_to
-from vidsindy_lite.cameras.shutter import steadied
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -112,19 +111,6 @@ def test_a_known_readout_is_undone(readout):
     np.testing.assert_allclose(vl.reconstruct(tracks, rig)[5:-5], x[5:-5], atol=1e-5)
     still = vl.Rig(replace(c, readout=0.0) for c in rig.cameras)
     assert np.abs(vl.reconstruct(tracks, still) - x).max() > 1e-3
-
-
-def test_a_global_shutter_and_gaps_stay_as_they_are():
-    track = np.cumsum(np.ones((9, 2)), axis=0)
-    track[4] = np.nan
-    assert steadied(track, 0.0, 100) is track
-    assert (
-        np.isnan(steadied(track, 0.5, 100)).any(axis=1).tolist()
-        == [False] * 4 + [True] + [False] * 4
-    )
-    short = np.full((9, 2), np.nan)
-    short[:3] = 1.0
-    assert steadied(short, 0.5, 100) is short
 
 
 @given(SEEDS)

@@ -41,6 +41,8 @@ def test_a_frame_is_that_of_the_instant():
     ticks = np.arange(9.0), np.array([0, 1, 3, 4, 5, 7, 8, 9.0])
     dropped = Lags(np.array([0, 1.0]), np.ones(2), np.zeros(2), 0.0, clocks=ticks)
     assert [dropped.frame_at(1, instant) for instant in (1, 4, 8)] == [0, 2, 5]
+    faster = Lags(np.array([0, 1.0]), np.array([1, 2.0]), np.zeros(2), 0.0, clocks=ticks)
+    assert [faster.frame_at(1, instant) for instant in (1, 3, 5)] == [0, 3, 6]
 
 
 def test_a_slope_is_from_the_frame_before_to_the_frame_after():

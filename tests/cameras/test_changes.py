@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from helpers import room
 
-from vidsindy_lite.cameras.changes import PARTS, SIZE, NearCamera, changed, units
+import vidsindy_lite as vl
+from vidsindy_lite.cameras.changes import PARTS, SIZE, NearCamera, changed, known_to, units
 
 CAMERA = room(np.random.default_rng(3), principal_point=(630.0, 350.0), readout=0.3).cameras[0]
 
@@ -61,3 +62,19 @@ def test_sizes_of_changes_are_those_of_the_scene_and_the_image():
     assert (sizes[PARTS["principal point"]] == 1280).all()
     assert (sizes[PARTS["nearness"]] == 0.25).all()
     assert (sizes[PARTS["normal"]] == 1).all()
+
+
+def test_how_well_a_camera_is_known():
+    """A tangential distortion is ten times as small as a radial one."""
+    image = {"principal_point_error": 4.0, "distortion_error": 0.3, "readout_error": 0.2}
+    errors = {"normal_error": 2.0, "scale_error": 0.03, "position_error": 0.5, **image}
+    place = {"position": (0, 0, 9), "normal": (0, 0, 1)}
+    known = known_to(vl.PerspectiveCamera(**place, scale=1, angle=0, **errors))
+    two = np.deg2rad(2)
+    expected = [two, two, two, 0.03, *[0.5] * 3, 4, 4, 0.3, 0.3, 0.03, 0.03, 0.2, 0, 0, 0]
+    np.testing.assert_allclose(known, expected)
+    unknown = known_to(vl.PerspectiveCamera(**place))
+    assert np.flatnonzero(unknown).tolist() == [2, 3]
+    assert np.isinf(unknown[2:4]).all()
+    flat = known_to(vl.OrthographicCamera(normal=(0, 0, 1), scale=1, angle=0))
+    assert np.flatnonzero(np.isinf(flat)).tolist() == [4, 5]  # along its axis it sees the same

@@ -17,8 +17,6 @@ from vidsindy_lite.cameras import (
     Rig,
     calibration_errors,
     learn_cameras,
-    learn_cameras_eq4,
-    learn_cameras_lbfgs,
     reconstruct,
     residuals,
 )
@@ -268,12 +266,6 @@ class TestLearning:
         tracks = [np.round(track) for track in tracks]
         assert learn_cameras(tracks, truth) == truth
         assert learn_cameras(tracks, truth.uncalibrated(1)).cameras[1] == truth.cameras[1]
-
-    @pytest.mark.parametrize("learn", [learn_cameras_eq4, learn_cameras_lbfgs])
-    def test_eq_4_is_orthographic(self, small, learn):
-        _, rig, tracks, _ = small
-        with pytest.raises(ValueError, match=r"Eq. \(4\) needs orthographic cameras, got a persp"):
-            learn(tracks, rig.uncalibrated())
 
 
 class TestReconstruction:

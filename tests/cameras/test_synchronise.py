@@ -6,7 +6,7 @@ from dataclasses import replace
 import helpers
 import numpy as np
 import pytest
-from helpers import trajectory
+from helpers import filmed, trajectory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
@@ -22,29 +22,9 @@ from vidsindy_lite.cameras import (
 )
 from vidsindy_lite.cameras import synchronise as synchrony
 from vidsindy_lite.cameras.alignment import Curve, Footage
-from vidsindy_lite.cameras.pairs import pair_missed, promising_lags
-from vidsindy_lite.cameras.timing import Timing
-from vidsindy_lite.cameras.triangulate import epipolar_lines
 from vidsindy_lite.cameras.unknowns import Unknowns
 
 NOISE = 0.05  # pixels
-
-
-@pytest.fixture(scope="module")
-def motion():
-    """A motion as a function of the frame number, from -60 to 340, and a rig around it."""
-    x = trajectory(np.random.default_rng(4), 400)
-    return CubicSpline(np.arange(400) - 60, x), vl.Rig.around(x)
-
-
-def filmed(motion, frames, lags, rates=(1, 1, 1), noise=NOISE):
-    path, rig = motion
-    rng = np.random.default_rng(0)
-    tracks = []
-    for camera, n, lag, rate in zip(rig.cameras, frames, lags, rates, strict=True):
-        pixels = camera.project(path(lag + np.arange(n) / rate))
-        tracks.append(pixels + noise * rng.normal(size=pixels.shape))
-    return tracks
 
 
 # ---------------------------------------------------------------------------------------- the clock
@@ -287,17 +267,6 @@ def test_a_target_that_hardly_moves_tells_no_lag():
     assert all("the target moves too little or too slowly" in w for w in found.warnings)
 
 
-def test_a_slope_that_is_noise_tells_nothing(motion, monkeypatch):
-    # If half of each squared slope is motion, it tells half as much of the noise that it collects.
-    tracks, errors = filmed(motion, (60,) * 3, (0, 0, 0)), {}
-    for share in (1, 0.5):
-        shares = np.full(2, share)
-        monkeypatch.setattr(Timing, "shares", shares)
-        errors[share] = learn_lags(tracks, motion[1]).errors
-    assert (errors[1][1:] > 0).all()
-    np.testing.assert_allclose(errors[0.5], 2 * errors[1], rtol=1e-9)
-
-
 def test_noise_of_the_tracks_is_no_reason_to_look_for_other_lags(motion, monkeypatch):
     """However large; what follows the motion is, however small."""
     tracks = filmed(motion, (250,) * 3, (0, 0, 0), noise=1.5)
@@ -313,42 +282,6 @@ def test_noise_of_the_tracks_is_no_reason_to_look_for_other_lags(motion, monkeyp
     quiet = filmed(motion, (250,) * 3, (0, 0, 0))
     learn_lags(quiet, vl.Rig([first, turned, third]))
     assert searched
-
-
-def test_promising_lags_are_not_neighbours(motion):
-    """From one of them the search comes to the best within a few frames."""
-    tracks = filmed(motion, (250,) * 3, (0, 9, -14), noise=2.0)
-    curves = [Curve(track, np.arange(250.0)) for track in tracks]
-    for lags in promising_lags(curves, np.ones(3), Unknowns.of(motion[1].uncalibrated()))[1:]:
-        assert np.diff(np.sort(lags)).min(initial=4) >= 4
-
-
-def test_two_views_are_compared_only_where_they_have_enough_in_common(motion):
-    """More equations than twice the unknowns, also without the tenth that is missed the most."""
-    tracks, (first, second, _) = filmed(motion, (8, 8, 8), (0, 0, 0)), motion[1].cameras
-    lines = epipolar_lines(first, tracks[0], second)
-    unknown = replace(second, scale=None, angle=None)
-    for other, placed, least in (
-        (second, True, 1), (second, False, 4), (unknown, True, 6), (unknown, False, 8),
-    ):  # fmt: skip
-        for frames, enough in ((least - 1, False), (least, True)):
-            theirs = np.where(np.arange(8)[:, None] < frames, tracks[1], np.nan)
-            (missed,) = pair_missed(other, placed, lines, theirs[None], shift=False)
-            assert np.isfinite(missed) == enough
-            assert not enough or missed < 5 * NOISE * first.scale
-
-
-@pytest.mark.parametrize("lag", [-50, 50])
-def test_videos_may_have_half_of_the_shorter_one_in_common(motion, lag):
-    tracks = filmed(motion, (100, 100, 100), (0, lag, 0), noise=0.0)
-    assert promising(tracks, motion[1])[1][0] == lag
-    tracks = filmed(motion, (100, 100, 100), (0, 1.1 * lag, 0), noise=0.0)
-    assert np.abs(promising(tracks, motion[1])[1]).max() <= 50
-
-
-def promising(tracks, rig):
-    curves = [Curve(track, np.arange(100.0)) for track in tracks]
-    return promising_lags(curves, np.ones(3), Unknowns.of(rig))
 
 
 @pytest.mark.slow
@@ -399,7 +332,7 @@ def measured_by_hand(rig, seed):
 @pytest.mark.parametrize("seed", range(2))
 def test_lags_at_half_a_pixel_of_noise(seed):
     lags = (0, 31.4, -22.7)
-    rig, tracks = room(seed, 300, lags)
+    rig, tracks = room(seed, 200, lags)
     for known, limit in ((rig, 0.05), (rig.uncalibrated(), 0.05), (measured_by_hand(rig, 0), 0.3)):
         found = learn_lags(tracks, known)
         assert found.agree
@@ -419,9 +352,11 @@ def test_a_wrong_rig_does_not_spoil_the_lags(motion):
     np.testing.assert_allclose(found.frames, (0, 9.3, -4), atol=0.05)
 
 
-@pytest.mark.parametrize(("tilt", "noise", "doubted"), [(0.003, 0.05, True), (0, 0.5, False)])
+@pytest.mark.parametrize(
+    ("tilt", "noise", "doubted"), [(0.003, 0.05, True), (0, 0.5, False), (0, 3.0, False)]
+)
 def test_a_rig_is_doubted_if_it_leaves_more_than_the_tracks_do(motion, tilt, noise, doubted):
-    """Both leave less than a pixel, but cameras that may turn only take out what a tilt leaves."""
+    """However much that is: cameras that may turn only take out what a tilt leaves."""
     first, second, third = motion[1].cameras
     turned = replace(second, normal=second.normal + tilt * second.rows[0])
     tracks = filmed(motion, (80,) * 3, (0, 2, 0), noise=noise)
@@ -430,14 +365,14 @@ def test_a_rig_is_doubted_if_it_leaves_more_than_the_tracks_do(motion, tilt, noi
     videos = synchrony._Videos(curves, unknowns, np.ones(3), tqdm(disable=True))
     loose, (best, *_) = synchrony._searched(videos, np.zeros(3))
     assert loose is doubted
-    assert best.score < 1
-    np.testing.assert_allclose(best.lags, (0, 2, 0), atol=0.1)
+    assert best.score < max(1, 2 * noise)
+    np.testing.assert_allclose(best.lags, (0, 2, 0), atol=max(0.1, 0.2 * noise))
 
 
 @pytest.mark.slow
 def test_motions_that_have_nothing_in_common_have_no_lags():
-    rig, tracks = room(0, 300)
-    _, others = room(7, 300)
+    rig, tracks = room(0, 150)
+    _, others = room(7, 150)
     found = learn_lags([tracks[0], others[1], tracks[2]], rig)
     assert not found.agree
     assert found.frames.tolist() == [0, 0, 0]
@@ -448,9 +383,9 @@ def test_motions_that_have_nothing_in_common_have_no_lags():
 
 @pytest.mark.slow
 def test_the_drift_of_a_clock_is_found():
-    rig, tracks = room(3, 3000, (0, 12.4, -3.3), (0, 2e-4, 0))
+    rig, tracks = room(3, 1500, (0, 12.4, -3.3), (0, 4e-4, 0))
     found = learn_lags(tracks, rig)
-    np.testing.assert_allclose(found.rates, (1, 1 + 2e-4, 1), rtol=0, atol=6e-5)
+    np.testing.assert_allclose(found.rates, (1, 1 + 4e-4, 1), rtol=0, atol=1.2e-4)
     assert found.rates[2] == 1  # what is not clear is not changed
     np.testing.assert_allclose(found.frames, (0, 12.4, -3.3), atol=0.15)
 

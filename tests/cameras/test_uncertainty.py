@@ -2,23 +2,14 @@
 
 import numpy as np
 import pytest
-from helpers import trajectory
+from helpers import dependent, trajectory
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
-from vidsindy_lite.cameras.covariance import fitted_factor, long_run_covariance
 from vidsindy_lite.cameras.uncertainty import _of_shape, systematic_errors, trailing_errors
 
 NOISE = 0.05  # pixels
-
-
-def dependent(rng, n, memory):
-    """A series of mean 0 and variance 1 in which each value keeps a share of the one before."""
-    series = rng.normal(size=(n, 2))
-    for k in range(1, n):
-        series[k] = memory * series[k - 1] + np.sqrt(1 - memory**2) * series[k]
-    return series
 
 
 def learned_rig(rng, memory, frames=250, path=trajectory):
@@ -139,12 +130,6 @@ def test_no_trail_where_nothing_moves_or_is_seen():
     np.testing.assert_array_equal(modes[:, 80:], 0)
 
 
-def test_long_run_covariance_of_an_autoregressive_series():
-    series = dependent(np.random.default_rng(0), 20000, 0.6)
-    np.testing.assert_allclose(np.diag(long_run_covariance(series)), 4, rtol=0.15)  # 1.6 / 0.4
-    np.testing.assert_allclose(np.diag(long_run_covariance(series[::40])), 1, rtol=0.3)
-
-
 # ------------------------------------------------------------------------------------ in the solver
 
 
@@ -238,50 +223,6 @@ def test_malformed_systematic_errors_are_named(systematic, message):
 
 
 # -------------------------------------------------------------------------- formulas, step by step
-
-
-def test_long_run_covariance_by_the_book():
-    """Newey and West 1987 with the width of Andrews 1991, written out."""
-    series = dependent(np.random.default_rng(2), 60, 0.5)
-    n = len(series)
-    parts = []
-    for column in series.T:
-        rho = sum(column[t] * column[t - 1] for t in range(1, n)) / sum(column**2)
-        parts.append(4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2))
-    width = 1.1447 * (np.mean(parts) * n) ** (1 / 3)
-    assert 2 < width < 20
-    total = np.zeros((2, 2))
-    for s in range(n):
-        for t in range(n):
-            total += max(0, 1 - abs(s - t) / (width + 1)) * np.outer(series[s], series[t])
-    found = long_run_covariance(series)
-    # The last weight that counts is the first one that is zero or less.
-    lag = int(np.ceil(width))
-    product = series[lag:].T @ series[:-lag]
-    total += min(0, 1 - lag / (width + 1)) * (product + product.T)
-    np.testing.assert_allclose(found, total / n, rtol=1e-10)
-
-
-def test_a_series_that_hardly_ever_changes_has_a_width():
-    series = np.ones((50, 1))
-    assert 0 < long_run_covariance(series)[0, 0] <= 50
-    assert long_run_covariance(np.zeros((50, 1)))[0, 0] == 0
-
-
-def test_covariance_of_independent_residuals_is_that_of_least_squares():
-    rng = np.random.default_rng(3)
-    slope = rng.normal(size=(4000, 3, 2))
-    missed = 0.2 * rng.normal(size=(4000, 3))
-    factor = fitted_factor(missed, slope, np.zeros(2), 0.2)
-    flat = slope.reshape(-1, 2)
-    expected = 0.2**2 * np.linalg.inv(flat.T @ flat)
-    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    assert np.abs(factor @ factor.T - expected).max() < 0.15 * size.max()
-    # Every residual three times in a row: three times the variance for as many numbers.
-    thrice = np.repeat(missed, 3, 0), np.repeat(slope, 3, 0)
-    tripled = fitted_factor(*thrice, np.zeros(2), 0.2)
-    grown = np.trace(tripled @ tripled.T) / np.trace(factor @ factor.T)
-    assert 0.6 < grown < 1.1  # and a third if they were taken as independent
 
 
 def test_trails_follow_the_motion():

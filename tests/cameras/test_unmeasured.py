@@ -93,7 +93,7 @@ def test_a_known_distance_gives_the_unit_of_length():
 def test_a_law_has_its_own_axes_though_nobody_has_measured_the_rig():
     rng = np.random.default_rng(4)
     rig = room(rng)
-    t, x = SYSTEMS["SprottF"].trajectory(1000)
+    t, x = SYSTEMS["SprottF"].trajectory(500)
     shown = 0.25 * (x - x.mean(axis=0)) / x.std() + walk(np.arange(FRAMES)).mean(axis=0)
     tracks = [c.project(shown) + 0.5 * rng.normal(size=(len(t), 2)) for c in rig.cameras]
     found = vl.discover_from_tracks(

@@ -24,7 +24,7 @@ import numpy as np
 from vidsindy_lite import discover
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise
 for name, noise in json.loads(sys.argv[1]):
-    t, x = SYSTEMS[name].shift(REFERENCE_OFFSET).trajectory(600)
+    t, x = SYSTEMS[name].shift(REFERENCE_OFFSET).trajectory(400)
     found = discover(t, add_noise(x, noise, np.random.default_rng(8)))
     print(json.dumps([found.coefficients.tolist(), found.standard_errors.tolist()]))
 """

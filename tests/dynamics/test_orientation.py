@@ -8,7 +8,8 @@ import vidsindy_lite as vl
 from vidsindy_lite.dynamics import solver, turning
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.orientation import _turns, apart, nearest, turned, with_turns
+from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.orientation import TurnedLaw, _turns, apart, nearest, turned, with_turns
 from vidsindy_lite.dynamics.selection import inverse
 from vidsindy_lite.dynamics.solver import _solved
 from vidsindy_lite.dynamics.turning import in_axes
@@ -213,3 +214,20 @@ def test_what_was_measured_is_turned_as_a_whole():
     np.testing.assert_allclose(y, [[2, -1], [6, -5]])
     np.testing.assert_allclose(shared[:, :, 0], [[1, -1], [1, -1]])
     np.testing.assert_allclose(sigma[0], [[0.2, 0.1], [0.2, 0.1]])
+
+
+def test_descending_ends_in_the_axes_and_at_the_origin_that_it_counted():
+    """A law of two terms around (.2, -.1), turned by .3: of the twelve terms two are left."""
+    exponents = monomial_exponents(2, 2)
+    law, rng = np.zeros((6, 2)), np.random.default_rng(0)
+    law[(exponents == (1, 1)).all(axis=1), 0] = 1.0
+    law[(exponents == (1, 0)).all(axis=1), 1] = -1.5
+    directions = 1e-3 * rng.normal(size=(12, 6, 2))
+    about = TurnedLaw(exponents, np.stack([law, *directions]), np.zeros(2))
+    turn, away = Rotation.from_rotvec([0, 0, 0.3]).as_matrix()[:2, :2], np.array([-0.2, 0.1])
+    askew = about._mapped(turn, turn @ away, turn.T)
+    cost, axes, origin = askew.descended(np.eye(2), np.zeros(2), 0.01)
+    estimate, variance = askew.seen(axes, origin)
+    z2 = estimate**2 / (variance + 0.01**2)
+    assert cost == pytest.approx(0.5 * np.log1p(z2).sum(), rel=1e-6)
+    assert (z2 > 1).sum() == 2

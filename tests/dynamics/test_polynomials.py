@@ -15,7 +15,7 @@ from vidsindy_lite.dynamics.library import (
     shift_matrix,
     variable_names,
 )
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.polynomials import PolynomialSystem, power_of_ten
 
 LORENZ = {
     "x": {"x": -10, "y": 10},
@@ -226,3 +226,11 @@ def test_degrees_are_whole_numbers(degree):
 def test_library_of_monomials():
     x = np.array([[2.0, 3.0]])
     assert monomials(x, monomial_exponents(2, 2)).tolist() == [[1, 2, 3, 4, 6, 9]]
+
+
+@pytest.mark.parametrize(
+    ("largest", "power"),
+    [(0.0, 0), (1.5, 0), (9.9e5, 0), (1.5e6, 6), (1.5e-5, 0), (9.9e-6, -6), (2e-300, -300)],
+)
+def test_numbers_of_many_digits_are_printed_with_a_power_of_ten(largest, power):
+    assert power_of_ten(largest) == power

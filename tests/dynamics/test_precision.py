@@ -137,6 +137,20 @@ def test_precision_is_foreseen_before_any_law_is_known():
     assert ratio == pytest.approx((0.2 / 0.02) ** 2, rel=0.4)
 
 
+def test_the_noise_is_that_of_the_errors_where_they_are_as_usual():
+    """By how much weighted errors are smaller than all, so much the noise shrinks."""
+    x, _ = uneven("growing", np.random.default_rng(2))
+    problem = posed(x)
+    (t, _), units = problem.trajectories[0], problem.units
+    residual, speed = (x - PATH) / units.scale, LAW(PATH) / units.scale * units.time
+    path = [np.stack([(PATH - units.centre) / units.scale, speed])]
+    found = weighing._weighed(problem, [(0, t)], path, residual, np.ones_like(residual))
+    factors = found.precision[0] / problem.precision[0]
+    assert np.ptp(factors, axis=0).min() > 0.5
+    smaller = np.mean(factors * residual**2, axis=0) / np.mean(residual**2, axis=0)
+    np.testing.assert_allclose(found.noise, problem.noise * np.sqrt(smaller))
+
+
 def test_noise_that_looks_even_before_a_law_is_known_stays_even():
     even = posed(PATH + 0.05 * np.random.default_rng(6).standard_normal(PATH.shape))
     assert weighing.foreseen(even) is even

@@ -9,7 +9,7 @@ from helpers import posed
 
 from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.errors import residual_noise
-from vidsindy_lite.dynamics.problem import NARROW, OFFSET_PENALTY, WIDE, fit_curves
+from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, fit_curves
 from vidsindy_lite.dynamics.search import _as_shifted, _candidate, _closed, _variants
 from vidsindy_lite.dynamics.state import State
 
@@ -25,7 +25,7 @@ def fit_of(problem, moving=(True, False)):
     return Fit(state, collocation, Status.CONVERGED)
 
 
-@pytest.mark.parametrize(("noise", "spacing"), [(0.0, NARROW), (0.005, NARROW), (0.1, WIDE)])
+@pytest.mark.parametrize(("noise", "spacing"), [(0.0, 1 / 16), (0.005, 1 / 16), (0.1, 1 / 5)])
 def test_knots_are_wider_where_there_is_noise(noise, spacing):
     assert posed(noise).spacing == spacing
 

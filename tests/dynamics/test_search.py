@@ -1,5 +1,7 @@
 """The search for terms: what it does where data are long, or where too many terms fit alike."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,3 +71,14 @@ def test_terms_that_cannot_be_told_apart_are_searched_from_the_first_fit(monkeyp
     expected = search.FIRST_WEIGHTS[-1 if fails_at is None else 0]
     assert weight == expected
     assert len(calls) == (4 if fails_at is None else fails_at + 1)
+
+
+def test_of_long_data_a_search_has_enough_turns_and_samples():
+    """A turn takes 2 pi in standard units."""
+    problem = posed([np.linspace(0, 20, 400)])
+    for time, count in ((4e3, 10**5), (1e5, 10**4)):
+        t = np.linspace(0, time, count)
+        long = replace(problem, stretches=[(0, (t, np.ones((count, 2))))])
+        ((_, (part, _)),) = search._enough(long)
+        wanted = max(search.ENOUGH_TURNS * 2 * np.pi, search.ENOUGH_SAMPLES / count * time)
+        assert part[-1] == pytest.approx(wanted, abs=2 * time / count)

@@ -4,16 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import posed
 from scipy.stats import kstest
 
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.posing import pose
-from vidsindy_lite.dynamics.problem import term_penalties
+from vidsindy_lite.dynamics.problem import fit_curves, term_penalties
 from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.dynamics.splines import Segment
+from vidsindy_lite.dynamics.state import State
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
 
 
@@ -352,3 +356,16 @@ def test_penalties_rise_with_the_number_of_rivals():
     by_degree = [np.unique(penalties[monomial_exponents(3, 3).sum(axis=1) == k]) for k in range(4)]
     assert all(len(values) == 1 for values in by_degree)
     assert np.diff(np.concatenate(by_degree)).min() > 0
+
+
+@pytest.mark.parametrize(("spacing", "halvings"), [(1.0, 1), (1.4, 2)])
+def test_knots_are_halved_until_that_changes_the_law_by_less_than_its_error(spacing, halvings):
+    problem = posed()
+    segments = [Segment.even(t, x, spacing, i) for i, (t, x) in problem.stretches]
+    grid = problem.collocation(segments)
+    law = np.array([[0, 0], [0, -1], [1, 0], [0, 0], [0, 0], [0, 0]], float)
+    state = State(fit_curves(grid, problem.curves), law, law != 0, np.zeros(2), np.zeros(2, bool))
+    fit = problem.weighted(grid, solver.FINAL_WEIGHT).solve(state)
+    finer = solver.polish(problem, fit, History())
+    spans = [len(s.breakpoints) - 1 for s in (*segments, *finer.collocation.segments)]
+    assert spans[1] == 2**halvings * spans[0]

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.refining import _BESIDE, joined
+from vidsindy_lite.vision.candidates import Plate
+from vidsindy_lite.vision.refining import _BESIDE, Lens, joined
 
 
 @pytest.mark.parametrize("missing", [0, 1])
@@ -12,3 +13,27 @@ def test_two_that_meet_and_part_are_one_in_between_if_both_sides_are_seen(missin
     expected = [False] * _BESIDE + [not missing] * 6 + [False] * len(after)
     assert joined(np.array(before + during + after)).tolist() == expected
     assert joined(np.array(after + during + before)).tolist() == expected[::-1]
+
+
+def disc(centre, radius, size=(80, 60)):
+    """How much of each pixel a disc covers, by pieces of a tenth."""
+    u, v = (np.arange(10 * n) / 10 - 0.45 for n in size)
+    inside = np.hypot(u[None] - centre[0], v[:, None] - centre[1]) < radius
+    return inside.reshape(size[1], 10, size[0], 10).mean(axis=(1, 3))[..., None]
+
+
+@pytest.mark.parametrize("radius", [5.0, 9.0])
+@pytest.mark.parametrize("centre", [(40.3, 30.6), (31.0, 22.25)])
+def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(centre, radius):
+    ground = np.full((60, 80, 3), 90, np.uint8)
+    share, colour = disc(centre, radius), np.array([30, 60, 220])
+    frame = np.rint((1 - share) * ground + share * colour).astype(np.uint8)
+    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
+    box = np.array([centre[0] - radius, centre[1] - radius, 2 * radius, 2 * radius])
+    gain = np.ones(3, np.float32)
+    view = Lens(plate, 0.0).look(frame, np.eye(3), box, np.array(centre), colour, gain)
+    assert view.inside
+    assert view.area == pytest.approx(np.pi * radius**2, rel=0.01)
+    np.testing.assert_allclose(view.centroid, centre, atol=0.02)
+    np.testing.assert_allclose(view.colour, colour, atol=1)
+    assert Lens(plate, 0.0).look(ground, np.eye(3), box, np.array(centre), colour, gain) is None

@@ -1,9 +1,9 @@
-"""Drawn backgrounds and training frames look as they did: figures and weights rest on them."""
+"""Drawn backgrounds look as they did: figures and weights rest on them."""
 
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision import scenery, training
+from vidsindy_lite.vision import scenery
 
 # Blue, green, red of pixels [25::65, 30::60] of an image of 256 x 192, seed 7.
 LOOKS = {
@@ -46,11 +46,6 @@ TREE = (
     "1 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 0 0 0 0 1 1 1 1 1 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 "
     "1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0"
 )
-# Mean and standard deviation of the training frames of seeds 0 to 23.
-FRAMES = (
-    "195 141 206 93 144 85 57 94 129 88 67 125 238 132 138 128 135 162 118 158 113 94 131 152",
-    "55 80 45 63 77 41 35 58 36 31 33 30 23 69 65 67 60 45 68 44 36 58 43 70",
-)
 
 
 def numbers(text):
@@ -69,17 +64,6 @@ def test_a_tree_stands_where_it_did():
     image, here = scenery.tree(np.random.default_rng(7), (120, 160))
     assert image.shape == (160, 120, 3)
     assert np.array_equal(here[7::15, 3::12].ravel(), numbers(TREE) > 0)
-
-
-def test_training_frames_look_as_they_did():
-    kinds = enumerate(training.SEEN_BACKGROUNDS)
-    pool = np.stack(
-        [scenery.BACKGROUNDS[kind](np.random.default_rng(i), (512, 512)) for i, kind in kinds]
-    )
-    frames = [training.training_frame(np.random.default_rng(k), pool)[0].frame for k in range(24)]
-    mean, spread = ([stat(frame) for frame in frames] for stat in (np.mean, np.std))
-    np.testing.assert_allclose(mean, numbers(FRAMES[0]), atol=1)
-    np.testing.assert_allclose(spread, numbers(FRAMES[1]), atol=1)
 
 
 def test_joints_part_all_bricks():

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, stands_still
+from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, displacement, stands_still
 
 SIZE = 960, 720
 
@@ -70,3 +70,10 @@ def test_what_a_few_of_the_corners_share_is_chance_and_tells_no_motion(share, to
     found, count = steadying._by_corners(_Relief.of(after))
     assert (found is not None) is told
     assert (count > 0) is told
+
+
+def test_pixels_by_which_maps_move_an_image():
+    shift = np.array([[1, 0, 3], [0, 1, -4], [0, 0, 1.0]])
+    found = displacement(np.stack([np.eye(3), shift, np.diag([1.1, 1, 1])]), (200, 100))
+    # The rms of a tenth of 40, 100 and 160 pixels.
+    np.testing.assert_allclose(found, [0, 5, np.sqrt((16 + 100 + 256) / 3)])
