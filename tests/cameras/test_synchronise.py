@@ -402,21 +402,6 @@ def test_a_motion_that_repeats_itself_is_told_though_a_clock_drifts():
     np.testing.assert_allclose(found.rates, (1, 1.001, 1), atol=2e-5)
 
 
-def test_slopes_that_are_noise_make_errors_larger(motion, monkeypatch):
-    """Of drifts as of lags: half of the information is half as much slope for the same noise."""
-    tracks = filmed(motion, (250,) * 3, (0, 0, 0))
-    kept = []
-    told = Timing.covariance.fget
-    monkeypatch.setattr(Timing, "covariance", property(lambda fit: kept.append(fit) or told(fit)))
-    learn_lags(tracks, motion[1])
-    free = next(fit for fit in kept if np.isinf(fit.fit.errors).sum() == 4)  # two lags, two drifts
-    monkeypatch.setattr(Timing, "shares", np.ones(2))
-    best = told(free)
-    monkeypatch.setattr(Timing, "shares", np.array([0.5, 1.0]))
-    errors = np.sqrt(np.diag(told(free)) / np.diag(best))
-    np.testing.assert_allclose(errors, [2, 1, 2, 1], rtol=1e-12)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("outliers", [0, 0.03])
 def test_errors_of_lags_are_honest(motion, outliers):
