@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from .library import monomials
 from .polynomials import PolynomialSystem, velocity_names
 from .rounds import Round, on_circle, on_sphere
@@ -26,6 +26,8 @@ Complexes = NDArray[np.complex128]
 CLOSE = 0.005
 """Distance from a shape, over the size of the shape, that is none: scales and cameras are off by
 as much."""
+RETRACED = 0.05
+"""The same of a curve on which a motion turns back, as nothing does that is not bound to one."""
 TOLD = 0.1
 """Distance, over the size of the shape, that noise must not hide."""
 FAINT = 0.5
@@ -75,9 +77,7 @@ def shapes(
         How many coefficients of each coordinate's equation the data have to settle.
     """
     x = np.concatenate([values for _, values in runs])
-    away = x - x.mean(axis=0)
-    part = [_distance(away[:, [j]], size)[1] / size for j, size in enumerate(noise)]
-    moves = np.array(part) > FAINT
+    moves = _moving(x, noise)
     for j in np.flatnonzero(~moves).tolist():
         yield f"{names[j]} moves by no more than a part of its noise: leave it out"
     if not moves.any():
@@ -87,6 +87,13 @@ def shapes(
     yield from _flat_or_round(x, noise, names)
     if len(runs) == 1:
         yield from _closed(runs[0][0], x, noise, terms)
+
+
+def _moving(x: Floats, noise: Floats) -> Bools:
+    """Which coordinates move by more than a part of their noise, (d,)."""
+    away = x - x.mean(axis=0)
+    part = [_distance(away[:, [j]], size)[1] / size for j, size in enumerate(noise)]
+    return np.array(part) > FAINT
 
 
 def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[str]:
@@ -111,6 +118,10 @@ def is_on_circle(x: Floats, noise: Floats) -> bool:
     """Whether positions, (n, d), are bound to a circle, if their errors, (d,), are so large."""
     if x.shape[1] not in (2, 3):
         return False
+    moves = _moving(x, noise)
+    if moves.sum() < 2:
+        return False
+    x, noise = x[:, moves], noise[moves]
     where = _round(x, noise, _across(x, noise)[1])
     return where is not None and len(where.axes) == 2
 
@@ -157,34 +168,38 @@ def _round(x: Floats, noise: Floats, flat: int) -> Round | None:
     toward = x - where.centre
     reach = np.linalg.norm(toward, axis=1)
     outward = (toward / reach[:, None]) ** 2
-    size = widths[-2 if planar else 0]
-    if not _on((reach - where.radius)[:, None], float(np.sqrt((outward @ noise**2).mean())), size):
-        return None
-    return where if not planar or _bound(where.angle, whole=d > 2) else None
+    off, error = (reach - where.radius)[:, None], float(np.sqrt((outward @ noise**2).mean()))
+    if not planar:
+        return where if _on(off, error, widths[0]) else None
+    back, around = _ways(where.angle)
+    bound = back or (d > 2 and around)
+    return where if bound and _on(off, error, widths[-2], RETRACED if back else CLOSE) else None
 
 
 def _told(where: Round) -> str:
-    shape, angles = ("circle", "angle") if len(where.axes) == 2 else ("sphere", "angles")
+    shape, free = (
+        ("circle", "its angle is") if len(where.axes) == 2 else ("sphere", "its angles are")
+    )
     centre = ", ".join(
         f"{c:.4g} +- {e:.1g}" for c, e in zip(where.centre, where.centre_errors, strict=True)
     )
     return (
         f"the motion stays on a {shape} (centre {centre}; radius {where.radius:.5g} +- "
         f"{where.radius_error:.1g}): there its coordinates depend on each other and many laws fit "
-        f"alike; give the {angles} that on_{shape} finds, with order=2"
+        f"alike; {free} free: on_{shape} finds it, and order=2 its law"
     )
 
 
-def _bound(angle: Floats, whole: bool) -> bool:
-    """Whether a motion along an arc turns back on it, or goes round, if that counts.
+def _ways(angle: Floats) -> tuple[bool, bool]:
+    """Whether a motion along an arc turns back on it, and whether it goes half round.
 
     If a step is a large part of a turn, the way between samples is not known.
     """
     if np.quantile(np.abs(np.diff(angle)), 0.9) > COARSEST:
-        return False
+        return False, False
     pieces = [piece.mean() for piece in np.array_split(angle, min(PIECES, len(angle)))]
     length = float(np.ptp(pieces))
-    return bool(np.abs(np.diff(pieces)).sum() > SWEPT * length or whole and length > np.pi)
+    return bool(np.abs(np.diff(pieces)).sum() > SWEPT * length), length > np.pi
 
 
 def _closed(t: Floats, x: Floats, noise: Floats, terms: Ints) -> Iterator[str]:
@@ -343,10 +358,10 @@ def _line_and_sine(law: PolynomialSystem, x: Floats) -> Iterator[str]:
                     )
 
 
-def _on(residual: Floats, noise: float, size: float) -> bool:
+def _on(residual: Floats, noise: float, size: float, close: float = CLOSE) -> bool:
     """Whether distances from a shape of some size, (n, k), are those of noise."""
     least, most = _distance(residual, noise)
-    return bool(least < CLOSE * size and most < TOLD * size)
+    return bool(least < close * size and most < TOLD * size)
 
 
 def _distance(residual: Floats, noise: float) -> tuple[float, float]:

@@ -23,6 +23,7 @@ from .trajectories import Trajectory
 LIBRARY = Library.polynomial(1) + Library.fourier(1)
 """What may pull at an angle: a push, a spring, friction, and gravity in any direction."""
 NAME = "angle"
+SUPPOSED = "if all its mass is at that radius and all axes have the same scale"
 TURNS = 3
 """Most laws of an angle, each of which tells better where it is zero."""
 
@@ -44,7 +45,11 @@ class Swing:
 
     @property
     def g(self) -> Quantity | None:
-        """What pulls at it, if all its mass is at that radius; None if no sine is in the law."""
+        """What pulls at it; None if no sine is in the law.
+
+        If all its mass is at that radius, and all axes have the same scale: along an arc, a scale
+        that is off by one per cent makes two of the radius, and the data hardly tell.
+        """
         row, circle = self.law.terms.index(f"sin({NAME})"), self.circle
         pull, error = -self.law.coefficients[row, 1], self.law.standard_errors[row, 1]
         if not pull:
@@ -54,7 +59,7 @@ class Swing:
 
     def __str__(self) -> str:
         radius, g = f"{self.circle.radius:.6g} ± {self.circle.radius_error:.2g}", self.g
-        pulled = "" if g is None else f"; {g}, if all its mass is there"
+        pulled = "" if g is None else f"; {g}, {SUPPOSED}"
         doubts = (f"doubt: {text}" for text in (*self.circle.warnings, *self.law.warnings))
         law = f"on a circle of radius {radius}: {self.law.equations()}{pulled}"
         return "\n".join([law, *doubts])

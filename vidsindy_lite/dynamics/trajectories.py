@@ -186,6 +186,8 @@ def check_systematic(
     """
     if systematic is None:
         return [np.empty((*x.shape, 0)) for _, x in trajectories]
+    if np.isscalar(systematic):
+        raise ValueError(f"systematic: must have shape (k, n, d), got {systematic!r:.60}")
     parts = [systematic] if len(trajectories) == 1 and np.ndim(systematic) == 3 else systematic
     if len(parts) != len(trajectories):
         raise ValueError(
