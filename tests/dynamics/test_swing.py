@@ -67,6 +67,14 @@ def test_a_plane_that_is_one_of_the_axes():
     assert abs(swing.g.value - G) < 4 * swing.g.error
 
 
+def test_coordinates_that_are_never_seen_together_are_on_no_circle():
+    x = flat(bob(1.5, 0.005))
+    x[::2, 0], x[1::2, 1] = np.nan, np.nan
+    found = vl.discover(TIMES, x, degree=1)
+    assert found.status == "suspect"
+    assert found.swing is None
+
+
 def test_errors_that_last_do_not_hide_a_circle():
     rng, errors = np.random.default_rng(5), np.zeros((len(TIMES), 2))
     for i in range(1, len(TIMES)):

@@ -28,6 +28,8 @@ CLOSE = 0.005
 as much."""
 RETRACED = 0.05
 """The same of a curve on which a motion turns back, as nothing does that is not bound to one."""
+FEWEST = 5
+"""Positions that are always on a circle, or nearly."""
 TOLD = 0.1
 """Distance, over the size of the shape, that noise must not hide."""
 FAINT = 0.5
@@ -116,7 +118,7 @@ def _flat_or_round(x: Floats, noise: Floats, names: Sequence[str]) -> Iterator[s
 
 def is_on_circle(x: Floats, noise: Floats) -> bool:
     """Whether positions, (n, d), are bound to a circle, if their errors, (d,), are so large."""
-    if x.shape[1] not in (2, 3):
+    if x.shape[1] not in (2, 3) or len(x) <= FEWEST:
         return False
     moves = _moving(x, noise)
     if moves.sum() < 2:
@@ -178,7 +180,9 @@ def _round(x: Floats, noise: Floats, flat: int) -> Round | None:
 
 def _told(where: Round) -> str:
     shape, free = (
-        ("circle", "its angle is") if len(where.axes) == 2 else ("sphere", "its angles are")
+        ("circle", "its angle is free: on_circle finds it")
+        if len(where.axes) == 2
+        else ("sphere", "its angles are free: on_sphere finds them")
     )
     centre = ", ".join(
         f"{c:.4g} +- {e:.1g}" for c, e in zip(where.centre, where.centre_errors, strict=True)
@@ -186,7 +190,7 @@ def _told(where: Round) -> str:
     return (
         f"the motion stays on a {shape} (centre {centre}; radius {where.radius:.5g} +- "
         f"{where.radius_error:.1g}): there its coordinates depend on each other and many laws fit "
-        f"alike; {free} free: on_{shape} finds it, and order=2 its law"
+        f"alike; {free}, and order=2 a law"
     )
 
 
