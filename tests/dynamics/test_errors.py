@@ -12,7 +12,7 @@ from vidsindy_lite.dynamics.errors import (
     inflation,
     passing,
     prediction_gain,
-    swing,
+    rebound,
     time_inflation,
 )
 
@@ -107,7 +107,7 @@ def test_what_uneven_errors_foretell_is_counted_in_their_own_sizes():
     assert prediction_gain(fit_with(error))[0] > 0.2 * weighed  # the large ones hide the others
 
 
-def test_errors_pass_that_are_forgotten_and_do_not_swing():
+def test_errors_pass_that_are_forgotten_and_do_not_rebound():
     rng, t = np.random.default_rng(8), np.arange(1500)
     white, slow = rng.standard_normal(1500), lasting(1500, 0.9, rng)
     averaged = np.convolve(rng.standard_normal(1508), np.ones(9) / 3, "valid")
@@ -122,14 +122,14 @@ def test_errors_pass_that_are_forgotten_and_do_not_swing():
 
 def test_errors_swing_as_theory_says():
     t = 2 * np.pi * np.arange(6000) / 6000
-    assert swing([np.sin(60 * t)[:, None]])[0] == pytest.approx(-1, abs=0.02)
+    assert rebound([np.sin(60 * t)[:, None]])[0] == pytest.approx(-1, abs=0.02)
     # One for the last and minus a half for the one before: at lag 1, -.5 / 1.25.
     white = np.random.default_rng(10).standard_normal(20_001)
-    assert swing([(white[1:] - 0.5 * white[:-1])[:, None]])[0] == pytest.approx(-0.4, abs=0.03)
-    assert -0.1 < swing([white[:, None]])[0] < 0
+    assert rebound([(white[1:] - 0.5 * white[:-1])[:, None]])[0] == pytest.approx(-0.4, abs=0.03)
+    assert -0.1 < rebound([white[:, None]])[0] < 0
     # Two stretches know nothing of each other, and one that is empty of none.
-    assert swing([np.ones((50, 1)), -np.ones((50, 1))])[0] >= 0
-    assert swing([white[:, None], np.zeros((0, 1))])[0] == swing([white[:, None]])[0]
+    assert rebound([np.ones((50, 1)), -np.ones((50, 1))])[0] >= 0
+    assert rebound([white[:, None], np.zeros((0, 1))])[0] == rebound([white[:, None]])[0]
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])

@@ -284,7 +284,7 @@ class Discovery:
         if self.model_error.any():
             sizes = zip(self.model_error, self.system.names, strict=True)
             kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
-            lines.append(f"kicked at random, by {kicks} over a unit of time")
+            lines.append(f"as if kicked at random, by {kicks} over a unit of time")
         if said := self.physics().headline:
             lines.append(said)
         if self.swing is not None:

@@ -15,7 +15,7 @@ ORDER = 40
 """Most errors that foretell the next."""
 LEAST = 1e-300
 """Keeps a quotient finite where nothing moves or is left."""
-SWING = 0.3
+REBOUND = 0.3
 """Autocorrelation below zero from which on errors come back with the other sign, as a motion does:
 three standard errors of a hundred independent ones."""
 
@@ -142,8 +142,8 @@ def passing(fit: Fit, tried: int) -> Bools:
     """
     seen, errors = fit.collocation.counts > 0, _errors_seen(fit)
     counts = np.array([sum(independent(piece[:, 0]) for piece in pieces) for pieces in errors])
-    lowest = np.concatenate([swing(pieces) for pieces in errors])
-    forgotten = (counts > tried) & (lowest > -SWING)
+    lowest = np.concatenate([rebound(pieces) for pieces in errors])
+    forgotten = (counts > tried) & (lowest > -REBOUND)
     return np.where(seen, forgotten, forgotten[seen].all())
 
 
@@ -157,7 +157,7 @@ def independent(errors: Floats) -> float:
     return float(4 * powers.sum() ** 2 / (powers**2).sum()) if powers.any() else 0.0
 
 
-def swing(pieces: Sequence[Floats]) -> Floats:
+def rebound(pieces: Sequence[Floats]) -> Floats:
     """The lowest autocorrelation of errors at any lag, (d,), as those of `inflation`."""
     covariances = _autocovariances(pieces)
     return covariances.min(axis=0) / np.maximum(covariances[0], LEAST)

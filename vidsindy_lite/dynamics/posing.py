@@ -14,7 +14,7 @@ from .errors import spread_to_unseen
 from .form import Form
 from .library import extended
 from .problem import Problem, fit_curves, term_penalties
-from .smoothing import smooth
+from .smoothing import PENALTIES, smooth
 from .splines import DEGREE
 from .trajectories import Trajectory, cut, typical_step, typical_steps
 from .units import Units
@@ -35,10 +35,12 @@ def pose(
     form: Form,
     rng: np.random.Generator,
     sigma: list[Floats] | None = None,
+    through: bool = False,
 ) -> Problem:
     """Pose the problem of a discovery: standard units, gaps, noise, prices.
 
-    The noise is as given by ``sigma``, (n, d) for each trajectory, or as the smoothing estimates.
+    The noise is as given by ``sigma``, (n, d) for each trajectory, or as the smoothing estimates;
+    the curves are smoothed, or go ``through`` the samples.
 
     Raises
     ------
@@ -61,7 +63,7 @@ def pose(
         centre = np.zeros_like(centre)
     step = typical_step(measured)
     trajectories = [(t / step, (values - centre) / scale) for t, values in measured]
-    stretches, curves, noise = _smoothed(trajectories, rng)
+    stretches, curves, noise = _smoothed(trajectories, rng, PENALTIES[:1] if through else PENALTIES)
     speed = _rms_speed(curves)
     curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]
     noise = np.maximum(noise, CLEANEST)
@@ -188,7 +190,7 @@ def _check_independent(form: Form, terms: Floats) -> None:
 
 
 def _smoothed(
-    trajectories: Sequence[Trajectory], rng: np.random.Generator
+    trajectories: Sequence[Trajectory], rng: np.random.Generator, penalties: Floats
 ) -> tuple[list[tuple[int, Trajectory]], Sequence[BSpline], Floats]:
     """Stretches between gaps, their smoothing splines and the noise; time in typical steps.
 
@@ -198,11 +200,11 @@ def _smoothed(
     """
     steps = typical_steps(trajectories)
     first = _stretches(trajectories, 5.0 * steps)
-    smoothed = smooth([piece for _, piece in first], rng)
+    smoothed = smooth([piece for _, piece in first], rng, penalties)
     longest = np.maximum(2.5 * steps, GAP / _rms_speed(smoothed.splines))
     stretches = _stretches(trajectories, longest)
     if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:
-        smoothed = smooth([piece for _, piece in stretches], rng)
+        smoothed = smooth([piece for _, piece in stretches], rng, penalties)
     return stretches, smoothed.splines, smoothed.noise
 
 

@@ -43,7 +43,9 @@ class Smooth:
     noise: Floats
 
 
-def smooth(stretches: Sequence[Trajectory], rng: np.random.Generator) -> Smooth:
+def smooth(
+    stretches: Sequence[Trajectory], rng: np.random.Generator, penalties: Floats = PENALTIES
+) -> Smooth:
     """Smooth stretches of data by generalised cross-validation.
 
     Minimises ``|G P - x|^2 + penalty |second derivative|^2`` with a knot at every sample; the
@@ -56,6 +58,8 @@ def smooth(stretches: Sequence[Trajectory], rng: np.random.Generator) -> Smooth:
         Times (n,) and values (n, d) without gaps, n >= 2; NaN where a coordinate was not seen.
     rng : numpy.random.Generator
         For the probes.
+    penalties : ndarray, optional
+        Among which to choose.
     """
     grid = Grid.of([Segment(t, x, t) for t, x in stretches])
     roughness, signs = _roughness(stretches, grid), rng.choice([-1.0, 1.0], size=len(grid.x))
@@ -64,14 +68,14 @@ def smooth(stretches: Sequence[Trajectory], rng: np.random.Generator) -> Smooth:
     for k, seen in enumerate(patterns.T):
         alike, rows = np.flatnonzero(kind == k), np.flatnonzero(seen)
         smoothed = _cross_validated(
-            grid.samples[rows], grid.x[np.ix_(rows, alike)], roughness, signs[rows]
+            grid.samples[rows], grid.x[np.ix_(rows, alike)], roughness, signs[rows], penalties
         )
         control[:, alike], noise[alike] = smoothed
     return Smooth(tuple(grid.splines(control)), noise)
 
 
 def _cross_validated(
-    samples: sparse.csr_array, x: Floats, roughness: Floats, signs: Floats
+    samples: sparse.csr_array, x: Floats, roughness: Floats, signs: Floats, penalties: Floats
 ) -> tuple[Floats, Floats]:
     """Control points, (r, d), and noise, (d,), of coordinates that were seen at the same times."""
     n, d = x.shape
@@ -82,12 +86,12 @@ def _cross_validated(
     right = samples.T @ np.concatenate([x, probes], axis=1)
     best, noise = np.full(d, np.inf), np.zeros(d)
     control, chosen = np.zeros((samples.shape[1], d)), np.zeros(d, dtype=int)
-    every = np.arange(len(PENALTIES))
+    every = np.arange(len(penalties))
     coarse = every % COARSE == 0
     for refined in (False, True):
         near = np.abs(every[:, None] - chosen).min(axis=1) < COARSE
         for index in every[near & ~coarse if refined else coarse]:
-            band = sample_band + PENALTIES[index] * roughness
+            band = sample_band + penalties[index] * roughness
             band[0] += 1e-12 * band[0].max()
             solved = cho_solve_banded((cholesky_banded(band, lower=True), True), right)
             fitted = samples @ solved

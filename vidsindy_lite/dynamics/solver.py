@@ -22,6 +22,7 @@ from tqdm import tqdm
 from ..arrays import Floats
 from ..checks import check_integer
 from .candidates import Library, check_library
+from .coarse import DROWNED, with_noise
 from .collocation import Fit, Status
 from .conclusion import conclude
 from .discovery import Discovery
@@ -52,8 +53,6 @@ EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
 RICHEST = 2.0
 """Most terms of a law that refines another, over the terms of that."""
-DROWNED = 0.5
-"""Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
 MOST_HALVINGS = 4
 """Most halvings of the knot spans."""
 MOST_WEIGHINGS = 2
@@ -214,7 +213,7 @@ def _solved(measured: Measured, seed: int, progress: bool, form: Form) -> Solved
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     history = History()
-    problem = foreseen(pose(trajectories, shared, form, probes, sigma))
+    problem = with_noise(lambda through: pose(trajectories, shared, form, probes, sigma, through))
     with tqdm(total=2, disable=not progress, desc="discover", leave=False) as bar:
         fit = polish(problem, search(problem, starts, history), history)
         bar.update()

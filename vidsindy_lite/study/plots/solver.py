@@ -157,8 +157,8 @@ def plot_histories(
     for frame, terms in true_terms.items():
         panels[2].axhline(terms, color="k", lw=0.8, ls=":")
         panels[2].annotate(
-            f"truth, {frame}", (0.01, terms), xycoords=("axes fraction", "data"), fontsize=9,
-            ha="left", va="center", bbox=_WHITE,  # where no optimiser has come that far
+            f"truth,\n{frame}", (1.01, terms), xycoords=("axes fraction", "data"), fontsize=9,
+            ha="left", va="center",
         )  # fmt: skip
     panels[2].set_yticks(ticks, [str(tick) for tick in ticks])
     panels[2].minorticks_off()

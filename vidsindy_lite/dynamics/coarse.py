@@ -1,0 +1,57 @@
+"""Noise of data with few samples a turn, told by all candidate terms together.
+
+A curve without a law has as much freedom as there are samples a turn. Where these are few, it takes
+motion for noise, or gives the motion up and is flat; a law says that much again. So all terms are
+fitted at once, and what they leave is the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from .errors import residual_noise
+from .history import History
+from .persistence import TOLERATED
+from .precision import foreseen
+from .problem import Problem, fit_curves
+from .search import CONSISTENT, FIRST_WEIGHTS, unpruned
+
+COARSE = 20
+"""Samples a turn from which on a curve tells the noise to a tenth."""
+DROWNED = 0.5
+"""Errors, relative to the spread of the data, beyond which a curve tells nothing of the motion."""
+
+
+def with_noise(pose: Callable[[bool], Problem]) -> Problem:
+    """A problem with the noise that its curves leave, or, where that is far less, all terms.
+
+    Parameters
+    ----------
+    pose : callable
+        Poses the problem: with smoothed curves, or, if what is passed is true, with curves through
+        the samples, which serve where smoothed ones leave out a part of the motion.
+    """
+    problem = foreseen(pose(False))
+    samples = sum(len(t) for t, _ in problem.trajectories)
+    turns = sum(t[-1] - t[0] for t, _ in problem.trajectories) / (2 * np.pi)
+    # A curve that has given up has no turns.
+    enough = samples > COARSE * turns and problem.noise.max() <= DROWNED
+    if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():
+        return problem
+    return _by_all_terms(problem) or _by_all_terms(pose(True)) or problem
+
+
+def _by_all_terms(problem: Problem) -> Problem | None:
+    """The problem with the noise that all terms leave, if they converge and leave far less."""
+    collocation = problem.collocation(problem.segments())
+    control = fit_curves(collocation, problem.curves)
+    rows = ~problem.form.implicit
+    fit, weight = unpruned(problem, collocation, control, rows, "all terms", History())
+    left = residual_noise(fit)
+    over = CONSISTENT * left < problem.noise
+    if weight < FIRST_WEIGHTS[-1] or not over.any():
+        return None
+    return replace(problem, noise=np.where(over, left, problem.noise))
