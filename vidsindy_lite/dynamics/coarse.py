@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .collocation import Fit
 from .errors import residual_noise
 from .history import History
 from .persistence import TOLERATED
@@ -25,23 +26,24 @@ DROWNED = 0.5
 """Errors, relative to the spread of the data, beyond which a curve tells nothing of the motion."""
 
 
-def with_noise(pose: Callable[[bool], Problem]) -> Problem:
-    """A problem with the noise that its curves leave, or, where that is far less, all terms.
+def views(pose: Callable[..., Problem]) -> list[Problem]:
+    """A problem with the noise that its curves leave, and, if far less, with that of all terms.
 
     Parameters
     ----------
     pose : callable
-        Poses the problem: with smoothed curves, or, if what is passed is true, with curves through
+        Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
         the samples, which serve where smoothed ones leave out a part of the motion.
     """
-    problem = foreseen(pose(False))
+    problem = foreseen(pose())
     samples = sum(len(t) for t, _ in problem.trajectories)
     turns = sum(t[-1] - t[0] for t, _ in problem.trajectories) / (2 * np.pi)
     # A curve that has given up has no turns.
     enough = samples > COARSE * turns and problem.noise.max() <= DROWNED
     if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():
-        return problem
-    return _by_all_terms(problem) or _by_all_terms(pose(True)) or problem
+        return [problem]
+    told = _by_all_terms(problem) or _by_all_terms(pose(True))
+    return [problem] if told is None else [problem, told]
 
 
 def _by_all_terms(problem: Problem) -> Problem | None:
@@ -55,3 +57,17 @@ def _by_all_terms(problem: Problem) -> Problem | None:
     if weight < FIRST_WEIGHTS[-1] or not over.any():
         return None
     return replace(problem, noise=np.where(over, left, problem.noise))
+
+
+def evidence(problem: Problem, fit: Fit) -> float:
+    """What a law costs whose noise is its own: n log variance, and the price of its terms.
+
+    The lower, the better (Bayesian information criterion); of laws of the same data.
+    """
+    counts = fit.collocation.counts
+    seen = counts > 0
+    # Of a law that is kicked, what is not foretold: the curve follows its data.
+    single = (
+        np.hypot(problem.noise, problem.process_noise) if problem.kicked else residual_noise(fit)
+    )
+    return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.price(fit.state)

@@ -22,7 +22,7 @@ from tqdm import tqdm
 from ..arrays import Floats
 from ..checks import check_integer
 from .candidates import Library, check_library
-from .coarse import DROWNED, with_noise
+from .coarse import DROWNED, evidence, views
 from .collocation import Fit, Status
 from .conclusion import conclude
 from .discovery import Discovery
@@ -213,29 +213,45 @@ def _solved(measured: Measured, seed: int, progress: bool, form: Form) -> Solved
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     history = History()
-    problem = with_noise(lambda through: pose(trajectories, shared, form, probes, sigma, through))
-    with tqdm(total=2, disable=not progress, desc="discover", leave=False) as bar:
+    with tqdm(total=0, disable=not progress, desc="discover", leave=False) as bar:
+        outcomes = [
+            _law(problem, starts, probes, history, bar)
+            for problem in views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
+        ]
+    problem, fit, path = min(outcomes, key=lambda outcome: evidence(*outcome[:2]))
+    return conclude(problem, fit, path, history), problem, fit
+
+
+def _law(
+    problem: Problem,
+    starts: np.random.Generator,
+    probes: np.random.Generator,
+    history: History,
+    bar: tqdm,
+) -> tuple[Problem, Fit, Path]:
+    """The law of a problem: the problem as that tells it, the last fit, and the path of laws."""
+    bar.total += 2
+    fit = polish(problem, search(problem, starts, history), history)
+    bar.update()
+    for _ in range(MOST_WEIGHINGS):
+        weighed = with_precision(problem, fit)
+        if weighed is problem:
+            break
+        problem = weighed
+        bar.total += 1
         fit = polish(problem, search(problem, starts, history), history)
         bar.update()
-        for _ in range(MOST_WEIGHINGS):
-            weighed = with_precision(problem, fit)
-            if weighed is problem:
-                break
-            problem = weighed
-            bar.total += 1
-            fit = polish(problem, search(problem, starts, history), history)
-            bar.update()
-        if (problem.errors(fit) > CONSISTENT * problem.noise).any():
-            problem = with_process_noise(problem, fit, probes)
-        if problem.kicked:
-            bar.total += 1
-            fit = search(problem, starts, history)
-            problem = rebalanced(problem, fit, probes)
-            fit = polish(problem, fit, history)
-            bar.update()
-        fit, path = settle(problem, fit, history)
+    if (problem.errors(fit) > CONSISTENT * problem.noise).any():
+        problem = with_process_noise(problem, fit, probes)
+    if problem.kicked:
+        bar.total += 1
+        fit = search(problem, starts, history)
+        problem = rebalanced(problem, fit, probes)
+        fit = polish(problem, fit, history)
         bar.update()
-    return conclude(problem, fit, path, history), problem, fit
+    fit, path = settle(problem, fit, history)
+    bar.update()
+    return problem, fit, path
 
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
