@@ -6,8 +6,9 @@ curve eliminated (`collocation`), a search over supports in the small algebra th
 (`selection`), the offset as the origin in which the law is sparsest (`origin`), and a physics
 weight that is raised until the law holds exactly. Nothing is set by hand per system.
 
-The stages, in order: `pose` (`problem`), `search` at a tolerated error, `polish` at the errors that
-are left, `settle` on the law that persists (`persistence`).
+The stages, in order: `pose` (`posing`), twice where samples are few (`coarse`), `search` at a
+tolerated error, `polish` at the errors that are left, `settle` on the law that persists
+(`persistence`).
 """
 
 from __future__ import annotations
