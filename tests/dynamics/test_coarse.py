@@ -55,7 +55,7 @@ def test_what_is_noise_stays_noise():
     assert (views(partial(posed, np.arange(200.0), x))[-1].noise > 0.7).all()
 
 
-@pytest.mark.parametrize(("step", "seed"), [(1.0, 0), (1.0, 2), (2.0, 1)])
+@pytest.mark.parametrize(("step", "seed"), [(1.0, 0), (1.0, 2), (2.0, 1), (2.0, 3)])
 def test_van_der_pol_from_fifty_samples(step, seed):
     rng = np.random.default_rng(seed)
     t = step * np.arange(50)

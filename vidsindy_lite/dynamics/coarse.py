@@ -42,21 +42,23 @@ def views(pose: Callable[..., Problem]) -> list[Problem]:
     enough = samples > COARSE * turns and problem.noise.max() <= DROWNED
     if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():
         return [problem]
-    told = _by_all_terms(problem) or _by_all_terms(pose(True))
+    told = _by_terms(problem) or _by_terms(pose(True))
     return [problem] if told is None else [problem, told]
 
 
-def _by_all_terms(problem: Problem) -> Problem | None:
-    """The problem with the noise that all terms leave, if they converge and leave far less."""
+def _by_terms(problem: Problem) -> Problem | None:
+    """The problem with the noise that terms leave, as many as converge, if it is far less."""
     collocation = problem.collocation(problem.segments())
     control = fit_curves(collocation, problem.curves)
-    rows = ~problem.form.implicit
-    fit, weight = unpruned(problem, collocation, control, rows, "all terms", History())
-    left = residual_noise(fit)
-    over = CONSISTENT * left < problem.noise
-    if weight < FIRST_WEIGHTS[-1] or not over.any():
-        return None
-    return replace(problem, noise=np.where(over, left, problem.noise))
+    degrees = problem.exponents.sum(axis=1)
+    for degree in range(problem.form.degree, 0, -1):
+        rows = ~problem.form.implicit & (degrees <= degree)
+        fit, weight = unpruned(problem, collocation, control, rows, "all terms", History())
+        left = residual_noise(fit)
+        over = CONSISTENT * left < problem.noise
+        if weight == FIRST_WEIGHTS[-1] and over.any():
+            return replace(problem, noise=np.where(over, left, problem.noise))
+    return None
 
 
 def evidence(problem: Problem, fit: Fit) -> float:
