@@ -22,8 +22,8 @@ from .search import CONSISTENT, FIRST_WEIGHTS, unpruned
 
 COARSE = 20
 """Samples a turn from which on a curve tells the noise to a tenth."""
-DROWNED = 0.5
-"""Errors, relative to the spread of the data, beyond which a curve tells nothing of the motion."""
+FLAT = 0.9
+"""Errors, relative to the spread of the data, of a curve that has given the motion up."""
 
 
 def views(pose: Callable[..., Problem]) -> list[Problem]:
@@ -39,7 +39,7 @@ def views(pose: Callable[..., Problem]) -> list[Problem]:
     samples = sum(len(t) for t, _ in problem.trajectories)
     turns = sum(t[-1] - t[0] for t, _ in problem.trajectories) / (2 * np.pi)
     # A curve that has given up has no turns.
-    enough = samples > COARSE * turns and problem.noise.max() <= DROWNED
+    enough = samples > COARSE * turns and problem.noise.max() < FLAT
     if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():
         return [problem]
     told = _by_terms(problem) or _by_terms(pose(True))

@@ -23,7 +23,7 @@ from tqdm import tqdm
 from ..arrays import Floats
 from ..checks import check_integer
 from .candidates import Library, check_library
-from .coarse import DROWNED, evidence, views
+from .coarse import evidence, views
 from .collocation import Fit, Status
 from .conclusion import conclude
 from .discovery import Discovery
@@ -54,6 +54,8 @@ EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
 RICHEST = 2.0
 """Most terms of a law that refines another, over the terms of that."""
+DROWNED = 0.5
+"""Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
 MOST_HALVINGS = 4
 """Most halvings of the knot spans."""
 MOST_WEIGHINGS = 2
