@@ -105,12 +105,15 @@ def closest_rival(
     joined = [tableau.outside[moved], tableau.outside[[alone.argmin()]] if len(alone) else NONE]
     rivals = [_with_newcomer(model, support, entry) for entry in np.concatenate(joined)]
     free = replace(model, penalty=np.where(np.isfinite(penalty), 0.0, penalty))
+    whole = free.fit(~np.isposinf(penalty))
+    lost = np.zeros(len(penalty))
+    lost[whole.inside] = whole.fitted**2 / np.diag(whole.inverse)
     for entry in fit.inside[np.isfinite(penalty[fit.inside])]:
         # No law without it is cheaper than all other entries were, if they cost nothing.
-        bound = free.fit(_changed(~np.isposinf(penalty), entry, NONE)).value
-        if bound < min((rival.value for rival in rivals), default=np.inf):
+        goal = min((rival.value for rival in rivals), default=np.inf)
+        if whole.value + lost[entry] < goal:
             without = _changed(support, entry, NONE)
-            rivals.append(_descend(model.priced(entry, np.inf), without))
+            rivals.append(_descend(model.priced(entry, np.inf), without, goal))
     if not rivals:
         return np.inf, NONE, NONE
     rival = min(rivals, key=lambda rival: rival.value)
@@ -184,13 +187,16 @@ class _Quadratic:
         return _Fit(support, inside, inverse, self.present[inside] + moved, left, value)
 
 
-def _descend(model: _Quadratic, start: Bools) -> _Fit:
-    """Take the best of all drops, adds and swaps until none helps."""
+def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
+    """Take the best of all drops, adds and swaps until none helps.
+
+    Or until as many changes like the best as there are entries would still not reach the goal.
+    """
     best = model.fit(start)
     while True:
         changes = _single_changes(model, _Tableau.of(model, best))
         change, dropped, added = min(changes, key=lambda item: item[0])
-        if not change < -PLATEAU:
+        if not change < -PLATEAU or best.value + len(best.inside) * change > goal:
             return best
         # Rounding may promise a fall that does not come: what counts is the value itself.
         fit = model.fit(_changed(best.support, dropped, added))
