@@ -7,8 +7,7 @@ import pytest
 from helpers import posed
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.dynamics import Library, discover, monomial_exponents
-from vidsindy_lite.dynamics import beyond
+from vidsindy_lite.dynamics import Library, beyond, discover, monomial_exponents
 from vidsindy_lite.dynamics.beyond import Beyond, _higher, newcomers, widened
 from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.state import State
