@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import posed
+from helpers import dependent, posed
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import PolynomialSystem
@@ -12,6 +12,7 @@ from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
 from vidsindy_lite.dynamics.conclusion import _kicks
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.process_noise import OCTAVE, _bands, evidence
+from vidsindy_lite.dynamics.search import FIRST_WEIGHTS
 from vidsindy_lite.dynamics.splines import Segment
 from vidsindy_lite.dynamics.state import State
 
@@ -47,6 +48,25 @@ def found_kicked():
 def test_law_of_a_kicked_motion_is_found(found_kicked):
     assert exact(found_kicked, LAW)
     assert found_kicked.status == "ok"
+
+
+def test_no_law_is_searched_at_larger_errors_where_the_motion_is_kicked():
+    rng = np.random.default_rng(11)
+    x = kicked(LAW, [2.0, 0.0], TIMES, 0.2, rng)
+    found = vl.discover(TIMES, x + 0.002 * rng.standard_normal(x.shape), order=1)
+    assert exact(found, LAW)
+    stages = [(step.stage, step.physics_weight) for step in found.history]
+    assert stages.count(("unpruned, degree 2", FIRST_WEIGHTS[0])) == 2  # before kicks, and under
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_errors_that_a_poor_law_leaves_are_not_taken_for_kicks(seed):
+    """The first law shows kicks; the one that is found under them holds exactly."""
+    rng = np.random.default_rng(seed)
+    x = LAW.simulate(TIMES, np.array([2.0, 0.0])) + 0.2 * dependent(rng, len(TIMES), 0.97)
+    found = vl.discover(TIMES, x, order=1)
+    assert exact(found, LAW)
+    assert not found.model_error.any()
 
 
 def test_kicks_are_as_large_as_they_were(found_kicked):

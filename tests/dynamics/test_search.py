@@ -12,6 +12,7 @@ from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.posing import pose
 from vidsindy_lite.dynamics.problem import fit_curves
+from vidsindy_lite.dynamics.state import State
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=2)
 
@@ -50,6 +51,20 @@ def test_all_data_decide_on_the_terms_of_a_part(monkeypatch):
     assert sum(len(s.t) for s in fit.collocation.segments) == 1500
     assert "subset search, all data" in [step.stage for step in history.steps]
     assert fit.state.active.sum() == 2
+
+
+def test_axes_that_moved_for_nothing_come_home_if_the_fit_has_converged():
+    problem, history = posed([np.linspace(0, 20, 400)]), History()
+    collocation = problem.weighted(problem.collocation(problem.segments()), search.FINAL_WEIGHT)
+    control = fit_curves(collocation, problem.curves)
+    active = CIRCLE.support
+    state = State(control, 0.0 * active, active, problem.home, np.ones(2, dtype=bool))
+    start = collocation.solve(state)
+    moved = search.select(problem, start, search.FINAL_WEIGHT, "moved", history)
+    assert moved.state.moving.all()
+    assert not search.come_home(problem, moved, history).state.moving.any()
+    unfinished = replace(moved, status=Status.MAX_STEPS)
+    assert search.come_home(problem, unfinished, history) is unfinished
 
 
 @pytest.mark.parametrize("fails_at", [None, 1, 3])

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from vidsindy_lite.dynamics import selection
 from vidsindy_lite.dynamics.selection import (
+    _descend,
     _moved_by_newcomers,
     _Quadratic,
     _single_changes,
@@ -173,7 +174,8 @@ def test_the_closest_rival_may_have_no_term_in_common():
 @given(st.integers(0, 2**32 - 1), st.integers(2, 8), st.floats(0.1, 100), st.integers(1, 2))
 def test_a_newcomer_moves_others_if_a_fit_with_it_says_so(seed, m, price, batches):
     information, pull, rng = random_problem(seed, m)
-    model = _Quadratic.of(information, pull, rng.standard_normal(m), np.full(m, price))
+    penalty = price * rng.uniform(0.5, 2, m)
+    model = _Quadratic.of(information, pull, rng.standard_normal(m), penalty)
     support = rng.random(m) < 0.5
     assume(not support.all())
     before = _Tableau.of(model, model.fit(support))
@@ -189,6 +191,16 @@ def test_a_newcomer_moves_others_if_a_fit_with_it_says_so(seed, m, price, batche
         least = min(cost for cost, _, _ in changes)
         assume(abs(least) > 1e-4)
         assert moved[number] == (least < 0)
+
+
+def test_a_descent_that_cannot_reach_its_goal_is_given_up():
+    information, pull, _ = random_problem(5, 8)
+    model = _Quadratic.of(information, pull, np.zeros(8), np.full(8, 1e-3))
+    start = np.arange(8) < 2
+    lowest = _descend(model, start).value
+    assert lowest < model.fit(start).value
+    assert _descend(model, start, goal=lowest).value == lowest
+    assert (_descend(model, start, goal=-np.inf).support == start).all()
 
 
 def test_a_penalty_of_minus_infinity_keeps_a_worthless_column():

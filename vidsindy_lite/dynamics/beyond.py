@@ -28,7 +28,7 @@ from .state import State
 HIGHER = 2
 """Degrees beyond that of the library: an odd function needs two."""
 BUDGET = 2e7
-"""Most entries of the derivatives of the data in the terms that are tried."""
+"""Most entries of the derivatives of the data, or the curve, in the terms that are tried."""
 CHANCE_OF_ALL, CHANCE_OF_ONE = 1e-4, 1e-3
 """Probability below which what all higher terms explain, or the best of them, is no chance."""
 SLIGHT = 1.5
@@ -162,7 +162,8 @@ def widened(problem: Problem, fit: Fit) -> Wider:
     """The last fit among terms beyond its library; of a fraction, whose terms are others, none."""
     form, size, d = problem.form, len(problem.exponents), problem.d
     equations = np.flatnonzero(form.candidates.any(axis=0))
-    budget = BUDGET / fit.collocation.grid.x.size / len(equations)
+    grid = fit.collocation.grid
+    budget = BUDGET / max(grid.x.size, grid.r * d) / len(equations)
     law, exponents = problem.law(fit.state), problem.exponents
     if not (law.support & law.implicit[:, None]).any():
         exponents = _higher(exponents, form.states, budget)

@@ -52,14 +52,15 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     segments = [
         Segment.even(s.t, s.x, problem.spacing, s.trajectory) for s in fit.collocation.segments
     ]
-    exact = _measured_badly(problem, fit, segments)
-    every = replace(exact.state, active=problem.form.candidates)
-    free = _free(problem)
-    start = problem.weighted(problem.collocation(segments), 1.0)
+    start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
+    every = replace(_on_knots(start, fit), active=problem.form.candidates)
     kicked = _balanced(problem, _hard_where_known(start, free), every, rng)
+    if unlike_kicks(kicked, free, rng) > UNLIKE:
+        return problem
+    exact = _measured_badly(problem, fit, segments)
     newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
     measured = evidence(exact) + prediction_gain(exact).sum()
-    if not evidence(kicked) + 2 * newcomers < measured or unlike_kicks(kicked, free, rng) > UNLIKE:
+    if not evidence(kicked) + 2 * newcomers < measured:
         return problem
     return _with_variances(problem, kicked.collocation)
 
@@ -103,11 +104,15 @@ def evidence(fit: Fit) -> float:
 def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
     """The exact law on other knots, at the errors that it leaves."""
     grid = problem.collocation(segments, residual_noise(fit))
-    curves = fit.collocation.grid.splines(fit.state.control_points)
-    state = replace(fit.state, control_points=fit_curves(grid, curves))
-    exact = problem.weighted(grid, HARDEST).solve(state)
+    exact = problem.weighted(grid, HARDEST).solve(_on_knots(grid, fit))
     own = exact.collocation.weighted(residual_noise(exact) ** -2, exact.collocation.physics_weights)
     return own.solve(exact.state)
+
+
+def _on_knots(collocation: Collocation, fit: Fit) -> State:
+    """The state of a fit on other knots."""
+    curves = fit.collocation.grid.splines(fit.state.control_points)
+    return replace(fit.state, control_points=fit_curves(collocation, curves))
 
 
 def _balanced(

@@ -46,30 +46,53 @@ LONGEST_SEARCH = 10
 CONSISTENT = 1.5
 """Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
 LONGEST_CLIMB = 4
-"""Most searches at larger errors."""
+"""Most searches, each at larger errors than the one before."""
 
 
 def search(problem: Problem, rng: np.random.Generator, history: History) -> Fit:
-    """The terms that make the motion: the cheapest law at a tolerated error.
+    """The terms that make the motion: the cheapest law at the least error that is tolerated."""
+    return _tolerating(problem, _tolerable(problem), rng, history)
+
+
+def consistent(problem: Problem, fit: Fit) -> bool:
+    """Whether a law of the first search leaves no larger errors than that tolerated."""
+    return bool((problem.errors(fit) <= CONSISTENT * _tolerable(problem)).all())
+
+
+def climb(problem: Problem, fit: Fit, rng: np.random.Generator, history: History) -> Fit:
+    """The law of a search at errors that it leaves.
 
     If the law leaves larger errors than were tolerated, or errors that last, the search is made
-    again and tolerates them. Kicks are tolerated as they are. Long data are searched in part: all
-    of them then decide on the terms once more.
+    again and tolerates them.
     """
-    tolerated = problem.noise if problem.kicked else np.maximum(problem.noise, TOLERATED)
-    stretches = _enough(problem)
-    for _ in range(LONGEST_CLIMB):
-        tolerant = replace(problem, noise=tolerated)
-        part = replace(tolerant, stretches=stretches)
-        fit = cheapest(part, candidates(part, rng, history), history)
-        if stretches is not problem.stretches:
-            fit = _of_all_data(tolerant, fit, history)
-        fit = bridge(tolerant, fit, history)
+    tolerated = _tolerable(problem)
+    for _ in range(LONGEST_CLIMB - 1):
         left = problem.errors(fit)
         if (left <= CONSISTENT * tolerated).all() or (tolerated >= LARGEST).all():
             break
         tolerated = np.maximum(tolerated, np.minimum(left, LARGEST))
+        fit = _tolerating(problem, tolerated, rng, history)
     return fit
+
+
+def _tolerable(problem: Problem) -> Floats:
+    """Errors that a first search tolerates, (d,); kicks are tolerated as they are."""
+    return problem.noise if problem.kicked else np.maximum(problem.noise, TOLERATED)
+
+
+def _tolerating(
+    problem: Problem, tolerated: Floats, rng: np.random.Generator, history: History
+) -> Fit:
+    """The cheapest law at tolerated errors, (d,).
+
+    Long data are searched in part: all of them then decide on the terms once more.
+    """
+    tolerant, stretches = replace(problem, noise=tolerated), _enough(problem)
+    part = replace(tolerant, stretches=stretches)
+    fit = cheapest(part, candidates(part, rng, history), history)
+    if stretches is not problem.stretches:
+        fit = _of_all_data(tolerant, fit, history)
+    return bridge(tolerant, fit, history)
 
 
 def _enough(problem: Problem) -> list[tuple[int, Trajectory]]:
@@ -295,7 +318,9 @@ def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
         ]
         limit = min(fit.criterion for fit in refined) + problem.penalties.max()
         kept = list({_key(fit.state): fit for fit in refined if fit.criterion <= limit}.values())
-    settled = [leave_home(problem, come_home(problem, fit, history), history) for fit in kept]
+    homes = [come_home(problem, fit, history) for fit in kept]
+    distinct = {_key(fit.state): fit for fit in homes}.values()
+    settled = [leave_home(problem, fit, history) for fit in distinct]
     return min(settled, key=lambda fit: fit.criterion)
 
 
@@ -310,8 +335,8 @@ def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
     The frames were compared at a small physics weight, at which weak terms do not count.
     """
     state = fit.state
-    if not state.moving.any():
-        return fit
+    if fit.status is not Status.CONVERGED or not state.moving.any():
+        return fit  # what has not converged is no law whose terms could tell
     closed = _closed(problem, fit, FINAL_WEIGHT)
     law = _as_shifted(problem, closed)
     variants = _variants(state.offset, problem.home)
@@ -328,7 +353,7 @@ def leave_home(problem: Problem, fit: Fit, history: History) -> Fit:
     """Move axes off home where terms make up for their staying there, while the criterion falls."""
     elsewhere = away(problem, fit.state)
     if fit.status is not Status.CONVERGED or not elsewhere:
-        return fit  # what has not converged is no law whose terms could tell
+        return fit  # as in `come_home`
     closed = _closed(problem, fit, FINAL_WEIGHT)
     law = _as_shifted(problem, closed)
     starts = [_candidate(problem, closed, law, *there) for there in elsewhere]

@@ -105,12 +105,15 @@ def closest_rival(
     joined = [tableau.outside[moved], tableau.outside[[alone.argmin()]] if len(alone) else NONE]
     rivals = [_with_newcomer(model, support, entry) for entry in np.concatenate(joined)]
     free = replace(model, penalty=np.where(np.isfinite(penalty), 0.0, penalty))
+    whole = free.fit(~np.isposinf(penalty))
+    lost = np.zeros(len(penalty))
+    lost[whole.inside] = whole.fitted**2 / np.diag(whole.inverse)
     for entry in fit.inside[np.isfinite(penalty[fit.inside])]:
         # No law without it is cheaper than all other entries were, if they cost nothing.
-        bound = free.fit(_changed(~np.isposinf(penalty), entry, NONE)).value
-        if bound < min((rival.value for rival in rivals), default=np.inf):
+        goal = min((rival.value for rival in rivals), default=np.inf)
+        if whole.value + lost[entry] < goal:
             without = _changed(support, entry, NONE)
-            rivals.append(_descend(model.priced(entry, np.inf), without))
+            rivals.append(_descend(model.priced(entry, np.inf), without, goal))
     if not rivals:
         return np.inf, NONE, NONE
     rival = min(rivals, key=lambda rival: rival.value)
@@ -174,7 +177,7 @@ class _Quadratic:
         inverse = np.asarray(np.linalg.inv(block), dtype=float)
         step = -self.present
         step[inside] = 0.0
-        target = (self.gradient - self.matrix @ step)[inside]
+        target = self.gradient[inside] - self.matrix[inside] @ step
         moved = inverse @ target
         moved += inverse @ (target - block @ moved)
         step[inside] = moved
@@ -184,13 +187,16 @@ class _Quadratic:
         return _Fit(support, inside, inverse, self.present[inside] + moved, left, value)
 
 
-def _descend(model: _Quadratic, start: Bools) -> _Fit:
-    """Take the best of all drops, adds and swaps until none helps."""
+def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
+    """Take the best of all drops, adds and swaps until none helps.
+
+    Or until as many changes like the best as there are entries would still not reach the goal.
+    """
     best = model.fit(start)
     while True:
         changes = _single_changes(model, _Tableau.of(model, best))
         change, dropped, added = min(changes, key=lambda item: item[0])
-        if not change < -PLATEAU:
+        if not change < -PLATEAU or best.value + len(best.inside) * change > goal:
             return best
         # Rounding may promise a fall that does not come: what counts is the value itself.
         fit = model.fit(_changed(best.support, dropped, added))
@@ -232,9 +238,13 @@ def _moved_by_newcomers(model: _Quadratic, tableau: _Tableau) -> Bools:
     left, free = tableau.left - common * pull, room - common**2 / share
     np.fill_diagonal(free, 0.0)  # the newcomer itself is in
     loss = fitted**2 / spread - model.penalty[inside]
+    gain = _gain(left, free)
     moved = (room <= COLLINEAR) | (loss < -PLATEAU).any(axis=1)
-    moved |= (price - _gain(left, free) < -PLATEAU).any(axis=1)
-    unsure = np.flatnonzero(~moved)
+    moved |= (price - gain < -PLATEAU).any(axis=1)
+    saved = gain - price + model.penalty[inside].max(initial=-np.inf)
+    lost = np.where(np.isfinite(model.penalty[inside]), fitted**2 / spread, np.inf)
+    swaps = _may_swap(tableau, common / share, spread, lost, free, gain, saved)
+    unsure = np.flatnonzero(~moved & swaps.any(axis=1))
     for many in np.array_split(unsure, 1 + tableau.response.size * len(unsure) // BATCH):
         response = tableau.response - (common / share)[many, :, None] * tableau.response[many, None]
         swapped_left = left[many, :, None] + response * (fitted / spread)[many, None]
@@ -243,6 +253,31 @@ def _moved_by_newcomers(model: _Quadratic, tableau: _Tableau) -> Bools:
         swap = loss[many, None] + price[:, None] - _gain(swapped_left, swapped_room)
         moved[many] = (swap < -PLATEAU).any(axis=(1, 2))
     return moved
+
+
+def _may_swap(
+    tableau: _Tableau,
+    common: Floats,
+    spread: Floats,
+    lost: Floats,
+    free: Floats,
+    gain: Floats,
+    saved: Floats,
+) -> Bools:
+    """Which of the others a newcomer may let take the place of an entry inside, two axes.
+
+    Few are enough alike. With the tangent ``k`` of what two have in common, for which there is a
+    bound, a swap pays only if ``sqrt(lost) < k sqrt(gain) + sqrt((1 + k^2) saved)``.
+    """
+    alike = np.abs(tableau.response / np.sqrt(tableau.spread)).max(axis=1, initial=0.0)
+    given = np.abs(tableau.response / np.sqrt(spread)).max(axis=1, initial=0.0)[:, None]
+    alike = (alike + np.abs(common) * given) / np.sqrt(np.maximum(free, COLLINEAR))
+    gain, saved = np.maximum(gain, 0.0), np.maximum(saved, 0.0)
+    most = alike * np.sqrt(gain) + np.sqrt((1 + alike**2) * saved)
+    pays = (saved > 0) & (np.sqrt(lost.min(axis=1, initial=np.inf))[:, None] <= most)
+    pays |= free <= COLLINEAR
+    np.fill_diagonal(pays, False)
+    return pays
 
 
 def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:

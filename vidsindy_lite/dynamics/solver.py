@@ -35,7 +35,15 @@ from .posing import pose
 from .precision import foreseen, with_precision
 from .problem import Problem, fit_curves
 from .process_noise import rebalanced, with_process_noise
-from .search import CONSISTENT, FINAL_WEIGHT, SEARCH_WEIGHTS, leave_home, search
+from .search import (
+    CONSISTENT,
+    FINAL_WEIGHT,
+    SEARCH_WEIGHTS,
+    climb,
+    consistent,
+    leave_home,
+    search,
+)
 from .selection import inverse
 from .shape import is_on_circle
 from .swing import LIBRARY, NAME, Swing, swinging
@@ -234,27 +242,52 @@ def _law(
 ) -> tuple[Problem, Fit, Path]:
     """The law of a problem: the problem as that tells it, the last fit, and the path of laws."""
     bar.total += 2
-    fit = polish(problem, search(problem, starts, history), history)
-    bar.update()
-    for _ in range(MOST_WEIGHINGS):
+    fit = search(problem, starts, history)
+    # No search at larger errors would find an exact law of a motion that is kicked.
+    asked = not consistent(problem, fit)
+    if asked:
+        problem, fit = _kicked(problem, fit, starts, probes, history)
+    if not problem.kicked:
+        fit = polish(problem, climb(problem, fit, starts, history), history)
+        bar.update()
+    for _ in range(0 if problem.kicked else MOST_WEIGHINGS):
         weighed = with_precision(problem, fit)
         if weighed is problem:
             break
         problem = weighed
         bar.total += 1
-        fit = polish(problem, search(problem, starts, history), history)
+        fit = climb(problem, search(problem, starts, history), starts, history)
+        fit = polish(problem, fit, history)
         bar.update()
-    if (problem.errors(fit) > CONSISTENT * problem.noise).any():
-        problem = with_process_noise(problem, fit, probes)
+    if not asked and (problem.errors(fit) > CONSISTENT * problem.noise).any():
+        problem, fit = _kicked(problem, fit, starts, probes, history)
     if problem.kicked:
         bar.total += 1
-        fit = search(problem, starts, history)
         problem = rebalanced(problem, fit, probes)
         fit = polish(problem, fit, history)
         bar.update()
     fit, path = settle(problem, fit, history)
     bar.update()
     return problem, fit, path
+
+
+def _kicked(
+    problem: Problem,
+    fit: Fit,
+    starts: np.random.Generator,
+    probes: np.random.Generator,
+    history: History,
+) -> tuple[Problem, Fit]:
+    """The problem with the kicks that its data show, and the law under them; else both as given.
+
+    A poor law shows kicks that are none: the law that is found under them must not hold exactly.
+    """
+    kicked = with_process_noise(problem, fit, probes)
+    if kicked is problem:
+        return problem, fit
+    law = search(kicked, starts, history)
+    exact = with_process_noise(problem, law, probes) is problem
+    return (problem, fit) if exact else (kicked, law)
 
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
