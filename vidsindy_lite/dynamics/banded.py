@@ -44,11 +44,14 @@ def solve_factored(factor: Floats, right: Floats) -> None:
     size = max(BLOCK, reach)
     blocks = [right[start : start + size] for start in range(0, n, size)]
     # Of each block of columns of L its triangle, and how it reaches on to the next block.
-    columns = np.zeros((len(blocks), size, size + reach))
+    triangles = np.zeros((len(blocks), size, size))
+    onward = np.zeros((len(blocks), reach, reach))
     padded = np.pad(factor, ((0, 0), (0, len(blocks) * size - n)))
     for c in range(size):
-        columns[:, c, c : c + reach + 1] = padded[:, c::size].T
-    triangles, onward = columns[:, :, :size].copy(), columns[:, size - reach :, size:]
+        column, inside = padded[:, c::size].T, size - c
+        triangles[:, c, c : c + reach + 1] = column[:, :inside]
+        if inside <= reach:
+            onward[:, reach - inside, : reach + 1 - inside] = column[:, inside:]
     last = len(blocks) - 1
     for k, here in enumerate(blocks):
         dtrsm(1.0, triangles[k].T[: len(here), : len(here)], here.T, 1, 1, 1, overwrite_b=1)
