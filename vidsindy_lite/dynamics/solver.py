@@ -260,7 +260,8 @@ def _law(
         fit = polish(problem, fit, history)
         bar.update()
     if not asked and (problem.errors(fit) > CONSISTENT * problem.noise).any():
-        problem, fit = _kicked(problem, fit, starts, probes, history)
+        problem = with_process_noise(problem, fit, probes)
+        fit = search(problem, starts, history) if problem.kicked else fit
     if problem.kicked:
         bar.total += 1
         problem = rebalanced(problem, fit, probes)
