@@ -104,14 +104,14 @@ towards = np.stack([np.cos(bearings), np.sin(bearings), np.full(3, 0.35)], axis=
 places = 200 * towards / np.linalg.norm(towards, axis=1, keepdims=True)
 rig = Rig(
     tuple(
-        PerspectiveCamera(position=place, normal=place, scale=1 / 1500, angle=0.0)
+        PerspectiveCamera(position=place, normal=place, scale=1 / 2200, angle=0.0)
         for place in places
     )
 )
 folder = TemporaryDirectory()
 paths = [Path(folder.name) / f"{ground}.mp4" for ground in ("hills", "sea", "wood")]
 for path, camera in zip(paths, rig.cameras, strict=True):
-    track, scene = camera.project(x), Scene(background=path.stem, size=14)
+    track, scene = camera.project(x), Scene(background=path.stem, size=24)
     drawn = render_video(path.with_suffix(".mov"), track, scene, fps, seed)
     write_video(path, read_video(drawn), fps, codec="mp4v")
 
@@ -160,7 +160,7 @@ print(f"the ball is at most {np.nanmax(beside):.2f} pixels beside the curve")
 assert np.nanmax(beside) < 0.5
 
 # %%
-moments = np.arange(0, 3 * fps, fps // 10)
+moments = np.arange(0, (3 if full else 1) * fps, fps // 10)
 shown = [[image for i, image in enumerate(read_video(path)) if i in moments] for path in paths]
 lines = found.equations().splitlines()
 pictures = plots.draw_tour(shown, moments, curves, seen.fitted, lines)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from .candidates import Library
 from .discovery import Discovery
 from .physics import Quantity
@@ -26,6 +26,8 @@ NAME = "angle"
 SUPPOSED = "if all its mass is at that radius and all axes have the same scale"
 TURNS = 3
 """Most laws of an angle, each of which tells better where it is zero."""
+OVER = 4 * 2 * np.pi
+"""Most that a run goes round: beside an angle that grows on and on, what pulls at it is small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +106,8 @@ def _samples(
 ) -> tuple[list[Trajectory], list[Floats]]:
     """The angles of each run where they were seen, and the errors that they share, (n, 1, k).
 
+    What goes round and round is several runs, of a few turns each.
+
     Those of positions, and those of the centre, of covariance ``own``, which moves the angle by
     what it moves across the line of sight from there.
     """
@@ -119,7 +123,28 @@ def _samples(
         curve = smooth([angles[-1]], rng).splines[0](t[seen])
         across = np.hstack([np.sin(curve), -np.cos(curve)]) @ moves
         errors.append(np.hstack([known[seen], across])[:, None])
-    return angles, errors
+    parts = [
+        ((t[part], angle[part] - _bottom(angle[part])), error[part])
+        for (t, angle), error in zip(angles, errors, strict=True)
+        for part in _rounds(angle[:, 0])
+    ]
+    return [run for run, _ in parts], [error for _, error in parts]
+
+
+def _rounds(angle: Floats) -> list[Bools]:
+    """Which samples of a bob that goes over the top and on are a run, the same way round for each.
+
+    The law is that of each turn, so that they are counted from the bottom anew.
+    """
+    gone = np.maximum.accumulate(np.abs(angle - angle[0]))
+    number = max(int(np.ceil(gone[-1] / OVER)), 1)
+    part = np.minimum(number * gone / max(gone[-1], OVER), number - 0.5).astype(int)
+    return [part == k for k in range(number)]
+
+
+def _bottom(angle: Floats) -> float:
+    """The full turns nearest to the middle of a motion."""
+    return float(2 * np.pi * np.round(angle.mean() / (2 * np.pi)))
 
 
 def _rest(law: Discovery) -> float:
