@@ -106,10 +106,8 @@ def _samples(
 ) -> tuple[list[Trajectory], list[Floats]]:
     """The angles of each run where they were seen, and the errors that they share, (n, 1, k).
 
-    What goes round and round is several runs, of a few turns each.
-
     Those of positions, and those of the centre, of covariance ``own``, which moves the angle by
-    what it moves across the line of sight from there.
+    what it moves across the line of sight from there. What goes round and round is several runs.
     """
     variances, directions = np.linalg.eigh(circle.axes @ own @ circle.axes.T)
     moves = np.sqrt(np.maximum(variances, 0.0)) * directions / circle.radius  # one a column
@@ -132,10 +130,7 @@ def _samples(
 
 
 def _rounds(angle: Floats) -> list[Bools]:
-    """Which samples of a bob that goes over the top and on are a run, the same way round for each.
-
-    The law is that of each turn, so that they are counted from the bottom anew.
-    """
+    """Which samples are a run of their own, of a few turns at most; the law is that of each turn."""
     gone = np.maximum.accumulate(np.abs(angle - angle[0]))
     number = max(int(np.ceil(gone[-1] / OVER)), 1)
     part = np.minimum(number * gone / max(gone[-1], OVER), number - 0.5).astype(int)
@@ -148,6 +143,15 @@ def _bottom(angle: Floats) -> float:
 
 
 def _rest(law: Discovery) -> float:
-    """The angle at which nothing pulls, if that is told from zero; otherwise zero."""
+    """The angle at which nothing pulls, if that is told from zero; otherwise zero.
+
+    What goes over the top may have no place of rest near the middle of its motion: then its sine
+    and cosine say.
+    """
     places = [quantity for quantity in law.physics().quantities if quantity.name == "rest"]
+    if not places:
+        sine, cosine = (
+            law.coefficients[law.terms.index(f"{f}({NAME})"), 1] for f in ("sin", "cos")
+        )
+        return float(np.arctan2(cosine, 0.0 - sine))
     return sum(float(q.value[0]) for q in places if abs(q.value[0]) > q.error[0])
