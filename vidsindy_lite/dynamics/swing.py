@@ -130,7 +130,7 @@ def _samples(
 
 
 def _rounds(angle: Floats) -> list[Bools]:
-    """Which samples are a run of their own, of a few turns at most; the law is that of each turn."""
+    """Which samples are a run of its own, of a few turns at most; the law is that of each turn."""
     gone = np.maximum.accumulate(np.abs(angle - angle[0]))
     number = max(int(np.ceil(gone[-1] / OVER)), 1)
     part = np.minimum(number * gone / max(gone[-1], OVER), number - 0.5).astype(int)
