@@ -21,11 +21,12 @@
 #
 # **What you will see**
 #
-# * a ball on a spring, from the tracks of three perspective cameras to its law and its forecasts;
+# * a ball on a spring, from three video files to its law, the law played over them, and its forecasts;
 # * what a first-order law says of the same data, and that it is not believed;
 # * gravity and drag from four throws, and why one throw is not enough;
 # * a motion that is kicked at random, and how strong the kicks are;
-# * a pendulum at a large amplitude, whose law is no polynomial, and its bob in space, whose angle has a law.
+# * a pendulum at a large amplitude, whose law is no polynomial, and its bob in space, whose angle has a law;
+# * a bob that swings round on a sphere, whose law needs no angles.
 #
 # **Afterwards you can** find a law of motion from positions alone: gravity, drag, springs, and when to doubt them.
 #
@@ -36,10 +37,13 @@
 
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
-pixel_noise: float = 0.5  # standard deviation of the errors of the tracks, in pixels
-seed: int = 0  # of all errors and kicks
+fps: int = 30  # frames a second of the films
+seed: int = 0  # of the scenes, and of all errors and kicks
 
 # %%
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -48,10 +52,15 @@ from vidsindy_lite import (
     PerspectiveCamera,
     PolynomialSystem,
     Rig,
+    Scene,
     discover,
-    discover_from_tracks,
+    discover_from_videos,
+    on_sphere,
+    read_video,
+    render_video,
+    write_video,
 )
-from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
+from vidsindy_lite.companion.artifacts import save_animation, save_figure, save_table, versions
 from vidsindy_lite.study import plots, term_errors
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -78,15 +87,16 @@ spring |= {
     "v" + axis: {axis: k, "v" + axis: -0.3, axis + "^3": -0.05} for axis, k in stiffness.items()
 }
 law = PolynomialSystem.from_terms(spring, degree=3)
-t = np.arange(600 if full else 300) / 60  # a video of 60 frames a second
+t = np.arange(fps * (10 if full else 5)) / fps
 start = np.array([12.0, -5.0, 8.0, 0.0, 60.0, 0.0])
 x = law.simulate(t, start)[:, :3]
 print(law.text())
 
 # %% [markdown]
-# ## Three cameras
+# ## Three films
 #
-# Three perspective cameras look at the ball from two metres. Their tracks have errors of half a pixel.
+# Three perspective cameras film the ball from two metres, before other grounds. The files are those of a telephone (.mp4):
+# their codec moves the edges of a small target.
 
 # %%
 bearings = np.radians([10.0, 130.0, 250.0])
@@ -98,18 +108,23 @@ rig = Rig(
         for place in places
     )
 )
-tracks = [camera.project(x) for camera in rig.cameras]
-tracks = [track + pixel_noise * rng.standard_normal(track.shape) for track in tracks]
+folder = TemporaryDirectory()
+paths = [Path(folder.name) / f"{ground}.mp4" for ground in ("hills", "sea", "wood")]
+for path, camera in zip(paths, rig.cameras, strict=True):
+    track, scene = camera.project(x), Scene(background=path.stem, size=14)
+    drawn = render_video(path.with_suffix(".mov"), track, scene, fps, seed)
+    write_video(path, read_video(drawn), fps, codec="mp4v")
 
 # %% [markdown]
-# One camera is calibrated, of the others position and normal are known; everything else is learned. The word
-# `order=2` asks for a law of motion; without it, one is looked for where a law of first order is doubtful.
+# One camera is calibrated, of the others position and normal are known; everything else is learned, when each
+# film began among it. The word `order=2` asks for a law of motion; without it, one is looked for where a law of
+# first order is doubtful. All that may be held against the law is that a further term would fit almost as well.
 
 # %%
-seen = discover_from_tracks(tracks, rig.uncalibrated(), fps=60, order=2)
+seen = discover_from_videos(paths, rig.uncalibrated(), order=2)
 found = seen.discovery
 print(seen, seen.status, sep="\n")
-assert seen.status == "ok"
+assert all("another law fits almost as well: with" in text for text in seen.warnings)
 assert (found.system.support == law.support).all()
 
 # %%
@@ -117,7 +132,7 @@ off = np.abs(found.coefficients - law.coefficients)[law.support]
 errors = found.standard_errors[law.support]
 searched = errors > 0  # the first half of the law was known
 print(f"worst coefficient: {(off[searched] / errors[searched]).max():.1f} standard errors off")
-assert (off[searched] < 4 * errors[searched]).all()
+assert (off[searched] < 5 * errors[searched]).all()
 
 # %% [markdown]
 # What a class wants to know is said with error bars, too, carried through from those of the coefficients: stiffness,
@@ -127,8 +142,35 @@ assert (off[searched] < 4 * errors[searched]).all()
 springs = found.physics()
 print(springs)
 period = springs["period z"]
-assert abs(period.value - 2 * np.pi / np.sqrt(25 - 0.15**2)) < 4 * period.error
+assert abs(period.value - 2 * np.pi / np.sqrt(25 - 0.15**2)) < 5 * period.error
 assert "never rises" in springs.notes[-1]
+
+# %% [markdown]
+# ## The law over the films
+#
+# A curve that obeys the law goes through what was seen. Each learned camera says where it would be in the image: over
+# the ball, in every frame.
+
+# %%
+curves = [camera.project(seen.fitted) for camera in seen.rig.cameras]
+beside = [
+    np.linalg.norm(curve - track, axis=1) for curve, track in zip(curves, seen.tracks, strict=True)
+]
+print(f"the ball is at most {np.nanmax(beside):.2f} pixels beside the curve")
+assert np.nanmax(beside) < 0.5
+
+# %%
+moments = np.arange(0, (3 if full else 1) * fps, fps // 10)
+shown = [[image for i, image in enumerate(read_video(path)) if i in moments] for path in paths]
+lines = found.equations().splitlines()
+pictures = plots.draw_tour(shown, moments, curves, seen.fitted, lines)
+caption = "Three films of a ball on a spring, and over them the curve that obeys the law found from them."
+save_animation("newton_films", pictures, caption=caption, numbers={"frame": moments})
+
+# %% [markdown]
+# ![Three films of a ball on a spring, with the law over them](../figures/newton_films.gif)
+#
+# *Three seconds of the films with the curve that obeys the law, its path in space, and the law.*
 
 # %% [markdown]
 # ## A forecast
@@ -150,7 +192,7 @@ caption = "Another motion of the ball: the true path (grey) and what the discove
 save_figure("newton_forecast", fig, caption=caption, numbers={"true": true, "told": told})
 
 # %% [markdown]
-# *Another motion of the ball: the true path (grey) and what the law discovered from the tracks foretells (blue).*
+# *Another motion of the ball: the true path (grey) and what the law discovered from the films foretells (blue).*
 
 # %% [markdown]
 # ## What a first-order law says
@@ -159,7 +201,7 @@ save_figure("newton_forecast", fig, caption=caption, numbers={"true": true, "tol
 # out with `order=1` is wrong; what matters is that it is not believed.
 
 # %%
-first = discover(t, seen.x, degree=1, order=1)
+first = discover(seen.t, seen.x, degree=1, order=1)
 print(first)
 assert first.status == "suspect"
 
@@ -324,11 +366,76 @@ assert abs(swing.circle.radius - 1) < 5 * swing.circle.radius_error
 assert abs(swing.g.value - 9.81) < 5 * swing.g.error
 
 # %% [markdown]
+# ### A bob that swings round
+#
+# Pushed aside, the bob leaves its plane and swings round, on a sphere. Counted from its centre, the string pulls
+# by as much as keeps the bob on it, and what is left needs no angles:
+#
+# $$\ddot{\mathbf r}=-\frac1{L^2}|\mathbf v|^2\,\mathbf r-g\left(\mathbf e_z-\frac z{|\mathbf r|^2}\mathbf r\right)-c\,\mathbf v.$$
+#
+# Three vectors with a coefficient each, $1/L^2$, $g$ and $c$. That $z$ is vertical is supposed; a constant along each
+# axis is a candidate, too, and would tell of a push aside.
+
+# %%
+def turning(x, y, z, vx, vy, vz):
+    return (vx**2 + vy**2 + vz**2) * np.array([x, y, z])
+
+
+def weight(x, y, z):  # less what the string bears of it
+    r = np.array([x, y, z])
+    return np.array([0 * z, 0 * z, 1 + 0 * z]) - z / (x**2 + y**2 + z**2) * r
+
+
+def speed(vx, vy, vz):
+    return np.array([vx, vy, vz])
+
+
+# %%
+vectors = {"|v|^2 r": turning, "weight": weight, "v": speed}
+tethered = Library.polynomial(0) + Library.terms(vectors)
+length, sizes = 1.0, {"|v|^2 r": -1.0, "weight": -9.81, "v": -0.05}
+terms = {axis: {"v" + axis: 1.0} for axis in "xyz"}
+terms |= {"v" + axis: {f"{term}_{axis}": k for term, k in sizes.items()} for axis in "xyz"}
+circling = PolynomialSystem.from_terms(terms, library=tethered)
+w = np.arange(600 if full else 300) / 60
+pushed_aside = np.array([np.sin(1.0), 0.0, -np.cos(1.0), 0.0, 1.5, 0.0])
+orbit = np.array([0.3, -0.2, 2.0]) + length * circling.simulate(w, pushed_aside)[:, :3]
+orbit = orbit + 0.005 * rng.standard_normal(orbit.shape)
+
+# %% [markdown]
+# Where the string is tied and how long it is, the positions say. The centre's errors move all positions alike: given
+# as such, they count in the error bars, and the centre may be better where the law asks for it.
+
+# %%
+sphere = on_sphere(orbit)
+print(sphere)
+moved = np.linalg.cholesky(sphere.centre_covariance).T[:, None].repeat(len(w), axis=1)
+around = discover(w, orbit - sphere.centre, order=2, library=tethered, systematic=moved)
+print(around)
+assert term_errors(around.system, circling) == ([], [])
+assert "stays on a sphere" in around.warnings[0]
+
+# %% [markdown]
+# The law is doubted, as on a sphere the coordinates depend on each other: what it says holds there, and
+# that is where the bob is. Its first coefficient is a second measurement of the length.
+
+# %%
+at = [around.terms.index(f"{term}_z") for term in sizes]
+told, wide = around.coefficients[at, 5], around.standard_errors[at, 5]
+by_law, by_law_error = np.abs(told[0]) ** -0.5, wide[0] / 2 * np.abs(told[0]) ** -1.5
+print(f"L = {by_law:.4f} ± {by_law_error:.4f} by the law")
+print(f"L = {sphere.radius:.4f} ± {sphere.radius_error:.4f} by the sphere")
+print(f"g = {-told[1]:.4f} ± {wide[1]:.4f}, c = {-told[2]:.5f} ± {wide[2]:.5f}")
+assert (np.abs(told - list(sizes.values())) < 5 * wide).all()
+assert abs(by_law - length) < 5 * by_law_error
+assert abs(sphere.radius - length) < 5 * sphere.radius_error
+
+# %% [markdown]
 # ## All laws of this page
 
 # %%
 laws = {
-    "spring, tracks of three cameras": (found, law),
+    "spring, three films": (found, law),
     "four throws": (fallen, flight),
     "one throw": (once, flight),
     "pendulum, with its sine": (swung, pendulum),
@@ -347,8 +454,10 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 # ## What we learned
 #
 # * Positions are enough: velocities enter as states without data, and the spring's law comes out exactly from
-#   tracks that are half a pixel off, with error bars that hold.
-#   <!-- by: (found.system.support == law.support).all(); (off[searched] < 4 * errors[searched]).all() -->
+#   three video files, with error bars that hold; its curve runs over the ball in every frame.
+#   <!-- by: (found.system.support == law.support).all(); (off[searched] < 5 * errors[searched]).all(); np.nanmax(beside) < 0.5 -->
+# * It foretells a motion that no camera has seen.
+#   <!-- by: apart < (0.01 if full else 0.05) -->
 # * $g$, drag, springs and periods come as named numbers with error bars, and the energy along the path is a check.
 #   <!-- by: abs(g.value - 9.81) < 4 * g.error; abs(drag.value - 0.4) < 4 * drag.error; abs(period.value; "never rises" in springs.notes[-1] -->
 # * A first-order law of the same data is wrong, and says so.
@@ -363,6 +472,8 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 #   <!-- by: (swung.system.support == pendulum.support).all(); miss < 0.1 -->
 # * From a bob's positions its circle is found, and on it the law of the angle, with the length and $g$.
 #   <!-- by: pulls == {"sin(angle)", "vangle"}; abs(swing.circle.radius - 1); abs(swing.g.value - 9.81) < 5 * swing.g.error -->
+# * On a sphere three vectors are the law, without angles: $g$, friction, and the length of the string once more.
+#   <!-- by: term_errors(around.system, circling) == ([], []); (np.abs(told - list(sizes.values())) < 5 * wide).all(); abs(by_law - length) < 5 * by_law_error -->
 #
 # **What the paper says and what we found.**
 #

@@ -24,7 +24,7 @@ SETTINGS = {
     "09": [{"seed": 1}, {"seed": 2}],
     "10": [{"seed": 1}, {"seed": 2}],
     "11": [{"seed": 10}, {"seed": 20}],
-    "12": [{"pixel_noise": 0.2}, {"seed": 1}],
+    "12": [{"fps": 60}, {"seed": 1}],
 }
 QUICK = ("01", "03")
 CASES = [

@@ -105,6 +105,12 @@ def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
     assert "closed orbit" in told(cycle[300:], t=TIMES[300:] * 5, terms=30)
 
 
+def test_a_centre_has_no_more_digits_than_its_error():
+    words = told(NAMED["bob that swings aside"][0])
+    centre = [part.split(" +-")[0] for part in words.split("centre ")[1].split(";")[0].split(", ")]
+    assert all(len(part) <= len("-0.00012") and "e" not in part for part in centre)
+
+
 def test_noise_that_could_hide_anything_tells_no_shape():
     assert told(NAMED["plane"][0][::20], 0.4, t=TIMES[::20]) == ""
 

@@ -147,3 +147,14 @@ def test_no_swing_where_none_is_asked_for_or_none_is_there(swung):
     assert vl.discover(t, x * [1, 0.7], order=2, degree=1).swing is None  # an ellipse
     assert vl.discover(t, x, order=2, library=SINES).swing is None
     assert swung.swing.law.swing is None
+
+
+@pytest.mark.parametrize(("speed", "turns"), [(8.0, 2), (12.0, 12), (15.0, 17)])
+def test_a_bob_that_goes_over_the_top_and_on(speed, turns):
+    angle = PENDULUM.simulate(TIMES, np.array([0.5, speed]))[:, 0]
+    assert np.ptp(angle) > turns * 2 * np.pi
+    x = 2 + LENGTH * (np.sin(angle)[:, None] * RIGHT + np.cos(angle)[:, None] * DOWN)
+    swing = swing_of([(TIMES, x + 0.005 * np.random.default_rng(0).standard_normal(x.shape))])
+    assert right_terms(swing.law)
+    assert abs(swing.g.value - G) < 4 * swing.g.error
+    assert swing.circle.axes[0] @ DOWN > np.cos(0.02)

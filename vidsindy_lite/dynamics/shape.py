@@ -185,13 +185,19 @@ def _told(where: Round) -> str:
         else ("sphere", "its angles are free: on_sphere finds them")
     )
     centre = ", ".join(
-        f"{c:.4g} +- {e:.1g}" for c, e in zip(where.centre, where.centre_errors, strict=True)
+        f"{_to_error(c, e):.4g} +- {e:.1g}"
+        for c, e in zip(where.centre, where.centre_errors, strict=True)
     )
     return (
         f"the motion stays on a {shape} (centre {centre}; radius {where.radius:.5g} +- "
         f"{where.radius_error:.1g}): there its coordinates depend on each other and many laws fit "
         f"alike; {free}, and order=2 a law"
     )
+
+
+def _to_error(value: float, error: float) -> float:
+    """A number without the digits that its error, one of them excepted, leaves no meaning."""
+    return round(value, 1 - int(np.floor(np.log10(max(error, LEAST))))) + 0.0
 
 
 def _ways(angle: Floats) -> tuple[bool, bool]:

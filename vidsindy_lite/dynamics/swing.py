@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from .candidates import Library
 from .discovery import Discovery
 from .physics import Quantity
@@ -26,6 +26,8 @@ NAME = "angle"
 SUPPOSED = "if all its mass is at that radius and all axes have the same scale"
 TURNS = 3
 """Most laws of an angle, each of which tells better where it is zero."""
+OVER = 4 * 2 * np.pi
+"""Most that a run goes round: beside an angle that grows on and on, what pulls at it is small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +107,7 @@ def _samples(
     """The angles of each run where they were seen, and the errors that they share, (n, 1, k).
 
     Those of positions, and those of the centre, of covariance ``own``, which moves the angle by
-    what it moves across the line of sight from there.
+    what it moves across the line of sight from there. What goes round and round is several runs.
     """
     variances, directions = np.linalg.eigh(circle.axes @ own @ circle.axes.T)
     moves = np.sqrt(np.maximum(variances, 0.0)) * directions / circle.radius  # one a column
@@ -119,10 +121,37 @@ def _samples(
         curve = smooth([angles[-1]], rng).splines[0](t[seen])
         across = np.hstack([np.sin(curve), -np.cos(curve)]) @ moves
         errors.append(np.hstack([known[seen], across])[:, None])
-    return angles, errors
+    parts = [
+        ((t[part], angle[part] - _bottom(angle[part])), error[part])
+        for (t, angle), error in zip(angles, errors, strict=True)
+        for part in _rounds(angle[:, 0])
+    ]
+    return [run for run, _ in parts], [error for _, error in parts]
+
+
+def _rounds(angle: Floats) -> list[Bools]:
+    """Which samples are a run of its own, of a few turns at most; the law is that of each turn."""
+    gone = np.maximum.accumulate(np.abs(angle - angle[0]))
+    number = max(int(np.ceil(gone[-1] / OVER)), 1)
+    part = np.minimum(number * gone / max(gone[-1], OVER), number - 0.5).astype(int)
+    return [part == k for k in range(number)]
+
+
+def _bottom(angle: Floats) -> float:
+    """The full turns nearest to the middle of a motion."""
+    return float(2 * np.pi * np.round(angle.mean() / (2 * np.pi)))
 
 
 def _rest(law: Discovery) -> float:
-    """The angle at which nothing pulls, if that is told from zero; otherwise zero."""
+    """The angle at which nothing pulls, if that is told from zero; otherwise zero.
+
+    What goes over the top may have no place of rest near the middle of its motion: then its sine
+    and cosine say.
+    """
     places = [quantity for quantity in law.physics().quantities if quantity.name == "rest"]
+    if not places:
+        sine, cosine = (
+            law.coefficients[law.terms.index(f"{f}({NAME})"), 1] for f in ("sin", "cos")
+        )
+        return float(np.arctan2(cosine, 0.0 - sine))
     return sum(float(q.value[0]) for q in places if abs(q.value[0]) > q.error[0])
