@@ -44,6 +44,8 @@ _TOLD = 100.0  # quality of the candidate that a user points at
 _PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
 _DENSE = 640  # pixels in a row of which the noise is known well
 _LARGE = 0.01  # share of the image that a target hardly fills
+_RESTLESS = 0.03  # of their length, by which the sides of a target hardly change in a frame
+_PIXELS = 2  # of each side that change with where its two ends lie between pixels
 
 
 class Rated(NamedTuple):
@@ -56,7 +58,8 @@ class Rated(NamedTuple):
 def rate(seen: Sightings, rows: Ints, value: float) -> float:
     """How plainly a path is that of a target: something that travels and stays what it is.
 
-    What stands still, flickers or is a part of something larger that changes is worth little.
+    What stands still, flickers or is a part of something larger that changes is worth little, and
+    so is what changes its outline from frame to frame, as people do who walk.
     """
     centre, size = seen.centre[rows], np.median(seen.size[rows])
     low, high = np.percentile(centre, [5, 95], axis=0)
@@ -67,7 +70,11 @@ def rate(seen: Sightings, rows: Ints, value: float) -> float:
     turn = np.median(np.linalg.norm(np.diff(speed, axis=0), axis=1))
     jitter = turn / (np.median(np.linalg.norm(speed, axis=1)) + 0.5)
     large = size**2 / seen.diagonal**2
+    sides = seen.box[rows, 2:]
+    change = np.maximum(np.abs(np.diff(sides, axis=0)) - _PIXELS, 0) / sides[1:]
+    restless = np.median(change.sum(axis=1))
     doubts = (1 + recolour / 30) * (1 + jitter) * (1 + large / _LARGE)
+    doubts *= 1 + restless / _RESTLESS
     return float(value * extent / (extent + 2) / doubts)
 
 
@@ -242,9 +249,10 @@ def sighted(
     ]
     if hint is not None:
         return hinted(found, hint, film.factor, path), difference.lights
-    if not film.sure:
-        found = [uncommon(some, targets) for some in found]
-    kept = [difference.travelling(f, here) for f, here in zip(found, film.maps, strict=False)]
+    kept = [
+        difference.travelling(uncommon(some, targets), here)
+        for some, here in zip(found, film.maps, strict=False)
+    ]
     return kept, difference.lights
 
 
