@@ -209,7 +209,9 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
 
 
 def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
-    views = [View(np.array([20.0 + 3 * k, 50]), 100.0, np.zeros(3), True) for k in range(20)]
+    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
+    places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]
+    views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
     errors = np.zeros(20)
     maps = np.tile(np.eye(3), (20, 1, 1))
     assert finished(views, CameraMotion(maps, errors), ()).doubts == ()

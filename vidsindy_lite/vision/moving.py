@@ -26,6 +26,7 @@ from .candidates import (
 from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
+from .occluders import hidden
 from .refining import Lens, View, fitting, scatter
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
 from .video import read_frame, read_video, video_info
@@ -388,6 +389,8 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
+    outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
+    inside &= ~hidden(outlines, steady, areas)
     good = fitting(at, steady, areas, inside)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):

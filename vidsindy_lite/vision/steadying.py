@@ -197,8 +197,6 @@ class Steadying:
         best, good = _similar(a, b, 2 * _EXACT)
         if best is None or good.sum() < max(_SOME, _AGREE * len(a)):
             return None, 0
-        if not _widespread(a[good], relief.fine.shape):
-            return None, 0
         if good.sum() >= _MANY:
             full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
             if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
