@@ -45,18 +45,18 @@ def hidden(outlines: Sequence[Floats], centres: Floats, areas: Floats) -> Bools:
     for outline in outlines:
         patch, window = _drawn((outline - low) / cell)
         chart[window] |= patch
-    unseen = np.asarray(cv2.dilate(chart, np.ones((3, 3), np.uint8))) == 0
+    unseen = np.asarray(cv2.dilate(chart, np.ones((3, 3), np.uint8)) == 0)
     whole = np.maximum(sides, median_filter(sides, _AROUND))
     usual = whole[:, None, None] * _usual(outlines, centres, sides)
     for centre, reach in zip(centres, usual, strict=True):
         patch, window = _drawn((centre + _INNER * reach - low) / cell)
         missed[window] += patch & unseen[window]
-    never = np.asarray(cv2.dilate((missed >= _OFTEN).astype(np.uint8), _TOUCHING))
+    never = np.asarray(cv2.dilate((missed >= _OFTEN).astype(np.uint8), _TOUCHING), np.uint8)
     found = np.zeros(len(centres), bool)
     for i, (outline, centre, reach) in enumerate(zip(outlines, centres, usual, strict=True)):
         for reached in (outline, centre + reach):
             patch, window = _drawn((reached - low) / cell)
-            found[i] |= (patch & never[window]).any()
+            found[i] |= bool((patch & never[window]).any())
     return found
 
 
