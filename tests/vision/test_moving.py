@@ -57,6 +57,15 @@ def test_a_large_target_is_plainer_than_leaves_that_sway(tmp_path):
     assert not found.warnings
 
 
+def test_a_small_dark_ball_is_not_lost_to_somebody_in_dark_clothes(tmp_path):
+    # Blurred, it is of their colour, and it passes before them.
+    phone = Phone("sky", 8, colour=(22, 18, 20), noise=4, exposure=0.9, person=True, **SMALL)
+    truth, _ = write_phone(tmp_path / "clip.mp4", phone, 4)
+    found, error = errors(tmp_path / "clip.mp4", truth)
+    assert np.isfinite(error).mean() >= 0.95
+    assert np.nanpercentile(error, 95) < 1.5
+
+
 @pytest.mark.slow
 @pytest.mark.thorough
 def test_twenty_films(tmp_path):

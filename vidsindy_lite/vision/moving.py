@@ -162,8 +162,9 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     elif hint is None and paths and _travels(seen, paths[0].rows, film.places):
         doubts = _rivals(seen, paths, film)
         # What the target looks like is known by now, which tells it from what it meets.
-        seen, paths = linked(_learned(found, seen, paths[0].rows), film)
-        paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
+        first = paths[0].rows
+        seen, paths = linked(_learned(found, seen, first), film)
+        paths = sorted(paths, key=lambda path: -np.isin(path.rows, first).sum())[:1]
     elif hint is None:
         paths = []
     if not paths:
@@ -187,22 +188,17 @@ def linked(
 
 
 def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[list[Candidate]]:
-    """Candidates as far as they have the colour of a path, whose best one is sure.
+    """Candidates as far as they have the colour of a path.
 
     What is as plain as the target usually is, is worth all: else a faint one would be left wherever
     its size and colour waver.
     """
     colour = np.median(seen.colour[rows], axis=0)
     usual = float(np.median(seen.quality[rows]))
-    alike = [
+    return [
         [replace(c, quality=min(c.quality / usual, 1.0) * _alike(c.colour, colour)) for c in f]
         for f in found
     ]
-    worth = [alike[seen.frame[r]][seen.which[r]].quality for r in rows]
-    best = rows[int(np.argmax(worth))]
-    frame = int(seen.frame[best])
-    alike[frame] = [replace(found[frame][seen.which[best]], quality=_TOLD)]
-    return alike
 
 
 class Film(NamedTuple):
