@@ -49,6 +49,23 @@ def test_phone_footage(tmp_path, phone):
     assert np.nanpercentile(error, 95) < 1.5
 
 
+def test_a_large_target_is_plainer_than_leaves_that_sway(tmp_path):
+    phone = Phone("sea", 58, colour=(185, 30, 200), noise=3, leaves=True, **SMALL)
+    truth, _ = write_phone(tmp_path / "clip.mp4", phone, 1)
+    found, error = errors(tmp_path / "clip.mp4", truth)
+    assert np.nanpercentile(error, 95) < 1.5
+    assert not found.warnings
+
+
+def test_a_small_dark_ball_is_not_lost_to_somebody_in_dark_clothes(tmp_path):
+    # Blurred, it is of their colour, and it passes before them.
+    phone = Phone("sky", 8, colour=(22, 18, 20), noise=4, exposure=0.9, person=True, **SMALL)
+    truth, _ = write_phone(tmp_path / "clip.mp4", phone, 4)
+    found, error = errors(tmp_path / "clip.mp4", truth)
+    assert np.isfinite(error).mean() >= 0.95
+    assert np.nanpercentile(error, 95) < 1.5
+
+
 @pytest.mark.slow
 @pytest.mark.thorough
 def test_twenty_films(tmp_path):
@@ -136,7 +153,10 @@ def test_what_travels_and_stays_what_it_is_is_plainest():
     plain = one_a_frame(places, np.full(30, 0.9))
     flickering = plain.colour + 40 * rng.normal(size=(30, 1))
     trembling = places + rng.normal(0, 6, places.shape)
+    strides = plain.box.copy()
+    strides[:, 2] *= 1 + 0.5 * (frames % 2)
     others = [
+        replace(plain, box=strides),  # of somebody who walks
         replace(plain, colour=flickering),
         replace(plain, centre=trembling),
         replace(plain, size=20 * plain.size),  # of a part of something large
@@ -198,7 +218,9 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
 
 
 def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
-    views = [View(np.array([20.0 + 3 * k, 50]), 100.0, np.zeros(3), True) for k in range(20)]
+    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
+    places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]
+    views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
     errors = np.zeros(20)
     maps = np.tile(np.eye(3), (20, 1, 1))
     assert finished(views, CameraMotion(maps, errors), ()).doubts == ()

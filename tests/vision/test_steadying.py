@@ -72,6 +72,21 @@ def test_what_a_few_of_the_corners_share_is_chance_and_tells_no_motion(share, to
     assert (count > 0) is told
 
 
+@pytest.mark.parametrize(("width", "told"), [(0.4, False), (1.0, True)])
+def test_what_one_large_thing_shares_is_its_own_motion_not_the_cameras(width, told):
+    # Before noise that is new in each frame: what moves is as wide as a share of the image.
+    def frame(place):
+        picture = np.random.default_rng(place).normal(128, 3, (*SIZE[::-1], 3))
+        side = (int(width * SIZE[0]), int(width * SIZE[1]))
+        left, top = (SIZE[0] - side[0]) // 2, (SIZE[1] - side[1]) // 2
+        moved = cv2.warpAffine(grains(), np.array([[1, 0, 2.5 * place], [0, 1, 0]]), SIZE)
+        window = np.s_[top : top + side[1], left : left + side[0]]
+        picture[window] = moved[window]
+        return np.clip(picture, 0, 255).astype(np.uint8)
+
+    frames = [frame(place) for place in range(4)]
+    assert (stands_still(frames) is False) == told
+
 def test_pixels_by_which_maps_move_an_image():
     shift = np.array([[1, 0, 3], [0, 1, -4], [0, 0, 1.0]])
     found = displacement(np.stack([np.eye(3), shift, np.diag([1.1, 1, 1])]), (200, 100))

@@ -280,8 +280,8 @@ def blobs(
 def uncommon(found: list[Candidate], targets: int) -> list[Candidate]:
     """The candidates of a frame, worth the less the more of them look alike than there are targets.
 
-    Before a plain wall that does not tell the camera's motion all that is at rest seems to move,
-    and the leaves of a tree hardly leave their places. But they are many, the targets few.
+    The leaves of a tree hardly leave their places, and before a plain wall that does not tell the
+    camera's motion all that is at rest seems to move. But they are many, the targets few.
     """
     colour = np.array([one.colour for one in found]).reshape(-1, 3)
     size = np.log([np.sqrt(one.area) for one in found])

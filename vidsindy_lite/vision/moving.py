@@ -26,6 +26,7 @@ from .candidates import (
 from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
+from .occluders import hidden
 from .refining import Lens, View, fitting, scatter
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
 from .video import read_frame, read_video, video_info
@@ -44,6 +45,8 @@ _TOLD = 100.0  # quality of the candidate that a user points at
 _PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
 _DENSE = 640  # pixels in a row of which the noise is known well
 _LARGE = 0.01  # share of the image that a target hardly fills
+_RESTLESS = 0.03  # of their length, by which the sides of a target hardly change in a frame
+_PIXELS = 2  # of each side that change with where its two ends lie between pixels
 
 
 class Rated(NamedTuple):
@@ -56,7 +59,8 @@ class Rated(NamedTuple):
 def rate(seen: Sightings, rows: Ints, value: float) -> float:
     """How plainly a path is that of a target: something that travels and stays what it is.
 
-    What stands still, flickers or is a part of something larger that changes is worth little.
+    What stands still, flickers or is a part of something larger that changes is worth little, and
+    so is what changes its outline from frame to frame, as people do who walk.
     """
     centre, size = seen.centre[rows], np.median(seen.size[rows])
     low, high = np.percentile(centre, [5, 95], axis=0)
@@ -67,7 +71,11 @@ def rate(seen: Sightings, rows: Ints, value: float) -> float:
     turn = np.median(np.linalg.norm(np.diff(speed, axis=0), axis=1))
     jitter = turn / (np.median(np.linalg.norm(speed, axis=1)) + 0.5)
     large = size**2 / seen.diagonal**2
+    sides = seen.box[rows, 2:]
+    change = np.maximum(np.abs(np.diff(sides, axis=0)) - _PIXELS, 0) / sides[1:]
+    restless = np.median(change.sum(axis=1))
     doubts = (1 + recolour / 30) * (1 + jitter) * (1 + large / _LARGE)
+    doubts *= 1 + restless / _RESTLESS
     return float(value * extent / (extent + 2) / doubts)
 
 
@@ -154,8 +162,9 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     elif hint is None and paths and _travels(seen, paths[0].rows, film.places):
         doubts = _rivals(seen, paths, film)
         # What the target looks like is known by now, which tells it from what it meets.
-        seen, paths = linked(_learned(found, seen, paths[0].rows), film)
-        paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
+        first = paths[0].rows
+        seen, paths = linked(_learned(found, seen, first), film)
+        paths = sorted(paths, key=lambda path: -np.isin(path.rows, first).sum())[:1]
     elif hint is None:
         paths = []
     if not paths:
@@ -179,22 +188,17 @@ def linked(
 
 
 def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[list[Candidate]]:
-    """Candidates as far as they have the colour of a path, whose best one is sure.
+    """Candidates as far as they have the colour of a path.
 
     What is as plain as the target usually is, is worth all: else a faint one would be left wherever
     its size and colour waver.
     """
     colour = np.median(seen.colour[rows], axis=0)
     usual = float(np.median(seen.quality[rows]))
-    alike = [
+    return [
         [replace(c, quality=min(c.quality / usual, 1.0) * _alike(c.colour, colour)) for c in f]
         for f in found
     ]
-    worth = [alike[seen.frame[r]][seen.which[r]].quality for r in rows]
-    best = rows[int(np.argmax(worth))]
-    frame = int(seen.frame[best])
-    alike[frame] = [replace(found[frame][seen.which[best]], quality=_TOLD)]
-    return alike
 
 
 class Film(NamedTuple):
@@ -242,9 +246,10 @@ def sighted(
     ]
     if hint is not None:
         return hinted(found, hint, film.factor, path), difference.lights
-    if not film.sure:
-        found = [uncommon(some, targets) for some in found]
-    kept = [difference.travelling(f, here) for f, here in zip(found, film.maps, strict=False)]
+    kept = [
+        difference.travelling(uncommon(some, targets), here)
+        for some, here in zip(found, film.maps, strict=False)
+    ]
     return kept, difference.lights
 
 
@@ -380,6 +385,8 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
+    outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
+    inside &= ~hidden(outlines, steady, areas)
     good = fitting(at, steady, areas, inside)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):

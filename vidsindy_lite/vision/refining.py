@@ -27,12 +27,16 @@ _BESIDE = 5  # views before and after such a meeting, which show how large it wa
 
 @dataclass(frozen=True)
 class View:
-    """One look at the target: its centroid (2,) in the frame, its area, and whether it is whole."""
+    """One look at the target, in pixels of its frame.
+
+    Centroid (2,), area, mean colour, is it clear of the image's border?, convex outline (k, 2).
+    """
 
     centroid: Floats
     area: float
     colour: Floats
     inside: bool
+    outline: Floats
 
 
 class Lens:
@@ -107,7 +111,9 @@ class Lens:
         last = low + [columns[-1], rows[-1]]
         inside = bool((first > 0).all() and (last < self.plate.size - 1).all())
         shade = now[core if core.any() else label].mean(axis=0)
-        return View(low + centroid, area, shade, inside)
+        at = np.argwhere(label)[:, ::-1].astype(np.int32)
+        outline = low + np.asarray(cv2.convexHull(at))[:, 0].astype(float)
+        return View(low + centroid, area, shade, inside, outline)
 
 
 def _nearest(mask: Bools, centre: Floats) -> Bools | None:

@@ -31,6 +31,7 @@ _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
 _SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
 _TELLING = 10  # corners that must share a motion, if it is to be the camera's
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
+_WIDE = 0.6  # times the image's own spread, that of corners that tell the camera's motion at least
 # Share of a key frame that is left, below which there must be a new one. Each adds its error to all
 # that follow, so late: a little above the 0.3 that `align` needs. From 0.3 to 0.6 nothing changes.
 _LEFT = 0.4
@@ -133,9 +134,16 @@ def _moved(before: _Relief, after: _Relief) -> bool | None:
     still = np.linalg.norm(b - a, axis=1) < _STILL
     share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
     moves = bool(still.sum() < 0.7 * share.sum())
-    if share.sum() < max(_TELLING, moves * _AGREE * len(a)):
+    few = share.sum() < max(_TELLING, moves * _AGREE * len(a))
+    if few or (moves and not _widespread(a[share], before.fine.shape)):
         return _drifted(before, after)
     return moves
+
+
+def _widespread(points: Floats, shape: Sequence[int]) -> bool:
+    """Are points spread over an image (height, width)? Those of one large thing are not."""
+    image = np.linalg.norm(shape) / np.sqrt(12)
+    return bool(np.sqrt(points.var(axis=0).sum()) > _WIDE * image)
 
 
 def _drifted(before: _Relief, after: _Relief) -> bool | None:
