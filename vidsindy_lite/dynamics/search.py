@@ -319,7 +319,8 @@ def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
         limit = min(fit.criterion for fit in refined) + problem.penalties.max()
         kept = list({_key(fit.state): fit for fit in refined if fit.criterion <= limit}.values())
     homes = [come_home(problem, fit, history) for fit in kept]
-    distinct = {_key(fit.state): fit for fit in homes}.values()
+    dearest_first = sorted(homes, key=lambda fit: -fit.criterion)
+    distinct = {_key(fit.state): fit for fit in dearest_first}.values()
     settled = [leave_home(problem, fit, history) for fit in distinct]
     return min(settled, key=lambda fit: fit.criterion)
 
