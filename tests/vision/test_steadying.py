@@ -87,6 +87,7 @@ def test_what_one_large_thing_shares_is_its_own_motion_not_the_cameras(width, to
     frames = [frame(place) for place in range(4)]
     assert (stands_still(frames) is False) == told
 
+
 def test_pixels_by_which_maps_move_an_image():
     shift = np.array([[1, 0, 3], [0, 1, -4], [0, 0, 1.0]])
     found = displacement(np.stack([np.eye(3), shift, np.diag([1.1, 1, 1])]), (200, 100))
