@@ -1,8 +1,8 @@
-"""Noise of data with few samples a turn, told by all candidate terms together.
+"""Noise of data with few samples a turn, told by candidate terms together.
 
 A curve without a law has as much freedom as there are samples a turn. Where these are few, it takes
-motion for noise, or gives the motion up and is flat; a law says that much again. So all terms are
-fitted at once, and what they leave is the noise.
+motion for noise, or gives the motion up and is flat. So terms are fitted at once, as many as
+converge, and what they leave is the noise; each of the two noises has its law.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FLAT = 0.9
 
 
 def views(pose: Callable[..., Problem]) -> list[Problem]:
-    """A problem with the noise that its curves leave, and, if far less, with that of all terms.
+    """A problem with the noise that its curves leave, and, if far less, with what terms leave.
 
     Parameters
     ----------
