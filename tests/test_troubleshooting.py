@@ -119,6 +119,17 @@ def oscillation(step, count, noise):
     return told(vl.discover, t, add_noise(x, noise, np.random.default_rng(0)), degree=1)
 
 
+def driven(studio):
+    """A spring pushed by cos(.85 t), at eight samples a turn."""
+    t = np.arange(80) * 2 * np.pi / 0.85 / 8
+    swing = solve_ivp(
+        lambda t, x: [x[1], np.cos(0.85 * t) - x[0] - 0.1 * x[1]], (0, t[-1]), [1, 0], t_eval=t,
+        rtol=1e-9,
+    )  # fmt: skip
+    x = add_noise(swing.y[:1].T, 0.05, np.random.default_rng(0))
+    return told(vl.discover, t, x)
+
+
 def undecided(studio):
     """A weak damping that may be in either of the two equations."""
     law = vl.PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1, "y": -0.03}}, degree=2)
@@ -197,6 +208,7 @@ TROUBLES = {
     "a sample lies far from those before and after it": jumping,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
     "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
+    "from a drive that nobody named": driven,
     "must be a new folder or hold an earlier report": occupied,
 }
 

@@ -9,7 +9,7 @@ from helpers import posed
 
 from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.errors import residual_noise
-from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, fit_curves
+from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, term_penalties
 from vidsindy_lite.dynamics.search import _as_shifted, _candidate, _closed, _variants
 from vidsindy_lite.dynamics.state import State
 
@@ -97,3 +97,20 @@ def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
     assert candidate.criterion == pytest.approx(expected, rel=1e-9)
     assert (candidate.state.moving == moving).all()
     np.testing.assert_array_equal(candidate.state.offset, origin)
+
+
+def test_a_law_is_compared_with_its_rivals_at_dearer_prices():
+    problem = posed(0.1)
+    np.testing.assert_array_equal(
+        problem.cautious.penalties, term_penalties(problem.exponents, 2, SURE)
+    )
+    assert (problem.cautious.penalties > problem.penalties + 2).all()
+
+
+def test_turns_and_samples_are_those_of_all_runs():
+    problem = posed()
+    (t, _), *_ = problem.trajectories
+    twice = replace(problem, trajectories=2 * problem.trajectories)
+    assert problem.turns == pytest.approx((t[-1] - t[0]) / (2 * np.pi))
+    assert twice.turns == pytest.approx(2 * problem.turns)
+    assert twice.samples_a_turn == pytest.approx(len(t) / problem.turns)

@@ -196,3 +196,16 @@ def test_a_tone_is_in_the_octave_of_its_frequency():
         tone = np.cos(2 * np.pi * k * np.arange(512) / 512)[:, None, None]
         (band,) = np.flatnonzero(_bands(tone)[:, 0] > 1e-9)
         assert band == (0 if k == OCTAVE else 1 + int(np.log2((k - 1) / OCTAVE)))
+
+
+def test_kicks_of_few_samples_a_turn_may_be_a_drive():
+    """A spring pushed by cos(.85 t), which nobody named, at eight samples a turn."""
+    times = np.arange(80) * 2 * np.pi / 0.85 / 8
+    driven = PolynomialSystem.from_terms(
+        {"x": {"v": 1}, "v": {"x": -1, "v": -0.1, "c": 1}, "c": {"s": -0.85}, "s": {"c": 0.85}}
+    )
+    x = driven.simulate(times, (1.0, 0.0, 1.0, 0.0))[:, :1]
+    x += 0.05 * x.std() * np.random.default_rng(0).standard_normal(x.shape)
+    found = vl.discover(times, x)
+    assert found.model_error.any()
+    assert any("from a drive that nobody named" in text for text in found.warnings)

@@ -9,6 +9,7 @@ from scipy.stats import kstest
 
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics.candidates import Library
+from vidsindy_lite.dynamics.collocation import Status
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.library import monomial_exponents
@@ -18,7 +19,7 @@ from vidsindy_lite.dynamics.problem import fit_curves, term_penalties
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.dynamics.splines import Segment
 from vidsindy_lite.dynamics.state import State
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise, drop_fibers, score
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, OdeContest, add_noise, drop_fibers, score
 
 
 def measured(name, noise, n=600, seed=11):
@@ -369,3 +370,30 @@ def test_knots_are_halved_until_that_changes_the_law_by_less_than_its_error(spac
     finer = solver.polish(problem, fit, History())
     spans = [len(s.breakpoints) - 1 for s in (*segments, *finer.collocation.segments)]
     assert spans[1] == 2**halvings * spans[0]
+
+
+def test_a_richer_law_that_did_not_converge_is_not_followed(monkeypatch):
+    asked, refitted, at_own_noise = [], solver._refitted, solver.at_own_noise
+
+    def noted(*question):
+        asked.append(question)
+        return refitted(*question)
+
+    monkeypatch.setattr(solver, "_refitted", noted)
+    data = OdeContest(41, 1).data()
+    discover(data.t, data.x, order=1)
+    assert refitted(*asked[0]) is not None
+
+    def unfinished(problem, fit):
+        return replace(at_own_noise(problem, fit), status=Status.MAX_STEPS)
+
+    monkeypatch.setattr(solver, "at_own_noise", unfinished)
+    assert refitted(*asked[0]) is None
+
+
+def test_a_term_that_is_worth_its_price_alone_is_kept_and_told():
+    """The weakest term of the seven systems, at the noise at which the data hardly tell it."""
+    truth, t, x = measured("Tsucs2", 0.1, n=1500, seed=0)
+    found = discover(t, x, order=1)
+    assert score(found, truth).exact
+    assert found.status == "suspect"

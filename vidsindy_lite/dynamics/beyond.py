@@ -21,7 +21,7 @@ from ..arrays import Floats, Ints
 from .collocation import Collocation, Fit, Linearisation
 from .library import monomial_exponents
 from .polynomials import PolynomialSystem
-from .problem import Problem, term_penalties
+from .problem import SURE, Problem, term_penalties
 from .selection import inverse
 from .state import State
 
@@ -188,7 +188,7 @@ def widened(problem: Problem, fit: Fit) -> Wider:
         collocation=replace(fit.collocation, exponents=exponents, known=known),
         searched=places[:, :size].ravel()[form.searched],
         further=places[equations, size:].ravel(),
-        prices=np.tile(term_penalties(exponents, problem.measured[0][1].shape[1]), d),
+        prices=np.tile(term_penalties(exponents, problem.measured[0][1].shape[1], SURE), d),
     )
 
 

@@ -17,11 +17,9 @@ from .errors import residual_noise
 from .history import History
 from .persistence import TOLERATED
 from .precision import foreseen
-from .problem import Problem, fit_curves
+from .problem import COARSE, Problem, fit_curves
 from .search import CONSISTENT, FIRST_WEIGHTS, unpruned
 
-COARSE = 20
-"""Samples a turn from which on a curve tells the noise to a tenth."""
 FLAT = 0.9
 """Errors, relative to the spread of the data, of a curve that has given the motion up."""
 
@@ -36,10 +34,8 @@ def views(pose: Callable[..., Problem]) -> list[Problem]:
         the samples, which serve where smoothed ones leave out a part of the motion.
     """
     problem = foreseen(pose())
-    samples = sum(len(t) for t, _ in problem.trajectories)
-    turns = sum(t[-1] - t[0] for t, _ in problem.trajectories) / (2 * np.pi)
     # A curve that has given up has no turns.
-    enough = samples > COARSE * turns and problem.noise.max() < FLAT
+    enough = problem.samples_a_turn > COARSE and problem.noise.max() < FLAT
     if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():
         return [problem]
     told = _by_terms(problem) or _by_terms(pose(True))

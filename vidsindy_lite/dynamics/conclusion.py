@@ -52,6 +52,8 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     prices = problem.prices * np.repeat(tolerated, l) ** 2
     moved, moved_covariance, margins = _pruned(moved, moved_covariance, prices)
     margins /= np.repeat(tolerated**2, l)
+    dearer = problem.cautious.prices - problem.prices
+    margins += np.where(moved.T.ravel() != 0, -dearer, dearer)
     if not state.moving.any():
         margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
     law = form.law(moved + form.known)

@@ -18,7 +18,7 @@ from .errors import passing, residual_noise
 from .library import shift_generators, shift_matrix
 from .persistence import Path
 from .polynomials import PolynomialSystem
-from .problem import Problem
+from .problem import COARSE, Problem
 from .search import away
 from .selection import closest_rival, minimiser, subset_search
 from .shape import cancelling, shapes, tied
@@ -31,7 +31,7 @@ NEAR_TIE = 4.0
 """Two laws whose criteria differ by less than this (a likelihood ratio of 7) are not told apart."""
 TURNS = 1.5
 """Turns of the motion that a trajectory should cover."""
-COARSE = 1.0
+LONGEST_STEP = 1.0
 """Longest typical time step, in time scales of the motion (about 6 to a turn)."""
 RESOLVED = 1e-2
 """Residual, relative to the spread of the data, below which a misfit does not matter."""
@@ -246,7 +246,7 @@ def _selection(
     model = model.of(problem.form.searched)
     yield from _left_over(model, fit.state)
     yield from _near_tie(wider, remedy)
-    yield from _elsewhere(problem, fit.state, model, law, remedy)
+    yield from _elsewhere(problem.cautious, fit.state, model, law, remedy)
 
 
 def _is_clean(fit: Fit) -> bool:
@@ -433,15 +433,18 @@ def _narrow(law: PolynomialSystem, margins: Floats) -> Iterator[str]:
 
 
 def _sampling(problem: Problem) -> Iterator[str]:
-    runs, form = problem.trajectories, problem.form
-    turns = sum(t[-1] - t[0] for t, _ in runs) / (2 * np.pi)
+    form, step = problem.form, typical_step(problem.trajectories)
     # On a line nothing turns; and a body need not turn, if it is seen from several starts.
-    bound = form.states > 1 and (form.movable.all() or len(runs) == 1)
-    if turns < TURNS and bound:
+    bound = form.states > 1 and (form.movable.all() or len(problem.trajectories) == 1)
+    if problem.turns < TURNS and bound:
         yield (
-            f"the trajectory covers only {turns:.1f} turns of the motion: terms may be "
+            f"the trajectory covers only {problem.turns:.1f} turns of the motion: terms may be "
             "indistinguishable on it; record longer, or several runs from other starts"
         )
-    step = typical_step(runs)
-    if step > COARSE:
+    if step > LONGEST_STEP:
         yield f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster"
+    if problem.kicked and problem.samples_a_turn < COARSE:
+        yield (
+            f"the motion is taken for kicked at random, which {problem.samples_a_turn:.1f} samples "
+            "per turn cannot tell from a drive that nobody named: sample faster, or name the drive"
+        )

@@ -150,7 +150,7 @@ def follow(problem: Problem, fit: Fit) -> Path:
             else:
                 low_here = low
             paths[j].append(Plateau(j, low_here, high, terms))
-    smooth = bool((lasting > LASTING * single).any() or (single <= NOISELESS).all())
+    smooth = bool((lasting > LASTING * single).any() or typical(single) <= NOISELESS)
     level = max(lowest, time_inflation(fit) * typical(lasting), SMOOTH if smooth else 0.0)
     return Path(fit, model, own, level, tuple(map(tuple, paths)))
 

@@ -7,7 +7,7 @@ root-mean-square speed is 1. `posing` makes it from data.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,10 +26,16 @@ from .state import State
 from .trajectories import Trajectory
 from .units import Units
 
-FALSE_ALARM = 0.004
-"""Chance of a false term in a law, if all candidates were independent."""
+FALSE_ALARM = 0.05
+"""Chance of a false term in a law, if all candidates were independent: where laws of the zoo have
+about the fewest wrong terms (`study.price`)."""
+SURE = 0.004
+"""The same for a law that is not to be doubted: a term that is worth its price and would not be
+worth this one is told."""
 OFFSET_PENALTY = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
+COARSE = 20
+"""Samples a turn from which on a curve tells the noise to a tenth, and kicks from a drive."""
 NOISY, WIDE, NARROW = 0.02, 1 / 5, 1 / 16
 """Knot spacing in time scales: wide where the noise is above this, narrow elsewhere."""
 
@@ -117,6 +123,12 @@ class Problem:
         """The penalties of all terms, equation by equation, shape (l d,)."""
         return np.tile(self.penalties, self.d)
 
+    @property
+    def cautious(self) -> Problem:
+        """The same at the prices at which a law is compared with its rivals: see `SURE`."""
+        equations = self.measured[0][1].shape[1]
+        return replace(self, penalties=term_penalties(self.exponents, equations, SURE))
+
     def columns(self, state: State) -> Ints:
         """Entries of `State.flat` that may differ from zero: candidates and moving axes."""
         size = self.form.candidates.size
@@ -146,6 +158,17 @@ class Problem:
     def axis_penalty(self) -> float:
         """Price of an axis along which the law's origin is not at home."""
         return float(OFFSET_PENALTY * self.penalties[0])
+
+    @property
+    def turns(self) -> float:
+        """Turns of the motion that the data cover."""
+        return float(sum(t[-1] - t[0] for t, _ in self.trajectories) / (2 * np.pi))
+
+    @property
+    def samples_a_turn(self) -> float:
+        """Samples of a turn of the motion; infinite where nothing turns."""
+        samples = sum(len(t) for t, _ in self.trajectories)
+        return samples / self.turns if self.turns else np.inf
 
     @property
     def spacing(self) -> float:

@@ -342,7 +342,8 @@ def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
 def _refitted(
     problem: Problem, path: Path, goal: Sequence[Plateau], history: History
 ) -> Fit | None:
-    """The law of these plateaus; none if it is that of the path, too rich, or leaves too much."""
+    """The law of these plateaus; none if it is that of the path, too rich, leaves too much, or has
+    not converged, so that its terms tell nothing."""
     changed = _changed(path.fit, goal)
     if not changed:
         return None
@@ -359,7 +360,8 @@ def _refitted(
     fit = at_own_noise(problem, leave_home(problem, priced, history))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     largest = max(plateau.low for plateau in changed)
-    return fit if typical(problem.errors(fit)) <= CONSISTENT * largest else None
+    fits = fit.status is Status.CONVERGED and typical(problem.errors(fit)) <= CONSISTENT * largest
+    return fit if fits else None
 
 
 def _changed(fit: Fit, goal: Sequence[Plateau]) -> list[Plateau]:
