@@ -22,7 +22,7 @@ from .collocation import Fit, Linearisation
 from .history import History
 from .library import monomial_gradients, monomials
 from .problem import Problem, fit_curves
-from .search import FIRST_WEIGHTS, SEARCH_WEIGHTS, leaves_something_over, unpruned
+from .search import FIRST_WEIGHTS, leaves_something_over, tightened, unpruned
 from .selection import inverse
 from .state import State
 
@@ -174,12 +174,9 @@ def refined(problem: Problem, fit: Fit) -> Floats:
     state, collocation = state.of_terms(state.active & (np.abs(sizes) > LEFT_OVER)), fit.collocation
     if not state.active.any():
         return np.eye(problem.measured[0][1].shape[1])
-    for weight in SEARCH_WEIGHTS:
-        collocation = problem.weighted(collocation, weight)
-        fit = collocation.solve(state, tolerance=1.0, max_steps=10)
-        state = fit.state
+    fit = tightened(problem, collocation, state)
     law = TurnedLaw.of(problem, fit)
-    return law.freed(state.active[_rows(fit)][:, -len(law.origin) :])
+    return law.freed(fit.state.active[_rows(fit)][:, -len(law.origin) :])
 
 
 def with_turns(problem: Problem, fit: Fit) -> Linearisation:

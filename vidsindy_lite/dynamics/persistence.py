@@ -133,8 +133,11 @@ def follow(problem: Problem, fit: Fit) -> Path:
     single = np.full(problem.d, own) if problem.kicked else residual_noise(fit)
     lasting = single if problem.kicked else effective_noise(fit)
     lowest = min(typical(single), LARGEST / 10**STEP)
+    smooth = bool((lasting > LASTING * single).any() or typical(single) <= NOISELESS)
+    level = max(lowest, time_inflation(fit) * typical(lasting), SMOOTH if smooth else 0.0)
     count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
-    levels = np.geomspace(lowest, LARGEST, count + 1)
+    # What has to be tolerated is asked itself: a plateau may begin just below it.
+    levels = np.union1d(np.geomspace(lowest, LARGEST, count + 1), min(level, LARGEST))
     paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
     for low, high in zip(levels[:-1].tolist(), levels[1:].tolist(), strict=True):
         share = (own / low) ** 2
@@ -150,8 +153,6 @@ def follow(problem: Problem, fit: Fit) -> Path:
             else:
                 low_here = low
             paths[j].append(Plateau(j, low_here, high, terms))
-    smooth = bool((lasting > LASTING * single).any() or typical(single) <= NOISELESS)
-    level = max(lowest, time_inflation(fit) * typical(lasting), SMOOTH if smooth else 0.0)
     return Path(fit, model, own, level, tuple(map(tuple, paths)))
 
 

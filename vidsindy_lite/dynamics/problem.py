@@ -26,7 +26,7 @@ from .state import State
 from .trajectories import Trajectory
 from .units import Units
 
-FALSE_ALARM = 0.05
+FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where laws of the zoo have
 about the fewest wrong terms (`study.price`)."""
 SURE = 0.004

@@ -113,10 +113,19 @@ def _of_all_data(problem: Problem, fit: Fit, history: History) -> Fit:
     """A law of a part of the data on all of them, its terms searched again."""
     collocation = problem.collocation(problem.segments())
     state = replace(fit.state, control_points=fit_curves(collocation, problem.curves))
+    fit = tightened(problem, collocation, state)
+    return select(problem, fit, FINAL_WEIGHT, "subset search, all data", history)
+
+
+def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
+    """The fit of a state's terms while the physics weight rises to its last.
+
+    At that weight alone the law holds so exactly that a state far from the minimum creeps.
+    """
     for weight in SEARCH_WEIGHTS:
         fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=10)
         state = fit.state
-    return select(problem, fit, FINAL_WEIGHT, "subset search, all data", history)
+    return fit
 
 
 def candidates(problem: Problem, rng: np.random.Generator, history: History) -> list[Fit]:
@@ -310,24 +319,24 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
 
 def cheapest(problem: Problem, found: Sequence[Fit], history: History) -> Fit:
     """Refine the cheapest candidates; the lowest criterion wins."""
-    ordered = sorted(found, key=lambda fit: fit.criterion)
-    kept = list({_key(fit.state): fit for fit in reversed(ordered)}.values())[::-1][:REFINED]
+    kept = _distinct(found)[:REFINED]
     for weight in SEARCH_WEIGHTS:
         refined = [
             select(problem, fit, weight, "subset search, own frame", history) for fit in kept
         ]
         limit = min(fit.criterion for fit in refined) + problem.penalties.max()
-        kept = list({_key(fit.state): fit for fit in refined if fit.criterion <= limit}.values())
+        kept = [fit for fit in _distinct(refined) if fit.criterion <= limit]
     homes = [come_home(problem, fit, history) for fit in kept]
-    dearest_first = sorted(homes, key=lambda fit: -fit.criterion)
-    distinct = {_key(fit.state): fit for fit in dearest_first}.values()
-    settled = [leave_home(problem, fit, history) for fit in distinct]
+    settled = [leave_home(problem, fit, history) for fit in _distinct(homes)]
     return min(settled, key=lambda fit: fit.criterion)
 
 
-def _key(state: State) -> tuple[bytes, bytes]:
-    """Same for states with the same terms and axes."""
-    return state.active.tobytes(), state.moving.tobytes()
+def _distinct(found: Sequence[Fit]) -> list[Fit]:
+    """The cheapest fit of each set of terms and moved axes, the cheapest first."""
+    first: dict[tuple[bytes, bytes], Fit] = {}
+    for fit in sorted(found, key=lambda fit: fit.criterion):
+        first.setdefault((fit.state.active.tobytes(), fit.state.moving.tobytes()), fit)
+    return list(first.values())
 
 
 def come_home(problem: Problem, fit: Fit, history: History) -> Fit:
@@ -415,15 +424,13 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
         fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing
     )
     bridged = problem.collocation(joined)
-    trial = replace(fit.state, control_points=fit_curves(bridged, curves))
-    for weight in SEARCH_WEIGHTS:
-        bridged = problem.weighted(bridged, weight)
-        trial = bridged.solve(trial, tolerance=1.0, max_steps=10).state
+    start = replace(fit.state, control_points=fit_curves(bridged, curves))
+    trial = tightened(problem, bridged, start)
     # A bridge takes away the freedom of one initial condition: so much may the fit lose.
     freedom = problem.d * len(group) + (bridged.counts - fit.collocation.counts).sum()
-    loss = bridged.objective(trial) - fit.collocation.objective(fit.state)
+    loss = trial.collocation.objective(trial.state) - fit.collocation.objective(fit.state)
     if loss < freedom + 4 * np.sqrt(2 * freedom):
-        return replace(fit, state=trial, collocation=bridged)
+        return replace(fit, state=trial.state, collocation=trial.collocation)
     if len(group) > 1:
         for half in (group[: len(group) // 2], group[len(group) // 2 :]):
             fit = _bridge_group(problem, fit, half)

@@ -38,11 +38,11 @@ from .process_noise import rebalanced, with_process_noise
 from .search import (
     CONSISTENT,
     FINAL_WEIGHT,
-    SEARCH_WEIGHTS,
     climb,
     consistent,
     leave_home,
     search,
+    tightened,
 )
 from .selection import inverse
 from .shape import is_on_circle
@@ -316,7 +316,11 @@ def at_own_noise(problem: Problem, fit: Fit) -> Fit:
     """The same fit, weighted with the errors that it leaves."""
     collocation = fit.collocation
     weighted = collocation.weighted(problem.errors(fit) ** -2, collocation.physics_weights)
-    return weighted.solve(fit.state, EXACT)
+    own = weighted.solve(fit.state, EXACT)
+    if own.status is Status.CONVERGED:
+        return own
+    looser = tightened(problem, weighted, own.state)
+    return looser.collocation.solve(looser.state, EXACT)
 
 
 def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
@@ -329,8 +333,8 @@ def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
     for _ in range(LONGEST_DESCENT):
         lowest = [plateaus[0] for plateaus in path.plateaus]
         trial = _refitted(problem, path, lowest, history)
-        if trial is None:
-            break
+        if trial is None or trial.status is not Status.CONVERGED:
+            break  # around what has not converged nothing is told
         deepest, path = trial, follow(problem, trial)
     best = [widest for widest, *_ in path.ranked()]
     for known in (fit, deepest):
@@ -342,26 +346,21 @@ def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
 def _refitted(
     problem: Problem, path: Path, goal: Sequence[Plateau], history: History
 ) -> Fit | None:
-    """The law of these plateaus; none if it is that of the path, too rich, leaves too much, or has
-    not converged, so that its terms tell nothing."""
+    """The law of these plateaus; none if it is that of the path, too rich, or leaves too much."""
     changed = _changed(path.fit, goal)
     if not changed:
         return None
     active = path.fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
     if active.sum() > RICHEST * path.fit.state.active.sum():
         return None
-    state, collocation = path.restricted(active), path.fit.collocation
-    for weight in SEARCH_WEIGHTS:
-        collocation = problem.weighted(collocation, weight)
-        state = collocation.solve(state, tolerance=1.0, max_steps=10).state
-    fit = at_own_noise(problem, collocation.solve(state, EXACT))
+    fit = tightened(problem, path.fit.collocation, path.restricted(active))
+    fit = at_own_noise(problem, fit.collocation.solve(fit.state, EXACT))
     priced = replace(fit, criterion=problem.criterion(fit.collocation, fit.state))
     # Terms that come in may be those of a shift, and worth their price at these errors alone.
     fit = at_own_noise(problem, leave_home(problem, priced, history))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     largest = max(plateau.low for plateau in changed)
-    fits = fit.status is Status.CONVERGED and typical(problem.errors(fit)) <= CONSISTENT * largest
-    return fit if fits else None
+    return fit if typical(problem.errors(fit)) <= CONSISTENT * largest else None
 
 
 def _changed(fit: Fit, goal: Sequence[Plateau]) -> list[Plateau]:
