@@ -221,7 +221,7 @@ def detect_near(path: Path, track: Floats) -> Floats:
             left, top = np.clip(_GRID * np.rint((place - WINDOW / 2) / _GRID), 0, last).astype(int)
             at.append(number)
             corners.append((left, top))
-            windows.append(frame[top : top + WINDOW, left : left + WINDOW])
+            windows.append(frame[top : top + WINDOW, left : left + WINDOW].copy())
     for first in range(0, len(at), _BATCH):
         batch = slice(first, first + _BATCH)
         seen = detector.predict_all(np.array(windows[batch]))

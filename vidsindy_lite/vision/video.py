@@ -20,6 +20,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, cast
 
+import cv2
 import numpy as np
 
 from ..arrays import Floats, Image
@@ -153,7 +154,10 @@ def _encode(
         with av.open(str(partial.absolute()), "w") as container:
             for frame in _checked(frames):
                 stream = stream or _add_stream(container, codec, rate, frame.shape[1::-1])
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "bgr24")))
+                pixels = "bgr24"
+                if codec.pixels == "rgb24":
+                    frame, pixels = _turned(frame), "rgb24"
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, pixels)))
                 count += 1
             if stream is None:
                 raise ValueError("frames: at least one frame is needed, got none")
@@ -413,10 +417,15 @@ def _images(path: str | os.PathLike) -> Iterator[Image]:
 
 def _image(frame: VideoFrame) -> Image:
     """Blue, green and red of a decoded frame, upright."""
-    # More threads cost more than they save.
-    image = (
-        upper_field(frame)
-        if frame.interlaced_frame
-        else cast("Image", frame.to_ndarray(format="bgr24", threads=1))
-    )
+    if frame.interlaced_frame:
+        image = upper_field(frame)
+    elif frame.format.name == "rgb24":
+        image = _turned(frame.to_ndarray())
+    else:  # more threads cost more than they save
+        image = cast("Image", frame.to_ndarray(format="bgr24", threads=1))
     return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90)))
+
+
+def _turned(image: Image) -> Image:
+    """Blue-green-red to red-green-blue or back, in half the time that ffmpeg takes."""
+    return cast("Image", cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
