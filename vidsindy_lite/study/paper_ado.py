@@ -21,7 +21,6 @@ PyTorch works in double precision: a cubic library is nearly collinear, and on a
 precision saves no more than a third of the time.
 """
 
-import math
 import time
 from dataclasses import dataclass
 
@@ -291,12 +290,17 @@ def _curve(basis: torch.Tensor, control_points: torch.Tensor) -> torch.Tensor:
 
 def _monomials(x: torch.Tensor, exponents: Ints) -> torch.Tensor:
     """Monomials of points (n, d), shape (n, l): as `polynomials.monomials`, for autograd."""
-    variables, ones = np.arange(x.shape[1]), torch.ones_like(x[:, 0])
-    columns = [
-        math.prod((x[:, i] for i in np.repeat(variables, powers)), start=ones)
-        for powers in exponents
-    ]
-    return torch.stack(columns, dim=1) if columns else x.new_zeros((len(x), 0))
+    columns = x.unbind(1)
+    products = {(): torch.ones_like(x[:, 0])} | {(i,): column for i, column in enumerate(columns)}
+
+    def product(factors: tuple[int, ...]) -> torch.Tensor:  # each of them once
+        if factors not in products:
+            products[factors] = product(factors[:-1]) * columns[factors[-1]]
+        return products[factors]
+
+    variables = np.arange(x.shape[1])
+    terms = [product(tuple(np.repeat(variables, powers).tolist())) for powers in exponents]
+    return torch.stack(terms, dim=1) if terms else x.new_zeros((len(x), 0))
 
 
 def _first_curve(first: Ints, values: Floats, x: Floats, r: int) -> Floats:
