@@ -291,7 +291,8 @@ def _curve(basis: torch.Tensor, control_points: torch.Tensor) -> torch.Tensor:
 def _monomials(x: torch.Tensor, exponents: Ints) -> torch.Tensor:
     """Monomials of points (n, d), shape (n, l): as `polynomials.monomials`, for autograd."""
     columns = x.unbind(1)
-    products = {(): torch.ones_like(x[:, 0])} | {(i,): column for i, column in enumerate(columns)}
+    products: dict[tuple[int, ...], torch.Tensor] = {(): torch.ones_like(x[:, 0])}
+    products |= {(i,): column for i, column in enumerate(columns)}
 
     def product(factors: tuple[int, ...]) -> torch.Tensor:  # each of them once
         if factors not in products:

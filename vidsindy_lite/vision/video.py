@@ -154,10 +154,7 @@ def _encode(
         with av.open(str(partial.absolute()), "w") as container:
             for frame in _checked(frames):
                 stream = stream or _add_stream(container, codec, rate, frame.shape[1::-1])
-                pixels = "bgr24"
-                if codec.pixels == "rgb24":
-                    frame, pixels = _turned(frame), "rgb24"
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, pixels)))
+                container.mux(stream.encode(_shown(frame, codec)))
                 count += 1
             if stream is None:
                 raise ValueError("frames: at least one frame is needed, got none")
@@ -168,6 +165,15 @@ def _encode(
         held = len(_packets(*opened))
     if held != count:
         raise OSError(f"path: cannot write {count} frames to '{path}', only {held} are in the file")
+
+
+def _shown(frame: Image, codec: _Codec) -> VideoFrame:
+    """A frame as ffmpeg takes it, and in the format of the codec if that costs no more."""
+    from av import VideoFrame
+
+    if codec.pixels == "rgb24":
+        return VideoFrame.from_numpy_buffer(_turned(frame), "rgb24")
+    return VideoFrame.from_ndarray(frame, "bgr24")
 
 
 def _checked(frames: Iterable[Image]) -> Iterator[Image]:
