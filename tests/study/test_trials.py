@@ -1,6 +1,7 @@
 """Typed trials: their data, their seeds, their scores; and the film behind them."""
 
 import pickle
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -84,6 +85,15 @@ def test_near_its_target_the_detector_sees_what_it_sees_in_the_whole_frame(tmp_p
     others = np.arange(len(near)) != 3
     np.testing.assert_allclose(near[others], np.array(whole)[others], atol=0.3)
     assert np.linalg.norm(near - shot.tracks[0], axis=1)[others].mean() < 1
+
+
+def test_the_detector_keeps_windows_of_the_frames_not_the_frames(tmp_path):
+    shot = film("Lorenz", tmp_path, frames=60)
+    tracemalloc.start()
+    detect_near(shot.paths[0], shot.tracks[0])
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 60 * 512 * 512 * 3 / 2
 
 
 def test_ours_is_told_the_systematic_errors_of_what_cameras_reconstructed(filmed, monkeypatch):
