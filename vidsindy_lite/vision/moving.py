@@ -26,6 +26,7 @@ from .candidates import (
 from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
+from .motley import entire
 from .occluders import hidden
 from .refining import Lens, View, fitting, scatter
 from .resting import explains, rests
@@ -387,10 +388,12 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     """The views of the whole target as a track."""
     n = len(views)
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
-    at = np.array([i for i, view in enumerate(views) if view], int)
+    whole, motley = entire(views)
+    at = np.array([i for i, view in enumerate(whole) if view], int)
     if len(at) < _SHORTEST:
         return nothing(motion, n)
-    shown = [view for view in views if view]
+    doubts += motley
+    shown = [view for view in whole if view]
     steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
