@@ -300,11 +300,13 @@ class BackgroundModel:
             return None
         label, stats = found
         core = _erode(label) if _erode(label).any() else label
-        inner = frame[window][core > 0]
-        colour = np.median(inner, axis=0)
-        contrast = np.linalg.norm(colour - self.background[window][core > 0], axis=1)
-        other = np.linalg.norm(inner - colour, axis=1) > contrast / 2
-        return colour, stats[cv2.CC_STAT_AREA], other.mean()
+        colour = np.median(frame[window][core > 0], axis=0)
+        core = _erode(
+            (_largest_component(energy > self.floor**2) or found)[0]
+        )  # also what is faint
+        inner, ground = frame[window][core > 0], self.background[window][core > 0]
+        other = np.linalg.norm(inner - colour, axis=1) > np.linalg.norm(colour - ground, axis=1) / 2
+        return colour, stats[cv2.CC_STAT_AREA], other.mean() if other.size else 0.0
 
     def search(self, frame: Image) -> tuple[Floats, float] | None:
         """Centre and half width of the part of the whole frame where the target seems to be."""
