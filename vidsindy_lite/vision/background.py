@@ -301,9 +301,7 @@ class BackgroundModel:
         label, stats = found
         core = _erode(label) if _erode(label).any() else label
         colour = np.median(frame[window][core > 0], axis=0)
-        core = _erode(
-            (_largest_component(energy > self.floor**2) or found)[0]
-        )  # also what is faint
+        core = _erode((_largest_component(energy > self.floor**2) or found)[0])  # and all fainter
         inner, ground = frame[window][core > 0], self.background[window][core > 0]
         other = np.linalg.norm(inner - colour, axis=1) > np.linalg.norm(colour - ground, axis=1) / 2
         return colour, stats[cv2.CC_STAT_AREA], other.mean() if other.size else 0.0
