@@ -44,6 +44,7 @@ _FLICKERS = 0.02  # change of the light above which it is not steady
 _TOO_LARGE = 0.25  # share of the image that no target fills
 _ROUNDING = 0.05  # grey levels squared; variance of coarse differences without any noise
 _QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
+_MOTLEY = 0.2  # share of the target that is of another colour, if it has several
 _BLIND = 0.1  # share of the target's outline that may lie on background of the same colour
 _ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
 _VIEWS = 200  # views among which the commonest one is sought
@@ -51,6 +52,7 @@ _VIEWS = 200  # views among which the commonest one is sought
 _DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
 
 Window = tuple[slice, slice]
+_Look = tuple[Floats, float, float]
 
 
 # -------------------------------------------------------------------------------------- background
@@ -260,6 +262,7 @@ class BackgroundModel:
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
         self.floor = max(5 * remaining, 12.0)
         self.contrast: Floats32 | None = None
+        self.motley = False
 
     def learn_target(self, samples: Image) -> None:
         """Colour and area of the target: the medians over the sampled frames."""
@@ -269,6 +272,7 @@ class BackgroundModel:
             return
         colour = np.median([look[0] for look in seen], axis=0)
         self.area = float(np.median([look[1] for look in seen]))
+        self.motley = bool(np.median([look[2] for look in seen]) > _MOTLEY)
         self.contrast = np.subtract(colour.astype(np.float32), self.background)
         self.square = _dot(self.contrast, self.contrast)
         self.blind = self.square < max(self.floor**2, 0.1 * np.median(self.square))
@@ -287,8 +291,8 @@ class BackgroundModel:
         smooth = cv2.GaussianBlur(change, (0, 0), self.blur) if self.blur else change
         return change, _dot(np.asarray(smooth), np.asarray(smooth))
 
-    def _look(self, frame: Image, centre: Floats, half: float) -> tuple[Floats, float] | None:
-        """Colour and rough area of what differs most from the background near `centre`."""
+    def _look(self, frame: Image, centre: Floats, half: float) -> _Look | None:
+        """Of what differs most near `centre`: colour, rough area, share that has another colour."""
         _, _, window = self._window(centre, half)
         _, energy = self._difference(frame, window)
         found = _largest_component(energy > max(self.floor**2, 0.2 * energy.max()))
@@ -296,7 +300,11 @@ class BackgroundModel:
             return None
         label, stats = found
         core = _erode(label) if _erode(label).any() else label
-        return np.median(frame[window][core > 0], axis=0), stats[cv2.CC_STAT_AREA]
+        colour = np.median(frame[window][core > 0], axis=0)
+        core = _erode((_largest_component(energy > self.floor**2) or found)[0])  # and all fainter
+        inner, ground = frame[window][core > 0], self.background[window][core > 0]
+        other = np.linalg.norm(inner - colour, axis=1) > np.linalg.norm(colour - ground, axis=1) / 2
+        return colour, stats[cv2.CC_STAT_AREA], other.mean() if other.size else 0.0
 
     def search(self, frame: Image) -> tuple[Floats, float] | None:
         """Centre and half width of the part of the whole frame where the target seems to be."""

@@ -68,6 +68,12 @@ def enlarged(factor: float) -> Floats:
     return np.array([[k, 0, (k - 1) / 2], [0, k, (k - 1) / 2], [0, 0, 1.0]])
 
 
+def reduced(maps: Floats, factor: float) -> Floats:
+    """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
+    larger = enlarged(factor)
+    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
+
+
 class Plate:
     """The steadied background, of frames of one size.
 

@@ -17,8 +17,8 @@ from .candidates import (
     Candidate,
     Difference,
     Plate,
-    enlarged,
     reduce,
+    reduced,
     reduction,
     tolerance,
     uncommon,
@@ -26,8 +26,10 @@ from .candidates import (
 from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
+from .motley import entire
 from .occluders import hidden
 from .refining import Lens, View, fitting, scatter
+from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
 from .video import read_frame, read_video, video_info
 
@@ -130,22 +132,31 @@ def _camera(
     """The camera's motion, and whether that is sure.
 
     It is read from all frames, unless the sampled ones tell that the camera is at rest. Maps that
-    say no more than their errors only add these.
+    say no more than their errors only add these, and so do maps by which the frames fit together
+    worse than they do at rest.
     """
     info = video_info(path)
     still = stands_still(small)
-    if still is not False:
-        return at_rest(info.frames), still is True
-    steadying = Steadying(factor)
-    for frame in read_video(path):
-        steadying.add(reduce(frame, factor))
-    motion = steadying.motion()
+    if still is False:
+        steadying = Steadying(factor)
+        for frame in read_video(path):
+            steadying.add(reduce(frame, factor))
+        motion = steadying.motion()
+        if _plainly(motion, info.size, factor):
+            at = np.minimum(sampled, len(motion.maps) - 1)
+            known = np.isfinite(motion.errors[at])
+            if explains(small, reduced(motion.maps[at], factor), known):
+                return motion, True
+    return at_rest(info.frames), still is True or rests(small)
+
+
+def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:
+    """Does a camera move by far more than the errors of its maps, and are these small?"""
     told = motion.errors[1:] < factor * _LOOSE
     if told.mean() < _TOLD_OFTEN:
-        return at_rest(info.frames), False
-    sure = displacement(motion.maps[1:], info.size) / np.maximum(motion.errors[1:], 1e-3)
-    plainly = np.quantile(sure, _PUSHED) > PLAINLY
-    return (motion if plainly else at_rest(info.frames)), True
+        return False
+    sure = displacement(motion.maps[1:], size) / np.maximum(motion.errors[1:], 1e-3)
+    return bool(np.quantile(sure, _PUSHED) > PLAINLY)
 
 
 def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) -> Followed:
@@ -225,8 +236,7 @@ class Film(NamedTuple):
         small = np.array([reduce(sample, factor) for sample in samples])
         motion, sure = (at_rest(frames), True) if rests else _camera(path, small, sampled, factor)
         sampled = np.minimum(sampled, len(motion.maps) - 1)
-        larger = enlarged(factor)
-        maps = np.linalg.inv(larger) @ motion.maps @ larger
+        maps = reduced(motion.maps, factor)
         known = np.isfinite(motion.errors[sampled])
         plate = Plate(small, maps[sampled], known)
         noise = _noise(small, maps[sampled], plate)
@@ -378,10 +388,12 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     """The views of the whole target as a track."""
     n = len(views)
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
-    at = np.array([i for i, view in enumerate(views) if view], int)
+    whole, motley = entire(views)
+    at = np.array([i for i, view in enumerate(whole) if view], int)
     if len(at) < _SHORTEST:
         return nothing(motion, n)
-    shown = [view for view in views if view]
+    doubts += motley
+    shown = [view for view in whole if view]
     steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])

@@ -6,7 +6,7 @@ view whose size or place does not fit those around it is of a part, of something
 in one, and is left out.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .candidates import Plate
+from .motley import whole
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
@@ -29,7 +30,9 @@ _BESIDE = 5  # views before and after such a meeting, which show how large it wa
 class View:
     """One look at the target, in pixels of its frame.
 
-    Centroid (2,), area, mean colour, is it clear of the image's border?, convex outline (k, 2).
+    Centroid (2,), area, mean colour, is it clear of the image's border?, convex outline (k, 2);
+    `whole` is the view of it with all that has another colour in one piece with it, if compact. The
+    area is 0 where nothing has the target's colour.
     """
 
     centroid: Floats
@@ -37,6 +40,7 @@ class View:
     colour: Floats
     inside: bool
     outline: Floats
+    whole: "View | None" = None
 
 
 class Lens:
@@ -80,11 +84,19 @@ class Lens:
         share = np.einsum("ijk,ijk->ij", smooth, contrast) / np.maximum(square, self.least**2)
         miss = np.linalg.norm(smooth - share[..., None] * contrast, axis=2)
         # What is of another colour, e.g. a shadow or a hand: off the line from ground to target.
-        own = mask & (share > 0.25) & (miss < np.maximum(0.45 * np.sqrt(square), 2 * self.least))
+        off = miss >= np.maximum(0.45 * np.sqrt(square), 2 * self.least)
+        own = mask & (share > 0.25) & ~off
         label = _nearest(own, centre - low)
-        if label is None:
+        part = label is not None
+        if label is None and (label := _nearest(mask, centre - low)) is None:
             return None
-        return self._measure(label, change, contrast, square, low, high, now)
+        view = self._measure(label, change, contrast, low, high, now)
+        found = whole(label, mask, mask & (off | (share < 0)), now, ground)
+        if found is None or found.plain:
+            return replace(view, whole=found and view) if part else None
+        contrast = found.colours - ground
+        all_ = self._measure(found.label, change, contrast, low, high, now)
+        return replace(view if part else replace(all_, area=0.0), whole=all_)
 
     def _tolerance(self, then: Image) -> Floats32:
         grey = cv2.cvtColor(then, cv2.COLOR_BGR2GRAY)
@@ -92,12 +104,13 @@ class Lens:
         return self.least + _EDGE[self.plate.moves] * slope.astype(np.float32)
 
     def _measure(
-        self, label: Bools, change: Floats32, contrast: Floats32, square: Floats32,
-        low: Floats, high: Floats, now: Floats32,
+        self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, high: Floats,
+        now: Floats32,
     ) -> View:  # fmt: skip
         """Centroid and area of one connected part."""
         near = cv2.dilate(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         core = cv2.erode(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        square = np.einsum("ijk,ijk->ij", contrast, contrast)
         alpha = np.einsum("ijk,ijk->ij", change, contrast) / np.maximum(square, self.least**2)
         alpha = np.clip(alpha, 0, 1)
         alpha[core] = 1

@@ -95,7 +95,8 @@ def track(
         A video of a target that moves. Other things may move, too, and the camera may tremble or
         be held in the hand.
     detector : {"auto", "background", "learned"} or path
-        * "auto": "background" as long as camera, light and background are at rest. Else the
+        * "auto": "background" as long as camera, light and background are at rest, and the target
+          is of one colour. Else the
           camera's motion and the light's are taken out, and of all that moves the plainest path is
           followed: something that travels, keeps its colour and turns gently.
         * "background": for a camera at rest, the most exact. The target may turn and change its
@@ -139,6 +140,8 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
         del model  # its images are large
         return _follow(path, samples, target)
     model.learn_target(samples)
+    if detector == "auto" and model.motley:
+        return _follow(path, samples, target)
     found, blurred = _track_blobs(path, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return _follow(path, samples, target)
