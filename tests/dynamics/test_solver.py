@@ -312,6 +312,7 @@ def test_a_last_fit_that_did_not_converge_is_told(monkeypatch):
     assert discover(t, x).status == "ok"
     monkeypatch.setattr(solver, "EXACT", -1.0)  # which no step can promise
     monkeypatch.setattr(collocation, "NEARLY", -1.0)
+    monkeypatch.setattr(collocation, "FAITHFUL", 0.0)
     assert any("the last fit did not converge" in text for text in discover(t, x).warnings)
 
 

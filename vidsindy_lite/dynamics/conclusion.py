@@ -49,13 +49,14 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
     # What the frame of the data needs is decided at the errors at which the terms were chosen.
     tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
-    prices = problem.prices * np.repeat(tolerated, l) ** 2
+    # To what the shift adds nothing, that the fit has weighed.
+    weighed = (moved == coefficients).T.ravel()
+    prices = np.where(weighed, KEPT, problem.prices * np.repeat(tolerated, l) ** 2)
     moved, moved_covariance, margins = _pruned(moved, moved_covariance, prices)
     margins /= np.repeat(tolerated**2, l)
     dearer = problem.cautious.prices - problem.prices
     margins += np.where(moved.T.ravel() != 0, -dearer, dearer)
-    if not state.moving.any():
-        margins[:] = np.inf  # nothing was carried over: the fit has weighed every term
+    margins[weighed] = np.inf
     law = form.law(moved + form.known)
     seen = collocation.counts > 0
     return Discovery(

@@ -320,7 +320,8 @@ def at_own_noise(problem: Problem, fit: Fit) -> Fit:
     if own.status is Status.CONVERGED:
         return own
     looser = tightened(problem, weighted, own.state)
-    return looser.collocation.solve(looser.state, EXACT)
+    again = looser.collocation.solve(looser.state, EXACT)
+    return again if again.status is Status.CONVERGED else own
 
 
 def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:

@@ -44,7 +44,7 @@ _FLICKERS = 0.02  # change of the light above which it is not steady
 _TOO_LARGE = 0.25  # share of the image that no target fills
 _ROUNDING = 0.05  # grey levels squared; variance of coarse differences without any noise
 _QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
-_MOTLEY = 0.2  # share of the target that is of another colour, if it has several
+_SEVERAL_COLOURS = 0.2  # share of the target that is of another colour, if it has several
 _BLIND = 0.1  # share of the target's outline that may lie on background of the same colour
 _ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
 _VIEWS = 200  # views among which the commonest one is sought
@@ -262,7 +262,7 @@ class BackgroundModel:
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
         self.floor = max(5 * remaining, 12.0)
         self.contrast: Floats32 | None = None
-        self.motley = False
+        self.several_colours = False
 
     def learn_target(self, samples: Image) -> None:
         """Colour and area of the target: the medians over the sampled frames."""
@@ -272,7 +272,7 @@ class BackgroundModel:
             return
         colour = np.median([look[0] for look in seen], axis=0)
         self.area = float(np.median([look[1] for look in seen]))
-        self.motley = bool(np.median([look[2] for look in seen]) > _MOTLEY)
+        self.several_colours = bool(np.median([look[2] for look in seen]) > _SEVERAL_COLOURS)
         self.contrast = np.subtract(colour.astype(np.float32), self.background)
         self.square = _dot(self.contrast, self.contrast)
         self.blind = self.square < max(self.floor**2, 0.1 * np.median(self.square))

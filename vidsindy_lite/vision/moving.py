@@ -23,10 +23,10 @@ from .candidates import (
     tolerance,
     uncommon,
 )
+from .colours import entire
 from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
-from .motley import entire
 from .occluders import hidden
 from .refining import Lens, View, fitting, scatter
 from .resting import explains, rests
@@ -388,11 +388,11 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     """The views of the whole target as a track."""
     n = len(views)
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
-    whole, motley = entire(views)
+    whole, of_parts = entire(views)
     at = np.array([i for i, view in enumerate(whole) if view], int)
     if len(at) < _SHORTEST:
         return nothing(motion, n)
-    doubts += motley
+    doubts += of_parts
     shown = [view for view in whole if view]
     steady = carry(motion.maps[at], np.array([view.centroid for view in shown]))
     areas = np.array([view.area for view in shown])

@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .candidates import Plate
-from .motley import whole
+from .colours import whole
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts

@@ -140,7 +140,7 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
         del model  # its images are large
         return _follow(path, samples, target)
     model.learn_target(samples)
-    if detector == "auto" and model.motley:
+    if detector == "auto" and model.several_colours:
         return _follow(path, samples, target)
     found, blurred = _track_blobs(path, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):

@@ -426,7 +426,7 @@ def _image(frame: VideoFrame) -> Image:
     if frame.interlaced_frame:
         image = upper_field(frame)
     elif frame.format.name == "rgb24":
-        image = _turned(frame.to_ndarray())
+        image = _turned(cast("Image", frame.to_ndarray()))
     else:  # more threads cost more than they save
         image = cast("Image", frame.to_ndarray(format="bgr24", threads=1))
     return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90)))

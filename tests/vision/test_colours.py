@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import track, write_video
-from vidsindy_lite.vision.motley import entire, whole
+from vidsindy_lite.vision.colours import entire, whole
 from vidsindy_lite.vision.refining import View
 from vidsindy_lite.vision.scenery import BACKGROUNDS
 
