@@ -208,14 +208,19 @@ def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
     assert "without the constant" not in warning
 
 
-@pytest.mark.parametrize(("decades", "contested"), [(0.9, False), (1.1, True)])
-def test_a_wider_plateau_of_larger_errors_contests_a_law(duffing, decades, contested):
+@pytest.mark.parametrize(
+    ("decades", "lasting", "contested"), [(0.9, 2, False), (1.1, 2, True), (1.1, 1, False)]
+)
+def test_a_wider_plateau_of_larger_errors_contests_a_law_if_errors_last(
+    duffing, decades, lasting, contested
+):
     problem, fit, model, path, law, margins = fitted(duffing)
     simpler = np.arange(len(law.terms)) == law.terms.index("x")
     (own,) = path.of(fit.state.active)[1:]
-    own = replace(own, low=0.01, high=0.1)
-    rival = Plateau(1, 0.1, 0.1 * 10**decades, simpler)
-    path = replace(path, plateaus=(path.plateaus[0], (own, rival)), level=0.02)
+    own = replace(own, low=path.lowest, high=10 * path.lowest)
+    rival = Plateau(1, own.high, own.high * 10**decades, simpler)
+    plateaus = path.plateaus[0], (own, rival)
+    path = replace(path, plateaus=plateaus, level=lasting * path.lowest)
     told = diagnose(problem, fit, model, path, law, margins)
     assert any("dy/dt is settled by how large an error" in one for one in told) is contested
 

@@ -272,7 +272,7 @@ def _range(low: float, high: float) -> str:
 
 def _contested(law: PolynomialSystem, state: State, path: Path, remedy: str) -> Iterator[str]:
     """Is another plateau nearly as wide as that of a law, or one of larger errors wider?"""
-    names = law.names
+    lasting = path.level > path.lowest  # what is independent averages out, and tells of each term
     for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
         near = [plateau for plateau in plateaus if plateau.low <= path.level]
         same = [plateau for plateau in near if (plateau.terms == own.terms).all()]
@@ -282,7 +282,7 @@ def _contested(law: PolynomialSystem, state: State, path: Path, remedy: str) -> 
         others = [
             (weight, plateau)
             for weight, plateau in zip(weights, plateaus, strict=True)
-            if (plateau.terms != own.terms).any() and (same or plateau in near)
+            if (plateau.terms != own.terms).any() and (lasting and same or plateau in near)
         ]
         standing, rival = max(others, key=lambda other: other[0], default=(0.0, own))
         if standing > RIVAL * own.decades:
@@ -292,7 +292,7 @@ def _contested(law: PolynomialSystem, state: State, path: Path, remedy: str) -> 
                 for k in changed
             )
             yield (
-                f"d{names[own.equation]}/dt is settled by how large an error is tolerated: "
+                f"d{law.names[own.equation]}/dt is settled by how large an error is tolerated: "
                 f"it stays the same {_range(own.low, own.high)} of the spread of the data, and "
                 f"{change} {_range(rival.low, rival.high)}; use {remedy}"
             )
