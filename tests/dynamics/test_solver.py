@@ -395,7 +395,7 @@ def test_no_path_is_followed_around_a_richer_law_that_did_not_converge(monkeypat
 
 def test_a_term_that_is_worth_its_price_alone_is_kept_and_told():
     """The weakest term of the seven systems, at the noise at which the data hardly tell it."""
-    truth, t, x = measured("Tsucs2", 0.1, n=1500, seed=0)
+    truth, t, x = measured("Tsucs2", 0.1, n=1500, seed=[7, 2, 100])
     found = discover(t, x, order=1)
     assert score(found, truth).exact
-    assert found.status == "suspect"
+    assert any("without x in dy/dt" in text for text in found.warnings)
