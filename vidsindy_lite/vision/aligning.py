@@ -17,7 +17,6 @@ _RIM = 2  # pixels of each level that depend on what lies beyond the image
 _LEVELS = 4  # of the pyramid, the first of half the size
 _ITERATIONS = 6
 _CLOSE = 0.01  # pixels of a level of a step that is no longer worth another
-_OUTSIDE = -1e4  # grey level of what a view does not show
 _LOOSE, _FIRM = 40.0, 3.0  # grey levels, and deviations, from which on a pixel is left aside
 _STEP, _TURN = 8.0, 0.03  # pixels and radians by which the guess may be wrong
 _FAIR = 4.0  # times what a usual block tells, that one block may tell at most
@@ -54,24 +53,25 @@ def align(before: list[Floats32], after: list[Floats32], guess: Floats) -> Align
     """
     found, fitted = guess, None
     for level in range(len(before), 0, -1):
-        scale = np.diag([0.5**level, 0.5**level, 1.0])
-        here = scale @ found @ np.linalg.inv(scale)
+        scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
+        here = scale @ found @ back
         fitted = _fit(before[level - 1], after[level - 1], here, scale[0, 0], _LOOSE * (level > 1))
         if fitted is None:
             return None
-        found = np.linalg.inv(scale) @ fitted.map @ scale
+        found = back @ fitted.map @ scale
     return fitted and Aligned(found, 2 * fitted.error)
 
 
 def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float) -> Aligned | None:
     """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
     height, width = key.shape
-    v, u = np.mgrid[:height, :width].astype(np.float32)
-    middle = np.array([[1, 0, -(width - 1) / 2], [0, 1, -(height - 1) / 2], [0, 0, 1.0]])
-    u, v = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
+    middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
+    to_middle = np.linalg.inv(middle)
+    u = np.arange(width, dtype=np.float32) - np.float32(middle[0, 2])
+    v = (np.arange(height, dtype=np.float32) - np.float32(middle[1, 2]))[:, None]
     slopes = _slopes(key, u, v)
-    steep = slopes.reshape(-1, 6)
-    power = _by_blocks(slopes[..., 0] ** 2 + slopes[..., 1] ** 2)
+    steep = slopes.reshape(6, -1)
+    power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
     fair = np.minimum(1, _FAIR * np.median(power) / np.maximum(power, 1e-9))
     share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
     sure = np.array([_STEP, _STEP, _TURN, _TURN, 1, 100]) * [scale, scale, 1, 1, 1, 1]
@@ -81,36 +81,43 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
     inner[_RIM:-_RIM, _RIM:-_RIM] = 1
     for step in range(_ITERATIONS):
         shown, known = _moved(view, here[:2]), _moved(inner, here[:2]) * inner > 0.99
-        if known.mean() < 0.3:
+        if np.count_nonzero(known) < 0.3 * known.size:
             return None
         miss = shown - gain * key - offset
         if step == 0:
-            offset = float(np.median(miss[known]))
+            offset = _median(miss[known])
             miss -= offset
-        spread = max(1.4826 * float(np.median(np.abs(miss[known]))), _FAINT)
+        spread = max(1.4826 * _median(np.abs(miss[known])), _FAINT)
         bound = max(_FIRM * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
-        heavy = steep * weight.reshape(-1, 1)
-        normal = heavy.T @ steep + spread**2 * prior
-        delta = np.linalg.solve(normal, heavy.T @ miss.ravel())
+        heavy = steep * weight.ravel()
+        normal = heavy @ steep.T + spread**2 * prior
+        delta = np.linalg.solve(normal, heavy @ miss.ravel())
         shift = np.array(
             [[1 + delta[2], -delta[3], delta[0]], [delta[3], 1 + delta[2], delta[1]], [0, 0, 1]]
         )
-        change = np.linalg.inv(middle) @ shift @ middle
-        here = here @ np.linalg.inv(change)
-        gain, offset = gain + delta[4], offset + delta[5]
+        here = here @ middle @ np.linalg.inv(shift) @ to_middle
+        gain, offset = float(gain + delta[4]), float(offset + delta[5])
         if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < _CLOSE:
             break
-    miss = miss - (slopes @ delta).astype(np.float32)
+    if loose:  # a finer level says how sure the map is
+        return Aligned(here, np.inf)
+    miss = miss - np.tensordot(delta.astype(np.float32), slopes, 1)
     seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32), u, v)
     # Noise has slopes, too, but not the same in both views.
-    value, direction = np.linalg.eigh(_symmetric(heavy.T @ seen.reshape(-1, 6)))
+    value, direction = np.linalg.eigh(_symmetric(heavy @ seen.reshape(6, -1).T))
     information = (direction * np.maximum(value, 0)) @ direction.T / spread**2 + prior
-    telling = _by_blocks(weight * np.einsum("ijk,ijk->ij", seen[..., :2], slopes[..., :2]))
+    telling = _by_blocks(weight * (seen[0] * slopes[0] + seen[1] * slopes[1]))
     telling = np.maximum(telling, 0)
     if telling.mean() ** 2 <= _WIDELY * (telling**2).mean():
         return Aligned(here, np.inf)
     return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
+
+
+def _median(values: Floats32) -> float:
+    """The median of every other value."""
+    few = values[::2]
+    return float(np.partition(few, len(few) // 2)[len(few) // 2])
 
 
 def _symmetric(matrix: Floats) -> Floats:
@@ -124,10 +131,9 @@ def _by_blocks(values: Floats32) -> Floats32:
 
 
 def _slopes(view: Floats32, u: Floats32, v: Floats32) -> Floats32:
-    """By what each pixel changes with shift, turn, scale and light, (h, w, 6)."""
-    gv, gu = np.gradient(view)
-    by = [gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)]
-    return np.stack(by, axis=-1)
+    """By what each pixel changes with shift, turn, scale and light, (6, h, w)."""
+    gu, gv = (0.5 * cv2.Sobel(view, cv2.CV_32F, *by, ksize=1) for by in ((1, 0), (0, 1)))
+    return np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)])
 
 
 def _moved(view: Floats32, here: Floats) -> Floats32:
@@ -147,10 +153,10 @@ def _error(
     if not height or not width:
         return np.inf
     cut = np.s_[: height * _BLOCKS, : width * _BLOCKS]
-    pulls = (slopes * pull[..., None])[cut].reshape(_BLOCKS, height, _BLOCKS, width, 6)
-    sums = pulls.sum(axis=(1, 3)).reshape(-1, 6)
+    pulls = (slopes * pull)[:, *cut].reshape(6, _BLOCKS, height, _BLOCKS, width)
+    sums = pulls.sum(axis=(2, 4)).reshape(6, -1)
     covariance = np.linalg.inv(information)
-    blockwise = covariance @ (sums.T @ sums) @ covariance
+    blockwise = covariance @ (sums @ sums.T) @ covariance
     variance = np.maximum(np.diag(blockwise), np.diag(covariance))
-    far = float(np.mean(at[0] ** 2 + at[1] ** 2))
+    far = float(np.mean(at[0] ** 2) + np.mean(at[1] ** 2))
     return float(np.sqrt((variance[0] + variance[1] + far * (variance[2] + variance[3])) / 2))
