@@ -310,6 +310,7 @@ def write_at(path, times, frames, codec="ffv1", pixels="bgr0", b_frames=0):
         ("a.mkv", "ffv1", "bgr0", 0),
         ("a.mp4", "mpeg4", "yuv420p", 2),
         ("b.avi", "mpeg4", "yuv420p", 2),  # keeps no times
+        ("b.mp4", "libx264", "yuv420p", 3),
     ],
 )
 def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixels, b_frames):
@@ -323,6 +324,17 @@ def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixe
     numbers = [0, 3, 4, 20, 21, 50]
     picked = list(pick_frames(path, numbers))
     assert all(np.array_equal(one, frames[k]) for one, k in zip(picked, numbers, strict=True))
+
+
+def test_frames_that_no_other_needs_are_not_decoded_on_the_way(tmp_path, monkeypatch):
+    path = write_at(tmp_path / "a.mp4", np.arange(24), drawn(24), "mpeg4", "yuv420p", 2)
+    decoded = []
+    decode = video._decoded
+    monkeypatch.setattr(
+        video, "_decoded", lambda *args: (decoded.append(f) or f for f in decode(*args))
+    )
+    assert len(list(pick_frames(path, [0, 7]))) == 2
+    assert len(decoded) < 7
 
 
 def test_no_file_has_so_many_frames(tmp_path):

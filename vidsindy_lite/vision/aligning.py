@@ -114,7 +114,7 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
     return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
 
 
-def _median(values: Floats32) -> float:
+def _median(values: Floats | Floats32) -> float:
     """The median of every other value."""
     few = values[::2]
     return float(np.partition(few, len(few) // 2)[len(few) // 2])

@@ -31,7 +31,7 @@ from .occluders import hidden
 from .refining import Lens, View, fitting, scatter
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
-from .video import read_frame, read_video, video_info
+from .video import VideoInfo, read_frame, read_video, video_info
 
 _PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path
@@ -127,7 +127,7 @@ def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
 
 
 def _camera(
-    path: str | os.PathLike, small: Image, sampled: Ints, factor: int
+    path: str | os.PathLike, info: VideoInfo, small: Image, sampled: Ints, factor: int
 ) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
@@ -135,7 +135,6 @@ def _camera(
     say no more than their errors only add these, and so do maps by which the frames fit together
     worse than they do at rest.
     """
-    info = video_info(path)
     still = stands_still(small)
     if still is False:
         steadying = Steadying(factor)
@@ -230,11 +229,14 @@ class Film(NamedTuple):
     @classmethod
     def of(cls, path: str | os.PathLike, samples: Image, rests: bool = False) -> "Film":
         """From its sampled frames, and from all of them if its camera may move."""
-        frames = video_info(path).frames
-        sampled = np.unique(np.linspace(0, frames - 1, SAMPLES).round().astype(int))[: len(samples)]
+        info = video_info(path)
+        spread = np.linspace(0, info.frames - 1, SAMPLES).round().astype(int)
+        sampled = np.unique(spread)[: len(samples)]
         factor = reduction((samples.shape[2], samples.shape[1]))
         small = np.array([reduce(sample, factor) for sample in samples])
-        motion, sure = (at_rest(frames), True) if rests else _camera(path, small, sampled, factor)
+        motion, sure = at_rest(info.frames), True
+        if not rests:
+            motion, sure = _camera(path, info, small, sampled, factor)
         sampled = np.minimum(sampled, len(motion.maps) - 1)
         maps = reduced(motion.maps, factor)
         known = np.isfinite(motion.errors[sampled])

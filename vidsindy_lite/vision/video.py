@@ -14,7 +14,7 @@ PyAV is imported by the functions that need it, since who works with tracks need
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
 from pathlib import Path
@@ -354,6 +354,7 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
             yield from (image for i, image in enumerate(_images(path)) if i in numbers)
             return
         keys = [time or 0 for time, is_key in packets if is_key]
+        wanted = {times[number] for number in numbers if number < len(times)}
         frames: Iterator[VideoFrame] = iter(())
         now = -np.inf
         for number in numbers:
@@ -363,7 +364,7 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
             key = max((key for key in keys if key <= time), default=min(keys, default=time))
             if key > now:
                 container.seek(key, stream=stream)
-                frames = _decoded(container, stream)
+                frames = _decoded(container, stream, wanted)
             frame = next((f for f in frames if f.pts is not None and f.pts >= time), None)
             if frame is None:
                 return
@@ -399,12 +400,21 @@ def _packets(container: InputContainer, stream: VideoStream) -> list[Shown]:
     return [(p.pts, p.is_keyframe) for p in packets if p.size and not p.is_discard]
 
 
-def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
-    """The frames from here on, up to where the file is cut off or damaged."""
+def _decoded(
+    container: InputContainer, stream: VideoStream, wanted: Container[int] | None = None
+) -> Iterator[VideoFrame]:
+    """The frames from here on, up to where the file is cut off or damaged.
+
+    If only those shown at some times are `wanted`, others that no frame needs are left out.
+    """
     import av
 
     with suppress(av.FFmpegError):
-        yield from container.decode(stream)
+        for packet in container.demux(stream):
+            if wanted is not None:
+                needed = packet.is_keyframe or packet.pts is None or packet.pts in wanted
+                stream.codec_context.skip_frame = "DEFAULT" if needed else "NONREF"
+            yield from packet.decode()
 
 
 def _first(path: str | os.PathLike, container: InputContainer, stream: VideoStream) -> Image:
