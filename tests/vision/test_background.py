@@ -12,7 +12,6 @@ from vidsindy_lite.vision.background import (
     _largest_component,
     _median,
     _others,
-    _reduce,
     _shape,
     _unrest,
     camera_motion,
@@ -41,13 +40,6 @@ def test_the_median_of_images():
     before = images.copy()
     np.testing.assert_array_equal(_median(images), np.median(images, axis=0))
     np.testing.assert_array_equal(images, before)
-
-
-def test_coarse_pixels_are_means():
-    image = np.random.default_rng(0).integers(0, 256, (16, 24, 3), np.uint8)
-    means = image.reshape(4, 4, 6, 4, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(_reduce(image), means, atol=0.5)
-    assert _reduce(np.zeros((17, 25, 3), np.uint8)).shape == (5, 7, 3)
 
 
 @pytest.mark.parametrize("shift", [(0.1, 0.0), (0.0, 0.2), (0.12, -0.16)])
@@ -235,7 +227,7 @@ def plain():
 def test_what_is_learned_of_a_square(plain):
     np.testing.assert_array_equal(plain.background, squares())
     assert plain.area == 16**2
-    np.testing.assert_array_equal(plain.contrast[0, 0], np.subtract(TARGET, GROUND))
+    np.testing.assert_array_equal(plain.colour, TARGET)
     assert plain.noise == 0
     assert plain.unrest == ()
 

@@ -11,7 +11,7 @@ from helpers import one_a_frame
 
 import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision.candidates import Candidate, Plate, reduce
+from vidsindy_lite.vision.candidates import Candidate, Plate
 from vidsindy_lite.vision.linking import Sightings, best_path
 from vidsindy_lite.vision.moving import _fits, _learned, finished, hinted, rate
 from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
@@ -281,17 +281,6 @@ def test_the_plate_of_a_moving_camera():
         assert known.mean() > 0.8
         assert np.median(difference) == 0
     assert plate.seen_from(maps[4], np.array([40, 40]), (20, 20))[0].min() > 0
-
-
-def test_reduced_pixels_are_means():
-    image = np.random.default_rng(0).integers(0, 256, (8, 12, 3), np.uint8)
-    means = image.reshape(4, 2, 6, 2, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(reduce(image, 2), means, atol=0.5)
-    # What is missing of the last squares repeats the last row and column.
-    cut = np.pad(image[:7, :10], ((0, 2), (0, 2), (0, 0)), mode="edge")
-    means = cut.reshape(3, 3, 4, 3, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(reduce(image[:7, :10], 3), means, atol=0.51)
-    assert reduce(image, 1) is image
 
 
 # ------------------------------------------------------------------------------------------- hints

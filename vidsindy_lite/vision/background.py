@@ -27,6 +27,7 @@ from scipy import ndimage
 from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
+from .reducing import reduce
 from .video import pick_frames, video_info
 
 SAMPLES = 21
@@ -85,18 +86,6 @@ def _median(frames: Image) -> Image:
     return result
 
 
-def _reduce(image: Image) -> Floats32:
-    """Means over squares of 4 x 4 pixels, as floats."""
-    return _reduced(image).astype(np.float32)
-
-
-def _reduced(image: Image) -> Image:
-    """Means over squares of 4 x 4 pixels, rounded."""
-    height, width = image.shape[:2]
-    size = (-(-width // _COARSE), -(-height // _COARSE))
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
 def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: float) -> None:
     """Correct in place a background that contains the target where it stayed for long.
 
@@ -104,9 +93,9 @@ def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: floa
     target. Of the two, the one that continues its surroundings is the background. `coarse` are the
     samples, reduced: what continues what needs no more.
     """
-    reduced = _reduced(background)
+    reduced = reduce(background, _COARSE)
     ground = reduced.astype(np.float32)
-    differs = np.array([np.linalg.norm(one - ground, axis=-1) > floor for one in coarse])
+    differs = np.array([lengths(one - ground) > floor for one in coarse])
     often = (differs.mean(axis=0) > _OFTEN).astype(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(often)
     for k in range(1, count):
@@ -139,7 +128,7 @@ def _others(changes: list[Floats32], floor: float) -> float:
     """
     found = []
     for change in changes:
-        differs = np.linalg.norm(change, axis=-1) > floor
+        differs = lengths(change) > floor
         largest = _largest_component(differs)
         if largest is None:
             continue
@@ -162,14 +151,15 @@ def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -
     To first order a displacement changes the image by minus that times its slope: least squares,
     with a prior of one coarse pixel where there is little to see.
     """
-    slope = np.array(np.gradient(background, axis=(1, 0)))
+    slope = np.array(np.gradient(background, axis=(1, 0))).reshape(2, -1)
     displaced = np.zeros(len(changes))
     for k, change in enumerate(changes):
-        calm = np.linalg.norm(change, axis=-1) <= floor
+        calm = lengths(change) <= floor
         if not calm.any():
             continue
-        g, d = slope[:, calm].reshape(2, -1), change[calm].ravel()
-        variance = d.var() + _ROUNDING
+        use = calm.repeat(3)
+        g, d = slope * use, change.ravel() * use
+        variance = d[use].var() + _ROUNDING
         information = g @ g.T / variance + np.eye(2)
         displacement = np.linalg.solve(information, g @ d / variance)
         error = np.sqrt(np.trace(np.linalg.inv(information)))
@@ -178,7 +168,7 @@ def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -
     return displaced
 
 
-def light(frame: Floats32, background: Floats32, known: Bools) -> Floats32:
+def light(frame: Image | Floats32, background: Image | Floats32, known: Bools) -> Floats32:
     """By what factor each colour of a frame is brighter than the background, (3,).
 
     The median over pixels that are neither dark nor saturated nor, probably, the target's.
@@ -249,10 +239,10 @@ class BackgroundModel:
         deviation = [cv2.absdiff(np.ascontiguousarray(s[::3, ::3]), calm) for s in samples]
         self.noise = 1.4826 * float(np.median(deviation))
         self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
-        coarse = np.array([_reduced(sample) for sample in samples])
+        coarse = np.array([reduce(sample, _COARSE) for sample in samples])
         _remove_ghosts(self.background, samples, coarse, self.coarse_floor)
         self.size = np.array(self.background.shape[1::-1])
-        self.coarse_background = _reduce(self.background)
+        self.coarse_background = reduce(self.background, _COARSE).astype(np.float32)
         changes = [one - self.coarse_background for one in coarse]
         displaced = camera_motion(self.coarse_background, changes, self.coarse_floor)
         self.camera_rests = bool(displaced.max(initial=0.0) <= _SHAKY)
@@ -261,7 +251,7 @@ class BackgroundModel:
         self.blur = 1.2 if self.noise > _QUIET else 0.0
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
         self.floor = max(5 * remaining, 12.0)
-        self.contrast: Floats32 | None = None
+        self.colour: Floats32 | None = None
         self.several_colours = False
 
     def learn_target(self, samples: Image) -> None:
@@ -270,14 +260,12 @@ class BackgroundModel:
         seen = [look for look in looks if look]
         if not seen:
             return
-        colour = np.median([look[0] for look in seen], axis=0)
+        self.colour = np.median([look[0] for look in seen], axis=0).astype(np.float32)
         self.area = float(np.median([look[1] for look in seen]))
         self.several_colours = bool(np.median([look[2] for look in seen]) > _SEVERAL_COLOURS)
-        self.contrast = np.subtract(colour.astype(np.float32), self.background)
-        self.square = _dot(self.contrast, self.contrast)
-        self.blind = self.square < max(self.floor**2, 0.1 * np.median(self.square))
-        self.coarse_contrast = (colour - self.coarse_background).astype(np.float32)
-        self.coarse_square = _dot(self.coarse_contrast, self.coarse_contrast)
+        self.coarse_contrast = self.colour - self.coarse_background
+        self.coarse_square = dot(self.coarse_contrast, self.coarse_contrast)
+        self.blind = max(self.floor**2, 0.1 * float(np.median(self.coarse_square)))
 
     def _window(self, centre: Floats, half: float) -> tuple[Ints, Ints, Window]:
         """First pixel, the one after the last, and the slices, of the square around a place."""
@@ -289,7 +277,7 @@ class BackgroundModel:
         """Signed difference from the background, and its (smoothed) square summed over colours."""
         change = frame[window].astype(np.float32) - self.background[window]
         smooth = cv2.GaussianBlur(change, (0, 0), self.blur) if self.blur else change
-        return change, _dot(np.asarray(smooth), np.asarray(smooth))
+        return change, dot(np.asarray(smooth), np.asarray(smooth))
 
     def _look(self, frame: Image, centre: Floats, half: float) -> _Look | None:
         """Of what differs most near `centre`: colour, rough area, share that has another colour."""
@@ -308,12 +296,12 @@ class BackgroundModel:
 
     def search(self, frame: Image) -> tuple[Floats, float] | None:
         """Centre and half width of the part of the whole frame where the target seems to be."""
-        change = _reduce(frame) - self.coarse_background
+        change = reduce(frame, _COARSE) - self.coarse_background
         weight = None
-        if self.contrast is not None:
-            match = _dot(change, self.coarse_contrast)
+        if self.colour is not None:
+            match = dot(change, self.coarse_contrast)
             weight = np.clip(match / (self.coarse_square + self.coarse_floor**2), 0, 1)
-        found = _largest_component(_dot(change, change) > self.coarse_floor**2, weight)
+        found = _largest_component(dot(change, change) > self.coarse_floor**2, weight)
         if found is None:
             return None
         corner, extent = found[1][:2], found[1][2:4]
@@ -322,17 +310,18 @@ class BackgroundModel:
 
     def measure(self, frame: Image, centre: Floats, half: float) -> Blob | None:
         """The target within `half` pixels of `centre`, if it is there."""
-        if self.contrast is None:  # no target was found in the samples
+        if self.colour is None:  # no target was found in the samples
             return None
         low, high, window = self._window(centre, half)
         change, energy = self._difference(frame, window)
-        square = self.square[window]
+        contrast = self.colour - self.background[window]
+        square = dot(contrast, contrast)
         found = _largest_component(energy > np.maximum(self.floor**2, 0.1 * square))
         if found is None or not 0.2 < found[1][cv2.CC_STAT_AREA] / self.area < 5:
             return None
         label, stats = found
         near = cv2.dilate(label, _DISC) > 0
-        alpha = _dot(change, self.contrast[window]) / (square + self.floor**2 / 9)
+        alpha = dot(change, contrast) / (square + self.floor**2 / 9)
         alpha[_erode(label) > 0] = 1
         alpha[~near] = 0
         area = float(alpha.sum())
@@ -346,7 +335,7 @@ class BackgroundModel:
         inside = bool((first > 0).all() and (last < self.size - 1).all())
         # A background that contains the target hides how far it goes, or makes coverages absurd:
         # as they lie in [0, 1], their squares (with some noise) cannot sum up to more than they do.
-        blind = self.blind[window][near & (label == 0)].mean() > _BLIND
+        blind = (square[near & (label == 0)] < self.blind).mean() > _BLIND
         sound = not blind and (alpha**2).sum() < 1.2 * area
         shape = _shape(alpha, u - centre[0], v - centre[1]) if sound else None
         softness = float((alpha * (1 - alpha)).sum() / np.sqrt(area))
@@ -359,9 +348,14 @@ def _erode(label: Image) -> Image:
     return np.asarray(eroded, np.uint8)
 
 
-def _dot(a: Floats32, b: Floats32) -> Floats32:
+def dot(a: Floats32, b: Floats32) -> Floats32:
     """Scalar product of the colours of each pixel."""
-    return np.einsum("ijk,ijk->ij", a, b)
+    return (a * b) @ np.ones(3, np.float32)
+
+
+def lengths(a: Floats32) -> Floats32:
+    """Root of the sum of the squares of the colours of each pixel."""
+    return np.sqrt(dot(a, a))
 
 
 def _largest_component(

@@ -6,7 +6,7 @@ and beyond what an edge does that is displaced a little, falls apart into blobs,
 with its place, size, colour and the strength of its evidence. Which of them are the target is for
 `linking` to say.
 
-All of this happens on reduced frames, whose longer side has at most 480 pixels.
+All of this happens on reduced frames, see `reducing`.
 """
 
 from dataclasses import dataclass, replace
@@ -15,9 +15,8 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import _median, light
+from .background import _median, lengths, light
 
-LONGEST = 480  # pixels of the longer side of a reduced frame
 _LARGEST = 2.5  # frames that the plate may hold, side by side
 _FEWEST = 3  # samples that must show a place of the plate
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts, whatever the noise
@@ -29,23 +28,6 @@ _KEPT = 12  # and that are kept, once it is known which of them stay where they 
 _STAYS = 1.0  # by how much of its quality a candidate loses that is there in all frames
 _WORTH = 0.4  # share of its quality that it keeps at least
 _ALIKE = 40.0, 2.0  # grey levels of colour and factor of size between two that look alike
-
-
-def reduction(size: tuple[int, int]) -> int:
-    """By how much frames of this size are reduced."""
-    return max(1, -(-max(size) // LONGEST))
-
-
-def reduce(image: Image, factor: int) -> Image:
-    """The means over squares of `factor` pixels."""
-    if factor == 1:
-        return image
-    size = (-(-image.shape[1] // factor), -(-image.shape[0] // factor))
-    right, bottom = size[0] * factor - image.shape[1], size[1] * factor - image.shape[0]
-    if right or bottom:
-        padded = cv2.copyMakeBorder(image, 0, bottom, 0, right, cv2.BORDER_REPLICATE)
-        image = np.asarray(padded, np.uint8)
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 @dataclass(frozen=True)
@@ -60,18 +42,6 @@ class Candidate:
     area: float
     colour: Floats
     quality: float
-
-
-def enlarged(factor: float) -> Floats:
-    """The map of pixels of an image reduced by a factor to those of the image."""
-    k = factor
-    return np.array([[k, 0, (k - 1) / 2], [0, k, (k - 1) / 2], [0, 0, 1.0]])
-
-
-def reduced(maps: Floats, factor: float) -> Floats:
-    """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
-    larger = enlarged(factor)
-    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
 
 
 class Plate:
@@ -105,7 +75,8 @@ class Plate:
         self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
         width, height = (int(x) for x in np.ceil(high - low) + 1)
         moves = [self.shift @ here for here in maps[known]]
-        self.image, count = _masked_median(list(samples[known]), moves, (width, height))
+        shown = [samples[k] for k in np.flatnonzero(known)]  # views: copies would fill the memory
+        self.image, count = _masked_median(shown, moves, (width, height))
         self.valid = np.where(count >= _FEWEST, 255, 0).astype(np.uint8)
 
     def samples(
@@ -123,19 +94,25 @@ class Plate:
         views = np.zeros((int(known.sum()), size[1], size[0], 3), np.uint8)
         shown = np.zeros(views.shape[:3], bool)
         full = np.full(samples.shape[1:3], 255, np.uint8)
-        for k, (sample, here) in enumerate(zip(samples[known], maps[known], strict=True)):
-            move = to_window @ here
-            views[k] = cv2.warpPerspective(sample, move, size)
+        for k, i in enumerate(np.flatnonzero(known)):
+            move = to_window @ maps[i]
+            views[k] = cv2.warpPerspective(samples[i], move, size)
             shown[k] = cv2.warpPerspective(full, move, size, flags=cv2.INTER_NEAREST) > 0
         return views, shown
 
-    def seen_from(self, here: Floats, corner: Floats, size: tuple[int, int]) -> tuple[Image, Bools]:
-        """The background in a window of the frame that the map carries; where it is known."""
+    def seen_from(
+        self, here: Floats, corner: Floats, size: tuple[int, int], step: int = 1
+    ) -> tuple[Image, Bools]:
+        """The background in a window of the frame that the map carries; where it is known.
+
+        Only every pixel of some `step` in each row and column.
+        """
         left, top = (int(x) for x in corner)
         if not self.moves:
-            window = np.s_[top : top + size[1], left : left + size[0]]
+            window = np.s_[top : top + size[1] : step, left : left + size[0] : step]
             return self.image[window], self.valid[window] > 0
-        to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, 1.0]])
+        to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, step]]) / step
+        size = -(-size[0] // step), -(-size[1] // step)
         back = to_window @ np.linalg.inv(self.shift @ here)
         image = cv2.warpPerspective(self.image, back, size, flags=cv2.INTER_LINEAR)
         valid = cv2.warpPerspective(self.valid, back, size, flags=cv2.INTER_NEAREST)
@@ -204,12 +181,10 @@ class Difference:
             back = np.linalg.inv(self.plate.shift @ here)
             carried = cv2.warpPerspective(tolerance, back, (width, height), borderValue=1e3)
             tolerance = np.asarray(carried, np.float32)
-        now, then = frame.astype(np.float32), background.astype(np.float32)
-        factor = light(now, then, known)
+        factor = light(frame, background, known)
         self.lights.append(factor)
-        np.multiply(then, factor, out=then)
-        change = now - then
-        strength = np.sqrt(np.einsum("ijk,ijk->ij", change, change)) / tolerance
+        change = frame - background * factor
+        strength = lengths(change) / tolerance
         differs = ((strength > 1) & known).astype(np.uint8)
         closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         mask = np.asarray(closed, np.uint8)
@@ -252,7 +227,8 @@ def blobs(
     shape = mask.shape
     count, labels, stats, centres = cv2.connectedComponentsWithStats(mask)
     areas = stats[1:, cv2.CC_STAT_AREA]
-    total = np.bincount(labels.ravel(), strength.ravel(), count)[1:]
+    parts = mask > 0
+    total = np.bincount(labels[parts], strength[parts], count)[1:]
     plain = (total / np.maximum(areas, 1) - 1) * np.sqrt(np.minimum(areas, 25))
     order = 1 + np.argsort(-plain)[:_MOST]
     found = []

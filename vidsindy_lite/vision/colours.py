@@ -47,8 +47,9 @@ def whole(
 
     Not all that `differs` has an `other` colour: what lies between ground and target is its blur.
     """
-    ratio = (now + 4) / (ground + 4)
-    mean, apart = ratio.mean(axis=2), np.ptp(ratio, axis=2)
+    ratio = cv2.split((now + 4) / (ground + 4))
+    mean = sum(ratio) / 3
+    apart = np.maximum.reduce(ratio) - np.minimum.reduce(ratio)
     least, most, equal = _SHADOW
     shadow = (mean > least) & (mean < most) & (apart < equal * mean)
     mask = (own | (differs & ~shadow)).astype(np.uint8)
@@ -60,9 +61,13 @@ def whole(
     outline = cv2.fillConvexPoly(np.zeros(label.shape, np.uint8), cv2.convexHull(at), 1)
     if not core.any() or label.sum() < _SOLID * outline.sum():
         return None
-    nearest = ndimage.distance_transform_edt(~core, return_distances=False, return_indices=True)
+    _, nearest = cv2.distanceTransformWithLabels(
+        (~core).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    colours = np.zeros((1 + np.count_nonzero(core), 3), np.float32)
+    colours[nearest[core]] = now[core]
     plain = (label & other & ~shadow).sum() < _OTHER * label.sum()
-    return Whole(label, now[tuple(np.asarray(nearest))], bool(plain))
+    return Whole(label, colours[nearest], bool(plain))
 
 
 def entire(views: Sequence["View | None"]) -> tuple[list["View | None"], tuple[str, ...]]:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
+from .background import lengths
 from .candidates import Plate
 
 _SEEN = 2  # samples that must differ in a place
@@ -90,8 +91,7 @@ def uncover(
 
 def _apart(views: Image, image: Image) -> Floats32:
     """Grey levels between images and another, pixel by pixel."""
-    change = views.astype(np.float32) - image
-    return np.sqrt(np.einsum("...k,...k->...", change, change))
+    return lengths(views.astype(np.float32) - image)
 
 
 def _compactness(masks: Bools) -> float:

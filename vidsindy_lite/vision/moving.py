@@ -17,9 +17,6 @@ from .candidates import (
     Candidate,
     Difference,
     Plate,
-    reduce,
-    reduced,
-    reduction,
     tolerance,
     uncommon,
 )
@@ -28,6 +25,7 @@ from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
 from .occluders import hidden
+from .reducing import reduce, reduced, reduction
 from .refining import Lens, View, fitting, scatter
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
@@ -116,13 +114,11 @@ def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
     """Of a pixel, in grey levels: of the quieter samples, which differ from the plate by that."""
     found = []
     step = max(3, samples.shape[2] // _DENSE)
-    few = np.s_[::step, ::step]
     for sample, here in zip(samples, maps, strict=True):
-        then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1])
-        a, b = sample[few].astype(np.float32), then[few].astype(np.float32)
-        known = known[few]
+        then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1], step)
+        now = sample[::step, ::step]
         if known.any():
-            found.append(1.4826 * np.median(np.abs(a - b * light(a, b, known))[known]))
+            found.append(1.4826 * np.median(np.abs(now - then * light(now, then, known))[known]))
     return float(np.median(found)) if found else 0.0
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
+from .background import dot, lengths
 from .candidates import Plate
 from .colours import whole
 
@@ -76,13 +77,13 @@ class Lens:
         now = frame[low[1] : high[1], low[0] : high[0]].astype(np.float32) / gain
         ground = then.astype(np.float32)
         change = now - ground
-        smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), self.blur))
-        differs = np.sqrt(np.einsum("ijk,ijk->ij", smooth, smooth))
+        smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), self.blur), np.float32)
+        differs = lengths(smooth)
         mask = (differs > self._tolerance(then)) & known
         contrast = colour.astype(np.float32) - ground
-        square = np.einsum("ijk,ijk->ij", contrast, contrast)
-        share = np.einsum("ijk,ijk->ij", smooth, contrast) / np.maximum(square, self.least**2)
-        miss = np.linalg.norm(smooth - share[..., None] * contrast, axis=2)
+        square = dot(contrast, contrast)
+        share = dot(smooth, contrast) / np.maximum(square, self.least**2)
+        miss = lengths(smooth - share[..., None] * contrast)
         # What is of another colour, e.g. a shadow or a hand: off the line from ground to target.
         off = miss >= np.maximum(0.45 * np.sqrt(square), 2 * self.least)
         own = mask & (share > 0.25) & ~off
@@ -110,8 +111,8 @@ class Lens:
         """Centroid and area of one connected part."""
         near = cv2.dilate(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         core = cv2.erode(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-        square = np.einsum("ijk,ijk->ij", contrast, contrast)
-        alpha = np.einsum("ijk,ijk->ij", change, contrast) / np.maximum(square, self.least**2)
+        square = dot(contrast, contrast)
+        alpha = dot(change, contrast) / np.maximum(square, self.least**2)
         alpha = np.clip(alpha, 0, 1)
         alpha[core] = 1
         alpha[~near] = 0

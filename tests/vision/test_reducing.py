@@ -1,0 +1,22 @@
+"""Reduced frames against the means they are."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite.vision.reducing import reduce
+
+
+@pytest.mark.parametrize("factor", [2, 3, 4, 6, 8])
+def test_reduced_pixels_are_means(factor):
+    image = np.random.default_rng(0).integers(0, 256, (4 * factor, 6 * factor, 3), np.uint8)
+    means = image.reshape(4, factor, 6, factor, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(reduce(image, factor), means, atol=0.5 * factor)
+    assert reduce(image, 1) is image
+
+
+@pytest.mark.parametrize("factor", [3, 4])
+def test_what_is_missing_of_the_last_squares_repeats_the_last_row_and_column(factor):
+    image = np.random.default_rng(0).integers(0, 256, (7, 10, 3), np.uint8)
+    cut = np.pad(image, ((0, -7 % factor), (0, -10 % factor), (0, 0)), mode="edge")
+    means = cut.reshape(len(cut) // factor, factor, -1, factor, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(reduce(image, factor), means, atol=1)

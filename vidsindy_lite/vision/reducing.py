@@ -1,0 +1,41 @@
+"""Frames reduced by a whole factor, and maps between their pixels."""
+
+import cv2
+import numpy as np
+
+from ..arrays import Floats, Image
+
+LONGEST = 480  # pixels of the longer side of a reduced frame
+
+
+def reduction(size: tuple[int, int]) -> int:
+    """By how much frames of this size are reduced."""
+    return max(1, -(-max(size) // LONGEST))
+
+
+def reduce(image: Image, factor: int) -> Image:
+    """The means over squares of `factor` pixels, also over what is left of squares at the edges."""
+    size = (-(-image.shape[1] // factor), -(-image.shape[0] // factor))
+    right, bottom = size[0] * factor - image.shape[1], size[1] * factor - image.shape[0]
+    if right or bottom:
+        padded = cv2.copyMakeBorder(image, 0, bottom, 0, right, cv2.BORDER_REPLICATE)
+        image = np.asarray(padded, np.uint8)
+    while factor % 2 == 0:  # OpenCV halves an image much faster than it quarters one
+        factor //= 2
+        half = (image.shape[1] // 2, image.shape[0] // 2)
+        image = np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
+    if factor == 1:
+        return image
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def enlarged(factor: float) -> Floats:
+    """The map of pixels of an image reduced by a factor to those of the image."""
+    k = factor
+    return np.array([[k, 0, (k - 1) / 2], [0, k, (k - 1) / 2], [0, 0, 1.0]])
+
+
+def reduced(maps: Floats, factor: float) -> Floats:
+    """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
+    larger = enlarged(factor)
+    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
