@@ -116,8 +116,7 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
 
 def _median(values: Floats | Floats32) -> float:
     """The median of every other value."""
-    few = values[::2]
-    return float(np.partition(few, len(few) // 2)[len(few) // 2])
+    return float(np.median(values[::2]))
 
 
 def _symmetric(matrix: Floats) -> Floats:
@@ -149,12 +148,10 @@ def _error(
 
     `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
     """
-    height, width = (side // _BLOCKS for side in pull.shape)
-    if not height or not width:
+    if min(pull.shape) < _BLOCKS:
         return np.inf
-    cut = np.s_[: height * _BLOCKS, : width * _BLOCKS]
-    pulls = (slopes * pull)[:, *cut].reshape(6, _BLOCKS, height, _BLOCKS, width)
-    sums = pulls.sum(axis=(2, 4)).reshape(6, -1)
+    means = np.array([_by_blocks(by) for by in slopes * pull], float).reshape(6, -1)
+    sums = pull.size / _BLOCKS**2 * means
     covariance = np.linalg.inv(information)
     blockwise = covariance @ (sums @ sums.T) @ covariance
     variance = np.maximum(np.diag(blockwise), np.diag(covariance))

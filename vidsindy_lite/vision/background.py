@@ -175,12 +175,18 @@ def light(frame: Image | Floats32, background: Image | Floats32, known: Bools) -
     """
     step = max(1, int(np.sqrt(known.size / 2000)))
     a, b = frame[::step, ::step], background[::step, ::step]
-    use = known[::step, ::step] & (b.min(axis=-1) > 40) & (b.max(axis=-1) < 240)
+    use = known[::step, ::step] & (cv2.inRange(b, (41,) * 3, (239,) * 3) > 0)
     if use.mean() < 0.1:
         return np.ones(3, np.float32)
     ratio = np.median(a[use] / b[use], axis=0)
     ratio[np.abs(ratio - 1) < 0.01] = 1  # what rounding and compression do
     return np.clip(ratio, 0.4, 2.5).astype(np.float32)
+
+
+def relit(image: Image, factor: Floats32) -> Floats32:
+    """An image as it is where each colour is brighter by a factor (3,)."""
+    rows = image.reshape(len(image), -1) * np.tile(factor, image.shape[1])
+    return np.asarray(rows.reshape(image.shape), np.float32)  # an axis of three is slow
 
 
 # --------------------------------------------------------------------------------------- the model

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import _median, lengths, light
+from .background import _median, lengths, light, relit
 
 _LARGEST = 2.5  # frames that the plate may hold, side by side
 _FEWEST = 3  # samples that must show a place of the plate
@@ -183,7 +183,7 @@ class Difference:
             tolerance = np.asarray(carried, np.float32)
         factor = light(frame, background, known)
         self.lights.append(factor)
-        change = frame - background * factor
+        change = frame - relit(background, factor)
         strength = lengths(change) / tolerance
         differs = ((strength > 1) & known).astype(np.uint8)
         closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .background import SAMPLES, light
+from .background import SAMPLES, light, relit
 from .candidates import (
     Candidate,
     Difference,
@@ -118,7 +118,9 @@ def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
         then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1], step)
         now = sample[::step, ::step]
         if known.any():
-            found.append(1.4826 * np.median(np.abs(now - then * light(now, then, known))[known]))
+            found.append(
+                1.4826 * np.median(np.abs(now - relit(then, light(now, then, known)))[known])
+            )
     return float(np.median(found)) if found else 0.0
 
 

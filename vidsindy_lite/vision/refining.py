@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import dot, lengths
+from .background import dot, lengths, relit
 from .candidates import Plate
 from .colours import whole
 
@@ -74,7 +74,7 @@ class Lens:
         low = np.clip(np.floor(box[:2] - spare), 0, self.plate.size - 1).astype(int)
         high = np.clip(np.ceil(box[:2] + box[2:] + spare), low + 1, self.plate.size).astype(int)
         then, known = self.plate.seen_from(here, low, tuple(high - low))
-        now = frame[low[1] : high[1], low[0] : high[0]].astype(np.float32) / gain
+        now = relit(frame[low[1] : high[1], low[0] : high[0]], np.reciprocal(gain))
         ground = then.astype(np.float32)
         change = now - ground
         smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), self.blur), np.float32)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import trim_mean
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import lengths, light
+from .background import lengths, light, relit
 from .candidates import Plate
 from .steadying import displacement
 
@@ -69,8 +69,8 @@ def _seen(plate: Plate, here: Floats) -> tuple[Image, Bools]:
 
 def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
     """Grey levels by which the parts (12, 12) of a frame differ from the ground; NaN if unknown."""
-    now, then = frame.astype(np.float32), ground.astype(np.float32)
-    smooth = cv2.GaussianBlur(now - light(frame, ground, known) * then, (0, 0), _SMOOTH)
+    change = frame - relit(ground, light(frame, ground, known))
+    smooth = cv2.GaussianBlur(change, (0, 0), _SMOOTH)
     apart = np.minimum(lengths(np.asarray(smooth, np.float32)), _MOST)
     use = cv2.erode(known.astype(np.uint8), _RIM).astype(np.float32)
     parts, share = (
