@@ -34,6 +34,7 @@ SAMPLES = 21
 """Frames whose median is the background."""
 
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
+_DENSE = 640  # pixels in a row, of every third of which the noise is known well
 _STRIP = 32  # rows of an image that are sorted at once
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
 _BORDER = 3  # coarse pixels around a place that show how its surroundings continue
@@ -53,7 +54,6 @@ _VIEWS = 200  # views among which the commonest one is sought
 _DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
 
 Window = tuple[slice, slice]
-_Look = tuple[Floats, float, float]
 
 
 # -------------------------------------------------------------------------------------- background
@@ -185,8 +185,8 @@ def light(frame: Image | Floats32, background: Image | Floats32, known: Bools) -
 
 def relit(image: Image, factor: Floats32) -> Floats32:
     """An image as it is where each colour is brighter by a factor (3,)."""
-    rows = image.reshape(len(image), -1) * np.tile(factor, image.shape[1])
-    return np.asarray(rows.reshape(image.shape), np.float32)  # an axis of three is slow
+    rows = image.reshape(len(image), -1) * np.tile(factor, image.shape[1])  # three are slow
+    return np.asarray(rows.reshape(image.shape), np.float32)
 
 
 # --------------------------------------------------------------------------------------- the model
@@ -241,9 +241,9 @@ class BackgroundModel:
 
     def __init__(self, samples: Image) -> None:
         self.background = _median(samples)
-        calm = np.ascontiguousarray(self.background[::3, ::3])
-        deviation = [cv2.absdiff(np.ascontiguousarray(s[::3, ::3]), calm) for s in samples]
-        self.noise = 1.4826 * float(np.median(deviation))
+        step = 3 * max(1, samples.shape[2] // _DENSE)
+        few, calm = samples[:, ::step, ::step], self.background[::step, ::step]
+        self.noise = 1.4826 * float(np.median(np.maximum(few, calm) - np.minimum(few, calm)))
         self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
         coarse = np.array([reduce(sample, _COARSE) for sample in samples])
         _remove_ghosts(self.background, samples, coarse, self.coarse_floor)
@@ -285,7 +285,9 @@ class BackgroundModel:
         smooth = cv2.GaussianBlur(change, (0, 0), self.blur) if self.blur else change
         return change, dot(np.asarray(smooth), np.asarray(smooth))
 
-    def _look(self, frame: Image, centre: Floats, half: float) -> _Look | None:
+    def _look(
+        self, frame: Image, centre: Floats, half: float
+    ) -> tuple[Floats, float, float] | None:
         """Of what differs most near `centre`: colour, rough area, share that has another colour."""
         _, _, window = self._window(centre, half)
         _, energy = self._difference(frame, window)

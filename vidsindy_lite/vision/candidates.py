@@ -135,6 +135,7 @@ def _masked_median(
     width, height = size
     result = np.zeros((height, width, 3), np.uint8)
     count = np.zeros((height, width), np.uint8)
+    full = np.full(samples[0].shape[:2], 255, np.uint8)
     for top in range(0, height, _STRIP):
         strip = (width, min(_STRIP, height - top))
         up = np.array([[1, 0, 0], [0, 1, -top], [0, 0, 1.0]])
@@ -142,7 +143,6 @@ def _masked_median(
         here = np.zeros((strip[1], width), np.uint8)
         for k, (sample, move) in enumerate(zip(samples, moves, strict=True)):
             layers[k] = cv2.warpPerspective(sample, up @ move, strip)
-            full = np.full(sample.shape[:2], 255, np.uint8)
             shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST) > 0
             missing = k - here  # samples before it that show nothing
             layers[k][~shown] = np.where(missing[~shown] % 2, 255, 0)[:, None]
