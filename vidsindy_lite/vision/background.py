@@ -27,6 +27,7 @@ from scipy import ndimage
 from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
+from .pixels import dot, lengths
 from .reducing import reduce
 from .video import pick_frames, video_info
 
@@ -54,6 +55,7 @@ _VIEWS = 200  # views among which the commonest one is sought
 _DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
 
 Window = tuple[slice, slice]
+_Look = tuple[Floats, float, float]
 
 
 # -------------------------------------------------------------------------------------- background
@@ -183,12 +185,6 @@ def light(frame: Image | Floats32, background: Image | Floats32, known: Bools) -
     return np.clip(ratio, 0.4, 2.5).astype(np.float32)
 
 
-def relit(image: Image, factor: Floats32) -> Floats32:
-    """An image as it is where each colour is brighter by a factor (3,)."""
-    rows = image.reshape(len(image), -1) * np.tile(factor, image.shape[1])  # three are slow
-    return np.asarray(rows.reshape(image.shape), np.float32)
-
-
 # --------------------------------------------------------------------------------------- the model
 
 
@@ -285,9 +281,7 @@ class BackgroundModel:
         smooth = cv2.GaussianBlur(change, (0, 0), self.blur) if self.blur else change
         return change, dot(np.asarray(smooth), np.asarray(smooth))
 
-    def _look(
-        self, frame: Image, centre: Floats, half: float
-    ) -> tuple[Floats, float, float] | None:
+    def _look(self, frame: Image, centre: Floats, half: float) -> _Look | None:
         """Of what differs most near `centre`: colour, rough area, share that has another colour."""
         _, _, window = self._window(centre, half)
         _, energy = self._difference(frame, window)
@@ -354,16 +348,6 @@ def _erode(label: Image) -> Image:
     """A mask without its rim of `_RING` pixels."""
     eroded = cv2.erode(label, _DISC, borderType=cv2.BORDER_CONSTANT, borderValue=0)
     return np.asarray(eroded, np.uint8)
-
-
-def dot(a: Floats32, b: Floats32) -> Floats32:
-    """Scalar product of the colours of each pixel."""
-    return (a * b) @ np.ones(3, np.float32)
-
-
-def lengths(a: Floats32) -> Floats32:
-    """Root of the sum of the squares of the colours of each pixel."""
-    return np.sqrt(dot(a, a))
 
 
 def _largest_component(

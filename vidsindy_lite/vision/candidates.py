@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import _median, lengths, light, relit
+from .background import _median, light
+from .pixels import lengths, relit
 
 _LARGEST = 2.5  # frames that the plate may hold, side by side
 _FEWEST = 3  # samples that must show a place of the plate

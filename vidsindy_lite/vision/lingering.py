@@ -14,8 +14,8 @@ import numpy as np
 from scipy import ndimage
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import lengths
 from .candidates import Plate
+from .pixels import lengths
 
 _SEEN = 2  # samples that must differ in a place
 _MARGIN = 4  # pixels around a thing that show how its surroundings continue

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .background import SAMPLES, light, relit
+from .background import SAMPLES, light
 from .candidates import (
     Candidate,
     Difference,
@@ -25,6 +25,7 @@ from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
 from .occluders import hidden
+from .pixels import relit
 from .reducing import reduce, reduced, reduction
 from .refining import Lens, View, fitting, scatter
 from .resting import explains, rests

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import dot, lengths, relit
 from .candidates import Plate
 from .colours import whole
+from .pixels import dot, lengths, relit
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
