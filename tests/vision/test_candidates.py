@@ -1,5 +1,7 @@
 """What differs from the background: how often it does in one place, and what that is worth."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -55,3 +57,24 @@ def test_of_a_crowd_of_like_things_none_is_worth_much():
     assert worth == pytest.approx([0.8 * 2 / 8] * 8 + [0.8] * 3)
     assert [each.quality for each in uncommon(leaves, 7)] == pytest.approx([0.8] * 8)
     assert uncommon([], 1) == []
+
+
+def test_a_plate_makes_no_copies_of_its_samples():
+    samples = np.random.default_rng(0).integers(0, 256, (21, 3000, 40, 3), np.uint8)
+    maps = np.array([[[1, 0, k % 3], [0, 1, k % 2], [0, 0, 1.0]] for k in range(21)])
+    tracemalloc.start()
+    plate = Plate(samples, maps, np.ones(21, bool))
+    plate.samples(samples, maps, np.ones(21, bool), np.s_[10:20, 10:20])
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < samples.nbytes / 2
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_every_third_pixel_of_a_plate_is_that_of_the_whole(moves):
+    _, frames, maps = filmed([(moves * k, 0) for k in range(FRAMES)])
+    plate = Plate(frames, maps, np.ones(FRAMES, bool))
+    whole, thin = (plate.seen_from(maps[4], [5, 2], (70, 50), step) for step in (1, 3))
+    assert thin[0].shape == (17, 24, 3)
+    for one, other in zip(whole, thin, strict=True):
+        np.testing.assert_array_equal(one[::3, ::3], other)
