@@ -148,10 +148,12 @@ def _error(
 
     `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
     """
-    if min(pull.shape) < _BLOCKS:
+    height, width = (side // _BLOCKS for side in pull.shape)
+    if not height or not width:
         return np.inf
-    means = np.array([_by_blocks(by) for by in slopes * pull], float).reshape(6, -1)
-    sums = pull.size / _BLOCKS**2 * means
+    pulls = (slopes * pull)[:, : height * _BLOCKS, : width * _BLOCKS]
+    means = np.array([_by_blocks(by) for by in pulls], float).reshape(6, -1)
+    sums = height * width * means
     covariance = np.linalg.inv(information)
     blockwise = covariance @ (sums @ sums.T) @ covariance
     variance = np.maximum(np.diag(blockwise), np.diag(covariance))
