@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from helpers import posed
 
+from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Fit, Status
 from vidsindy_lite.dynamics.errors import residual_noise
+from vidsindy_lite.dynamics.form import Form
+from vidsindy_lite.dynamics.posing import pose
 from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, term_penalties
 from vidsindy_lite.dynamics.search import _as_shifted, _candidate, _closed, _variants
 from vidsindy_lite.dynamics.state import State
+from vidsindy_lite.study import SYSTEMS
 
 
 def fit_of(problem, moving=(True, False)):
@@ -105,6 +109,15 @@ def test_a_law_is_compared_with_its_rivals_at_dearer_prices():
         problem.cautious.penalties, term_penalties(problem.exponents, 2, SURE)
     )
     assert (problem.cautious.penalties > problem.penalties + 2).all()
+
+
+def test_terms_are_dearer_where_all_samples_share_errors():
+    rng = np.random.default_rng(0)
+    t, x = SYSTEMS["Lorenz"].trajectory(300)
+    form = Form.of(("x", "y", "z"), Library.polynomial(2), 1)
+    alone, shared = (pose([(t, x)], [np.ones((300, 3, k))], form, rng) for k in (0, 1))
+    assert (alone.shared, shared.shared) == (False, True)
+    np.testing.assert_array_equal(shared.penalties, alone.cautious.penalties)
 
 
 def test_turns_and_samples_are_those_of_all_runs():

@@ -235,7 +235,7 @@ def _selection(
     law: PolynomialSystem,
 ) -> Iterator[str]:
     remedy, clean = _remedy(fit), _is_clean(fit)
-    yield from _contested(problem.law(fit.state), fit.state, path, remedy)
+    yield from _contested(problem, fit.state, path, remedy)
     if clean and not problem.kicked:
         return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
@@ -270,9 +270,9 @@ def _range(low: float, high: float) -> str:
     return f"at {ends[0]}"
 
 
-def _contested(law: PolynomialSystem, state: State, path: Path, remedy: str) -> Iterator[str]:
-    """Is another plateau nearly as wide as that of a law, or one of larger errors wider?"""
-    lasting = path.level > path.lowest  # what is independent averages out, and tells of each term
+def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Iterator[str]:
+    """Is another plateau nearly as wide, or, where errors last, one of larger errors wider?"""
+    lasting, law = problem.shared or path.level > path.lowest, problem.law(state)
     for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
         near = [plateau for plateau in plateaus if plateau.low <= path.level]
         same = [plateau for plateau in near if (plateau.terms == own.terms).all()]

@@ -87,6 +87,8 @@ def pose(
         process_noise=np.zeros(len(form.names)),
         measured_errors=sigma is not None,
     )
+    if problem.shared:
+        problem = problem.cautious
     if form.states > x.shape[1]:
         problem = _with_velocities(problem, curves)
     if form.states < len(form.names):

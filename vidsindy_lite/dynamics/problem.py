@@ -30,8 +30,8 @@ FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where laws of the zoo have
 about the fewest wrong terms (`study.price`)."""
 SURE = 0.004
-"""The same for a law that is not to be doubted: a term that is worth its price and would not be
-worth this one is told."""
+"""The same where samples share errors, which look like evidence for small terms, and elsewhere for a
+law that is not to be doubted: a term that is only worth the price above is told."""
 OFFSET_PENALTY = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 COARSE = 20
@@ -124,8 +124,13 @@ class Problem:
         return np.tile(self.penalties, self.d)
 
     @property
+    def shared(self) -> bool:
+        """Whether there are errors that all samples share, and that do not average out."""
+        return any(modes.size for modes in self.systematic)
+
+    @property
     def cautious(self) -> Problem:
-        """The same at the prices at which a law is compared with its rivals: see `SURE`."""
+        """The same at the prices of `SURE`, at which a law is compared with its rivals."""
         equations = self.measured[0][1].shape[1]
         return replace(self, penalties=term_penalties(self.exponents, equations, SURE))
 

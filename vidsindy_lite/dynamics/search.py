@@ -30,6 +30,8 @@ FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
 """Physics weights of the unpruned fits, relative to the misfit of a plain regression."""
 SEARCH_WEIGHTS = (1e2, 1e4, 1e8)
 """Physics weights of the subset searches in the law's own frame."""
+BARRED = 1e9
+"""Price of a term that does not take part."""
 REFINED = 3
 """Most candidates that are refined."""
 FINAL_WEIGHT = SEARCH_WEIGHTS[-1]
@@ -137,16 +139,22 @@ def candidates(problem: Problem, rng: np.random.Generator, history: History) -> 
     control = fit_curves(collocation, problem.curves)
     found, degree = [], problem.form.degree
     degrees, implicit = problem.exponents.sum(axis=1), problem.form.implicit
-    starts = {f"degree {k}": ~implicit & (degrees <= k) for k in (min(2, degree), degree)}
+    stages = {f"degree {k}": ~implicit & (degrees <= k) for k in (min(2, degree), degree)}
     if implicit.any():
-        starts["all"] = degrees <= degree
-    for name, rows in starts.items():
+        stages["all"] = degrees <= degree
+    for name, rows in stages.items():
         stage = f"unpruned, {name}"
         fit, weight = unpruned(problem, collocation, control, rows, stage, history)
         here = _in_sparse_frames(problem, fit, weight, rng, history)
         if weight < FIRST_WEIGHTS[-1]:
             best = sorted(here, key=lambda candidate: candidate.criterion)[: REFINED - 1]
-            here = _climbed(problem, [_at_home(problem, fit), *best], weight, history)
+            starts = [_at_home(problem, fit), *best]
+            here = _climbed(problem, starts, weight, history)
+            if not rows.all():
+                # Where the law hardly binds, terms of high degree lead astray: also without them.
+                lower = replace(problem, penalties=np.where(rows, problem.penalties, BARRED))
+                starts = [_at_home(lower, fit), *best]
+                here += _climbed(lower, starts, weight, history)
         found += here
         if not leaves_something_over(problem, fit):
             break
