@@ -224,6 +224,9 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     errors = np.zeros(20)
     maps = np.tile(np.eye(3), (20, 1, 1))
     assert finished(views, CameraMotion(maps, errors), ()).doubts == ()
+    larger = [replace(view, area=300.0) for view in views[12:]]
+    (doubt,) = finished(views[:12] + larger, CameraMotion(maps, errors), ()).doubts
+    assert doubt.startswith("from frame 12 on, what is followed has another size at once")
     errors[16:] = np.inf
     found = finished(views, CameraMotion(maps, errors), ())
     assert np.isfinite(found.pixels[:, 0]).sum() == 16

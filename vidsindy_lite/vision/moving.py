@@ -28,7 +28,7 @@ from .hints import Hint
 from .lingering import Place, lingering, uncover
 from .linking import Sightings, best_path
 from .occluders import hidden
-from .refining import Lens, View, fitting, scatter
+from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
 from .video import read_frame, read_video, video_info
@@ -406,6 +406,9 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
                    f"moved, from {untold[0]} to {untold[-1]}: they are left out",)  # fmt: skip
     if good.sum() < max(_SHORTEST, _SCARCE * n):
         return nothing(motion, n)
+    if (first := swapped(at[good], areas[good])) is not None:
+        doubts += (f"from frame {at[good][first]} on, what is followed has another size at once: "
+                   "perhaps it is something else",)  # fmt: skip
     pixels[at[good]] = steady[good]
     errors[at[good]] = np.hypot(scatter(at[good], steady[good]), motion.errors[at[good]])
     if np.median(motion.errors[at[good]]) > _LOOSE:

@@ -184,6 +184,21 @@ def joined(areas: Floats) -> Bools:
     return found
 
 
+def swapped(frames: Ints, areas: Floats) -> int | None:
+    """The first view (n,) of something else that is larger or smaller at once, None if all is well.
+
+    No target changes like that from one frame to another and remains so.
+    """
+    logs = np.log(np.maximum(areas, 1e-3))
+    steps = np.flatnonzero((np.abs(np.diff(logs)) > np.log(_JOINED)) & (np.diff(frames) <= _BESIDE))
+    for first in 1 + steps:
+        before, after = logs[:first][-_BESIDE:], logs[first:][:_BESIDE]
+        apart = abs(np.median(after) - np.median(before))
+        if min(len(before), len(after)) == _BESIDE and apart > np.log(_JOINED):
+            return int(first)
+    return None
+
+
 def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
     """How far a place is from where the three on both sides of it say, and how unsure that is.
 
