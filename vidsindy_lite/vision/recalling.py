@@ -63,11 +63,21 @@ class Template(NamedTuple):
         mask = np.repeat(self.mask[..., None], 3, axis=2)
         own = np.asarray(cv2.matchTemplate(now, self.image, cv2.TM_SQDIFF, mask=mask))
         ground = np.asarray(cv2.matchTemplate(change, self.mask, cv2.TM_CCORR))
-        v, u = np.unravel_index(int((ground - own).argmax()), own.shape)
+        gain = ground - own
+        v, u = np.unravel_index(int(gain.argmax()), gain.shape)
         if own[v, u] > (1 - _LIKE) * ground[v, u]:
             return None
-        here = Template(now[v : v + height, u : u + width], self.mask, self.centre)
-        return look.corner + low + [u, v] + self.centre, here
+        centre = self.centre + [_peak(gain[v], int(u)), _peak(gain[:, u], int(v))]
+        here = Template(now[v : v + height, u : u + width], self.mask, centre)
+        return look.corner + low + [u, v] + centre, here
+
+
+def _peak(values: Floats32, i: int) -> float:
+    """By how much the maximum of a curve is off its highest value, in steps: that of a parabola."""
+    if not 0 < i < len(values) - 1:
+        return 0.0
+    before, here, after = values[i - 1 : i + 2].tolist()
+    return 0.5 * (after - before) / max(2 * here - before - after, 1e-9)
 
 
 def recalled(
