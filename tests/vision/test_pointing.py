@@ -5,7 +5,8 @@ import pytest
 
 from vidsindy_lite import Hint, track
 from vidsindy_lite.vision.candidates import Candidate
-from vidsindy_lite.vision.pointing import TOLD, Pointer, _fits, _overlap
+from vidsindy_lite.vision.linking import TOLD
+from vidsindy_lite.vision.pointing import Pointer, _fits, _overlap
 
 
 def blob(u, v, size, colour=(30, 30, 200)):
@@ -37,6 +38,19 @@ def test_what_is_in_the_box_is_all_that_its_frame_has():
 def test_of_what_is_in_a_box_the_one_that_fills_it_is_meant():
     found = [[blob(40.0, 50.0, 3), blob(41.0, 50.0, 9)]]
     assert Pointer.of(Hint(0, (36, 46, 9, 9)), found, 1, "none.mov").one.area == 81
+
+
+def test_what_a_path_has_is_to_be_on_the_next_one_and_what_is_as_large_is_preferred():
+    pointer = Pointer.of(Hint(0, (36, 46, 9, 9)), FOUND, 1, "none.mov")
+    found = [FOUND[0], FOUND[1], [blob(40.0, 50.0, 9), blob(40.0, 50.0, 63)]]
+    frames, which = np.array([0, 1]), np.array([0, 0])
+    kept = pointer.kept(found, frames, which)
+    assert [[c.quality for c in some] for some in kept[1:]] == [
+        [pytest.approx(1.8)],
+        [pytest.approx(0.8), pytest.approx(0.8 * np.exp(-((np.log(49) / 2.2) ** 2)))],
+    ]
+    assert [c.quality for c in kept[0]] == pytest.approx([0.8, 0.8])  # the one is pinned there
+    assert pointer.like(found)[2][1].quality < 0.1
 
 
 def test_two_boxes_overlap_by_what_both_cover():

@@ -23,6 +23,7 @@ def test_what_is_larger_or_smaller_at_once_and_remains_so_is_something_else(fact
     areas[20:] *= factor
     assert swapped(frames, areas) == 20
     assert swapped(np.where(frames < 20, frames, frames + 20), areas) is None  # nobody looked
+    assert swapped(np.where(frames < 20, frames, frames + 6), areas) == 20
     areas[22:] /= factor
     assert swapped(frames, areas) is None
 

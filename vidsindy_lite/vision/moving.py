@@ -26,9 +26,9 @@ from .candidates import (
 from .colours import entire
 from .hints import Hint
 from .lingering import Place, lingering, uncover
-from .linking import Sightings, best_path
+from .linking import TOLD, Sightings, best_path
 from .occluders import hidden
-from .pointing import TOLD, Pointer, alike
+from .pointing import Pointer, alike
 from .recalling import recalled
 from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
@@ -176,7 +176,10 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     if paths:
         # What the target looks like is known by now, which tells it from what it meets.
         first = paths[0].rows
-        seen, paths = linked(_learned(found, seen, first), film, pointer)
+        learned = _learned(found, seen, first)
+        if pointer is not None:
+            learned = pointer.kept(learned, seen.frame[first], seen.which[first])
+        seen, paths = linked(learned, film, pointer)
         paths = sorted(paths, key=lambda path: -np.isin(path.rows, first).sum())[:1]
     if not paths:
         return told(nothing(film.motion, len(found)), pointer)

@@ -7,14 +7,15 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import Floats, Image
+from ..arrays import Floats, Image, Ints
 from .candidates import Candidate, reduce
 from .hints import Hint
+from .linking import TOLD
 from .steadying import carry
 from .video import read_frame
 
-TOLD = 100.0  # quality of the candidate that a user points at
 _COLOUR = 70.0  # grey levels between colours that are not alike
+_SIZE = 2.2  # logarithm of the factor, of nine, between areas that are not alike
 _COVERS = 0.25  # share of what a candidate and the box cover together, that both cover
 _RIM = 1.0  # pixels by which a box may be drawn too small
 
@@ -48,16 +49,30 @@ class Pointer:
         return cls(hint, replace(one, quality=TOLD))
 
     def like(self, found: Sequence[Sequence[Candidate]]) -> list[list[Candidate]]:
-        """Candidates as far as they have the colour that is told, or that of what is in the box."""
+        """Candidates as far as they have the colour that is told, and the looks of the one."""
         if self.hint.colour is not None:
             colour = np.array(self.hint.colour[::-1], float)
         else:
             assert self.one is not None
             colour = self.one.colour
-        return [
+        coloured = [
             [replace(c, quality=c.quality * alike(c.colour, colour)) for c in some]
             for some in found
         ]
+        return coloured if self.one is None else _sized(coloured, self.one.area)
+
+    def kept(
+        self, found: Sequence[Sequence[Candidate]], frames: Ints, which: Ints
+    ) -> list[list[Candidate]]:
+        """Candidates as far as they have the size of a path's, which are to be on the next one."""
+        on = [
+            (i, k) for i, k in zip(frames.tolist(), which.tolist(), strict=True)
+            if self.one is None or i != self.hint.frame
+        ]  # fmt: skip
+        likely = _sized(found, float(np.median([found[i][k].area for i, k in on])))
+        for i, k in on:
+            likely[i][k] = replace(found[i][k], quality=found[i][k].quality + 1)
+        return likely
 
     def pinned(self, found: list[list[Candidate]]) -> list[list[Candidate]]:
         """Candidates of which the one in the box is the only one in its frame."""
@@ -78,6 +93,17 @@ class Pointer:
             return ()
         u, v = there
         return (which + f"is not what is followed, which is at ({u:.0f}, {v:.0f}) in that frame",)
+
+
+def _sized(found: Sequence[Sequence[Candidate]], area: float) -> list[list[Candidate]]:
+    """Candidates as far as they are about as large."""
+    return [
+        [
+            replace(c, quality=c.quality * float(np.exp(-((np.log(c.area / area) / _SIZE) ** 2))))
+            for c in some
+        ]
+        for some in found
+    ]
 
 
 def _overlap(one: Floats, other: Floats) -> float:

@@ -187,14 +187,14 @@ def joined(areas: Floats) -> Bools:
 def swapped(frames: Ints, areas: Floats) -> int | None:
     """The first view (n,) of something else that is larger or smaller at once, None if all is well.
 
-    No target changes like that from one frame to another and remains so.
+    No target changes like that within a few frames and remains so.
     """
-    logs = np.log(np.maximum(areas, 1e-3))
-    steps = np.flatnonzero((np.abs(np.diff(logs)) > np.log(_JOINED)) & (np.diff(frames) <= _BESIDE))
-    for first in 1 + steps:
+    logs = np.log2(np.maximum(areas, 1e-3)) / np.log2(_JOINED)
+    most = np.maximum(np.diff(frames) / _BESIDE, 1)
+    for first in 1 + np.flatnonzero(np.abs(np.diff(logs)) > most):
         before, after = logs[:first][-_BESIDE:], logs[first:][:_BESIDE]
         apart = abs(np.median(after) - np.median(before))
-        if min(len(before), len(after)) == _BESIDE and apart > np.log(_JOINED):
+        if min(len(before), len(after)) == _BESIDE and apart > most[first - 1]:
             return int(first)
     return None
 
