@@ -167,33 +167,49 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     """
     film = Film.of(path, samples)
     found, lights = sighted(path, film)
-    pointer = None if hint is None else Pointer.of(hint, found, film.factor, path)
+    lens = lens_of(samples, film)
+    if hint is None:
+        return _followed(path, film, lens, found, lights)
+    pointer = Pointer.of(hint, found, film.factor, path)
+    if pointer.one is not None:  # the plainest path may be the one that is meant
+        plain = _followed(path, film, lens, found, lights, hinted=True)
+        if not pointer.missed(plain.pixels, plain.maps):
+            return plain
+    followed = _followed(path, film, lens, found, lights, hinted=True, pointer=pointer)
+    missed = pointer.missed(followed.pixels, followed.maps)
+    return followed._replace(doubts=followed.doubts + missed)
+
+
+def _followed(
+    path: str | os.PathLike, film: "Film", lens: Lens, found: list[list[Candidate]],
+    lights: list[Floats32], *, hinted: bool = False, pointer: Pointer | None = None,
+) -> Followed:  # fmt: skip
+    """What moves most plainly, of that at which a hint points; gaps are filled if it is hinted."""
     seen, paths = linked(pointer.like(found) if pointer else found, film, pointer)
     doubts: tuple[str, ...] = ()
-    if hint is None and paths:
+    if pointer is None and paths:
         paths = paths if _travels(seen, paths[0].rows, film.places) else []
-        doubts = _rivals(seen, paths, film) if paths else ()
-    if paths:
-        # What the target looks like is known by now, which tells it from what it meets.
-        first = paths[0].rows
-        learned = _learned(found, seen, first)
-        if pointer is not None:
-            learned = pointer.kept(learned, seen.frame[first], seen.which[first])
-        seen, paths = linked(learned, film, pointer)
-        paths = sorted(paths, key=lambda path: -np.isin(path.rows, first).sum())[:1]
+        doubts = _rivals(seen, paths, film) if paths and not hinted else ()
     if not paths:
-        return told(nothing(film.motion, len(found)), pointer)
+        return nothing(film.motion, len(found))
+    # What the target looks like is known by now, which tells it from what it meets.
+    first = paths[0].rows
+    learned = _learned(found, seen, first)
+    if pointer is not None:
+        learned = pointer.kept(learned, seen.frame[first], seen.which[first])
+    seen, paths = linked(learned, film, pointer)
+    if not paths:
+        return nothing(film.motion, len(found))
     if not film.sure:
         doubts += ("the background is too plain to tell whether the camera moves: if so, its "
                    "motion is part of the track",)  # fmt: skip
-    rows = paths[0].rows
-    lens = lens_of(samples, film)
+    rows = max(paths, key=lambda path: np.isin(path.rows, first).sum()).rows
     views = viewed(path, film, lens, expected(seen, rows, film, len(found)), lights)
     followed = finished(views, film.motion, doubts)
-    if pointer is not None:
-        first, last = seen.frame[rows[[0, -1]]]
-        followed = remembered(path, lens, lights, followed, views, np.s_[first : last + 1])
-    return told(followed, pointer)
+    if not hinted:
+        return followed
+    start, last = seen.frame[rows[[0, -1]]]
+    return remembered(path, lens, lights, followed, views, np.s_[start : last + 1])
 
 
 def linked(
@@ -404,9 +420,3 @@ def remembered(
         known = np.isfinite(places[:, 0])
         pixels[known], errors[known] = places[known], _RECALLED
     return found._replace(pixels=pixels, errors=errors)
-
-
-def told(found: Followed, pointer: Pointer | None) -> Followed:
-    """A track with the doubt whether it is what somebody pointed at."""
-    missed = pointer.missed(found.pixels, found.maps) if pointer is not None else ()
-    return found._replace(doubts=found.doubts + missed)
