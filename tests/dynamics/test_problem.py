@@ -103,21 +103,16 @@ def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
     np.testing.assert_array_equal(candidate.state.offset, origin)
 
 
-def test_a_law_is_compared_with_its_rivals_at_dearer_prices():
-    problem = posed(0.1)
-    np.testing.assert_array_equal(
-        problem.cautious.penalties, term_penalties(problem.exponents, 2, SURE)
-    )
-    assert (problem.cautious.penalties > problem.penalties + 2).all()
-
-
-def test_terms_are_dearer_where_all_samples_share_errors():
+def test_prices_are_dearer_for_rivals_and_where_all_samples_share_errors():
     rng = np.random.default_rng(0)
     t, x = SYSTEMS["Lorenz"].trajectory(300)
     form = Form.of(("x", "y", "z"), Library.polynomial(2), 1)
     alone, shared = (pose([(t, x)], [np.ones((300, 3, k))], form, rng) for k in (0, 1))
+    sure = term_penalties(alone.exponents, 3, SURE)
     assert (alone.shared, shared.shared) == (False, True)
-    np.testing.assert_array_equal(shared.penalties, alone.cautious.penalties)
+    assert (sure > alone.penalties + 2).all()
+    for problem in (alone.cautious, shared, shared.cautious):
+        np.testing.assert_array_equal(problem.penalties, sure)
 
 
 def test_turns_and_samples_are_those_of_all_runs():

@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.candidates import Candidate, Difference, Plate, uncommon
+from vidsindy_lite.vision.candidates import Candidate, Difference, Plate, cores, uncommon
 
 WIDTH, HEIGHT, FRAMES = 160, 120, 12
 SWAYING = np.array([70, 60])  # a place of the scene
@@ -78,3 +78,31 @@ def test_every_third_pixel_of_a_plate_is_that_of_the_whole(moves):
     assert thin[0].shape == (17, 24, 3)
     for one, other in zip(whole, thin, strict=True):
         np.testing.assert_array_equal(one[::3, ::3], other)
+
+
+def test_what_differs_much_more_than_that_with_which_it_is_in_one_piece_is_a_core():
+    strength = np.zeros((60, 80), np.float32)
+    strength[10:50, 10:70] = 1.5  # a wide change of the light
+    strength[20:30, 20:30] = 9
+    strength[22:26, 22:26] = 40  # of what is in it, too small for one
+    mask = (strength > 1).astype(np.uint8)
+    (core,) = cores(mask, strength)
+    assert core.sum() == 100
+    assert core[20:30, 20:30].all()
+    strength[10:50, 10:70] = 1.5
+    strength[10:50, 10:70:2] = 9  # of a person, many parts differ as much
+    assert not cores(mask, strength)
+    strength[strength < 9] = 0
+    assert not cores((strength > 1).astype(np.uint8), strength)  # one alone is no core of itself
+
+
+def test_a_target_is_told_from_a_faint_change_that_it_meets():
+    plain, _, maps = filmed([(0, 0)] * FRAMES)
+    frame = plain[0].copy()
+    frame[20:100, 30:120] += 15
+    frame[60:70, 80:90] = 250
+    difference = Difference(Plate(plain, maps, np.ones(FRAMES, bool)), noise=1.0)
+    found = difference.candidates(frame, maps[0])
+    (core,) = (one for one in found if abs(one.area - 100) < 10)
+    np.testing.assert_allclose(core.centre, [84.5, 64.5], atol=0.1)
+    assert core.colour.min() > 200

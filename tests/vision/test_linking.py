@@ -5,7 +5,7 @@ import pytest
 from helpers import one_a_frame
 
 from vidsindy_lite.vision.candidates import Candidate
-from vidsindy_lite.vision.linking import Sightings, _prices, best_path
+from vidsindy_lite.vision.linking import TOLD, Sightings, _prices, best_path
 
 
 def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
@@ -58,11 +58,12 @@ def test_the_longer_nothing_is_seen_the_less_it_is_worth_to_go_on():
     assert (np.diff(values) < -0.01).all()
 
 
-def priced(speed, moving, *, gap=1, step=(0, 0), size=1.0, colour=0.0):
+def priced(speed, moving, *, gap=1, step=(0, 0), size=1.0, colour=0.0, qualities=(1, 1)):
     """What it costs to go on from a candidate of 8 pixels in an image whose diagonal is 100."""
     seen = Sightings(
         np.array([0, gap]), np.zeros(2, int), np.array([[0, 0], step], float),
-        8 * np.array([1, size]), np.array([[0, 0, 0], [colour, 0, 0]], float), np.ones(2),
+        8 * np.array([1, size]), np.array([[0, 0, 0], [colour, 0, 0]], float),
+        np.array(qualities, float),
         np.zeros((2, 4)), 100.0,
     )  # fmt: skip
     old, new = np.array([0]), np.array([1])
@@ -86,6 +87,14 @@ def test_prices_by_hand():
     assert priced((0, 0), True, size=0.5) == pytest.approx(np.log(2))
     assert priced((0, 0), True, colour=30) == pytest.approx(0.5)
     assert priced((0, 0), True, colour=250) == pytest.approx(2)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_nothing_jumps_to_or_from_what_somebody_points_at(which):
+    assert priced((6, 0), True, step=(6, 90)) == pytest.approx(2)
+    qualities = np.where(np.arange(2) == which, TOLD, 1.0)
+    assert priced((6, 0), True, step=(6, 90), qualities=qualities) == pytest.approx((90 / 9) ** 2)
+    assert priced((6, 0), True, step=(6, 0), qualities=qualities) == pytest.approx(0)
 
 
 @pytest.mark.parametrize(("gap", "bridged"), [(20, True), (21, False)])

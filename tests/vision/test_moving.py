@@ -13,7 +13,7 @@ import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision.candidates import Candidate, Plate
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import _fits, _learned, finished, hinted, rate
+from vidsindy_lite.vision.moving import _learned, finished, rate
 from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
 from vidsindy_lite.vision.steadying import CameraMotion, Steadying, _Relief, carry, stands_still
 
@@ -224,6 +224,9 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     errors = np.zeros(20)
     maps = np.tile(np.eye(3), (20, 1, 1))
     assert finished(views, CameraMotion(maps, errors), ()).doubts == ()
+    larger = [replace(view, area=300.0) for view in views[12:]]
+    (doubt,) = finished(views[:12] + larger, CameraMotion(maps, errors), ()).doubts
+    assert doubt.startswith("from frame 12 on, what is followed has another size at once")
     errors[16:] = np.inf
     found = finished(views, CameraMotion(maps, errors), ())
     assert np.isfinite(found.pixels[:, 0]).sum() == 16
@@ -281,41 +284,6 @@ def test_the_plate_of_a_moving_camera():
         assert known.mean() > 0.8
         assert np.median(difference) == 0
     assert plate.seen_from(maps[4], np.array([40, 40]), (20, 20))[0].min() > 0
-
-
-# ------------------------------------------------------------------------------------------- hints
-
-
-def blob(u, v, size, colour=(30, 30, 200)):
-    """A candidate of quality .8, as wide as high."""
-    box = np.array([u - (size - 1) / 2, v - (size - 1) / 2, size, size])
-    return Candidate(np.array([u, v]), box, size**2, np.array(colour, float), 0.8)
-
-
-def test_a_candidate_of_another_colour_is_worth_less():
-    found = [[blob(40.0, 50.0, 9), blob(80.0, 50.0, 9, (200, 30, 30))], [blob(9.0, 9.0, 9)]]
-    (same, other), (again,) = hinted(found, Hint(colour=(200, 30, 30)), 1, "none.mov")
-    assert same.quality == again.quality == pytest.approx(0.8)
-    assert other.quality < 0.1
-    (own,), _ = hinted(found, Hint(0, (36, 46, 9, 9)), 1, "none.mov")
-    assert own.quality > 0.8
-
-
-def test_a_candidate_fits_a_box_about_its_place_and_size():
-    """A pixel beyond half of the box at most; 1.6 times as large and four pixels more."""
-    box, middle = np.array([35.5, 45.5, 10, 10]), np.array([40.0, 50.0])
-    for u, v, size, fits in (
-        (46.0, 50.0, 10, True), (46.1, 50.0, 10, False), (40.0, 43.9, 10, False),
-        (40.0, 44.0, 20, True), (40.0, 50.0, 20.1, False), (40.0, 50.0, 1, True),
-    ):  # fmt: skip
-        assert _fits(blob(u, v, size), box, middle) is fits
-
-
-def test_a_hint_is_for_auto_and_must_be_one(tmp_path):
-    with pytest.raises(ValueError, match="target: may be given for detector='auto'"):
-        track(tmp_path / "a.mov", "learned", Hint(colour=(1, 2, 3)))
-    with pytest.raises(ValueError, match="target: must be of type Hint"):
-        track(tmp_path / "a.mov", target=(1, 2, 3, 4))
 
 
 # --------------------------------------------------------------------------------------- real clips

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision.candidates import Plate
-from vidsindy_lite.vision.refining import _BESIDE, Lens, joined
+from vidsindy_lite.vision.refining import _BESIDE, Lens, joined, swapped
 
 
 @pytest.mark.parametrize("missing", [0, 1])
@@ -13,6 +13,19 @@ def test_two_that_meet_and_part_are_one_in_between_if_both_sides_are_seen(missin
     expected = [False] * _BESIDE + [not missing] * 6 + [False] * len(after)
     assert joined(np.array(before + during + after)).tolist() == expected
     assert joined(np.array(after + during + before)).tolist() == expected[::-1]
+
+
+@pytest.mark.parametrize("factor", [3.0, 1 / 3])
+def test_what_is_larger_or_smaller_at_once_and_remains_so_is_something_else(factor):
+    areas = np.linspace(100, 150, 40)
+    frames = np.arange(40)
+    assert swapped(frames, areas) is None
+    areas[20:] *= factor
+    assert swapped(frames, areas) == 20
+    assert swapped(np.where(frames < 20, frames, frames + 20), areas) is None  # nobody looked
+    assert swapped(np.where(frames < 20, frames, frames + 6), areas) == 20
+    areas[22:] /= factor
+    assert swapped(frames, areas) is None
 
 
 def disc(centre, radius, size=(80, 60)):

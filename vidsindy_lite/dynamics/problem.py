@@ -30,8 +30,8 @@ FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where laws of the zoo have
 about the fewest wrong terms (`study.price`)."""
 SURE = 0.004
-"""The same where samples share errors, which look like evidence for small terms, and elsewhere for a
-law that is not to be doubted: a term that is only worth the price above is told."""
+"""The same where samples share errors, which look like evidence for small terms, and elsewhere for
+a law that is not to be doubted: a term that is only worth the price above is told."""
 OFFSET_PENALTY = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 COARSE = 20

@@ -9,7 +9,8 @@
   moving          what moves most plainly, if camera and background are not: steadying takes out the
                   camera's motion (aligning: by all pixels, where corners are few), candidates are
                   what differs (lingering: also what hardly leaves its place), linking joins,
-                  refining measures
+                  refining measures; with a hint (hints), pointing says which candidate it means,
+                  and recalling where the target is that shows only in part
   several     track_targets: the same for several targets, each where it is apart from the others
   detector        what looks like a target in a single frame: our network, or any YOLO-v8
   network     that network, in PyTorch; training trained it, on frames that are drawn here

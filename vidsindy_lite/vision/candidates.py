@@ -28,6 +28,9 @@ _MOST = 40  # candidates of a frame that are looked at
 _KEPT = 12  # and that are kept, once it is known which of them stay where they are
 _STAYS = 1.0  # by how much of its quality a candidate loses that is there in all frames
 _WORTH = 0.4  # share of its quality that it keeps at least
+_LEVELS = 2.0, 4.0, 8.0  # times the tolerance, by which a core differs at least; and
+_PLAINER = 2.0  # times as much as what is around it
+_CORE = 25, 0.5  # pixels of a core at least, and its share of the whole at most
 _ALIKE = 40.0, 2.0  # grey levels of colour and factor of size between two that look alike
 
 
@@ -190,7 +193,10 @@ class Difference:
         closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         mask = np.asarray(closed, np.uint8)
         self._note(mask, here)
-        return blobs(mask, strength, frame, background, factor)
+        found = blobs(mask, strength, frame, background, factor)
+        for core in cores(mask, strength):
+            found += blobs(core, strength, frame, background, factor)
+        return found
 
     def _note(self, mask: Image, here: Floats) -> None:
         """Count how often each place of the plate differs from it."""
@@ -219,6 +225,36 @@ class Difference:
         u, v = (int(x) for x in _carry(self.plate.shift @ here, one.centre[None])[0].round())
         window = self.often[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2]
         return float(window.mean() / len(self.lights)) if window.size and u >= 0 and v >= 0 else 0.0
+
+
+def cores(mask: Image, strength: Floats32) -> list[Image]:
+    """Masks of what differs far more than that with which it is in one piece.
+
+    A target that meets its shadow, or a wide and faint change of the light, is a small part of the
+    whole. Of a person, many parts differ about as much, and none is a core.
+    """
+    _, whole, stats, _ = cv2.connectedComponentsWithStats(mask)
+    areas = stats[:, cv2.CC_STAT_AREA].tolist()
+    totals = np.bincount(whole.ravel(), strength.ravel()).tolist()
+    found = []
+    for level in _LEVELS:
+        core = np.zeros_like(mask)
+        plain = np.asarray(mask & (strength > level), np.uint8)
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(plain)
+        for k in 1 + np.flatnonzero(stats[1:, cv2.CC_STAT_AREA] >= _CORE[0]):
+            left, top, width, height, area = stats[k].tolist()
+            window = np.s_[top : top + height, left : left + width]
+            here = labels[window] == k
+            total, around = float(strength[window][here].sum()), whole[window][here][0]
+            rest = (totals[around] - total) / max(areas[around] - area, 1)
+            if area < _CORE[1] * areas[around] and total / area > _PLAINER * rest:
+                core[window][here] = 1
+                whole[window][here] = len(areas)  # what lies within is compared with this
+                areas.append(area)
+                totals.append(total)
+        if core.any():
+            found.append(core)
+    return found
 
 
 def blobs(

@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .candidates import Candidate
 
+TOLD = 100.0  # quality of a candidate that somebody points at, to and from which nothing jumps
 _GAIN = 0.15  # of quality, that a candidate must exceed to be worth anything
 _GAP = 0.3  # price of a gap
 _SLOT = 0.04  # price of each frame of it
@@ -81,7 +82,9 @@ def _prices(seen: Sightings, old: Ints, new: Ints, speed: Floats, moving: Floats
     size, travel = seen.size[old][:, None], np.linalg.norm(speed, axis=1)[:, None]
     known = 2 + 0.5 * size + 0.5 * travel * gap
     reach = np.where(moving[:, None], known, _START * seen.diagonal + 2 * size * gap)
-    price = _JUMP * (1 - np.exp(-0.5 * (miss / reach) ** 2))
+    far = 0.5 * (miss / reach) ** 2
+    told = (seen.quality[new] >= TOLD) | (seen.quality[old] >= TOLD)[:, None]
+    price = _JUMP * np.where(told, far, 1 - np.exp(-far))
     price += np.where(gap > 1, _GAP + _SLOT * gap, 0)
     price += np.abs(np.log(seen.size[new] / size))
     apart = np.linalg.norm(seen.colour[new] - seen.colour[old][:, None], axis=2)

@@ -23,14 +23,16 @@ from .candidates import (
 from .colours import entire
 from .hints import Hint
 from .lingering import Place, lingering, uncover
-from .linking import Sightings, best_path
+from .linking import TOLD, Sightings, best_path
 from .occluders import hidden
 from .pixels import relit
+from .pointing import Pointer, alike
+from .recalling import recalled
 from .reducing import reduce, reduced, reduction
-from .refining import Lens, View, fitting, scatter
+from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
-from .video import VideoInfo, read_frame, read_video, video_info
+from .video import VideoInfo, read_video, video_info
 
 _PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path
@@ -41,8 +43,7 @@ _SWINGS = 0.1  # of its size, by which what lingers in its place moves at least
 _SCARCE = 0.05  # share of the frames in which a target must be seen
 _TOLD_OFTEN = 0.5  # share of the frames that tell of the camera's motion, if it is known
 _LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
-_COLOUR = 70.0  # grey levels between colours that are not alike
-_TOLD = 100.0  # quality of the candidate that a user points at
+_RECALLED = 2.0  # pixels, about, to which a target is recalled that is not seen whole
 _PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
 _DENSE = 640  # pixels in a row of which the noise is known well
 _LARGE = 0.01  # share of the image that a target hardly fills
@@ -163,37 +164,69 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(path, samples)
-    found, lights = sighted(path, film, hint)
-    seen, paths = linked(found, film)
+    found, lights = sighted(path, film)
+    lens = lens_of(samples, film)
+    if hint is None:
+        return _followed(path, film, lens, found, lights)
+    pointer = Pointer.of(hint, found, film.factor, path)
+    if pointer.one is not None:  # the plainest path may be the one that is meant
+        plain = _followed(path, film, lens, found, lights, hinted=True)
+        if not pointer.missed(plain.pixels, plain.maps):
+            return plain
+    followed = _followed(path, film, lens, found, lights, hinted=True, pointer=pointer)
+    missed = pointer.missed(followed.pixels, followed.maps)
+    return followed._replace(doubts=followed.doubts + missed)
+
+
+def _followed(
+    path: str | os.PathLike, film: "Film", lens: Lens, found: list[list[Candidate]],
+    lights: list[Floats32], *, hinted: bool = False, pointer: Pointer | None = None,
+) -> Followed:  # fmt: skip
+    """What moves most plainly, of that at which a hint points; gaps are filled if it is hinted."""
+    seen, paths = linked(pointer.like(found) if pointer else found, film, pointer)
     doubts: tuple[str, ...] = ()
-    if hint is not None and hint.box is not None:
-        paths = [p for p in paths if (seen.quality[p.rows] > 1).any()]
-    elif hint is None and paths and _travels(seen, paths[0].rows, film.places):
-        doubts = _rivals(seen, paths, film)
-        # What the target looks like is known by now, which tells it from what it meets.
-        first = paths[0].rows
-        seen, paths = linked(_learned(found, seen, first), film)
-        paths = sorted(paths, key=lambda path: -np.isin(path.rows, first).sum())[:1]
-    elif hint is None:
-        paths = []
+    if pointer is None and paths:
+        paths = paths if _travels(seen, paths[0].rows, film.places) else []
+        doubts = _rivals(seen, paths, film) if paths and not hinted else ()
+    if not paths:
+        return nothing(film.motion, len(found))
+    # What the target looks like is known by now, which tells it from what it meets.
+    first = paths[0].rows
+    learned = _learned(found, seen, first)
+    if pointer is not None:
+        learned = pointer.kept(learned, seen.frame[first], seen.which[first])
+    seen, paths = linked(learned, film, pointer)
     if not paths:
         return nothing(film.motion, len(found))
     if not film.sure:
         doubts += ("the background is too plain to tell whether the camera moves: if so, its "
                    "motion is part of the track",)  # fmt: skip
-    ways = expected(seen, paths[0].rows, film, len(found))
-    return finished(viewed(path, samples, film, ways, lights), film.motion, doubts)
+    rows = max(paths, key=lambda path: np.isin(path.rows, first).sum()).rows
+    views = viewed(path, film, lens, expected(seen, rows, film, len(found)), lights)
+    followed = finished(views, film.motion, doubts)
+    if not hinted:
+        return followed
+    start, last = seen.frame[rows[[0, -1]]]
+    return remembered(path, lens, lights, followed, views, np.s_[start : last + 1])
 
 
 def linked(
-    found: list[list[Candidate]], film: "Film", most: int = _PATHS
+    found: list[list[Candidate]], film: "Film", pointer: Pointer | None = None, most: int = _PATHS
 ) -> tuple[Sightings, list[Rated]]:
-    """The candidates as a table, and the paths through them, the plainest first."""
+    """The candidates as a table, and the paths through them, the plainest first.
+
+    If somebody points at one of them, only those through that.
+    """
+    if pointer is not None:
+        found = pointer.pinned(found)
     places = [
         carry(film.maps[i], np.array([c.centre for c in f])) for i, f in enumerate(found) if f
     ]
     seen = Sightings.of(found, places, float(np.hypot(*film.plate.size)))
-    return seen, plainest_paths(seen, most)
+    paths = plainest_paths(seen, most)
+    if pointer is not None and pointer.one is not None:
+        paths = [path for path in paths if (seen.quality[path.rows] >= TOLD).any()]
+    return seen, paths
 
 
 def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[list[Candidate]]:
@@ -205,7 +238,7 @@ def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[
     colour = np.median(seen.colour[rows], axis=0)
     usual = float(np.median(seen.quality[rows]))
     return [
-        [replace(c, quality=min(c.quality / usual, 1.0) * _alike(c.colour, colour)) for c in f]
+        [replace(c, quality=min(c.quality / usual, 1.0) * alike(c.colour, colour)) for c in f]
         for f in found
     ]
 
@@ -247,7 +280,7 @@ class Film(NamedTuple):
 
 
 def sighted(
-    path: str | os.PathLike, film: Film, hint: Hint | None, targets: int = 1
+    path: str | os.PathLike, film: Film, targets: int = 1
 ) -> tuple[list[list[Candidate]], list[Floats32]]:
     """What may be the target in each frame, and how bright the frame is."""
     difference = Difference(film.plate, film.noise)
@@ -255,8 +288,6 @@ def sighted(
         difference.candidates(reduce(frame, film.factor), here)
         for frame, here in zip(read_video(path), film.maps, strict=False)
     ]
-    if hint is not None:
-        return hinted(found, hint, film.factor, path), difference.lights
     kept = [
         difference.travelling(uncommon(some, targets), here)
         for some, here in zip(found, film.maps, strict=False)
@@ -264,15 +295,20 @@ def sighted(
     return kept, difference.lights
 
 
-def viewed(
-    path: str | os.PathLike, samples: Image, film: Film, ways: "Ways", lights: list[Floats32]
-) -> list[View | None]:
-    """The target in whole frames, near where it is expected."""
+def lens_of(samples: Image, film: Film) -> Lens:
+    """What looks at targets in whole frames, of which these are samples."""
     known = np.isfinite(film.motion.errors[film.sampled])
     maps = film.motion.maps[film.sampled]
     plate = Plate(samples, maps, known)
     lens = Lens(plate, _noise(samples, maps, plate))
     uncover(plate, samples, maps, known, film.places, film.factor)
+    return lens
+
+
+def viewed(
+    path: str | os.PathLike, film: Film, lens: Lens, ways: "Ways", lights: list[Floats32]
+) -> list[View | None]:
+    """The target in whole frames, near where it is expected."""
     views = []
     for i, (frame, here) in enumerate(zip(read_video(path), film.motion.maps, strict=False)):
         view = None
@@ -286,52 +322,6 @@ def nothing(motion: CameraMotion, n: int) -> Followed:
     """Of a film of n frames in which no target was found."""
     none = "nothing was found that moves like one target"
     return Followed(np.full((n, 2), np.nan), np.full(n, np.inf), motion.maps[:n], (none,))
-
-
-def hinted(
-    found: list[list[Candidate]], hint: Hint, factor: int, path: str | os.PathLike
-) -> list[list[Candidate]]:
-    """Candidates as far as they are what a hint says: of its colour, in its box in its frame."""
-    if hint.box is not None and hint.frame is not None:
-        box = (np.array(hint.box) - [(factor - 1) / 2, (factor - 1) / 2, 0, 0]) / factor
-        middle = box[:2] + (box[2:] - 1) / 2
-        if hint.frame >= len(found):
-            raise ValueError(f"target: its frame must be one of {len(found)}, got {hint.frame}")
-        here = [c for c in found[hint.frame] if _fits(c, box, middle)]
-        if here:
-            one = here[int(np.argmin([np.linalg.norm(c.centre - middle) for c in here]))]
-        else:
-            one = _boxed(reduce(read_frame(path, hint.frame), factor), box, middle)
-        found = list(found)
-        found[hint.frame] = [replace(one, quality=_TOLD)]
-        colour = one.colour
-    if hint.colour is not None:
-        colour = np.array(hint.colour[::-1], float)
-    return [
-        [replace(c, quality=c.quality * _alike(c.colour, colour)) for c in some] for some in found
-    ]
-
-
-def _fits(one: Candidate, box: Floats, middle: Floats) -> bool:
-    """Has a candidate about the place and the size of a box?"""
-    near = (np.abs(one.centre - middle) <= box[2:] / 2 + 1).all()
-    return bool(near and (one.box[2:] <= 1.6 * box[2:] + 4).all())
-
-
-def _boxed(frame: Image, box: Floats, middle: Floats) -> Candidate:
-    """What is in a box, where nothing differs from the background."""
-    low, high = middle - box[2:] / 4, middle + box[2:] / 4
-    rows = slice(max(int(low[1]), 0), int(high[1]) + 1)
-    inner = frame[rows, max(int(low[0]), 0) : int(high[0]) + 1].reshape(-1, 3)
-    if not len(inner):
-        raise ValueError(f"box: must lie in the image, got {box.tolist()}")
-    return Candidate(middle, box, 0.8 * box[2] * box[3], np.median(inner, axis=0).astype(float), 1)
-
-
-def _alike(colour: Floats, told: Floats) -> float:
-    """How alike two colours are, from 0 to 1, also in another light."""
-    shade = np.clip(float(colour @ told) / max(float(colour @ colour), 1.0), 0.7, 1.4)
-    return float(np.exp(-((np.linalg.norm(shade * colour - told) / _COLOUR) ** 2)))
 
 
 def _travels(seen: Sightings, rows: Ints, places: list[Place]) -> bool:
@@ -407,9 +397,27 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
                    f"moved, from {untold[0]} to {untold[-1]}: they are left out",)  # fmt: skip
     if good.sum() < max(_SHORTEST, _SCARCE * n):
         return nothing(motion, n)
+    if (first := swapped(at[good], areas[good])) is not None:
+        doubts += (f"from frame {at[good][first]} on, what is followed has another size at once: "
+                   "perhaps it is something else",)  # fmt: skip
     pixels[at[good]] = steady[good]
     errors[at[good]] = np.hypot(scatter(at[good], steady[good]), motion.errors[at[good]])
     if np.median(motion.errors[at[good]]) > _LOOSE:
         error = np.median(motion.errors[at[good]])
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
     return Followed(pixels, errors, motion.maps[:n], doubts)
+
+
+def remembered(
+    path: str | os.PathLike, lens: Lens, lights: list[Floats32], found: Followed,
+    views: list[View | None], sure: slice,
+) -> Followed:  # fmt: skip
+    """A track with its gaps filled where the target is recalled from its path, and beyond that."""
+    pixels, errors = found.pixels.copy(), found.errors.copy()
+    inside = np.full_like(pixels, np.nan)
+    inside[sure] = pixels[sure]
+    if np.isfinite(inside[:, 0]).any():
+        places = recalled(path, lens, lights, inside, found.maps, entire(views)[0])
+        known = np.isfinite(places[:, 0])
+        pixels[known], errors[known] = places[known], _RECALLED
+    return found._replace(pixels=pixels, errors=errors)

@@ -185,6 +185,21 @@ def joined(areas: Floats) -> Bools:
     return found
 
 
+def swapped(frames: Ints, areas: Floats) -> int | None:
+    """The first view (n,) of something else that is larger or smaller at once, None if all is well.
+
+    No target changes like that within a few frames and remains so.
+    """
+    logs = np.log2(np.maximum(areas, 1e-3)) / np.log2(_JOINED)
+    most = np.maximum(np.diff(frames) / _BESIDE, 1)
+    for first in 1 + np.flatnonzero(np.abs(np.diff(logs)) > most):
+        before, after = logs[:first][-_BESIDE:], logs[first:][:_BESIDE]
+        apart = abs(np.median(after) - np.median(before))
+        if min(len(before), len(after)) == _BESIDE and apart > most[first - 1]:
+            return int(first)
+    return None
+
+
 def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
     """How far a place is from where the three on both sides of it say, and how unsure that is.
 

@@ -14,7 +14,18 @@ from ..arrays import Bools
 from ..checks import check_integer
 from .background import BackgroundModel, sample_frames
 from .linking import Sightings
-from .moving import Film, Rated, Ways, expected, finished, linked, nothing, sighted, viewed
+from .moving import (
+    Film,
+    Rated,
+    Ways,
+    expected,
+    finished,
+    lens_of,
+    linked,
+    nothing,
+    sighted,
+    viewed,
+)
 from .tracking import Track
 
 _MEETINGS = 8  # paths of a target that may follow each other
@@ -49,16 +60,17 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     samples = sample_frames(path)
     # Before a plain background, all that could tell of a camera's motion may be the targets.
     film = Film.of(path, samples, BackgroundModel(samples).camera_rests)
-    found, lights = sighted(path, film, None, count)
-    seen, paths = linked(found, film, count * _MEETINGS)
+    found, lights = sighted(path, film, count)
+    seen, paths = linked(found, film, most=count * _MEETINGS)
     lanes, strange = _lanes(seen, paths, count)
     ways = [_joined([expected(seen, p.rows, film, len(found)) for p in lane]) for lane in lanes]
     touching = _touching(ways)
     doubts = _doubts(seen, strange, film.factor, len(found), Path(path).name)
     tracks = []
+    lens = lens_of(samples, film)
     for way, hidden in zip(ways, touching, strict=True):
         way.centre[hidden] = np.nan
-        followed = finished(viewed(path, samples, film, way, lights), film.motion, doubts)
+        followed = finished(viewed(path, film, lens, way, lights), film.motion, doubts)
         tracks.append(Track.of_motion(followed))
         doubts = ()
     missing = Track.of_motion(nothing(film.motion, len(found)))

@@ -106,13 +106,14 @@ def track(
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
-        Which of the things that move is the target, for "auto".
+        Which of the things that move is the target, for "auto". Gaps of a few frames in which a
+        part of it shows are filled where its motion leads.
 
     Returns
     -------
     Track
-        Its warnings say where something else might be the target; of "background", whether the
-        camera or the background is not at rest.
+        Its warnings say where something else might be the target, and whether it misses a hint; of
+        "background", whether the camera or the background is not at rest.
 
     Raises
     ------

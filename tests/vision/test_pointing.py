@@ -1,0 +1,92 @@
+"""What a hint says of the candidates, and of a track that misses it."""
+
+import numpy as np
+import pytest
+
+from vidsindy_lite import Hint, track
+from vidsindy_lite.vision.candidates import Candidate
+from vidsindy_lite.vision.linking import TOLD
+from vidsindy_lite.vision.pointing import Pointer, _fits, _overlap
+
+
+def blob(u, v, size, colour=(30, 30, 200)):
+    """A candidate of quality .8, as wide as high."""
+    box = np.array([u - (size - 1) / 2, v - (size - 1) / 2, size, size])
+    return Candidate(np.array([u, v]), box, size**2, np.array(colour, float), 0.8)
+
+
+FOUND = [[blob(40.0, 50.0, 9), blob(80.0, 50.0, 9, (200, 30, 30))], [blob(9.0, 9.0, 9)]]
+
+
+def test_a_candidate_of_another_colour_is_worth_less():
+    pointer = Pointer.of(Hint(colour=(200, 30, 30)), FOUND, 1, "none.mov")
+    (same, other), (again,) = pointer.like(FOUND)
+    assert same.quality == again.quality == pytest.approx(0.8)
+    assert other.quality < 0.1
+    assert pointer.pinned(FOUND) is FOUND
+
+
+def test_what_is_in_the_box_is_all_that_its_frame_has():
+    pointer = Pointer.of(Hint(0, (76, 46, 9, 9)), FOUND, 1, "none.mov")
+    (own,), rest = pointer.pinned(FOUND)
+    assert own.quality == TOLD
+    np.testing.assert_array_equal(own.centre, [80, 50])
+    assert rest is FOUND[1]
+    assert pointer.like(FOUND)[0][0].quality < 0.1 < pointer.like(FOUND)[0][1].quality
+
+
+def test_of_what_is_in_a_box_the_one_that_fills_it_is_meant():
+    found = [[blob(40.0, 50.0, 3), blob(41.0, 50.0, 9)]]
+    assert Pointer.of(Hint(0, (36, 46, 9, 9)), found, 1, "none.mov").one.area == 81
+
+
+def test_what_a_path_has_is_to_be_on_the_next_one_and_what_is_as_large_is_preferred():
+    pointer = Pointer.of(Hint(0, (36, 46, 9, 9)), FOUND, 1, "none.mov")
+    found = [FOUND[0], FOUND[1], [blob(40.0, 50.0, 9), blob(40.0, 50.0, 63)]]
+    frames, which = np.array([0, 1]), np.array([0, 0])
+    kept = pointer.kept(found, frames, which)
+    assert [[c.quality for c in some] for some in kept[1:]] == [
+        [pytest.approx(1.8)],
+        [pytest.approx(0.8), pytest.approx(0.8 * np.exp(-((np.log(49) / 2.2) ** 2)))],
+    ]
+    assert [c.quality for c in kept[0]] == pytest.approx([0.8, 0.8])  # the one is pinned there
+    assert pointer.like(found)[2][1].quality < 0.1
+
+
+def test_two_boxes_overlap_by_what_both_cover():
+    one, other = np.array([0.0, 0, 4, 4]), np.array([2.0, 0, 4, 4])
+    assert _overlap(one, other) == pytest.approx(8 / 24)
+    assert _overlap(one, other + [4, 0, 0, 0]) == 0
+
+
+def test_a_candidate_fits_a_box_about_its_place_and_size():
+    """A pixel beyond half of the box at most; 1.6 times as large and four pixels more."""
+    box, middle = np.array([35.5, 45.5, 10, 10]), np.array([40.0, 50.0])
+    for u, v, size, fits in (
+        (46.0, 50.0, 10, True), (46.1, 50.0, 10, False), (40.0, 43.9, 10, False),
+        (40.0, 44.0, 20, True), (40.0, 50.0, 20.1, False), (40.0, 50.0, 1, True),
+    ):  # fmt: skip
+        assert _fits(blob(u, v, size), box, middle) is fits
+
+
+def test_a_track_that_is_not_in_the_box_says_so():
+    pointer = Pointer.of(Hint(0, (36, 46, 9, 9)), FOUND, 1, "none.mov")
+    maps = np.array(
+        [[[1, 0, 5], [0, 1, 0], [0, 0, 1.0]]]
+    )  # the frame lies five pixels to the right
+    assert pointer.missed(np.array([[49.0, 50]]), maps) == ()
+    (elsewhere,) = pointer.missed(np.array([[52.0, 50]]), maps)
+    assert "pointed at in frame 0" in elsewhere
+    assert "at (47, 50)" in elsewhere
+    (unseen,) = pointer.missed(np.full((1, 2), np.nan), maps)
+    assert unseen.endswith("is not seen in that frame")
+    assert Pointer.of(Hint(colour=(1, 2, 3)), FOUND, 1, "none.mov").missed(maps[:, 0], maps) == ()
+
+
+def test_a_hint_is_for_auto_and_must_be_one(tmp_path):
+    with pytest.raises(ValueError, match="target: may be given for detector='auto'"):
+        track(tmp_path / "a.mov", "learned", Hint(colour=(1, 2, 3)))
+    with pytest.raises(ValueError, match="target: must be of type Hint"):
+        track(tmp_path / "a.mov", target=(1, 2, 3, 4))
+    with pytest.raises(ValueError, match="target: its frame must be one of 2, got 2"):
+        Pointer.of(Hint(2, (36, 46, 9, 9)), FOUND, 1, "none.mov")
