@@ -801,7 +801,9 @@ if full:
 
 # %% [markdown]
 # *The sum of wrong terms has a flat minimum, and the solver's price lies in it. A term that is only just worth it may be
-# false: a law is compared with its rivals at a dearer price, of a chance of 0.4 %, and a term that is not worth that is told.*
+# false: a law is compared with its rivals at a dearer price, of a chance of 0.4 %, and a term that is not worth that is told.
+# Here errors are independent. Errors that all samples share, such as those of cameras, look like evidence for small terms; where
+# there are any, every term costs the dearer price.*
 #
 # ## Errors that are no noise
 #

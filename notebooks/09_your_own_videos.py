@@ -367,7 +367,7 @@ unsaid = {"position_error": 0, "normal_error": 0, "scale_error": 0}
 exact, stated, taken = {}, {}, {}
 for name, folder in folders.items():
     raw, t = [vision.track(folder / f"{p}.avi").pixels for p in "abc"], shots[name][1]
-    rigs = [measured(name, trial) for trial in range(6 if full else 2)]
+    rigs = [measured(name, trial) for trial in range(4 if full else 2)]
     bare = [Rig([replace(camera, **unsaid) for camera in rig.cameras]) for rig in rigs]
     exact[name] = [observe_tracks(raw, Rig.load(folder / "rig.toml"), t)]
     stated[name] = [discover_from_tracks(raw, rig, t) for rig in rigs]
@@ -424,8 +424,7 @@ for known, good, bad in zip(rows[::3], rows[1::3], rows[2::3], strict=True):
     assert with_errors < 2 * at_best
     assert at_fault > 10 * with_errors
     assert good["law, l2"] < 1e-3
-    assert bad["wrong and ok"] == 0
-    assert good["wrong and ok"] <= good["draws"] / 2
+    assert bad["wrong and ok"] == good["wrong and ok"] == 0
 assert np.mean(right) >= 0.5
 caption = "The same tracks by how the rig is known: without its error, a measured number spoils the path."
 save_table("own_by_hand", rows, caption=caption)
@@ -433,9 +432,8 @@ save_table("own_by_hand", rows, caption=caption)
 # %% [markdown]
 # With the errors in the file, a rig measured by hand gives the same path as the exact one, and the same coefficients, but for the
 # unit of length, the origin and the axes. The axes are off by a degree or so, which by itself would look like small false
-# terms; as the file states the errors, `discover` allows for them. In some draws a tiny false term remains nevertheless, of a
-# ten-thousandth of the others, and the verdict does not always say so. (The error bars of the law hold in the unit and about
-# the origin that were found.)
+# terms; as the file states the errors, `discover` allows for them. Where a tiny false term remains nevertheless, the verdict
+# is "suspect". (The error bars of the law hold in the unit and about the origin that were found.)
 # The same numbers taken as exact bend the path by per cents, and the report doubts the rig before any law.
 #
 # ## What to check
@@ -587,9 +585,8 @@ assert max(lost) > 0
 #   different instants cannot be brought to agree.
 #   <!-- by: np.allclose(lags, (0, late, 0), atol=0.01); worst[tried == late - 1] > 3 * worst.min() -->
 # * A rig measured by hand, its errors stated, gives the path and the coefficients as the exact one does, but for origin, axes and
-#   unit of length; a false term that remains is tiny, but not always doubted. Without the errors the path is wrong, and the report
-#   says so.
-#   <!-- by: with_errors < 2 * at_best; at_fault > 10 * with_errors; good["law, l2"] < 1e-3; bad["wrong and ok"] == 0; np.mean(right) >= 0.5 -->
+#   unit of length; a law with a false term is doubted. Without the errors the path is wrong, and the report says so.
+#   <!-- by: with_errors < 2 * at_best; at_fault > 10 * with_errors; good["law, l2"] < 1e-3; bad["wrong and ok"] == good["wrong and ok"] == 0; np.mean(right) >= 0.5 -->
 # * A wrong lag, a wrong rig, or a bad file is told in words, before the law.
 #   <!-- by: done.returncode == 2; "(0, 7, 0) do" in wrong_lag; "must be a video file" in no_video -->
 # * Two targets that look the same and meet in the images are told apart by geometry, and their common law says

@@ -239,8 +239,9 @@ def plot_price(chances: Floats, false: Floats, lost: Floats, chosen: float) -> F
     axes.axvline(chosen, color="0.5", lw=1)
     at = {"xy": (chosen, 0.02), "xycoords": ("data", "axes fraction")}
     axes.annotate(" the solver's", **at, ha="left", va="bottom", color="0.4")
-    axes.set(xscale="log", ylim=(0, None), xlabel="chance of a false term", ylabel="terms per law")
-    axes.legend(loc="upper center", ncols=3)
+    most = 1.25 * float((false + lost).max())  # the legend has the room above the curves
+    axes.set(xscale="log", ylim=(0, most), xlabel="chance of a false term", ylabel="terms per law")
+    axes.legend(loc="upper center", ncols=3, framealpha=1)
     return figure
 
 
