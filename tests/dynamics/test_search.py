@@ -12,7 +12,9 @@ from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.posing import pose
 from vidsindy_lite.dynamics.problem import fit_curves
+from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.dynamics.state import State
+from vidsindy_lite.study import score
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=2)
 
@@ -97,3 +99,25 @@ def test_of_long_data_a_search_has_enough_turns_and_samples():
         ((_, (part, _)),) = search._enough(long)
         wanted = max(search.ENOUGH_TURNS * 2 * np.pi, search.ENOUGH_SAMPLES / count * time)
         assert part[-1] == pytest.approx(wanted, abs=2 * time / count)
+
+
+@pytest.mark.slow
+def test_four_species_are_found_among_terms_of_high_degree():
+    # Chaotic competition, of Vano et al. (2006); where the law hardly binds, cubic terms fit as well.
+    growth = {"x": 1, "y": 0.72, "z": 1.53, "w": 1.27}
+    harm = {
+        "x": {"x^2": 1, "xy": 1.09, "xz": 1.52},
+        "y": {"y^2": 1, "yz": 0.44, "yw": 1.36},
+        "z": {"xz": 2.33, "z^2": 1, "zw": 0.47},
+        "w": {"xw": 1.21, "yw": 0.51, "zw": 0.35, "w^2": 1},
+    }
+    equations = {
+        name: {name: rate} | {term: -rate * value for term, value in harm[name].items()}
+        for name, rate in growth.items()
+    }
+    truth = PolynomialSystem.from_terms(equations, degree=3)
+    t = 0.5 * np.arange(1500)
+    x = truth.simulate(t, np.array([0.3013, 0.4586, 0.1307, 0.3557]))
+    rng = np.random.default_rng([9, 3])
+    found = discover(t, x + 0.05 * x.std(axis=0) * rng.standard_normal(x.shape), order=1)
+    assert score(found.system, truth).exact
