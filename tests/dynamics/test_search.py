@@ -103,7 +103,7 @@ def test_of_long_data_a_search_has_enough_turns_and_samples():
 
 @pytest.mark.slow
 def test_four_species_are_found_among_terms_of_high_degree():
-    # Chaotic competition, of Vano et al. (2006); where the law hardly binds, cubic terms fit as well.
+    # Chaotic competition (Vano et al. 2006); where the law hardly binds, cubic terms fit as well.
     growth = {"x": 1, "y": 0.72, "z": 1.53, "w": 1.27}
     harm = {
         "x": {"x^2": 1, "xy": 1.09, "xz": 1.52},
