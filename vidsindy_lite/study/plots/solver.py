@@ -241,7 +241,7 @@ def plot_price(chances: Floats, false: Floats, lost: Floats, chosen: float) -> F
     axes.annotate(" the solver's", **at, ha="left", va="bottom", color="0.4")
     most = 1.25 * float((false + lost).max())  # the legend has the room above the curves
     axes.set(xscale="log", ylim=(0, most), xlabel="chance of a false term", ylabel="terms per law")
-    axes.legend(loc="upper center", ncols=3, framealpha=1)
+    axes.legend(loc="upper left", ncols=3)
     return figure
 
 
