@@ -168,8 +168,11 @@ def test_a_fraction_evaluates_differentiates_and_prints(tmp_path):
         np.testing.assert_allclose(law.gradient(x)[:, :, i], slope, atol=1e-7)
     assert law.text().splitlines()[1] == "dy/dt = (-0.4 y + 0.4 xy) / (1 + 0.5 x)"
     assert r"\dot{y} &= \frac{-0.4\,y + 0.4\,x y}{1 + 0.5\,x}" in law.latex()
-    with pytest.raises(ValueError, match="offset: must be zero for a law that is no polynomial"):
-        law.shift([1.0, 0.0])
+    moved = law.shift([1.0, -0.5])
+    np.testing.assert_allclose(moved(x + [1.0, -0.5]), law(x), rtol=1e-12)
+    np.testing.assert_allclose(moved.shift([-1.0, 0.5])(x), law(x), rtol=1e-12)
+    with pytest.raises(ValueError, match="offset: no denominator may vanish there, got .2.0, 0.0"):
+        law.shift([2.0, 0.0])
     t = np.linspace(0, 30, 400)
     found = vl.discover(t, law.simulate(t, [1.0, 0.5]), library=FRACTION)
     found.save(tmp_path / "law")
@@ -242,7 +245,9 @@ def test_a_law_evaluates_differentiates_and_prints():
         slope = (law(x + step * axis) - law(x - step * axis)) / (2 * step)
         np.testing.assert_allclose(law.gradient(x)[:, :, i], slope, atol=1e-6)
     assert law.shift([0.0, 0.0])(x) == pytest.approx(law(x))
-    with pytest.raises(ValueError, match="offset: must be zero for a law that is no polynomial"):
+    with pytest.raises(
+        ValueError, match="offset: must be zero for a law with functions of the state"
+    ):
         law.shift([1.0, 0.0])
     product = PolynomialSystem.from_terms({"v": {"u cos(u)": 1}, "u": {"1": 1}}, library=library)
     np.testing.assert_allclose(product(x)[:, 0], u * np.cos(u))
@@ -296,7 +301,19 @@ def test_a_law_is_saved_and_its_own_functions_are_given_again(tmp_path):
             Library.terms({"a": lambda x: [x, x, x]}),
             r"'a' must return .* or 2 of these, got shape .3, 2.",
         ),
-        (Library.terms({"a": lambda x: np.log(-2 - x)}), "library: a must be finite on the data"),
+        (Library.terms({"a": lambda x: np.ones(2)}), r"shape .2,. for n = 2 and .2,. for n = 3"),
+        (
+            Library.terms({"a": lambda x: np.log(-2 - x)}),
+            r"library: a must be finite on the data, got no such value at \(1, ",
+        ),
+        (
+            Library.polynomial(1) + Library.inputs([0, 2, 9], {"u": [1, 0, 2]}),
+            "library: u must be finite on the data, got no such value at t = 9.03",
+        ),
+        (
+            Library.terms({"a": lambda x, y: [x, y], "b": lambda x, y: [2 * x, 2 * y]}),
+            "library: its terms must not depend on each other, got a_x, b_x",
+        ),
         (
             Library.polynomial(1)
             + Library.terms({"s": lambda x: np.sin(x) ** 2, "c": lambda x: np.cos(x) ** 2}),
@@ -355,3 +372,42 @@ def test_a_product_of_coordinates_is_named_alike_in_every_library():
     law = PolynomialSystem.from_terms({"x": {"x": 1.0}, "y": {"xy": 3.0}}, library=own)
     assert len(set(law.terms)) == len(law.terms)
     assert "x y" in law.terms
+
+
+def test_a_velocity_in_the_library_asks_for_order_2():
+    drag = Library.terms({"slow": lambda vx: vx})
+    t = np.linspace(0, 10, 300)
+    x = (np.exp(-0.1 * t) * np.cos(2 * t))[:, None]
+    found = vl.discover(t, x, library=Library.terms({"pull": lambda x: x}) + drag)
+    assert found.system.order == 2
+    assert found.system.text().startswith("x'' = ")
+    known = vl.discover(t, x, library=Library.polynomial(1).where({"vx": {"vx": -0.2}}))
+    assert known.system.coefficients[known.terms.index("vx"), 1] == -0.2
+    with pytest.raises(ValueError, match="got vx: velocities are variables of a law of order=2"):
+        vl.discover(t, x, library=drag, order=1)
+
+
+def test_vectors_of_which_one_is_the_other_turned():
+    """A charge in a magnetic field: neither of its equations tells the two apart by itself."""
+    library = Library.terms(
+        {
+            "pull": lambda x, y: [x, y],
+            "turn": lambda vx, vy: [-vy, vx],
+            "slow": lambda vx, vy: [vx, vy],
+            "down": lambda y: [0 * y, 1 + 0 * y],
+        }
+    )
+    wanted = {"pull": -4.0, "turn": 1.5, "slow": -0.1, "down": -3.0}
+    rows = {f"v{i}": {f"{name}_{i}": value for name, value in wanted.items()} for i in "xy"}
+    law = PolynomialSystem.from_terms({"x": {"vx": 1}, "y": {"vy": 1}} | rows, library=library)
+    t = np.linspace(0, 20, 1000)
+    x = law.simulate(t, [1, 0, 0, 0.8])[:, :2]
+    x += 0.01 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
+    found = vl.discover(t, x, library=library)
+    assert found.status == "ok"
+    for name, value in wanted.items():
+        column, error = (
+            part[found.terms.index(f"{name}_y"), 3]
+            for part in (found.coefficients, found.standard_errors)
+        )
+        assert abs(column - value) < 4 * error < 0.02

@@ -209,18 +209,21 @@ def test_a_law_that_is_not_the_widest_plateau_is_contested(duffing):
 
 
 @pytest.mark.parametrize(
-    ("decades", "lasting", "contested"), [(0.9, 2, False), (1.1, 2, True), (1.1, 1, False)]
+    ("decades", "lasting", "own_errors", "contested"),
+    [(0.9, 2, 1, False), (1.1, 2, 1, True), (1.1, 1, 1, False), (0.9, 2, 2, True)],
 )
 def test_a_wider_plateau_of_larger_errors_contests_a_law_if_errors_last(
-    duffing, decades, lasting, contested
+    duffing, decades, lasting, own_errors, contested
 ):
+    """What a plateau covers below the errors that there are does not count for it."""
     problem, fit, model, path, law, margins = fitted(duffing)
     simpler = np.arange(len(law.terms)) == law.terms.index("x")
     (own,) = path.of(fit.state.active)[1:]
     own = replace(own, low=path.lowest, high=10 * path.lowest)
     rival = Plateau(1, own.high, own.high * 10**decades, simpler)
     plateaus = path.plateaus[0], (own, rival)
-    path = replace(path, plateaus=plateaus, level=lasting * path.lowest)
+    level, errors = lasting * path.lowest, own_errors * path.lowest
+    path = replace(path, plateaus=plateaus, level=level, own=errors)
     told = diagnose(problem, fit, model, path, law, margins)
     assert any("dy/dt is settled by how large an error" in one for one in told) is contested
 

@@ -138,8 +138,9 @@ def test_the_energy_along_the_path():
         (law_of(x={"x": 1.0}), [0.1, 0], "nothing holds it"),
         (law_of(x={"x": -1.0}, y={}), [1, 0, 0, 1], "nothing holds it"),
         (law_of(x={"x": -1.0, "vx": -3.0}), [1, 0], "no period: it creeps back"),
+        (law_of(x={"x": -1.0, "vx": 0.1}), [1, 0], "no period: what is near rest leaves it"),
         (law_of(x={"vx": -1.0}), [0, 1], "no constant force: no g"),
-        (law_of(x={"vy": 1.0}, y={"vx": -1.0, "1": 1.0}), [0, 0, 0, 1], "no drag"),
+        (law_of(x={"vy": 1.0}, y={"vx": -1.0, "1": 1.0}), [0, 0, 0, 1], "turns the motion"),
     ],
 )
 def test_what_cannot_be_said_is_said_in_a_line(law, start, words):
@@ -179,3 +180,17 @@ def test_coordinates_are_alone_if_only_rounding_ties_them(unit):
     assert _diagonal(unit * alone)
     assert not _diagonal(unit * (alone + [[0, 1e-3], [0, 0]]))
     assert not _diagonal(unit * np.array([[0, 1.0], [1.0, 0]]))
+
+
+def test_what_turns_a_velocity_does_not_slow_it():
+    turned = law_of(x={"vx": -0.3, "vy": 1.0}, y={"vx": -1.0, "vy": -0.3, "1": 1.0})
+    said = told(turned, [0, 0, 0, 1])
+    assert said["drag"].value == pytest.approx(0.3)
+    assert "turns the motion" in said.notes[0]
+    uneven = law_of(x={"vx": -0.3, "vy": 1.0}, y={"vy": -0.3, "1": 1.0})
+    assert "drag" not in {quantity.name for quantity in told(uneven, [0, 0, 0, 1]).quantities}
+
+
+def test_periods_are_said_to_be_of_small_swings():
+    said = told(law_of(x={"x": -4.0, "x^3": -1.0}), [2, 0])
+    assert said.headline == "of small swings: period = 3.142"

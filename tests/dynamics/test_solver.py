@@ -19,7 +19,15 @@ from vidsindy_lite.dynamics.problem import fit_curves, term_penalties
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.dynamics.splines import Segment
 from vidsindy_lite.dynamics.state import State
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, OdeContest, add_noise, drop_fibers, score
+from vidsindy_lite.study import (
+    REFERENCE_OFFSET,
+    SYSTEMS,
+    OdeContest,
+    add_noise,
+    corruption,
+    drop_fibers,
+    score,
+)
 
 
 def measured(name, noise, n=600, seed=11):
@@ -399,3 +407,15 @@ def test_a_term_that_is_worth_its_price_alone_is_kept_and_told():
     found = discover(t, x, order=1)
     assert score(found, truth).exact
     assert any("without x in dy/dt" in text for text in found.warnings)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over(seed):
+    """A fall against drag, integrated coarsely: a constant slope promises what it cannot keep."""
+    fall = PolynomialSystem.from_terms({"x": {"1": 9.81, "x^2": -0.0021175}})
+    t = np.linspace(0, 10, 150)
+    seen = np.sort(np.random.default_rng(seed).permutation(150)[:75])
+    x = corruption.coarse_path(fall, t, [73.0])
+    found = discover(t[seen], x[seen], order=1)
+    assert found.terms[np.flatnonzero(found.system.support[:, 0])[-1]] == "x^2"
+    assert found.noise < 1e-3 * x.std()

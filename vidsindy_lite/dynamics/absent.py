@@ -68,7 +68,9 @@ def unseen(
     x = np.concatenate([curve(np.unique(curve.t)) for curve in curves]) - offset
     size = np.sqrt((law.library(x) ** 2).mean(axis=0))[:, None]
     own = np.where(law.support, size * np.abs(law.coefficients), np.inf).min(axis=0)
-    reach = size * np.nan_to_num(np.abs(absent).max(axis=2), nan=0.0, posinf=np.inf) / own
+    most = np.nan_to_num(np.abs(absent).max(axis=2), nan=0.0, posinf=np.inf)
+    with np.errstate(invalid="ignore"):  # of an equation without terms
+        reach = size * most / own
     for entry in np.argsort(-reach, axis=None, kind="stable")[: int((reach > 1).sum())].tolist():
         row, j = divmod(entry, law.d)
         low, high = absent[row, j]

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Ints
 from ..checks import check_instance, check_integer, check_number
 from .inputs import Input
-from .library import CLOCK, Function, monomial_exponents, name_latex
+from .library import CLOCK, Function, monomial_exponents, name_latex, velocity_names
 
 FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
 """What can be written as text."""
@@ -250,6 +250,12 @@ class Library:
         arguments = {argument for _, rule in self.functions for argument in _arguments(rule)}
         return CLOCK in arguments - set(names)
 
+    def moving(self, names: tuple[str, ...]) -> bool:
+        """Whether it names velocities of the named coordinates, which a law of order 2 has."""
+        named = {argument for _, rule in self.functions for argument in _arguments(rule)}
+        named |= {equation for equation, _ in self.given}
+        return not named.isdisjoint(set(velocity_names(names)) - set(names))
+
     def resolve(self, names: tuple[str, ...], measured: int) -> tuple[Ints, tuple[Function, ...]]:
         """The terms of a law in named variables, of which the first ``measured`` were measured.
 
@@ -372,16 +378,16 @@ def own(
             return np.asarray(rule(*(values[argument] for argument in arguments)), dtype=float)
 
     try:
-        shape = evaluate(np.ones((2, len(names)))).shape
+        shape, longer = (evaluate(np.ones((n, len(names)))).shape for n in (2, 3))
     except Exception as error:  # whatever a function of one's own may raise
         raise ValueError(
             f"library: {name!r} must take and return arrays of shape (n,), as numpy's functions "
             f"do, got {type(error).__name__}: {error}"
         ) from error
-    if shape not in ((2,), (measured, 2)):
+    if shape not in ((2,), (measured, 2)) or longer != (*shape[:-1], 3):
         raise ValueError(
             f"library: {name!r} must return an array of the shape of its arguments, (n,), or "
-            f"{measured} of these, got shape {shape} for n = 2"
+            f"{measured} of these, got shape {shape} for n = 2 and {longer} for n = 3"
         )
 
     def component(direction: int | None) -> Function:
@@ -409,9 +415,12 @@ def _checked_arguments(
     arguments = _arguments(rule)
     unknown = [argument for argument in arguments if argument not in names]
     if not arguments or unknown:
+        moving = not set(velocity_names(names)).isdisjoint(unknown)
         raise ValueError(
             f"library: the arguments of {name!r} must be named like variables "
             f"({', '.join(names)}), as in lambda x: np.sin(x), got {', '.join(unknown) or 'none'}"
+            + ": velocities are variables of a law of order=2"
+            * moving
         )
     return arguments
 

@@ -14,7 +14,7 @@ from .diagnostics import diagnose
 from .discovery import Discovery
 from .errors import residual_noise
 from .history import History
-from .library import shift_generators, shift_matrix
+from .library import divides, shift_generators, shift_matrix
 from .persistence import Path
 from .problem import Problem
 from .selection import inverse
@@ -23,6 +23,8 @@ from .units import Units
 
 KEPT = 1e-12
 """Price of a term that stays whatever its error."""
+HOLDS = 3
+"""Steps to the likeliest law of which a term is zero."""
 
 
 def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discovery:
@@ -46,13 +48,13 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     covariance = _covariance(units, fit, model)
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
-    moved, moved_covariance = _shifted(exponents, coefficients, offset, covariance)
     # What the frame of the data needs is decided at the errors at which the terms were chosen.
     tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
     # To what the shift adds nothing, that the fit has weighed.
-    weighed = (moved == coefficients).T.ravel()
+    weighed = _shifted(exponents, coefficients, offset) == coefficients.T.ravel()
     prices = np.where(weighed, KEPT, problem.prices * np.repeat(tolerated, l) ** 2)
-    moved, moved_covariance, margins = _pruned(moved, moved_covariance, prices)
+    native = exponents, coefficients, offset, covariance
+    moved, moved_covariance, margins = _pruned(*native, prices)
     margins /= np.repeat(tolerated**2, l)
     dearer = problem.cautious.prices - problem.prices
     margins += np.where(moved.T.ravel() != 0, -dearer, dearer)
@@ -86,12 +88,12 @@ def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisati
     state, form = fit.state, problem.form
     covariance, size = _covariance(problem.units, fit, model), state.coefficients.size
     coefficients = state.coefficients * problem.units.factors(problem.exponents)
-    moved = _shifted(problem.exponents, coefficients, found.offset, covariance)
     kept = (found.system.support & ~(form.known != 0)).T.ravel()
-    moved_coefficients, moved_covariance, _ = _pruned(*moved, np.where(kept, KEPT, np.inf))
+    native = problem.exponents, coefficients, found.offset, covariance
+    moved, moved_covariance, _ = _pruned(*native, np.where(kept, KEPT, np.inf))
     return replace(
         found,
-        system=form.law(moved_coefficients + form.known),
+        system=form.law(moved + form.known),
         covariance=moved_covariance,
         native_covariance=covariance[:size, :size],
         offset_errors=np.sqrt(np.diag(covariance)[size:]),
@@ -120,56 +122,88 @@ def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:
     return covariance * (unit[:, None] * unit)
 
 
-def _shifted(
-    exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats
-) -> tuple[Floats, Floats]:
-    """Law in the data's frame, with the covariance of coefficients and offset carried along."""
-    l, d = coefficients.shape
+def _shifted(exponents: Ints, coefficients: Floats, offset: Floats) -> Floats:
+    """The coefficients of a law in the data's frame, equation by equation, (l d,)."""
+    return (shift_matrix(exponents, offset) @ coefficients).T.ravel()
+
+
+def _entry(exponents: Ints, coefficients: Floats, offset: Floats, k: int) -> tuple[float, Floats]:
+    """One of them, and its derivatives in coefficients and offset, (l d + d,)."""
+    (l, d), (j, row) = coefficients.shape, divmod(k, len(exponents))
     matrix = shift_matrix(exponents, offset)
-    moved = matrix @ coefficients
-    jacobian = np.zeros((l * d, l * d + d))
-    jacobian[:, : l * d] = np.kron(np.eye(d), matrix)
-    for i, generator in enumerate(shift_generators(exponents)[:d]):
-        jacobian[:, l * d + i] = -(generator @ moved).T.ravel()
-    return moved, jacobian @ covariance @ jacobian.T
+    slope, moved = np.zeros(l * d + d), matrix @ coefficients[:, j]
+    slope[j * l : (j + 1) * l] = matrix[row]
+    slope[l * d :] = -shift_generators(exponents)[:d, row] @ moved
+    return float(moved[row]), slope
+
+
+def _carried(exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats) -> Floats:
+    """Their covariance, (l d, l d), from that of coefficients and offset."""
+    (l, d), size = coefficients.shape, coefficients.size
+    matrix = shift_matrix(exponents, offset)
+    along = -shift_generators(exponents)[:d] @ (matrix @ coefficients)
+    rates = along.swapaxes(1, 2).reshape(d, size).T
+
+    def moved(rows: Floats) -> Floats:
+        own = matrix @ rows[:size].reshape(d, l, -1)
+        return np.asarray(own.reshape(size, -1) + rates @ rows[size:])
+
+    return moved(moved(covariance).T)
+
+
+def _powers(exponents: Ints, coefficients: Floats, offset: Floats) -> Ints:
+    """The lowest power of the offset in each term of the law in the data's frame, (l d,).
+
+    1 for terms of the law itself.
+    """
+    lowered = exponents.sum(axis=1) - exponents.sum(axis=1)[:, None]
+    left = np.where(divides(exponents, offset != 0), lowered, len(exponents))
+    powers = [left[:, column != 0].min(axis=1, initial=len(exponents)) for column in coefficients.T]
+    return np.maximum(np.concatenate(powers), 1)
 
 
 def _pruned(
-    coefficients: Floats, covariance: Floats, penalties: Floats
+    exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats, penalties: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Set what cannot be told from zero to zero, one by one, and correct the others for it.
+    """A law in the data's frame without what cannot be told from zero, and its covariance.
 
-    Shifting a law by an estimated offset leaves remainders where the exact shift cancels. The
-    least significant is taken out by conditioning the Gaussian estimate on its being zero. Comes
-    back with the margin of each decision, in chi-square units; infinite where none was taken.
+    Shifting a law by an estimated offset leaves remainders where the exact shift cancels. One by
+    one, the least significant is taken out by conditioning the Gaussian estimate of coefficients
+    and offset on its being zero. A power of an offset is as far from zero as the offset: in its own
+    standard errors so many times less. Comes back with the margin of each decision, in chi-square
+    units; infinite where none was taken.
     """
-    shape = coefficients.shape[::-1]
-    flat = coefficients.T.ravel().copy()
-    covariance = covariance.copy()
-    original = np.diag(covariance).copy()
-    margins = np.full(len(flat), np.inf)
+    shape, size = coefficients.shape[::-1], coefficients.size
+    native = np.concatenate([coefficients.T.ravel(), offset])
+    flat = _shifted(exponents, coefficients, offset)
+    powers = _powers(exponents, coefficients, offset)
+    moved = _carried(exponents, coefficients, offset, covariance)
+    original, margins, dead = np.diag(moved).copy(), np.full(size, np.inf), flat == 0
     while True:
-        variance = np.diag(covariance)
-        live = np.flatnonzero(flat)
+        variance = np.diag(moved)
         # After conditioning, a dependent entry has neither value nor variance left.
-        known = variance[live] <= 1e-12 * original[live]
-        score = np.where(known, np.inf, flat[live] ** 2 / np.where(known, 1.0, variance[live]))
-        gone = live[known & (flat[live] ** 2 < 1e-6 * original[live])]
-        if len(gone):
-            flat[gone] = 0.0
-            continue
+        known = variance <= 1e-12 * original
+        dead |= known & (flat**2 < 1e-6 * original)
+        live = np.flatnonzero(~dead)
+        sigma = np.where(known, 1.0, variance)[live]
+        score = np.where(known[live], np.inf, (powers * flat)[live] ** 2 / sigma)
         weakness = score / penalties[live]
         if not len(live) or weakness.min() >= 1:
             margins[live] = score - penalties[live]
             break
-        weakest = weakness.argmin()
+        # Of the powers of one offset the lowest: the others vanish with it.
+        weakest = np.lexsort([weakness, np.where(weakness < 1, powers[live], size)])[0]
         k = live[weakest]
-        margins[k] = penalties[k] - score[weakest]
-        gain = covariance[:, k] / covariance[k, k]
-        flat -= gain * flat[k]
-        covariance -= np.outer(gain, covariance[k])
-        flat[k] = 0.0
-        covariance[k] = covariance[:, k] = 0.0
-    dead = flat == 0
-    covariance[dead] = covariance[:, dead] = 0.0
-    return flat.reshape(shape).T, covariance, margins
+        margins[k], dead[k] = penalties[k] - score[weakest], True
+        point = native
+        for _ in range(HOLDS):  # the shift is linear around where it is held alone
+            value, slope = _entry(exponents, point[:size].reshape(shape).T, point[size:], int(k))
+            pull = covariance @ slope
+            point = native - pull * ((value + slope @ (native - point)) / (slope @ pull))
+        covariance = covariance - np.outer(pull, pull / (slope @ pull))
+        native, law = point, (point[:size].reshape(shape).T, point[size:])
+        flat = _shifted(exponents, *law)
+        moved = _carried(exponents, *law, covariance)
+    flat = np.where(dead, 0.0, flat)
+    moved[dead] = moved[:, dead] = 0.0
+    return flat.reshape(shape).T, moved, margins

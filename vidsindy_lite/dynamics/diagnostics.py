@@ -120,7 +120,7 @@ def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
     found = []
     for t, x in trajectories:
         far: set[int] = set()
-        for column in x.T:
+        for column in x.T[np.isfinite(x).any(axis=0)]:
             seen = np.flatnonzero(np.isfinite(column))
             values = column[seen]
             away = np.abs(values - np.median(values))
@@ -276,16 +276,18 @@ def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Itera
     for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
         near = [plateau for plateau in plateaus if plateau.low <= path.level]
         same = [plateau for plateau in near if (plateau.terms == own.terms).all()]
-        own = max(same, key=lambda plateau: plateau.decades, default=own)
+        own = max(same, key=path.width, default=own)
         # Of errors larger than there are, a plateau tells less.
-        weights = [(1.0 if plateau in near else RIVAL) * plateau.decades for plateau in plateaus]
+        weights = [
+            (1.0 if plateau in near else RIVAL) * path.width(plateau) for plateau in plateaus
+        ]
         others = [
             (weight, plateau)
             for weight, plateau in zip(weights, plateaus, strict=True)
             if (plateau.terms != own.terms).any() and (lasting and same or plateau in near)
         ]
         standing, rival = max(others, key=lambda other: other[0], default=(0.0, own))
-        if standing > RIVAL * own.decades:
+        if standing > RIVAL * path.width(own):
             changed = np.flatnonzero(rival.terms != own.terms).tolist()
             change = ", ".join(
                 f"{'with' if rival.terms[k] else 'without'} {spoken(law, k, own.equation)}"

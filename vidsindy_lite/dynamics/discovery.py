@@ -281,14 +281,14 @@ class Discovery:
     def statement(self) -> str:
         """The law as text, and what was found out beside it: all but the warnings."""
         lines = [self.equations()]
+        if self.swing is not None:
+            lines = [str(self.swing), "a law of its positions, one of many that fit alike:", *lines]
         if self.model_error.any():
             sizes = zip(self.model_error, self.system.names, strict=True)
             kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
             lines.append(f"as if kicked at random, by {kicks} over a unit of time")
         if said := self.physics().headline:
             lines.append(said)
-        if self.swing is not None:
-            lines.append(str(self.swing))
         if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
             frame = "in its own frame, " if self.offset.any() else ""
             more = f" and {len(terms) - SHOWN} more" if len(terms) > SHOWN else ""

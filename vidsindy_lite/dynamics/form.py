@@ -13,8 +13,8 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .candidates import OTHERS, Library
-from .library import CLOCK, Function, closure
-from .polynomials import PolynomialSystem, parse_term, velocity_names
+from .library import CLOCK, Function, closure, velocity_names
+from .polynomials import PolynomialSystem, parse_term
 
 
 @dataclass(frozen=True, eq=False)

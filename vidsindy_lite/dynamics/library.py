@@ -24,6 +24,11 @@ def variable_names(d: int) -> tuple[str, ...]:
     return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
 
 
+def velocity_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of the velocities of variables: vx, vy, ..."""
+    return tuple(f"v{name}" for name in names)
+
+
 CLOCK = "t"
 """The time as a variable of a law: after all others, with dt/dt = 1."""
 

@@ -93,6 +93,10 @@ class Path:
         """The smallest tolerated error."""
         return self.plateaus[0][0].low
 
+    def width(self, plateau: Plateau) -> float:
+        """How far a plateau reaches beyond the errors there are, in decades."""
+        return max(float(np.log10(plateau.high / max(plateau.low, self.own))), 0.0)
+
     def ranked(self) -> list[list[Plateau]]:
         """The plateaus of each equation that begin at or below the level, the widest first."""
         return [

@@ -41,8 +41,8 @@ ROUNDING = 1e-12
 NO_REST = "nothing holds it at a place near the motion: no spring constants and no periods"
 LEAST = 1e-300
 """Keeps a quotient finite where no force is constant."""
-HEADLINES = ("g", "direction", "drag", "quadratic drag", "period")
-"""What is not read off the equations."""
+HEADLINES = ("g", "direction", "drag", "quadratic drag")
+"""What is not read off the equations, beside periods."""
 
 Complexes = NDArray[np.complex128]
 Rule = Callable[[PolynomialSystem], dict[str, Floats]]
@@ -91,9 +91,9 @@ class Physics:
     quantities : tuple of Quantity
         Of a body whose forces are the same everywhere: ``g``, its ``direction``, ``drag``, and
         ``quadratic drag``. Of one with a place of ``rest``: ``spring constant``, ``damping``,
-        ``natural frequency`` (in radians) and ``period`` of small swings about it, of each
-        coordinate, as in ``period x``, or where coordinates pull at each other of each mode, as in
-        ``period 1``, the slowest first.
+        ``natural frequency`` (in radians) and ``period`` of small swings about it, unless they
+        grow, of each coordinate, as in ``period x``, or where coordinates pull at each other of
+        each mode, as in ``period 1``, the slowest first.
     energy : tuple of ndarray, shape (n, 2)
         Along each fitted curve, times, and the energy per unit mass over that at rest, or over that
         of rest where the curve begins. Empty if the forces have no potential.
@@ -115,7 +115,10 @@ class Physics:
     @property
     def headline(self) -> str:
         """In one line what is not read off the equations: gravity and drag, or periods."""
-        return "; ".join(str(q) for q in self.quantities if q.name.startswith(HEADLINES))
+        said = [str(q) for q in self.quantities if q.name.startswith(HEADLINES)]
+        if periods := [str(q) for q in self.quantities if q.name.startswith("period")]:
+            said.append(f"of small swings: {'; '.join(periods)}")
+        return "; ".join(said)
 
     def __str__(self) -> str:
         return "\n".join([*map(str, self.quantities), *self.notes])
@@ -271,10 +274,10 @@ class _Body:
             yield Quantity.of("g", *said["g"])
             if down is None:
                 yield Quantity.of("direction", *said["direction"])
-        if _diagonal(slowed):
+        if not _diagonal(slowed):
+            yield "a velocity pulls across its own direction, too: something turns the motion"
+        if _diagonal(slowed + slowed.T):  # what turns a velocity does not slow it
             yield from self.drags("drag", *said["drag"])
-        else:
-            yield "a velocity turns another: no drag"
         yield from self.drags("quadratic drag", *said["quadratic drag"])
 
     def drags(self, name: str, values: Floats, covariance: Floats) -> Iterator[Quantity]:
@@ -320,7 +323,9 @@ class _Body:
         _, pull, slowed = self.at_rest(self.law, rest)
         alone = _diagonal(pull) and _diagonal(slowed)
         labels = self.axes if alone else [f" {k + 1}" for k in range(self.m)]
-        swings = _swings(-pull, -slowed, alone).imag > 0
+        rates = _swings(-pull, -slowed, alone)
+        leaves = rates.real > FAINT * np.abs(rates)
+        swings = (rates.imag > 0) & ~leaves
 
         def rule(law: PolynomialSystem) -> dict[str, Floats]:
             place = self.settled(law, rest)
@@ -339,7 +344,8 @@ class _Body:
 
         yield from (Quantity.of(name, *values) for name, values in self.carried(rule).items())
         for j in np.flatnonzero(~swings).tolist():
-            yield f"no period{labels[j]}: it creeps back to rest"
+            why = "what is near rest leaves it" if leaves[j] else "it creeps back to rest"
+            yield f"no period{labels[j]}: {why}"
 
     def energies(
         self, times: Sequence[Floats], paths: Sequence[Floats], rest: Floats | None

@@ -30,6 +30,7 @@ from .library import (
     monomials,
     name_latex,
     shift_matrix,
+    velocity_names,
 )
 
 SMALLEST, LARGEST = -5, 6
@@ -183,7 +184,7 @@ class PolynomialSystem:
 
     @property
     def is_polynomial(self) -> bool:
-        """Whether terms are products of the variables alone: only then can the origin be moved."""
+        """Whether terms are products of the variables alone."""
         return self.exponents.shape[1] == self.d
 
     @cached_property
@@ -269,13 +270,14 @@ class PolynomialSystem:
         Raises
         ------
         ValueError
-            If the law is no polynomial, and the shift is not zero.
+            If the shift is not zero, and the law holds functions of the state, or the denominator
+            of a fraction vanishes at the new origin.
         """
         shift = check_vector("offset", offset, self.d)
-        moves = all(function.of_time for function in self.functions) and not self.implicit.any()
+        moves = all(function.of_time for function in self.functions)
         if shift[self.states :].any() or (shift.any() and not moves):
             raise ValueError(
-                f"offset: must be zero for a law that is no polynomial, got {offset!r:.60}"
+                f"offset: must be zero for a law with functions of the state, got {offset!r:.60}"
             )
         exponents = closure(self.exponents)
         rows = {tuple(e): row for row, e in enumerate(exponents)}
@@ -285,7 +287,15 @@ class PolynomialSystem:
         shifted = matrix @ closed
         # What cancels in exact arithmetic must not survive as a term of 1e-16.
         shifted[np.abs(shifted) <= 1e-13 * (np.abs(matrix) @ np.abs(closed))] = 0.0
-        return replace(self, exponents=exponents, coefficients=shifted)
+        # A slope by itself belongs to the constant of a denominator, which is 1.
+        slopes = (exponents.sum(axis=1) == 1) & exponents[:, self.d + len(self.functions) :].any(
+            axis=1
+        )
+        below = 1 - shifted[slopes].sum(axis=0)
+        if (np.abs(below) <= 1e-13).any():
+            raise ValueError(f"offset: no denominator may vanish there, got {offset!r:.60}")
+        shifted[slopes] = 0.0
+        return replace(self, exponents=exponents, coefficients=shifted / below)
 
     def simulate(self, t: Floats, x0: Floats) -> Floats:
         """Integrate from ``x0`` at ``t[0]`` with an adaptive 8th-order Runge-Kutta method.
@@ -398,11 +408,6 @@ class PolynomialSystem:
         if x.ndim != 2 or x.shape[1] != self.d:
             raise ValueError(f"x: must have shape (n, {self.d}), got {x.shape}")
         return x
-
-
-def velocity_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of the velocities of variables: vx, vy, ..."""
-    return tuple(f"v{name}" for name in names)
 
 
 def parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:

@@ -1,8 +1,8 @@
-"""Poses the problem of a discovery: standard units, gaps, the noise, and states that nobody saw."""
+"""Poses the problem of a discovery: standard units, gaps, the noise, and the library's units."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +10,8 @@ from scipy.interpolate import BSpline
 
 from ..arrays import Floats
 from .collocation import CLEANEST
-from .errors import spread_to_unseen
 from .form import Form
+from .hidden import with_hidden, with_time, with_velocities
 from .library import extended
 from .problem import Problem, fit_curves, term_penalties
 from .smoothing import PENALTIES, smooth
@@ -45,110 +45,64 @@ def pose(
     Raises
     ------
     ValueError
-        If a coordinate does not move, or there are fewer samples than unknowns; if a function of
-        the library is not finite on the data, or its terms depend on each other.
+        If a coordinate does not move, or there are fewer samples than unknowns; if one was never
+        seen, and no equation that is known tells it; if a function of the library is not finite on
+        the data, or its terms depend on each other.
     """
     x = np.concatenate([values for _, values in measured])
+    seen = np.isfinite(x).any(axis=0)
+    x = x.compress(seen, axis=1)
     unknowns, samples = len(form.exponents) + 1, int(np.isfinite(x).sum(axis=0).min())
     if samples < unknowns:
         raise ValueError(
             f"x: must hold at least as many samples as unknowns per equation ({unknowns} for this "
-            f"library and d = {x.shape[1]}), got {samples} samples"
+            f"library and d = {len(seen)}), got {samples} samples"
         )
     centre, scale = np.nanmean(x, axis=0), np.nanstd(x, axis=0)
     if not (scale > 1e-12 * np.abs(centre)).all():
-        still = int(np.argmin(scale))
+        still = int(np.flatnonzero(seen)[np.argmin(scale)])
         raise ValueError(f"x: every coordinate must move, got a constant column {still}")
     if not form.movable.any():  # terms are what they are in the frame of the data
         centre = np.zeros_like(centre)
     step = typical_step(measured)
-    trajectories = [(t / step, (values - centre) / scale) for t, values in measured]
+    trajectories = [
+        (t / step, (values.compress(seen, axis=1) - centre) / scale) for t, values in measured
+    ]
     stretches, curves, noise = _smoothed(trajectories, rng, PENALTIES[:1] if through else PENALTIES)
     speed = _rms_speed(curves)
     curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]
     noise = np.maximum(noise, CLEANEST)
-    precision = [np.isfinite(values).astype(float) for _, values in measured]
+    precision = [np.isfinite(values).astype(float) for _, values in trajectories]
     if sigma is not None:
-        errors = [np.maximum(part / scale, CLEANEST) for part in sigma]
+        errors = [np.maximum(part.compress(seen, axis=1) / scale, CLEANEST) for part in sigma]
         noise = np.nanmedian(np.concatenate(errors), axis=0)
         precision = [np.nan_to_num((noise / part) ** 2) for part in errors]
     problem = Problem(
         measured=measured,
         trajectories=[(t * speed, values) for t, values in trajectories],
-        systematic=[modes / scale[:, None] for modes in systematic],
+        systematic=[modes.compress(seen, axis=1) / scale[:, None] for modes in systematic],
         precision=precision,
         stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
         curves=curves,
         units=Units(centre, scale, step / speed),
         noise=noise,
         form=form,
-        penalties=term_penalties(form.exponents, x.shape[1]),
+        penalties=term_penalties(form.exponents, len(seen)),
         slack=np.ones(len(form.names)),
         process_noise=np.zeros(len(form.names)),
         measured_errors=sigma is not None,
     )
     if problem.shared:
         problem = problem.cautious
-    if form.states > x.shape[1]:
-        problem = _with_velocities(problem, curves)
+    if not seen.all():
+        problem = with_hidden(problem, curves, seen)
+    elif form.states > len(seen):
+        problem = with_velocities(problem, curves)
     if form.states < len(form.names):
-        problem = _with_time(problem)
+        problem = with_time(problem)
     if form.exponents.shape[1] > len(form.names):
         problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))
-
-
-def _with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
-    """The same with velocities as further states: a velocity of zero stays what it is."""
-    units = problem.units
-    slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in positions]
-    rms = np.sqrt((np.concatenate(slopes) ** 2).mean(axis=0))
-
-    def with_velocity(position: BSpline) -> Callable[[Floats], Floats]:
-        velocity = position.derivative()
-        return lambda t: np.hstack([position(t), velocity(t) / rms])
-
-    curves = [with_velocity(spline) for spline in positions]
-    return _with_unseen(problem, curves, rms * units.scale / units.time)
-
-
-def _with_time(problem: Problem) -> Problem:
-    """The same with the time as a further state, in time units."""
-
-    def with_time(curve: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-        return lambda t: np.column_stack([curve(t), t])
-
-    curves = [with_time(curve) for curve in problem.curves]
-    return _with_unseen(problem, curves, np.array([problem.units.time]))
-
-
-def _with_unseen(
-    problem: Problem, curves: Sequence[Callable[[Floats], Floats]], scale: Floats
-) -> Problem:
-    """The same with further states, (k,), of curves and scales, which nobody has measured.
-
-    Their standard units have mean 0.
-    """
-    units, (m,), (k,) = problem.units, problem.noise.shape, scale.shape
-
-    def unseen(values: Floats, filling: float) -> Floats:
-        shape = (len(values), k, *values.shape[2:])
-        return np.concatenate([values, np.full(shape, filling)], axis=1)
-
-    return replace(
-        problem,
-        trajectories=[(t, unseen(x, np.nan)) for t, x in problem.trajectories],
-        systematic=[unseen(modes, 0.0) for modes in problem.systematic],
-        precision=[unseen(precision, 0.0) for precision in problem.precision],
-        stretches=[(i, (t, unseen(x, np.nan))) for i, (t, x) in problem.stretches],
-        curves=curves,
-        units=Units(
-            centre=np.append(units.centre, np.zeros(k)),
-            scale=np.append(units.scale, scale),
-            time=units.time,
-        ),
-        noise=spread_to_unseen(problem.noise, np.arange(m + k) < m),
-    )
 
 
 def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
@@ -159,9 +113,10 @@ def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
     values = extended(x, functions)[:, problem.d :]
     for function, column in zip(functions, values.T, strict=True):
         if not np.isfinite(column).all():
-            where = ", ".join(f"{v:g}" for v in x[np.argmin(np.isfinite(column))])
+            *place, last = (f"{v:g}" for v in x[np.argmin(np.isfinite(column))])
+            where = f"t = {last}" if function.of_time else f"({', '.join([*place, last])})"
             raise ValueError(
-                f"library: {function.name} must be finite on the data, got none at ({where})"
+                f"library: {function.name} must be finite on the data, got no such value at {where}"
             )
     sizes = np.sqrt((values**2).mean(axis=0))
     for k, function in enumerate(problem.form.functions):
@@ -180,15 +135,29 @@ def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
 
 
 def _check_independent(form: Form, terms: Floats) -> None:
-    """Refuse candidates that depend on each other at any points, given as terms (n, l)."""
-    searched = form.candidates.any(axis=1) & ~form.implicit
-    columns = terms[np.isfinite(terms).all(axis=1)][:, searched]
-    columns /= np.maximum(np.linalg.norm(columns, axis=0), LEAST)
-    _, sizes, shares = np.linalg.svd(columns, full_matrices=False)
-    if len(columns) >= len(sizes) and sizes[-1] < DEPENDENT * sizes[0]:
-        names = np.array(form.law(form.known).terms)[searched]
-        tied = ", ".join(names[np.abs(shares[-1]) > INVOLVED])
-        raise ValueError(f"library: its terms must not depend on each other, got {tied}")
+    """Refuse candidates that depend on each other at any points, given as terms (n, l).
+
+    Those of an equation; where vectors tie some of several, those of all equations at once.
+    """
+    terms, l = terms[np.isfinite(terms).all(axis=1)], terms.shape[1]
+    explicit = form.candidates & ~form.implicit[:, None]
+    searched = np.flatnonzero(explicit.any(axis=0))
+    tied = (form.shared != np.arange(len(form.shared))).any()
+    _, unlike = np.unique(explicit[:, searched].T, axis=0, return_index=True)
+    for equations in [searched] if tied else searched[unlike, None]:
+        row, term = np.nonzero(explicit[:, equations].T)
+        unknowns, column = np.unique(form.shared[equations[row] * l + term], return_inverse=True)
+        columns = np.zeros((len(equations), len(terms), len(unknowns)))
+        columns[row, :, column] = terms[:, term].T
+        flat = columns.reshape(-1, len(unknowns))
+        flat /= np.maximum(np.linalg.norm(flat, axis=0), LEAST)
+        _, sizes, shares = np.linalg.svd(flat, full_matrices=False)
+        if len(terms) >= len(sizes) and sizes[-1] < DEPENDENT * sizes[0]:
+            names = np.array(form.law(form.known).terms)[unknowns % l]
+            raise ValueError(
+                "library: its terms must not depend on each other, got "
+                + ", ".join(dict.fromkeys(names[np.abs(shares[-1]) > INVOLVED]))
+            )
 
 
 def _smoothed(

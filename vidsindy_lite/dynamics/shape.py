@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from ..arrays import Bools, Floats, Ints
-from .library import monomials
-from .polynomials import PolynomialSystem, velocity_names
+from .library import monomials, velocity_names
+from .polynomials import PolynomialSystem
 from .rounds import Round, on_circle, on_sphere
 from .trajectories import Trajectory
 

@@ -70,6 +70,8 @@ MOST_WEIGHINGS = 2
 """Most laws of which the precision of the measurements is learned."""
 LONGEST_DESCENT = 3
 """Most laws at smaller errors."""
+MOST_PLATEAUS = 4
+"""Most choices of plateaus that are fitted until one leaves no more than it tolerates."""
 
 
 def discover(
@@ -110,7 +112,8 @@ def discover(
         1 for ``x' = f(x)``; 2 for ``x'' = f(x, x')``, where ``x`` are positions alone: velocities
         become states ``vx, ...`` of the law, after the positions. ``"auto"`` looks for the second
         where the first is doubtful and the motion is that of a body, and says in `Discovery.note`
-        which was taken and why. Where terms are given of the equations, it is 1.
+        which was taken and why. Where terms are given of the equations, it is 1; where the library
+        names velocities, 2.
     library : Library, optional
         The candidate terms, in place of ``degree``; `Library.where` says what is known of them, and
         `Library.inputs` brings measured inputs.
@@ -179,6 +182,8 @@ def _of_order(
     order: int | str,
 ) -> Discovery:
     """The law of an order, or of the one that is to be trusted."""
+    if order == "auto" and library.moving(names):
+        order = 2  # who names a velocity means a law of motion
     solved = partial(_solved, measured, seed, progress)
     found, problem, _ = solved(Form.of(names, library, 2 if order == 2 else 1, origin))
     if order == 1 or library.given or not found.warnings:
@@ -336,20 +341,30 @@ def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
         trial = _refitted(problem, path, lowest, history)
         if trial is None or trial.status is not Status.CONVERGED:
             break  # around what has not converged nothing is told
+        if not _leaves(problem, trial, path.lowest):
+            break
         deepest, path = trial, follow(problem, trial)
-    best = [widest for widest, *_ in path.ranked()]
-    for known in (fit, deepest):
-        if not _changed(known, best):
-            return known, path
-    return _refitted(problem, path, best, history) or fit, path
+    ranked = path.ranked()
+    for _ in range(MOST_PLATEAUS):
+        best = [widest for widest, *_ in ranked]
+        for known in (fit, deepest):
+            if not _changed(known, best):
+                return known, path
+        found = _refitted(problem, path, best, history)
+        largest = max(_changed(path.fit, best), key=lambda plateau: plateau.low)
+        if found and _leaves(problem, found, max(path.own, largest.low)):
+            return found, path
+        ranked[largest.equation].remove(largest)  # it leaves more than it was said to
+        if not ranked[largest.equation]:
+            break
+    return fit, path
 
 
 def _refitted(
     problem: Problem, path: Path, goal: Sequence[Plateau], history: History
 ) -> Fit | None:
-    """The law of these plateaus; none if it is that of the path, too rich, or leaves too much."""
-    changed = _changed(path.fit, goal)
-    if not changed:
+    """The law of these plateaus; none if it is that of the path, or too rich."""
+    if not _changed(path.fit, goal):
         return None
     active = path.fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
     if active.sum() > RICHEST * path.fit.state.active.sum():
@@ -360,8 +375,12 @@ def _refitted(
     # Terms that come in may be those of a shift, and worth their price at these errors alone.
     fit = at_own_noise(problem, leave_home(problem, priced, history))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
-    largest = max(plateau.low for plateau in changed)
-    return fit if typical(problem.errors(fit)) <= CONSISTENT * largest else None
+    return fit
+
+
+def _leaves(problem: Problem, fit: Fit, tolerated: float) -> bool:
+    """Whether a law leaves no larger errors than were tolerated when it was chosen."""
+    return typical(problem.errors(fit)) <= CONSISTENT * tolerated
 
 
 def _changed(fit: Fit, goal: Sequence[Plateau]) -> list[Plateau]:

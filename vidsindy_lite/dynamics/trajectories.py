@@ -58,13 +58,9 @@ def _check_samples(t: Floats, x: Floats) -> Trajectory:
     largest = np.nanmax(np.abs(x), initial=0.0)
     if largest > FARTHEST:
         raise ValueError(f"x: must be at most {FARTHEST:g}, got {largest:g}: take another unit")
-    seen = ~np.isnan(x)
-    if not seen.any(axis=0).all():
-        column = int(np.argmin(seen.any(axis=0)))
-        raise ValueError(
-            f"x: every coordinate must be seen, got {len(x)} rows of NaN in column {column}"
-        )
-    rows = seen.any(axis=1)
+    rows = ~np.isnan(x).all(axis=1)
+    if not rows.any():
+        raise ValueError(f"x: must hold a number, got {len(x)} rows of NaN")
     return t[rows], x[rows]
 
 
@@ -89,6 +85,13 @@ def check_trajectories(
         raise ValueError(
             "t: a list of trajectories must hold at least one, all of the same dimension, "
             f"got shapes {[values.shape for _, values in trajectories]}"
+        )
+    seen = np.array([np.isfinite(values).any(axis=0) for _, values in trajectories])
+    if (some := seen.any(axis=0) & ~seen.all(axis=0)).any():
+        column = int(some.argmax())
+        raise ValueError(
+            f"x: a coordinate must be seen in all trajectories or in none, got column {column} "
+            f"without a number in trajectory {int(seen[:, column].argmin())}"
         )
     return trajectories
 
