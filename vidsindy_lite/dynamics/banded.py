@@ -41,20 +41,19 @@ def solve_factored(factor: Floats, right: Floats) -> None:
     block, all of them at once are three times as fast.
     """
     reach, n = len(factor) - 1, len(right)
-    size = max(BLOCK, reach)
+    size = max(BLOCK, 2 * reach)
     blocks = [right[start : start + size] for start in range(0, n, size)]
-    # Of each block of columns of L its triangle, and how it reaches on to the next block.
-    triangles = np.zeros((len(blocks), size, size))
-    onward = np.zeros((len(blocks), reach, reach))
-    padded = np.pad(factor, ((0, 0), (0, len(blocks) * size - n)))
-    for c in range(size):
-        column, inside = padded[:, c::size].T, size - c
-        triangles[:, c, c : c + reach + 1] = column[:, :inside]
-        if inside <= reach:
-            onward[:, reach - inside, : reach + 1 - inside] = column[:, inside:]
-    last = len(blocks) - 1
+    count, last = len(blocks), len(blocks) - 1
+    # Rows of one more than a block, read as rows of a block: so each column of L begins one place
+    # further on than the last. What reaches on to the next block then lies before the diagonal.
+    columns = np.zeros((count, size, size + 1))
+    padded = np.pad(factor, ((0, 0), (0, count * size - n)))
+    columns[:, :, : reach + 1] = padded.reshape(reach + 1, count, size).transpose(1, 2, 0)
+    rows = columns.reshape(count, size + 1, size)
+    triangles = [rows[k, : len(here), : len(here)].T for k, here in enumerate(blocks)]
+    onward = rows[:, size + 1 - reach :, :reach]
     for k, here in enumerate(blocks):
-        dtrsm(1.0, triangles[k].T[: len(here), : len(here)], here.T, 1, 1, 1, overwrite_b=1)
+        dtrsm(1.0, triangles[k], here.T, 1, 1, 1, overwrite_b=1)
         if k < last:
             after = blocks[k + 1][:reach]
             after -= onward[k].T[: len(after)] @ here[-reach:]
@@ -62,4 +61,4 @@ def solve_factored(factor: Floats, right: Floats) -> None:
         if k < last:
             after = blocks[k + 1][:reach]
             here[-reach:] -= onward[k][:, : len(after)] @ after
-        dtrsm(1.0, triangles[k].T[: len(here), : len(here)], here.T, 1, 1, overwrite_b=1)
+        dtrsm(1.0, triangles[k], here.T, 1, 1, overwrite_b=1)

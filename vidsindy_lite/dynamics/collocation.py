@@ -246,11 +246,12 @@ class Collocation:
 
         What was not observed has residual 0.
         """
-        seen = self.precision > 0
-        residual = np.where(seen, self.curve(control_points) - self.grid.x, 0.0)
+        residual = np.where(self.precision > 0, self.curve(control_points) - self.grid.x, 0.0)
+        if not self.systematic.size:
+            return residual, np.zeros(0)
         weighted, information = self._shared
         sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
-        return residual + seen * (self.systematic @ sizes), sizes
+        return residual + (self.precision > 0) * (self.systematic @ sizes), sizes
 
     def data_loss(self, control_points: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""

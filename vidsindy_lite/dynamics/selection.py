@@ -182,7 +182,8 @@ class _Quadratic:
         moved += inverse @ (target - block @ moved)
         step[inside] = moved
         left = self.gradient - self.matrix @ step
-        paid = self.penalty[inside[np.isfinite(self.penalty[inside])]].sum()
+        prices = self.penalty[inside]
+        paid = prices[np.isfinite(prices)].sum()
         value = float(paid - step @ (left + self.gradient))
         return _Fit(support, inside, inverse, self.present[inside] + moved, left, value)
 
@@ -311,7 +312,7 @@ class _Tableau:
         response = shared @ fit.inverse
         room = 1 - (response * shared).sum(axis=1)
         return cls(
-            inside, outside, fit.fitted, np.diag(fit.inverse), response, fit.left[outside], room
+            inside, outside, fit.fitted, fit.inverse.diagonal(), response, fit.left[outside], room
         )
 
 
@@ -319,8 +320,8 @@ def _single_changes(model: _Quadratic, tableau: _Tableau) -> list[Change]:
     """Best drop, add and swap."""
     inside, outside, spread = tableau.inside, tableau.outside, tableau.spread
     response, left, room = tableau.response, tableau.left, tableau.room
-    loss = tableau.fitted**2 / spread - model.penalty[inside]
-    cost = model.penalty[outside] - _gain(left, room)
+    loss, price = tableau.fitted**2 / spread - model.penalty[inside], model.penalty[outside]
+    cost = price - _gain(left, room)
     changes = [(np.inf, NONE, NONE)]
     if len(inside):
         changes.append((loss.min(), inside[[loss.argmin()]], NONE))
@@ -328,17 +329,23 @@ def _single_changes(model: _Quadratic, tableau: _Tableau) -> list[Change]:
         changes.append((cost.min(), NONE, outside[[cost.argmin()]]))
     if len(inside) and len(outside):
         # A drop changes what the others leave over, and the room a newcomer has, by rank one.
-        swapped_left = left[:, None] + response * (tableau.fitted / spread)
-        swapped_room = room[:, None] + response**2 / spread
-        swap = loss + model.penalty[outside][:, None] - _gain(swapped_left, swapped_room)
-        add, drop = np.unravel_index(swap.argmin(), swap.shape)
+        swapped_left = response * (tableau.fitted / spread)
+        swapped_left += left[:, None]
+        swapped_room = response**2 / spread
+        swapped_room += room[:, None]
+        swap = loss + price[:, None]
+        swap -= _gain(swapped_left, swapped_room)
+        add, drop = divmod(int(swap.argmin()), len(inside))
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
     return changes
 
 
 def _gain(left: Floats, room: Floats) -> Floats:
     """What a newcomer explains; nothing if it is a combination of those that are in."""
-    return np.where(room > COLLINEAR, left**2 / np.maximum(room, COLLINEAR), -np.inf)
+    gain = left**2
+    gain /= np.maximum(room, COLLINEAR)
+    gain[~(room > COLLINEAR)] = -np.inf
+    return gain
 
 
 def equilibrated(information: Floats, ridge: float = RIDGE) -> tuple[Floats, Floats]:

@@ -61,6 +61,10 @@ WEAK_WIDTH = 0.05
 Half of pysindy's default: alike on clean data, better under noise, erratic all the same.
 """
 
+UNCHECKED = {"check_input": False}
+"""For scikit-learn's ridge regression, whose checks of its arguments take longer than such small
+regressions: a fit is handed to it in a dozen parts."""
+
 Rows = tuple[Floats, Floats]
 """Values of the candidate terms (k, l) and of the derivatives (k, d): a linear regression."""
 
@@ -210,11 +214,11 @@ def _error(coefficients: Floats, rows: Rows) -> float:
 
 
 def _least_squares(threshold: float, ridge: float = RIDGE) -> BaseOptimizer:
-    return pysindy.STLSQ(threshold=threshold, alpha=ridge)
+    return pysindy.STLSQ(threshold=threshold, alpha=ridge, ridge_kw=UNCHECKED)
 
 
 def _fit(optimizer: BaseOptimizer, rows: Rows) -> Floats:
-    # Without the checks of arguments, which take longer than such small regressions.
+    # Also without the other checks of arguments.
     unchecked = config_context(skip_parameter_validation=True, assume_finite=True)
     with unchecked, warnings.catch_warnings():
         # A threshold above all coefficients is a normal member of the grid.
