@@ -200,6 +200,32 @@ def test_partial_views_and_jumps_are_left_out():
     np.testing.assert_array_equal(np.flatnonzero(~good), [5, 10, 25])
 
 
+@pytest.mark.parametrize("end", [np.s_[:2], np.s_[-2:]])
+def test_the_first_and_last_views_are_held_against_those_beside_them(end):
+    frames, inside = np.arange(40), np.full(40, True)
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    areas = np.full(40, 100.0)
+    areas[end] = 190
+    good = fitting(frames, places, areas, inside)
+    np.testing.assert_array_equal(np.flatnonzero(~good), frames[end])
+    last = frames[end][[0] if end.start is None else [-1]]
+    places[last] += [0, 9]
+    good = fitting(frames, places, np.full(40, 100.0), inside)
+    np.testing.assert_array_equal(np.flatnonzero(~good), last)
+
+
+def test_what_touches_other_things_must_be_where_the_motion_leads():
+    frames, areas, inside = np.arange(40), np.full(40, 900.0), np.full(40, True)
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    places[20] += [4, 3]
+    alone = np.full(40, True)
+    assert fitting(frames, places, areas, inside, alone).all()
+    alone[18:23] = False
+    good = fitting(frames, places, areas, inside, alone)
+    np.testing.assert_array_equal(np.flatnonzero(~good), [20])
+    assert fitting(frames, places, areas, inside, np.full(40, False)).all()  # nothing special
+
+
 def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     areas = np.linspace(100, 200, 60)
     areas[20:40] *= 2.5  # one beside the other
@@ -211,6 +237,10 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     # Nothing tells which is the target, where they never part, or were one from the beginning.
     assert not joined(areas[:40]).any()
     assert not joined(areas[18:]).any()
+    # Half hidden just before, it meets somebody.
+    areas = np.full(40, 100.0)
+    areas[11:15], areas[15:25], areas[24] = [30, 40, 60, 80], 180, 210
+    np.testing.assert_array_equal(np.flatnonzero(joined(areas)), np.arange(15, 25))
     # Between two posts, each of which hides it in two views, it is whole.
     areas = np.full(40, 100.0)
     areas[[10, 11, 30, 31]] = 30

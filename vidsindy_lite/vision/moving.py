@@ -182,7 +182,7 @@ def _followed(
     path: str | os.PathLike, film: "Film", lens: Lens, found: list[list[Candidate]],
     lights: list[Floats32], *, hinted: bool = False, pointer: Pointer | None = None,
 ) -> Followed:  # fmt: skip
-    """What moves most plainly, of that at which a hint points; gaps are filled if it is hinted."""
+    """What moves most plainly, of that at which a hint points, its gaps filled."""
     seen, paths = linked(pointer.like(found) if pointer else found, film, pointer)
     doubts: tuple[str, ...] = ()
     if pointer is None and paths:
@@ -204,10 +204,9 @@ def _followed(
     rows = max(paths, key=lambda path: np.isin(path.rows, first).sum()).rows
     views = viewed(path, film, lens, expected(seen, rows, film, len(found)), lights)
     followed = finished(views, film.motion, doubts)
-    if not hinted:
-        return followed
     start, last = seen.frame[rows[[0, -1]]]
-    return remembered(path, lens, lights, followed, views, np.s_[start : last + 1])
+    sure = np.s_[start : last + 1]
+    return remembered(path, lens, lights, followed, views, sure, told=hinted)
 
 
 def linked(
@@ -390,7 +389,8 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
     inside &= ~hidden(outlines, steady, areas)
-    good = fitting(at, steady, areas, inside)
+    alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
+    good = fitting(at, steady, areas, inside, alone)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):
         doubts += (f"in {len(untold)} frames of {n} the target is seen, but not how the camera "
@@ -410,14 +410,14 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
 
 def remembered(
     path: str | os.PathLike, lens: Lens, lights: list[Floats32], found: Followed,
-    views: list[View | None], sure: slice,
+    views: list[View | None], sure: slice, *, told: bool,
 ) -> Followed:  # fmt: skip
-    """A track with its gaps filled where the target is recalled from its path, and beyond that."""
+    """A track with its gaps filled; if somebody told the target, it is carried on beyond its ends."""
     pixels, errors = found.pixels.copy(), found.errors.copy()
     inside = np.full_like(pixels, np.nan)
     inside[sure] = pixels[sure]
     if np.isfinite(inside[:, 0]).any():
-        places = recalled(path, lens, lights, inside, found.maps, entire(views)[0])
+        places = recalled(path, lens, lights, inside, found.maps, entire(views)[0], told=told)
         known = np.isfinite(places[:, 0])
         pixels[known], errors[known] = places[known], _RECALLED
     return found._replace(pixels=pixels, errors=errors)

@@ -24,6 +24,7 @@ _ROOM = 8  # pixels more
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
+_ASTRAY = 0.3  # of its size, by which a view may be off the way
 _BESIDE = 5  # views before and after such a meeting, which show how large it was and is
 
 
@@ -143,8 +144,13 @@ def _nearest(mask: Bools, centre: Floats) -> Bools | None:
     return labels == best
 
 
-def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Bools:
-    """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2)."""
+def fitting(
+    frames: Floats, places: Floats, areas: Floats, inside: Bools, alone: Bools | None = None
+) -> Bools:
+    """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2).
+
+    If most of them show it `alone`, those that do not must be where the motion leads.
+    """
     inside = inside & ~joined(areas)
     good = inside
     logs = np.log(np.maximum(areas, 1e-3))
@@ -152,13 +158,16 @@ def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Boo
         use = np.flatnonzero(good)
         if len(use) < 3:
             return good
-        usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="nearest"))
+        usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="mirror"))
         good = inside & (np.abs(logs - usual) < np.log(_WHOLE))
+    room = _ASTRAY * np.sqrt(areas)
+    if alone is not None and alone[good].mean() > 0.5:
+        room[~alone] = 0
     while (use := np.flatnonzero(good)).size >= 7:
         told = [_leave_out(frames[use], places[use], i) for i in range(len(use))]
         off, unsure = np.array(told).T
         usual = max(float(np.median(off)), 0.05)
-        over = off / (np.maximum(10 * usual, 1 + 0.3 * np.sqrt(areas[use])) + unsure)
+        over = off / (np.maximum(10 * usual, 1 + room[use]) + unsure)
         # A wrong place spoils what its neighbours seem to be: the worst of them goes first.
         worst = (over > 1) & (over == maximum_filter1d(over, 7))
         if not worst.any():
@@ -181,7 +190,7 @@ def joined(areas: Floats) -> Bools:
         before, after = areas[max(first - _BESIDE, 0) : first], areas[last + 1 :][:_BESIDE]
         if min(len(before), len(after)) == _BESIDE:
             usual = max(np.median(before), np.median(after))
-            found[first : last + 1] = np.median(areas[first : last + 1]) > _JOINED * usual
+            found[first : last + 1] = np.median(areas[first : last + 1]) > _WHOLE * usual
     return found
 
 
@@ -206,7 +215,8 @@ def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
     A quartic through these says it. Where a target turns within a few frames, or some of them are
     missing, no polynomial is right, and a parabola says something else.
     """
-    others = np.array([j for j in range(max(i - 3, 0), min(i + 4, len(frames))) if j != i])
+    first = min(max(i - 3, 0), max(len(frames) - 7, 0))
+    others = np.array([j for j in range(first, min(first + 7, len(frames))) if j != i])
     t = frames[others] - frames[i]
     if len(others) < 4 or np.ptp(t) > 15:
         return 0.0, 0.0
@@ -215,7 +225,8 @@ def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
         np.linalg.lstsq(powers, places[others])[0][-1] for powers in (basis, basis[:, -3:])
     )
     off, unsure = np.linalg.norm([quartic - places[i], quartic - parabola], axis=1)
-    return float(off), float(unsure)
+    beyond = t.min() > 0 or t.max() < 0
+    return float(off), float(unsure * (1 + beyond))
 
 
 def scatter(frames: Ints, places: Floats) -> float:
