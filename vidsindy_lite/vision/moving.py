@@ -412,7 +412,7 @@ def remembered(
     path: str | os.PathLike, lens: Lens, lights: list[Floats32], found: Followed,
     views: list[View | None], sure: slice, *, told: bool,
 ) -> Followed:  # fmt: skip
-    """A track with its gaps filled; if somebody told the target, it is carried on beyond its ends."""
+    """A track with its gaps filled; if somebody told the target, carried on beyond its ends."""
     pixels, errors = found.pixels.copy(), found.errors.copy()
     inside = np.full_like(pixels, np.nan)
     inside[sure] = pixels[sure]
