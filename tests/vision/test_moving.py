@@ -265,6 +265,19 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     assert "16 to 19" in doubt
 
 
+def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are():
+    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
+    places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]
+    maps = np.tile(np.eye(3), (20, 1, 1))
+    for faint in (8, 20):
+        views = [
+            View(place, 100.0, np.zeros(3), True, place + square, faint=k < faint)
+            for k, place in enumerate(places)
+        ]
+        seen = np.isfinite(finished(views, CameraMotion(maps, np.zeros(20)), ()).pixels[:, 0])
+        np.testing.assert_array_equal(seen, (np.arange(20) >= faint) | (faint == 20))
+
+
 def dashing(frames, turn, width):
     """Round in `turn` frames, by up to 37 pixels a frame in a few of them."""
     angle = 2 * np.pi * frames / turn

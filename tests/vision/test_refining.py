@@ -50,3 +50,16 @@ def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(centre
     np.testing.assert_allclose(view.centroid, centre, atol=0.02)
     np.testing.assert_allclose(view.colour, colour, atol=1)
     assert Lens(plate, 0.0).look(ground, np.eye(3), box, np.array(centre), colour, gain) is None
+
+
+@pytest.mark.parametrize(("shade", "faint"), [(90, False), (176, False), (192, True)])
+def test_a_view_before_ground_of_about_its_own_colour_is_faint(shade, faint):
+    ground = np.full((60, 80, 3), 90, np.uint8)
+    ground[:, 10:70] = shade
+    share = disc((40.0, 30.0), 8)
+    frame = np.rint((1 - share) * ground + share * 200).astype(np.uint8)
+    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
+    box, gain = np.array([32.0, 22, 16, 16]), np.ones(3, np.float32)
+    colour = np.full(3, 200.0)
+    view = Lens(plate, 0.0).look(frame, np.eye(3), box, np.array([40.0, 30]), colour, gain)
+    assert view.faint == faint

@@ -46,6 +46,7 @@ _LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a came
 _RECALLED = 2.0  # pixels, about, to which a target is recalled that is not seen whole
 _PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
 _DENSE = 640  # pixels in a row of which the noise is known well
+_RARELY = 0.5  # share of the views before ground of about the target's colour, which are of parts
 _LARGE = 0.01  # share of the image that a target hardly fills
 _RESTLESS = 0.03  # of their length, by which the sides of a target hardly change in a frame
 _PIXELS = 2  # of each side that change with where its two ends lie between pixels
@@ -389,6 +390,9 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
     inside &= ~hidden(outlines, steady, areas)
+    faint = np.array([view.faint for view in shown])
+    if faint.mean() < _RARELY:  # else it is so everywhere
+        inside &= ~faint
     alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
     good = fitting(at, steady, areas, inside, alone)
     untold = at[~np.isfinite(motion.errors[at])]

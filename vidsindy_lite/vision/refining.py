@@ -21,6 +21,7 @@ _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; i
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
 _GROW = 0.5  # of its size, by which a window exceeds the target; and
 _ROOM = 8  # pixels more
+_FAINT, _RIM = 2.0, 0.9  # tolerances by which a ground differs from the target; share of its rim
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
@@ -34,7 +35,7 @@ class View:
 
     Centroid (2,), area, mean colour, is it clear of the image's border?, convex outline (k, 2);
     `whole` is the view of it with all that has another colour in one piece with it, if compact. The
-    area is 0 where nothing has the target's colour.
+    area is 0 where nothing has the target's colour. It is `faint` before ground like itself.
     """
 
     centroid: Floats
@@ -43,6 +44,7 @@ class View:
     inside: bool
     outline: Floats
     whole: "View | None" = None
+    faint: bool = False
 
 
 class Lens:
@@ -80,7 +82,8 @@ class Lens:
         change = now - ground
         smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), self.blur), np.float32)
         differs = lengths(smooth)
-        mask = (differs > self._tolerance(then)) & known
+        bound = self._tolerance(then)
+        mask = (differs > bound) & known
         contrast = colour.astype(np.float32) - ground
         square = dot(contrast, contrast)
         share = dot(smooth, contrast) / np.maximum(square, self.least**2)
@@ -92,12 +95,12 @@ class Lens:
         part = label is not None
         if label is None and (label := _nearest(mask, centre - low)) is None:
             return None
-        view = self._measure(label, change, contrast, low, high, now)
+        view = self._measure(label, change, contrast, low, bound, now)
         found = whole(label, mask, mask & (off | (share < 0)), now, ground)
         if found is None or found.plain:
             return replace(view, whole=found and view) if part else None
         contrast = found.colours - ground
-        all_ = self._measure(found.label, change, contrast, low, high, now)
+        all_ = self._measure(found.label, change, contrast, low, bound, now)
         return replace(view if part else replace(all_, area=0.0), whole=all_)
 
     def _tolerance(self, then: Image) -> Floats32:
@@ -106,11 +109,12 @@ class Lens:
         return self.least + _EDGE[self.plate.moves] * slope.astype(np.float32)
 
     def _measure(
-        self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, high: Floats,
+        self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, bound: Floats32,
         now: Floats32,
     ) -> View:  # fmt: skip
-        """Centroid and area of one connected part."""
+        """Centroid and area of one connected part; `bound` tells what differs from the ground."""
         near = cv2.dilate(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        rim = near & ~label
         core = cv2.erode(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         square = dot(contrast, contrast)
         alpha = dot(change, contrast) / np.maximum(square, self.least**2)
@@ -125,10 +129,11 @@ class Lens:
         first = low + [columns[0], rows[0]]
         last = low + [columns[-1], rows[-1]]
         inside = bool((first > 0).all() and (last < self.plate.size - 1).all())
+        faint = bool((square[rim] < (_FAINT * bound[rim]) ** 2).mean() > _RIM)
         shade = now[core if core.any() else label].mean(axis=0)
         at = np.argwhere(label)[:, ::-1].astype(np.int32)
         outline = low + np.asarray(cv2.convexHull(at))[:, 0].astype(float)
-        return View(low + centroid, area, shade, inside, outline)
+        return View(low + centroid, area, shade, inside, outline, faint=faint)
 
 
 def _nearest(mask: Bools, centre: Floats) -> Bools | None:
