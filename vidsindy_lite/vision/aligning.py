@@ -85,9 +85,9 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
             return None
         miss = shown - gain * key - offset
         if step == 0:
-            offset = _median(miss[known])
+            offset = _middle(miss[known])
             miss -= offset
-        spread = max(1.4826 * _median(np.abs(miss[known])), _FAINT)
+        spread = max(1.4826 * _middle(np.abs(miss[known])), _FAINT)
         bound = max(_FIRM * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
         heavy = steep * weight.ravel()
@@ -114,7 +114,7 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
     return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
 
 
-def _median(values: Floats | Floats32) -> float:
+def _middle(values: Floats | Floats32) -> float:
     """The median of every other value."""
     return float(np.median(values[::2]))
 

@@ -28,7 +28,7 @@ from .occluders import hidden
 from .pixels import relit
 from .pointing import Pointer, alike
 from .recalling import recalled
-from .reducing import reduce, reduced, reduction
+from .reducing import ReducedFrames, reduce, reduced, reduction
 from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
@@ -128,7 +128,7 @@ def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
 
 
 def _camera(
-    path: str | os.PathLike, info: VideoInfo, small: Image, sampled: Ints, factor: int
+    frames: ReducedFrames, info: VideoInfo, small: Image, sampled: Ints
 ) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
@@ -136,11 +136,11 @@ def _camera(
     say no more than their errors only add these, and so do maps by which the frames fit together
     worse than they do at rest.
     """
-    still = stands_still(small)
+    still, factor = stands_still(small), frames.factor
     if still is False:
         steadying = Steadying(factor)
-        for frame in read_video(path):
-            steadying.add(reduce(frame, factor))
+        for frame in frames:
+            steadying.add(frame)
         motion = steadying.motion()
         if _plainly(motion, info.size, factor):
             at = np.minimum(sampled, len(motion.maps) - 1)
@@ -165,7 +165,7 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(path, samples)
-    found, lights = sighted(path, film)
+    found, lights = sighted(film)
     lens = lens_of(samples, film)
     if hint is None:
         return _followed(path, film, lens, found, lights)
@@ -249,7 +249,7 @@ class Film(NamedTuple):
     `sure` is whether its camera is known to be at rest, or to move as `motion` says.
     """
 
-    factor: int
+    frames: ReducedFrames
     motion: CameraMotion
     maps: Floats
     plate: Plate
@@ -257,6 +257,11 @@ class Film(NamedTuple):
     sampled: Ints
     places: list[Place]
     sure: bool
+
+    @property
+    def factor(self) -> int:
+        """By how much the frames are reduced."""
+        return self.frames.factor
 
     @classmethod
     def of(cls, path: str | os.PathLike, samples: Image, rests: bool = False) -> "Film":
@@ -266,9 +271,9 @@ class Film(NamedTuple):
         sampled = np.unique(spread)[: len(samples)]
         factor = reduction((samples.shape[2], samples.shape[1]))
         small = np.array([reduce(sample, factor) for sample in samples])
-        motion, sure = at_rest(info.frames), True
+        frames, motion, sure = ReducedFrames(path, factor), at_rest(info.frames), True
         if not rests:
-            motion, sure = _camera(path, info, small, sampled, factor)
+            motion, sure = _camera(frames, info, small, sampled)
         sampled = np.minimum(sampled, len(motion.maps) - 1)
         maps = reduced(motion.maps, factor)
         known = np.isfinite(motion.errors[sampled])
@@ -276,17 +281,15 @@ class Film(NamedTuple):
         noise = _noise(small, maps[sampled], plate)
         places = lingering(plate, small, maps[sampled], known, tolerance(plate, noise))
         uncover(plate, small, maps[sampled], known, places)
-        return cls(factor, motion, maps, plate, noise, sampled, places, sure)
+        return cls(frames, motion, maps, plate, noise, sampled, places, sure)
 
 
-def sighted(
-    path: str | os.PathLike, film: Film, targets: int = 1
-) -> tuple[list[list[Candidate]], list[Floats32]]:
+def sighted(film: Film, targets: int = 1) -> tuple[list[list[Candidate]], list[Floats32]]:
     """What may be the target in each frame, and how bright the frame is."""
     difference = Difference(film.plate, film.noise)
     found = [
-        difference.candidates(reduce(frame, film.factor), here)
-        for frame, here in zip(read_video(path), film.maps, strict=False)
+        difference.candidates(frame, here)
+        for frame, here in zip(film.frames, film.maps, strict=False)
     ]
     kept = [
         difference.travelling(uncommon(some, targets), here)

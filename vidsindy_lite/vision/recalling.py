@@ -102,9 +102,11 @@ def recalled(
     told : bool
         Was it pointed at? Else only gaps count in which its motion is known to two pixels.
     """
-    looks = _looks(path, lens, lights, pixels, maps, views)
     at = np.flatnonzero(np.isfinite(pixels[:, 0]))
     places = np.full(pixels.shape, np.nan)
+    if len(at) == (len(pixels) if told else np.ptp(at) + 1):
+        return places
+    looks = _looks(path, lens, lights, pixels, maps, views)
     for order in (range(int(at[-1]), len(pixels)), range(int(at[0]), -1, -1)) if told else ():
         _carry_on(places, order, looks, pixels, maps, views)
     for before, after in zip(at[:-1].tolist(), at[1:].tolist(), strict=True):
