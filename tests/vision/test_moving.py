@@ -11,6 +11,7 @@ from helpers import one_a_frame
 
 import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
+from vidsindy_lite.vision import moving
 from vidsindy_lite.vision.candidates import Candidate, Plate
 from vidsindy_lite.vision.linking import Sightings, best_path
 from vidsindy_lite.vision.moving import _learned, finished, rate
@@ -81,7 +82,7 @@ def test_twenty_films(tmp_path):
     assert np.median(medians) < 0.3
 
 
-def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
+def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path, monkeypatch):
     n = 60
     t = np.arange(n)
     places = [np.column_stack([40 + 4 * t, 60 + 30 * np.sin(t / (6 + k)) + 80 * k]) for k in (0, 1)]
@@ -97,13 +98,22 @@ def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
             yield np.clip(frame + rng.normal(0, 2, frame.shape), 0, 255).astype(np.uint8)
 
     path = write_video(tmp_path / "clip.mov", frames())
-    assert any("something else moves" in warning for warning in track(path).warnings)
+    plain = track(path)
+    assert any("something else moves" in warning for warning in plain.warnings)
+    sought, followed = [], moving._followed
+    monkeypatch.setattr(
+        moving, "_followed", lambda *a, **k: sought.append("pointer" in k) or followed(*a, **k)
+    )
     for truth in places:
         hint = Hint(frame=20, box=(*(truth[20] - 9), 19, 19))
         found, error = errors(path, truth, hint)
         assert np.isfinite(error).mean() > 0.9
         assert np.nanmax(error) < 1
         assert not any("something else moves" in warning for warning in found.warnings)
+        # Where the plain path goes through the box, no other is sought.
+        meant = np.nanmax(np.linalg.norm(plain.pixels - truth, axis=1)) < 1
+        assert sought == ([False] if meant else [False, True])
+        sought.clear()
 
 
 # --------------------------------------------------------------------------------------- its parts

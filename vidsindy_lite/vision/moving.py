@@ -204,6 +204,8 @@ def _followed(
                    "motion is part of the track",)  # fmt: skip
     rows = max(paths, key=lambda path: np.isin(path.rows, first).sum()).rows
     views = viewed(path, film, lens, expected(seen, rows, film, len(found)), lights)
+    if pointer is not None and any(views):
+        doubts += pointer.unlike(np.median([view.colour for view in views if view], axis=0))
     followed = finished(views, film.motion, doubts)
     start, last = seen.frame[rows[[0, -1]]]
     sure = np.s_[start : last + 1]
