@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .candidates import Plate
-from .colours import whole
+from .colours import shadowed, whole
 from .pixels import dot, lengths, relit
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
@@ -91,6 +91,9 @@ class Lens:
         # What is of another colour, e.g. a shadow or a hand: off the line from ground to target.
         off = miss >= np.maximum(0.45 * np.sqrt(square), 2 * self.least)
         own = mask & (share > 0.25) & ~off
+        # Where half of it over the ground would look like one, nothing is told from a shadow.
+        dark = shadowed(ground + smooth, ground)
+        own &= ~dark | shadowed(ground + np.float32(0.5) * contrast, ground)
         label = _nearest(own, centre - low)
         part = label is not None
         if label is None and (label := _nearest(mask, centre - low)) is None:
