@@ -147,7 +147,7 @@ def test_an_input_is_a_spline_and_unknown_outside():
         ),
         (
             lambda: vl.discover(T + 1, FORCED, library=CUBIC + U),
-            "u must be finite on the data, got none",
+            "u must be finite on the data, got no such value at t = 40.0",
         ),
     ],
 )

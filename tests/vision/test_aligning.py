@@ -55,6 +55,16 @@ def test_shift_turn_and_scale_of_clouds(move, light):
     assert miss.mean() <= 8 * found.error < 0.5
 
 
+def test_the_perspective_of_a_guess_does_no_harm():
+    move = similar(3, -2, 0.01)
+    guess = move.copy()
+    guess[2, :2] = 1e-4, -5e-5
+    found = align(pyramid(sight(0)), pyramid(sight(0, move)), guess)
+    points = np.array([[40, 40, 1], [280, 40, 1], [160, 120, 1], [280, 200, 1.0]])
+    ends = points @ found.map.T
+    assert np.linalg.norm((ends / ends[:, 2:] - points @ move.T)[:, :2], axis=1).max() < 0.1
+
+
 def test_what_moves_on_its_own_is_left_aside():
     move = similar(3, 2)
     views = [sight(1), sight(1, move)]

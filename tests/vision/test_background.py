@@ -10,12 +10,12 @@ from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
     _largest_component,
-    _median,
     _others,
     _shape,
     _unrest,
     camera_motion,
     light,
+    median_image,
     sample_frames,
     track_blobs,
     view_distances,
@@ -38,7 +38,7 @@ def texture():
 def test_the_median_of_images():
     images = np.random.default_rng(0).integers(0, 256, (21, 10, 12, 3), np.uint8)
     before = images.copy()
-    np.testing.assert_array_equal(_median(images), np.median(images, axis=0))
+    np.testing.assert_array_equal(median_image(images), np.median(images, axis=0))
     np.testing.assert_array_equal(images, before)
 
 

@@ -2,6 +2,7 @@
 
 import tracemalloc
 
+import cv2
 import numpy as np
 import pytest
 
@@ -94,6 +95,20 @@ def test_what_differs_much_more_than_that_with_which_it_is_in_one_piece_is_a_cor
     assert not cores(mask, strength)
     strength[strength < 9] = 0
     assert not cores((strength > 1).astype(np.uint8), strength)  # one alone is no core of itself
+
+
+def test_cores_are_sought_only_where_a_whole_is_large_enough(monkeypatch):
+    seen, count = [], cv2.connectedComponentsWithStats
+    monkeypatch.setattr(
+        cv2, "connectedComponentsWithStats", lambda mask: seen.append(mask.shape) or count(mask)
+    )
+    strength = np.zeros((60, 80), np.float32)
+    strength[10:17, 10:17] = 20  # 49 pixels, of which no part has 25 and less than a half
+    assert not cores((strength > 1).astype(np.uint8), strength)
+    assert seen == [(60, 80)]
+    strength[30:50, 40:70] = 3
+    assert not cores((strength > 1).astype(np.uint8), strength)
+    assert seen[1:] == [(60, 80), (20, 30)]  # at the one level that any part of it exceeds
 
 
 def test_a_target_is_told_from_a_faint_change_that_it_meets():

@@ -11,6 +11,7 @@ from helpers import one_a_frame
 
 import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
+from vidsindy_lite.vision import moving
 from vidsindy_lite.vision.candidates import Candidate, Plate
 from vidsindy_lite.vision.linking import Sightings, best_path
 from vidsindy_lite.vision.moving import _learned, finished, rate
@@ -81,7 +82,7 @@ def test_twenty_films(tmp_path):
     assert np.median(medians) < 0.3
 
 
-def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
+def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path, monkeypatch):
     n = 60
     t = np.arange(n)
     places = [np.column_stack([40 + 4 * t, 60 + 30 * np.sin(t / (6 + k)) + 80 * k]) for k in (0, 1)]
@@ -97,13 +98,22 @@ def test_where_two_things_move_alike_it_says_so_and_a_hint_decides(tmp_path):
             yield np.clip(frame + rng.normal(0, 2, frame.shape), 0, 255).astype(np.uint8)
 
     path = write_video(tmp_path / "clip.mov", frames())
-    assert any("something else moves" in warning for warning in track(path).warnings)
+    plain = track(path)
+    assert any("something else moves" in warning for warning in plain.warnings)
+    sought, followed = [], moving._followed
+    monkeypatch.setattr(
+        moving, "_followed", lambda *a, **k: sought.append("pointer" in k) or followed(*a, **k)
+    )
     for truth in places:
         hint = Hint(frame=20, box=(*(truth[20] - 9), 19, 19))
         found, error = errors(path, truth, hint)
         assert np.isfinite(error).mean() > 0.9
         assert np.nanmax(error) < 1
         assert not any("something else moves" in warning for warning in found.warnings)
+        # Where the plain path goes through the box, no other is sought.
+        meant = np.nanmax(np.linalg.norm(plain.pixels - truth, axis=1)) < 1
+        assert sought == ([False] if meant else [False, True])
+        sought.clear()
 
 
 # --------------------------------------------------------------------------------------- its parts
@@ -200,6 +210,32 @@ def test_partial_views_and_jumps_are_left_out():
     np.testing.assert_array_equal(np.flatnonzero(~good), [5, 10, 25])
 
 
+@pytest.mark.parametrize("end", [np.s_[:2], np.s_[-2:]])
+def test_the_first_and_last_views_are_held_against_those_beside_them(end):
+    frames, inside = np.arange(40), np.full(40, True)
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    areas = np.full(40, 100.0)
+    areas[end] = 190
+    good = fitting(frames, places, areas, inside)
+    np.testing.assert_array_equal(np.flatnonzero(~good), frames[end])
+    last = frames[end][[0] if end.start is None else [-1]]
+    places[last] += [0, 9]
+    good = fitting(frames, places, np.full(40, 100.0), inside)
+    np.testing.assert_array_equal(np.flatnonzero(~good), last)
+
+
+def test_what_touches_other_things_must_be_where_the_motion_leads():
+    frames, areas, inside = np.arange(40), np.full(40, 900.0), np.full(40, True)
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    places[20] += [4, 3]
+    alone = np.full(40, True)
+    assert fitting(frames, places, areas, inside, alone).all()
+    alone[18:23] = False
+    good = fitting(frames, places, areas, inside, alone)
+    np.testing.assert_array_equal(np.flatnonzero(~good), [20])
+    assert fitting(frames, places, areas, inside, np.full(40, False)).all()  # nothing special
+
+
 def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     areas = np.linspace(100, 200, 60)
     areas[20:40] *= 2.5  # one beside the other
@@ -211,6 +247,10 @@ def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     # Nothing tells which is the target, where they never part, or were one from the beginning.
     assert not joined(areas[:40]).any()
     assert not joined(areas[18:]).any()
+    # Half hidden just before, it meets somebody.
+    areas = np.full(40, 100.0)
+    areas[11:15], areas[15:25], areas[24] = [30, 40, 60, 80], 180, 210
+    np.testing.assert_array_equal(np.flatnonzero(joined(areas)), np.arange(15, 25))
     # Between two posts, each of which hides it in two views, it is whole.
     areas = np.full(40, 100.0)
     areas[[10, 11, 30, 31]] = 30
@@ -233,6 +273,19 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     (doubt,) = found.doubts
     assert doubt.startswith("in 4 frames of 20 the target is seen")
     assert "16 to 19" in doubt
+
+
+def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are():
+    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
+    places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]
+    maps = np.tile(np.eye(3), (20, 1, 1))
+    for faint in (8, 20):
+        views = [
+            View(place, 100.0, np.zeros(3), True, place + square, faint=k < faint)
+            for k, place in enumerate(places)
+        ]
+        seen = np.isfinite(finished(views, CameraMotion(maps, np.zeros(20)), ()).pixels[:, 0])
+        np.testing.assert_array_equal(seen, (np.arange(20) >= faint) | (faint == 20))
 
 
 def dashing(frames, turn, width):

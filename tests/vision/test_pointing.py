@@ -1,9 +1,11 @@
 """What a hint says of the candidates, and of a track that misses it."""
 
+import re
+
 import numpy as np
 import pytest
 
-from vidsindy_lite import Hint, track
+from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision.candidates import Candidate
 from vidsindy_lite.vision.linking import TOLD
 from vidsindy_lite.vision.pointing import Pointer, _fits, _overlap
@@ -90,3 +92,31 @@ def test_a_hint_is_for_auto_and_must_be_one(tmp_path):
         track(tmp_path / "a.mov", target=(1, 2, 3, 4))
     with pytest.raises(ValueError, match="target: its frame must be one of 2, got 2"):
         Pointer.of(Hint(2, (36, 46, 9, 9)), FOUND, 1, "none.mov")
+
+
+@pytest.mark.parametrize("box", [(-80, 20, 30, 30), (20, -40, 30, 30), (190, 20, 30, 30)])
+def test_a_box_outside_the_image_is_refused_as_it_was_given(tmp_path, box):
+    path = write_video(tmp_path / "a.mov", np.zeros((2, 120, 200, 3), np.uint8))
+    said = re.escape(f"box: must have its middle in the image of 200 x 120 pixels, got {box}")
+    with pytest.raises(ValueError, match=said):
+        Pointer.of(Hint(0, box), [[], []], 4, path)
+    assert Pointer.of(Hint(0, (180, 20, 30, 30)), [[], []], 4, path).one is not None
+
+
+def test_a_colour_that_was_told_is_held_against_what_is_followed():
+    pointer = Pointer.of(Hint(colour=(200, 30, 20)), FOUND, 1, "none.mov")
+    assert pointer.unlike(np.array([30.0, 40, 170])) == ()  # in less light
+    (doubt,) = pointer.unlike(np.array([200.0, 120, 30]))
+    assert doubt == "what is followed has the colour (30, 120, 200), not (200, 30, 20) as told"
+    boxed = Pointer.of(Hint(0, (36, 46, 9, 9)), FOUND, 1, "none.mov")
+    assert boxed.unlike(np.array([200.0, 120, 30])) == ()
+
+
+def test_a_track_of_another_colour_than_was_told_is_doubted(tmp_path):
+    frames = np.full((40, 120, 200, 3), 90, np.uint8)
+    for i, frame in enumerate(frames):
+        frame[40 + i : 52 + i, 20 + 4 * i : 32 + 4 * i] = (200, 90, 40)
+    path = write_video(tmp_path / "a.mov", iter(frames))
+    for told, doubted in (((40, 90, 200), False), ((40, 150, 160), True)):
+        warnings = track(path, target=Hint(colour=told)).warnings
+        assert any("has the colour (40, 90, 200)" in warning for warning in warnings) == doubted

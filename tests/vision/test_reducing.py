@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.reducing import reduce
+from vidsindy_lite import write_video
+from vidsindy_lite.vision import reducing
+from vidsindy_lite.vision.reducing import ReducedFrames, reduce
 
 
 def rounded(factor):
@@ -26,3 +28,17 @@ def test_what_is_missing_of_the_last_squares_repeats_the_last_row_and_column(fac
     cut = np.pad(image, ((0, -7 % factor), (0, -10 % factor), (0, 0)), mode="edge")
     means = cut.reshape(len(cut) // factor, factor, -1, factor, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(reduce(image, factor), means, atol=rounded(factor))
+
+
+@pytest.mark.parametrize(("room", "reads"), [(1.0, 1), (0.8, 2)])
+def test_reduced_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads):
+    images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
+    path = write_video(tmp_path / "clip.mov", iter(images))
+    read, count = reducing.read_video, []
+    monkeypatch.setattr(reducing, "read_video", lambda path: count.append(path) or read(path))
+    monkeypatch.setattr(reducing, "_KEPT", int(room * images.nbytes / 4))
+    frames = ReducedFrames(path, 2)
+    for _ in range(2):
+        for frame, image in zip(frames, images, strict=True):
+            np.testing.assert_array_equal(frame, reduce(image, 2))
+    assert len(count) == reads

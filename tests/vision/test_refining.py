@@ -50,3 +50,30 @@ def test_the_centroid_and_area_of_a_disc_are_those_of_its_parts_of_pixels(centre
     np.testing.assert_allclose(view.centroid, centre, atol=0.02)
     np.testing.assert_allclose(view.colour, colour, atol=1)
     assert Lens(plate, 0.0).look(ground, np.eye(3), box, np.array(centre), colour, gain) is None
+
+
+@pytest.mark.parametrize(("shade", "faint"), [(90, False), (176, False), (192, True)])
+def test_a_view_before_ground_of_about_its_own_colour_is_faint(shade, faint):
+    ground = np.full((60, 80, 3), 90, np.uint8)
+    ground[:, 10:70] = shade
+    share = disc((40.0, 30.0), 8)
+    frame = np.rint((1 - share) * ground + share * 200).astype(np.uint8)
+    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
+    box, gain = np.array([32.0, 22, 16, 16]), np.ones(3, np.float32)
+    colour = np.full(3, 200.0)
+    view = Lens(plate, 0.0).look(frame, np.eye(3), box, np.array([40.0, 30]), colour, gain)
+    assert view.faint == faint
+
+
+@pytest.mark.parametrize("colour", [(75, 130, 110), (70, 98, 122)])
+def test_a_shadow_that_touches_the_target_is_no_part_of_it_unless_they_look_alike(colour):
+    ground = np.full((60, 80, 3), (100, 140, 175), np.uint8)
+    shade, share = 0.3 * disc((46.0, 36.0), 8), disc((38.0, 28.0), 8)
+    frame = np.rint(share * np.array(colour) + (1 - share) * (1 - shade) * ground).astype(np.uint8)
+    plate = Plate(np.stack([ground] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
+    box, gain = np.array([30.0, 20, 17, 17]), np.ones(3, np.float32)
+    view = Lens(plate, 0.0).look(
+        frame, np.eye(3), box, np.array([38.0, 28.0]), np.array(colour, float), gain
+    )
+    off = np.linalg.norm(view.centroid - [38, 28])
+    assert off < 2 if colour == (75, 130, 110) else off > 4

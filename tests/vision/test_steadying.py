@@ -4,7 +4,14 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.steadying import Steadying, _Relief, carry, displacement, stands_still
+from vidsindy_lite.vision.steadying import (
+    _MANY,
+    Steadying,
+    _Relief,
+    carry,
+    displacement,
+    stands_still,
+)
 
 SIZE = 960, 720
 
@@ -93,3 +100,20 @@ def test_pixels_by_which_maps_move_an_image():
     found = displacement(np.stack([np.eye(3), shift, np.diag([1.1, 1, 1])]), (200, 100))
     # The rms of a tenth of 40, 100 and 160 pixels.
     np.testing.assert_allclose(found, [0, 5, np.sqrt((16 + 100 + 256) / 3)])
+
+
+def test_pixels_say_it_better_than_many_corners_in_noise():
+    rng = np.random.default_rng(0)
+    scene = cv2.GaussianBlur(rng.normal(0, 1, (280, 360)).astype(np.float32), (0, 0), 6)
+    scene = 130 + 10 * scene / scene.std()
+    steadying, misses = Steadying(1), []
+    for k in range(12):
+        shift = np.array([1.5 * np.sin(k), 1.5 * np.cos(2 * k) - 1.5])
+        move = np.array([[1, 0, shift[0] - 20], [0, 1, shift[1] - 20]])
+        view = cv2.warpAffine(scene, move, (320, 240))[..., None]
+        noisy = view + rng.normal(0, 6, (240, 320, 3))
+        steadying.add(np.clip(noisy, 0, 255).astype(np.uint8))
+        here = carry(steadying.maps[-1], np.array([[160.0, 120]]))
+        misses.append(np.linalg.norm(here + shift - [160, 120]))
+    assert steadying._by_corners(_Relief.of(np.clip(noisy, 0, 255).astype(np.uint8)))[1] >= _MANY
+    assert np.median(misses) < 0.05

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ..arrays import Floats, Floats32, Image
+from ..arrays import Floats, Floats32, Image, Ints
 
 _RIM = 2  # pixels of each level that depend on what lies beyond the image
 _LEVELS = 4  # of the pyramid, the first of half the size
@@ -51,7 +51,7 @@ def align(before: list[Floats32], after: list[Floats32], guess: Floats) -> Align
     guess : ndarray, shape (3, 3)
         In pixels of the images of which the pyramids are.
     """
-    found, fitted = guess, None
+    found, fitted = _similar(guess, 2 * np.array(before[0].shape[::-1])), None
     for level in range(len(before), 0, -1):
         scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
         here = scale @ found @ back
@@ -60,6 +60,19 @@ def align(before: list[Floats32], after: list[Floats32], guess: Floats) -> Align
             return None
         found = back @ fitted.map @ scale
     return fitted and Aligned(found, 2 * fitted.error)
+
+
+def _similar(guess: Floats, size: Ints) -> Floats:
+    """The shift, turn and scale nearest to a guess in an image (width, height).
+
+    Other parts of it, as perspective, would stay as they are, since nothing is fitted to them.
+    """
+    u, v = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]).T * size[:, None]
+    zero, one = np.zeros(4), np.ones(4)
+    ends = guess @ [u, v, one]
+    rows = np.concatenate([np.column_stack([u, -v, one, zero]), np.column_stack([v, u, zero, one])])
+    c, s, right, down = np.linalg.lstsq(rows, (ends[:2] / ends[2]).ravel())[0]
+    return np.array([[c, -s, right], [s, c, down], [0, 0, 1]])
 
 
 def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float) -> Aligned | None:
@@ -85,9 +98,9 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
             return None
         miss = shown - gain * key - offset
         if step == 0:
-            offset = _median(miss[known])
+            offset = _middle(miss[known])
             miss -= offset
-        spread = max(1.4826 * _median(np.abs(miss[known])), _FAINT)
+        spread = max(1.4826 * _middle(np.abs(miss[known])), _FAINT)
         bound = max(_FIRM * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
         heavy = steep * weight.ravel()
@@ -114,7 +127,7 @@ def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float
     return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
 
 
-def _median(values: Floats | Floats32) -> float:
+def _middle(values: Floats | Floats32) -> float:
     """The median of every other value."""
     return float(np.median(values[::2]))
 

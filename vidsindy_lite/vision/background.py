@@ -71,7 +71,7 @@ def sample_frames(path: str | os.PathLike) -> NDArray[np.uint8]:
     return samples[:count]
 
 
-def _median(frames: Image) -> Image:
+def median_image(frames: Image) -> Image:
     """Median over the first axis of uint8 images, by a sorting network (8 times numpy's speed).
 
     Strip by strip: what is sorted stays in the cache, and the memory is not filled by copies.
@@ -119,7 +119,7 @@ def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: floa
         view = background[window]
         mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]] > 0
         better = group if off[0] < off[1] else ~group
-        view[mask] = _median(samples[:, *window][better])[mask]
+        view[mask] = median_image(samples[:, *window][better])[mask]
 
 
 def _others(changes: list[Floats32], floor: float) -> float:
@@ -236,7 +236,7 @@ class BackgroundModel:
     """
 
     def __init__(self, samples: Image) -> None:
-        self.background = _median(samples)
+        self.background = median_image(samples)
         step = 3 * max(1, samples.shape[2] // _DENSE)
         few, calm = samples[:, ::step, ::step], self.background[::step, ::step]
         self.noise = 1.4826 * float(np.median(np.maximum(few, calm) - np.minimum(few, calm)))

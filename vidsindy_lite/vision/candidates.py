@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import _median, light
+from .background import light, median_image
 from .pixels import lengths, relit
 
 _LARGEST = 2.5  # frames that the plate may hold, side by side
@@ -65,7 +65,7 @@ class Plate:
         self.size = size
         self.moves = not np.allclose(maps, np.eye(3))
         if not self.moves:
-            self.shift, self.image = np.eye(3), _median(samples)
+            self.shift, self.image = np.eye(3), median_image(samples)
             self.valid = np.full(self.image.shape[:2], 255, np.uint8)
             return
         corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (size - 1.0)
@@ -151,7 +151,7 @@ def _masked_median(
             missing = k - here  # samples before it that show nothing
             layers[k][~shown] = np.where(missing[~shown] % 2, 255, 0)[:, None]
             here += shown
-        result[top : top + strip[1]] = _median(layers)
+        result[top : top + strip[1]] = median_image(layers)
         count[top : top + strip[1]] = here
     return result, count
 
@@ -235,11 +235,19 @@ def cores(mask: Image, strength: Floats32) -> list[Image]:
     """
     _, whole, stats, _ = cv2.connectedComponentsWithStats(mask)
     areas = stats[:, cv2.CC_STAT_AREA].tolist()
-    totals = np.bincount(whole.ravel(), strength.ravel()).tolist()
+    large = stats[1:][stats[1:, cv2.CC_STAT_AREA] > _CORE[0] / _CORE[1]]
+    if not len(large):  # no whole has a part that is large enough
+        return []
+    low, high = large[:, :2].min(axis=0), (large[:, :2] + large[:, 2:4]).max(axis=0)
+    place = np.s_[low[1] : high[1], low[0] : high[0]]
+    whole, strength, inside = whole[place], strength[place], mask[place]
+    totals = np.bincount(whole.ravel(), strength.ravel(), len(areas)).tolist()
     found = []
     for level in _LEVELS:
-        core = np.zeros_like(mask)
-        plain = np.asarray(mask & (strength > level), np.uint8)
+        plain = np.asarray(inside & (strength > level), np.uint8)
+        if np.count_nonzero(plain) < _CORE[0]:
+            break
+        core = np.zeros_like(plain)
         _, labels, stats, _ = cv2.connectedComponentsWithStats(plain)
         for k in 1 + np.flatnonzero(stats[1:, cv2.CC_STAT_AREA] >= _CORE[0]):
             left, top, width, height, area = stats[k].tolist()
@@ -253,7 +261,8 @@ def cores(mask: Image, strength: Floats32) -> list[Image]:
                 areas.append(area)
                 totals.append(total)
         if core.any():
-            found.append(core)
+            found.append(np.zeros_like(mask))
+            found[-1][place] = core
     return found
 
 

@@ -40,6 +40,15 @@ class Whole(NamedTuple):
     plain: bool
 
 
+def shadowed(now: Floats32, ground: Floats32) -> Bools:
+    """Where (h, w) the same surface is seen in less light: darker by the same in all colours."""
+    ratio = cv2.split((now + 4) / (ground + 4))
+    mean = sum(ratio) / 3
+    apart = np.maximum.reduce(ratio) - np.minimum.reduce(ratio)
+    least, most, equal = _SHADOW
+    return np.asarray((mean > least) & (mean < most) & (apart < equal * mean))
+
+
 def whole(
     own: Bools, differs: Bools, other: Bools, now: Floats32, ground: Floats32
 ) -> Whole | None:
@@ -47,11 +56,7 @@ def whole(
 
     Not all that `differs` has an `other` colour: what lies between ground and target is its blur.
     """
-    ratio = cv2.split((now + 4) / (ground + 4))
-    mean = sum(ratio) / 3
-    apart = np.maximum.reduce(ratio) - np.minimum.reduce(ratio)
-    least, most, equal = _SHADOW
-    shadow = (mean > least) & (mean < most) & (apart < equal * mean)
+    shadow = shadowed(now, ground)
     mask = (own | (differs & ~shadow)).astype(np.uint8)
     _, labels = cv2.connectedComponents(np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, _CORE)))
     inside = np.bincount(labels[own], minlength=2)

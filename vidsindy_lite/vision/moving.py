@@ -28,7 +28,7 @@ from .occluders import hidden
 from .pixels import relit
 from .pointing import Pointer, alike
 from .recalling import recalled
-from .reducing import reduce, reduced, reduction
+from .reducing import ReducedFrames, reduce, reduced, reduction
 from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
@@ -46,6 +46,7 @@ _LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a came
 _RECALLED = 2.0  # pixels, about, to which a target is recalled that is not seen whole
 _PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
 _DENSE = 640  # pixels in a row of which the noise is known well
+_RARELY = 0.5  # share of the views before ground of about the target's colour, which are of parts
 _LARGE = 0.01  # share of the image that a target hardly fills
 _RESTLESS = 0.03  # of their length, by which the sides of a target hardly change in a frame
 _PIXELS = 2  # of each side that change with where its two ends lie between pixels
@@ -127,7 +128,7 @@ def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
 
 
 def _camera(
-    path: str | os.PathLike, info: VideoInfo, small: Image, sampled: Ints, factor: int
+    frames: ReducedFrames, info: VideoInfo, small: Image, sampled: Ints
 ) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
@@ -135,11 +136,11 @@ def _camera(
     say no more than their errors only add these, and so do maps by which the frames fit together
     worse than they do at rest.
     """
-    still = stands_still(small)
+    still, factor = stands_still(small), frames.factor
     if still is False:
         steadying = Steadying(factor)
-        for frame in read_video(path):
-            steadying.add(reduce(frame, factor))
+        for frame in frames:
+            steadying.add(frame)
         motion = steadying.motion()
         if _plainly(motion, info.size, factor):
             at = np.minimum(sampled, len(motion.maps) - 1)
@@ -164,7 +165,7 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(path, samples)
-    found, lights = sighted(path, film)
+    found, lights = sighted(film)
     lens = lens_of(samples, film)
     if hint is None:
         return _followed(path, film, lens, found, lights)
@@ -182,7 +183,7 @@ def _followed(
     path: str | os.PathLike, film: "Film", lens: Lens, found: list[list[Candidate]],
     lights: list[Floats32], *, hinted: bool = False, pointer: Pointer | None = None,
 ) -> Followed:  # fmt: skip
-    """What moves most plainly, of that at which a hint points; gaps are filled if it is hinted."""
+    """What moves most plainly, of that at which a hint points, its gaps filled."""
     seen, paths = linked(pointer.like(found) if pointer else found, film, pointer)
     doubts: tuple[str, ...] = ()
     if pointer is None and paths:
@@ -203,11 +204,12 @@ def _followed(
                    "motion is part of the track",)  # fmt: skip
     rows = max(paths, key=lambda path: np.isin(path.rows, first).sum()).rows
     views = viewed(path, film, lens, expected(seen, rows, film, len(found)), lights)
+    if pointer is not None and any(views):
+        doubts += pointer.unlike(np.median([view.colour for view in views if view], axis=0))
     followed = finished(views, film.motion, doubts)
-    if not hinted:
-        return followed
     start, last = seen.frame[rows[[0, -1]]]
-    return remembered(path, lens, lights, followed, views, np.s_[start : last + 1])
+    sure = np.s_[start : last + 1]
+    return remembered(path, lens, lights, followed, views, sure, told=hinted)
 
 
 def linked(
@@ -249,7 +251,7 @@ class Film(NamedTuple):
     `sure` is whether its camera is known to be at rest, or to move as `motion` says.
     """
 
-    factor: int
+    frames: ReducedFrames
     motion: CameraMotion
     maps: Floats
     plate: Plate
@@ -257,6 +259,11 @@ class Film(NamedTuple):
     sampled: Ints
     places: list[Place]
     sure: bool
+
+    @property
+    def factor(self) -> int:
+        """By how much the frames are reduced."""
+        return self.frames.factor
 
     @classmethod
     def of(cls, path: str | os.PathLike, samples: Image, rests: bool = False) -> "Film":
@@ -266,9 +273,9 @@ class Film(NamedTuple):
         sampled = np.unique(spread)[: len(samples)]
         factor = reduction((samples.shape[2], samples.shape[1]))
         small = np.array([reduce(sample, factor) for sample in samples])
-        motion, sure = at_rest(info.frames), True
+        frames, motion, sure = ReducedFrames(path, factor), at_rest(info.frames), True
         if not rests:
-            motion, sure = _camera(path, info, small, sampled, factor)
+            motion, sure = _camera(frames, info, small, sampled)
         sampled = np.minimum(sampled, len(motion.maps) - 1)
         maps = reduced(motion.maps, factor)
         known = np.isfinite(motion.errors[sampled])
@@ -276,17 +283,15 @@ class Film(NamedTuple):
         noise = _noise(small, maps[sampled], plate)
         places = lingering(plate, small, maps[sampled], known, tolerance(plate, noise))
         uncover(plate, small, maps[sampled], known, places)
-        return cls(factor, motion, maps, plate, noise, sampled, places, sure)
+        return cls(frames, motion, maps, plate, noise, sampled, places, sure)
 
 
-def sighted(
-    path: str | os.PathLike, film: Film, targets: int = 1
-) -> tuple[list[list[Candidate]], list[Floats32]]:
+def sighted(film: Film, targets: int = 1) -> tuple[list[list[Candidate]], list[Floats32]]:
     """What may be the target in each frame, and how bright the frame is."""
     difference = Difference(film.plate, film.noise)
     found = [
-        difference.candidates(reduce(frame, film.factor), here)
-        for frame, here in zip(read_video(path), film.maps, strict=False)
+        difference.candidates(frame, here)
+        for frame, here in zip(film.frames, film.maps, strict=False)
     ]
     kept = [
         difference.travelling(uncommon(some, targets), here)
@@ -390,7 +395,11 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
     inside &= ~hidden(outlines, steady, areas)
-    good = fitting(at, steady, areas, inside)
+    faint = np.array([view.faint for view in shown])
+    if faint.mean() < _RARELY:  # else it is so everywhere
+        inside &= ~faint
+    alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
+    good = fitting(at, steady, areas, inside, alone)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):
         doubts += (f"in {len(untold)} frames of {n} the target is seen, but not how the camera "
@@ -410,14 +419,14 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
 
 def remembered(
     path: str | os.PathLike, lens: Lens, lights: list[Floats32], found: Followed,
-    views: list[View | None], sure: slice,
+    views: list[View | None], sure: slice, *, told: bool,
 ) -> Followed:  # fmt: skip
-    """A track with its gaps filled where the target is recalled from its path, and beyond that."""
+    """A track with its gaps filled; if somebody told the target, carried on beyond its ends."""
     pixels, errors = found.pixels.copy(), found.errors.copy()
     inside = np.full_like(pixels, np.nan)
     inside[sure] = pixels[sure]
     if np.isfinite(inside[:, 0]).any():
-        places = recalled(path, lens, lights, inside, found.maps, entire(views)[0])
+        places = recalled(path, lens, lights, inside, found.maps, entire(views)[0], told=told)
         known = np.isfinite(places[:, 0])
         pixels[known], errors[known] = places[known], _RECALLED
     return found._replace(pixels=pixels, errors=errors)

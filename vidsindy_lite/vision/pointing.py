@@ -16,6 +16,7 @@ from .steadying import carry
 from .video import read_frame
 
 _COLOUR = 70.0  # grey levels between colours that are not alike
+_UNLIKE = 0.5  # of 1, to which colours are alike at most that are not the same
 _SIZE = 2.2  # logarithm of the factor, of nine, between areas that are not alike
 _COVERS = 0.25  # share of what a candidate and the box cover together, that both cover
 _RIM = 1.0  # pixels by which a box may be drawn too small
@@ -46,7 +47,15 @@ class Pointer:
         here = [(_overlap(c.box, box), c) for c in found[hint.frame] if _fits(c, box, middle)]
         share, one = max(here, key=lambda pair: pair[0], default=(0.0, None))
         if one is None or share < _COVERS:
-            one = _boxed(reduce(read_frame(path, hint.frame), factor), box, middle)
+            frame = read_frame(path, hint.frame)
+            there = np.array(hint.box[:2]) + (np.array(hint.box[2:]) - 1) / 2
+            width, height = frame.shape[1::-1]
+            if not (0 <= there[0] < width and 0 <= there[1] < height):
+                raise ValueError(
+                    f"box: must have its middle in the image of {width} x {height} pixels, "
+                    f"got {_told(hint.box)}"
+                )
+            one = _boxed(reduce(frame, factor), box, middle)
         return cls(hint, replace(one, quality=TOLD))
 
     def like(self, found: Sequence[Sequence[Candidate]]) -> list[list[Candidate]]:
@@ -95,6 +104,18 @@ class Pointer:
         u, v = there
         return (which + f"is not what is followed, which is at ({u:.0f}, {v:.0f}) in that frame",)
 
+    def unlike(self, colour: Floats) -> tuple[str, ...]:
+        """Has what is followed, of this colour, another one than is told?"""
+        if self.hint.colour is None or alike(colour, np.array(self.hint.colour[::-1])) > _UNLIKE:
+            return ()
+        here = _told(colour[::-1].round().tolist())
+        return (f"what is followed has the colour {here}, not {_told(self.hint.colour)} as told",)
+
+
+def _told(numbers: Sequence[float]) -> str:
+    """Numbers as a user writes them."""
+    return f"({', '.join(f'{number:g}' for number in numbers)})"
+
 
 def _sized(found: Sequence[Sequence[Candidate]], area: float) -> list[list[Candidate]]:
     """Candidates as far as they are about as large."""
@@ -125,8 +146,6 @@ def _boxed(frame: Image, box: Floats, middle: Floats) -> Candidate:
     low, high = middle - box[2:] / 4, middle + box[2:] / 4
     rows = slice(max(int(low[1]), 0), int(high[1]) + 1)
     inner = frame[rows, max(int(low[0]), 0) : int(high[0]) + 1].reshape(-1, 3)
-    if not len(inner):
-        raise ValueError(f"box: must lie in the image, got {box.tolist()}")
     return Candidate(middle, box, 0.8 * box[2] * box[3], np.median(inner, axis=0).astype(float), 1)
 
 

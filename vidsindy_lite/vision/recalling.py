@@ -1,10 +1,10 @@
-"""Where a target that was pointed at is in frames that show only a part of it.
+"""Where a target is in frames that show only a part of it.
 
 Before a ground of its own colour, or where it touches other things, views of the target are of a
 part of it, and are left out. Between two views of the whole target its motion tells the place,
 though, and there it is, if a part of it is seen there, or what it looks like explains what the
-frame shows better than the ground does. Before the first view and behind the last it is carried on
-from frame to frame by its looks, as long as it is found.
+frame shows better than the ground does. One that was pointed at is carried on before the first view
+and behind the last from frame to frame by its looks, as long as it is found.
 """
 
 import os
@@ -24,7 +24,8 @@ _BESIDE = 4  # views on each side of a gap that say how it moves in between
 _MARGIN = 3  # pixels around the target's outline that are a part of its looks
 _ASTRAY = 0.5, 4.0  # sides of the target, and pixels more, that it may be from where it is expected
 _PART = 0.75  # sides of the target from its middle to that of a part of it
-_UNSURE = 0.25  # of its side: a place that is known no better than that is not known
+_UNSURE = 0.25  # of its side: a place that is known no better than that is not known; and
+_ROUGHLY = 2.0  # pixels, if nobody said which is the target
 _LIKE = 0.4  # share of the change in a frame that the target's looks explain
 
 
@@ -82,7 +83,7 @@ def _peak(values: Floats32, i: int) -> float:
 
 def recalled(
     path: str | os.PathLike, lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
-    views: Sequence[View | None],
+    views: Sequence[View | None], *, told: bool,
 ) -> Floats:  # fmt: skip
     """Places (n, 2) of the target in the gaps of a track, NaN elsewhere.
 
@@ -98,14 +99,18 @@ def recalled(
         Where each frame lies in the first one.
     views : sequence of View or None
         Of the whole target, where there is a track.
+    told : bool
+        Was it pointed at? Else only gaps count in which its motion is known to two pixels.
     """
-    looks = _looks(path, lens, lights, pixels, maps, views)
     at = np.flatnonzero(np.isfinite(pixels[:, 0]))
     places = np.full(pixels.shape, np.nan)
-    for order in (range(int(at[-1]), len(pixels)), range(int(at[0]), -1, -1)):
+    if len(at) == (len(pixels) if told else np.ptp(at) + 1):
+        return places
+    looks = _looks(path, lens, lights, pixels, maps, views)
+    for order in (range(int(at[-1]), len(pixels)), range(int(at[0]), -1, -1)) if told else ():
         _carry_on(places, order, looks, pixels, maps, views)
     for before, after in zip(at[:-1].tolist(), at[1:].tolist(), strict=True):
-        _fill(places, before, after, looks, pixels, maps, views)
+        _fill(places, before, after, looks, pixels, maps, views, np.inf if told else _ROUGHLY)
     return places
 
 
@@ -168,21 +173,24 @@ def _carry_on(
 
 def _fill(
     places: Floats, before: int, after: int, looks: dict[int, Look], pixels: Floats, maps: Floats,
-    views: Sequence[View | None],
+    views: Sequence[View | None], bound: float,
 ) -> None:  # fmt: skip
-    """Find places between two views, where the motion on both sides leads."""
+    """Find places between two views, where the motion on both sides leads to so many pixels."""
     known = [one for i in (before, after) if (one := _template(looks, views, i))]
     at = np.flatnonzero(np.isfinite(pixels[:, 0]))
     beside = np.concatenate([at[at <= before][-_BESIDE:], at[at >= after][:_BESIDE]])
     frames = np.arange(before + 1, after)
     way, rough = (_curve(beside - before, pixels[beside], frames - before, k) for k in (3, 2))
-    for i, place, other in zip(frames.tolist(), way, rough, strict=True):
+    apart = np.linalg.norm(way - rough, axis=1)
+    if apart.max(initial=0) > bound:
+        return
+    for i, place, unsure in zip(frames.tolist(), way, apart, strict=True):
         if i not in looks:
             continue
         expected, view = carry(np.linalg.inv(maps[i]), place[None])[0], views[i]
         side = min(np.sqrt(views[k].area) for k in (before, after))  # type: ignore[union-attr]
         part = view is not None and np.linalg.norm(view.centroid - expected) < _PART * side
-        sure = np.linalg.norm(place - other) < _UNSURE * side
+        sure = unsure < _UNSURE * side
         if sure and (part or any(one.found(looks[i], expected) for one in known)):
             places[i] = place
 

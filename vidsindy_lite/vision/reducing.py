@@ -1,10 +1,15 @@
 """Frames reduced by a whole factor, and maps between their pixels."""
 
+import os
+from collections.abc import Iterator
+
 import cv2
 import numpy as np
 
 from ..arrays import Floats, Image
+from .video import read_video
 
+_KEPT = 64_000_000  # bytes of reduced frames that are kept
 LONGEST = 480  # pixels of the longer side of a reduced frame
 
 
@@ -27,6 +32,30 @@ def reduce(image: Image, factor: int) -> Image:
     if factor == 1:
         return image
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+class ReducedFrames:
+    """The frames of a video file, reduced by a factor; read once if they are few."""
+
+    def __init__(self, path: str | os.PathLike, factor: int) -> None:
+        self.path, self.factor = path, factor
+        self.kept: list[Image] | None = None
+
+    def __iter__(self) -> Iterator[Image]:
+        if self.kept is not None:
+            yield from self.kept
+            return
+        kept: list[Image] = []
+        size = 0
+        for frame in read_video(self.path):
+            small = reduce(frame, self.factor)
+            size += small.nbytes
+            if size <= _KEPT:
+                kept.append(small)
+            else:
+                kept.clear()
+            yield small
+        self.kept = kept if size <= _KEPT else None
 
 
 def enlarged(factor: float) -> Floats:

@@ -14,16 +14,18 @@ from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .candidates import Plate
-from .colours import whole
+from .colours import shadowed, whole
 from .pixels import dot, lengths, relit
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
 _GROW = 0.5  # of its size, by which a window exceeds the target; and
 _ROOM = 8  # pixels more
+_FAINT, _RIM = 2.0, 0.9  # tolerances by which a ground differs from the target; share of its rim
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
+_ASTRAY = 0.3  # of its size, by which a view may be off the way
 _BESIDE = 5  # views before and after such a meeting, which show how large it was and is
 
 
@@ -33,7 +35,7 @@ class View:
 
     Centroid (2,), area, mean colour, is it clear of the image's border?, convex outline (k, 2);
     `whole` is the view of it with all that has another colour in one piece with it, if compact. The
-    area is 0 where nothing has the target's colour.
+    area is 0 where nothing has the target's colour. It is `faint` before ground like itself.
     """
 
     centroid: Floats
@@ -42,6 +44,7 @@ class View:
     inside: bool
     outline: Floats
     whole: "View | None" = None
+    faint: bool = False
 
 
 class Lens:
@@ -79,7 +82,8 @@ class Lens:
         change = now - ground
         smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), self.blur), np.float32)
         differs = lengths(smooth)
-        mask = (differs > self._tolerance(then)) & known
+        bound = self._tolerance(then)
+        mask = (differs > bound) & known
         contrast = colour.astype(np.float32) - ground
         square = dot(contrast, contrast)
         share = dot(smooth, contrast) / np.maximum(square, self.least**2)
@@ -87,16 +91,19 @@ class Lens:
         # What is of another colour, e.g. a shadow or a hand: off the line from ground to target.
         off = miss >= np.maximum(0.45 * np.sqrt(square), 2 * self.least)
         own = mask & (share > 0.25) & ~off
+        # Where half of it over the ground would look like one, nothing is told from a shadow.
+        dark = shadowed(ground + smooth, ground)
+        own &= ~dark | shadowed(ground + np.float32(0.5) * contrast, ground)
         label = _nearest(own, centre - low)
         part = label is not None
         if label is None and (label := _nearest(mask, centre - low)) is None:
             return None
-        view = self._measure(label, change, contrast, low, high, now)
+        view = self._measure(label, change, contrast, low, bound, now)
         found = whole(label, mask, mask & (off | (share < 0)), now, ground)
         if found is None or found.plain:
             return replace(view, whole=found and view) if part else None
         contrast = found.colours - ground
-        all_ = self._measure(found.label, change, contrast, low, high, now)
+        all_ = self._measure(found.label, change, contrast, low, bound, now)
         return replace(view if part else replace(all_, area=0.0), whole=all_)
 
     def _tolerance(self, then: Image) -> Floats32:
@@ -105,11 +112,12 @@ class Lens:
         return self.least + _EDGE[self.plate.moves] * slope.astype(np.float32)
 
     def _measure(
-        self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, high: Floats,
+        self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, bound: Floats32,
         now: Floats32,
     ) -> View:  # fmt: skip
-        """Centroid and area of one connected part."""
+        """Centroid and area of one connected part; `bound` tells what differs from the ground."""
         near = cv2.dilate(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        rim = near & ~label
         core = cv2.erode(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         square = dot(contrast, contrast)
         alpha = dot(change, contrast) / np.maximum(square, self.least**2)
@@ -124,10 +132,11 @@ class Lens:
         first = low + [columns[0], rows[0]]
         last = low + [columns[-1], rows[-1]]
         inside = bool((first > 0).all() and (last < self.plate.size - 1).all())
+        faint = bool((square[rim] < (_FAINT * bound[rim]) ** 2).mean() > _RIM)
         shade = now[core if core.any() else label].mean(axis=0)
         at = np.argwhere(label)[:, ::-1].astype(np.int32)
         outline = low + np.asarray(cv2.convexHull(at))[:, 0].astype(float)
-        return View(low + centroid, area, shade, inside, outline)
+        return View(low + centroid, area, shade, inside, outline, faint=faint)
 
 
 def _nearest(mask: Bools, centre: Floats) -> Bools | None:
@@ -143,8 +152,13 @@ def _nearest(mask: Bools, centre: Floats) -> Bools | None:
     return labels == best
 
 
-def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Bools:
-    """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2)."""
+def fitting(
+    frames: Floats, places: Floats, areas: Floats, inside: Bools, alone: Bools | None = None
+) -> Bools:
+    """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2).
+
+    If most of them show it `alone`, those that do not must be where the motion leads.
+    """
     inside = inside & ~joined(areas)
     good = inside
     logs = np.log(np.maximum(areas, 1e-3))
@@ -152,13 +166,16 @@ def fitting(frames: Floats, places: Floats, areas: Floats, inside: Bools) -> Boo
         use = np.flatnonzero(good)
         if len(use) < 3:
             return good
-        usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="nearest"))
+        usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="mirror"))
         good = inside & (np.abs(logs - usual) < np.log(_WHOLE))
+    room = _ASTRAY * np.sqrt(areas)
+    if alone is not None and alone[good].mean() > 0.5:
+        room[~alone] = 0
     while (use := np.flatnonzero(good)).size >= 7:
         told = [_leave_out(frames[use], places[use], i) for i in range(len(use))]
         off, unsure = np.array(told).T
         usual = max(float(np.median(off)), 0.05)
-        over = off / (np.maximum(10 * usual, 1 + 0.3 * np.sqrt(areas[use])) + unsure)
+        over = off / (np.maximum(10 * usual, 1 + room[use]) + unsure)
         # A wrong place spoils what its neighbours seem to be: the worst of them goes first.
         worst = (over > 1) & (over == maximum_filter1d(over, 7))
         if not worst.any():
@@ -181,7 +198,7 @@ def joined(areas: Floats) -> Bools:
         before, after = areas[max(first - _BESIDE, 0) : first], areas[last + 1 :][:_BESIDE]
         if min(len(before), len(after)) == _BESIDE:
             usual = max(np.median(before), np.median(after))
-            found[first : last + 1] = np.median(areas[first : last + 1]) > _JOINED * usual
+            found[first : last + 1] = np.median(areas[first : last + 1]) > _WHOLE * usual
     return found
 
 
@@ -206,7 +223,8 @@ def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
     A quartic through these says it. Where a target turns within a few frames, or some of them are
     missing, no polynomial is right, and a parabola says something else.
     """
-    others = np.array([j for j in range(max(i - 3, 0), min(i + 4, len(frames))) if j != i])
+    first = min(max(i - 3, 0), max(len(frames) - 7, 0))
+    others = np.array([j for j in range(first, min(first + 7, len(frames))) if j != i])
     t = frames[others] - frames[i]
     if len(others) < 4 or np.ptp(t) > 15:
         return 0.0, 0.0
@@ -215,7 +233,8 @@ def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
         np.linalg.lstsq(powers, places[others])[0][-1] for powers in (basis, basis[:, -3:])
     )
     off, unsure = np.linalg.norm([quartic - places[i], quartic - parabola], axis=1)
-    return float(off), float(unsure)
+    beyond = t.min() > 0 or t.max() < 0
+    return float(off), float(unsure * (1 + beyond))
 
 
 def scatter(frames: Ints, places: Floats) -> float:

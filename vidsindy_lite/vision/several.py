@@ -60,7 +60,7 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     samples = sample_frames(path)
     # Before a plain background, all that could tell of a camera's motion may be the targets.
     film = Film.of(path, samples, BackgroundModel(samples).camera_rests)
-    found, lights = sighted(path, film, count)
+    found, lights = sighted(film, count)
     seen, paths = linked(found, film, most=count * _MEETINGS)
     lanes, strange = _lanes(seen, paths, count)
     ways = [_joined([expected(seen, p.rows, film, len(found)) for p in lane]) for lane in lanes]

@@ -29,6 +29,7 @@ _AS_SURE = 3.0  # times the error of another map that is about as good
 PLAINLY = 10.0  # standard errors of a displacement that is one
 _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
 _SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
+_EXACTLY = 0.05  # reduced pixels: corners that tell a map no better need another witness, too
 _TELLING = 10  # corners that must share a motion, if it is to be the camera's
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 _WIDE = 0.6  # times the image's own spread, that of corners that tell the camera's motion at least
@@ -208,7 +209,7 @@ class Steadying:
         """Where the key frame lies in another: by corners; if these are few, perhaps by pixels."""
         assert self.key is not None
         found, count = self._by_corners(relief)
-        if found is not None and count >= _MANY:
+        if found is not None and count >= _MANY and found.error < _EXACTLY:
             return found
         direct = align(self.key.levels, relief.levels, self.last)
         both = [one for one in (found, direct) if one is not None and one.error < _VAGUE]

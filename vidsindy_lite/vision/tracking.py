@@ -98,7 +98,8 @@ def track(
         * "auto": "background" as long as camera, light and background are at rest, and the target
           is of one colour. Else the
           camera's motion and the light's are taken out, and of all that moves the plainest path is
-          followed: something that travels, keeps its colour and turns gently.
+          followed: something that travels, keeps its colour and turns gently. Gaps of a few
+          frames in which a part of it shows are filled where its motion leads.
         * "background": for a camera at rest, the most exact. The target may turn and change its
           size, not its shape, and is whole in at least a quarter of the frames that show any of
           it. It must stay away from each place for at least a fifth of the frames: what never
@@ -106,8 +107,8 @@ def track(
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
-        Which of the things that move is the target, for "auto". Gaps of a few frames in which a
-        part of it shows are filled where its motion leads.
+        Which of the things that move is the target, for "auto". It is then carried on beyond its
+        first and last whole view, too.
 
     Returns
     -------
