@@ -14,6 +14,20 @@ TRUTH = np.column_stack([30 + 4.4 * np.arange(N), 110 - 25 * np.sin(np.arange(N)
 HINT = Hint(frame=10, box=(*(TRUTH[10] - 12), 25, 25))
 
 
+def plain(path, truth, radius, shown=N):
+    """A film of a red disc before a grey wall, with its lens, light and views of the whole."""
+    frames = np.full((N, 200, 320, 3), 120, np.uint8)
+    for frame, place in zip(frames[:shown], truth, strict=False):
+        cv2.circle(frame, tuple(np.rint(16 * place).astype(int)), 16 * radius, (30, 30, 210),
+                   -1, cv2.LINE_AA, 4)  # fmt: skip
+    maps = np.tile(np.eye(3), (N, 1, 1))
+    lens = Lens(Plate(np.full((3, 200, 320, 3), 120, np.uint8), maps[:3], np.ones(3, bool)), 1.0)
+    square = radius * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    area = round(np.pi * radius**2)
+    views = [View(place, area, np.zeros(3), True, place + square) for place in truth]
+    return write_video(path, iter(frames)), lens, [np.ones(3, np.float32)] * N, maps, views
+
+
 def film(path, post, wall):
     """A red ball that flies behind a post, or before a wall of its colour, past other things."""
     rng = np.random.default_rng(0)
@@ -56,19 +70,9 @@ def test_what_is_hidden_altogether_stays_a_gap(tmp_path):
 
 
 def test_beyond_its_views_a_target_is_carried_on_as_long_as_it_is_found(tmp_path):
-    frames = np.full((N, 200, 320, 3), 120, np.uint8)
-    for i, place in enumerate(TRUTH):
-        if i < 54:  # then it is gone
-            cv2.circle(frames[i], tuple(np.rint(16 * place).astype(int)), 16 * 11, (30, 30, 210),
-                       -1, cv2.LINE_AA, 4)  # fmt: skip
-    path = write_video(tmp_path / "clip.mov", iter(frames))
-    maps = np.tile(np.eye(3), (N, 1, 1))
-    lens = Lens(Plate(np.full((3, 200, 320, 3), 120, np.uint8), maps[:3], np.ones(3, bool)), 1.0)
-    square = np.array([[-11.0, -11], [11, -11], [11, 11], [-11, 11]])
-    views = [View(p, 380.0, np.zeros(3), True, p + square) for p in TRUTH]
+    path, lens, lights, maps, views = plain(tmp_path / "clip.mov", TRUTH, 11, shown=54)
     pixels = TRUTH.copy()
     pixels[:8], pixels[45:] = np.nan, np.nan
-    lights = [np.ones(3, np.float32)] * N
     places = recalled(path, lens, lights, pixels, maps, views, told=True)
     found = np.isfinite(places[:, 0])
     np.testing.assert_array_equal(np.flatnonzero(found), [*range(8), *range(45, 54)])
@@ -83,20 +87,11 @@ def test_beyond_its_views_a_target_is_carried_on_as_long_as_it_is_found(tmp_path
 
 @pytest.mark.parametrize("sharp", [1.0, 30.0])
 def test_without_a_hint_a_gap_is_filled_where_its_motion_is_known_to_two_pixels(tmp_path, sharp):
-    frames = np.full((N, 200, 320, 3), 120, np.uint8)
     at = np.arange(N)
     truth = np.column_stack([30 + 4.4 * at, 100 + sharp * np.tanh((at - 30) / 4)])
-    for frame, place in zip(frames, truth, strict=True):
-        cv2.circle(frame, tuple(np.rint(16 * place).astype(int)), 16 * 25, (30, 30, 210),
-                   -1, cv2.LINE_AA, 4)  # fmt: skip
-    path = write_video(tmp_path / "clip.mov", iter(frames))
-    maps = np.tile(np.eye(3), (N, 1, 1))
-    lens = Lens(Plate(np.full((3, 200, 320, 3), 120, np.uint8), maps[:3], np.ones(3, bool)), 1.0)
-    square = np.array([[-25.0, -25], [25, -25], [25, 25], [-25, 25]])
-    views = [View(p, 1963.0, np.zeros(3), True, p + square) for p in truth]
+    path, lens, lights, maps, views = plain(tmp_path / "clip.mov", truth, 25)
     pixels = truth.copy()
     pixels[28:33] = np.nan
     for told in (True, False):
-        lights = [np.ones(3, np.float32)] * N
         places = recalled(path, lens, lights, pixels, maps, views, told=told)
         assert np.isfinite(places[28:33, 0]).all() == (told or sharp < 2)

@@ -390,10 +390,8 @@ def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
 def _cheapest_two(
     problem: Problem, state: State, model: Linearisation, there: State
 ) -> Iterator[tuple[float, State]]:
-    """The cheapest law around a state in another frame and its closest rival, with their costs.
-
-    The quadratic model around the law knows them: what a move does to polynomials is exact.
-    """
+    """The cheapest law around a state in another frame and its closest rival, with their costs."""
+    # The quadratic model around the law knows them: what a move does to polynomials is exact.
     columns, size = problem.columns(there), state.coefficients.size
     back = shift_matrix(problem.exponents, there.offset - state.offset)
     axes = np.flatnonzero(there.moving)

@@ -369,10 +369,7 @@ class PolynomialSystem:
         )
 
     def _right(self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str) -> str:
-        """The right-hand side of an equation, given how terms, fractions and products are written.
-
-        Terms without their slopes.
-        """
+        """The right-hand side of an equation, given terms without slopes and how it is written."""
         column = self.coefficients[:, j]
         above = _sum_text(np.where(self.implicit, 0.0, column), terms, digits, times)
         below = np.where(self.implicit, -column, 0.0)
