@@ -74,4 +74,5 @@ def unseen(
     for entry in np.argsort(-reach, axis=None, kind="stable")[: int((reach > 1).sum())].tolist():
         row, j = divmod(entry, law.d)
         low, high = absent[row, j]
-        yield f"{place(law, j * len(law.terms) + row)} ({low:.2g} to {high:.2g})"
+        between = f"{low:.2g} to {high:.2g}" if np.isfinite(most[row, j]) else "of any size"
+        yield f"{place(law, j * len(law.terms) + row)} ({between})"

@@ -111,7 +111,7 @@ class Wider:
         The same.
     searched, further : ndarray of int
         Places in the coefficients, equation by equation: of the old candidates, and of the terms
-        that the library has not.
+        that the library has not, not even as a function of another name.
     prices : ndarray
         Of all places.
     """
@@ -159,14 +159,13 @@ class Wider:
 
 
 def widened(problem: Problem, fit: Fit) -> Wider:
-    """The last fit among terms beyond its library; of a fraction, whose terms are others, none."""
+    """The last fit among terms beyond its library; of a fraction, in its numerators."""
     form, size, d = problem.form, len(problem.exponents), problem.d
     equations = np.flatnonzero(form.candidates.any(axis=0))
     grid = fit.collocation.grid
     budget = BUDGET / max(grid.x.size, grid.r * d) / len(equations)
     law, exponents = problem.law(fit.state), problem.exponents
-    if not (law.support & law.implicit[:, None]).any():
-        exponents = _higher(exponents, form.states, budget)
+    exponents = _higher(exponents, form.states, budget)
     l, new = len(exponents), len(exponents) - size
 
     def padded(array: NDArray[Any]) -> NDArray[Any]:
@@ -176,7 +175,7 @@ def widened(problem: Problem, fit: Fit) -> Wider:
     shared = places.copy()
     shared[:, :size] = places[:, :size].ravel()[form.shared].reshape(d, size)
     known = padded(fit.collocation.known)
-    return Wider(
+    wider = Wider(
         law=replace(law, exponents=exponents, coefficients=padded(law.coefficients)),
         state=replace(
             fit.state,
@@ -190,6 +189,14 @@ def widened(problem: Problem, fit: Fit) -> Wider:
         further=places[equations, size:].ravel(),
         prices=np.tile(term_penalties(exponents, problem.measured[0][1].shape[1], SURE), d),
     )
+    return _renamed_left_out(wider) if form.functions else wider
+
+
+def _renamed_left_out(wider: Wider) -> Wider:
+    """The same without further terms that the candidates make, as a function may be a monomial."""
+    model = wider.model.of(np.concatenate([wider.searched, wider.further]))
+    _, variance = newcomers(model.information, model.gradient, len(wider.searched))
+    return replace(wider, further=wider.further[np.isfinite(variance)])
 
 
 def _higher(exponents: Ints, d: int, budget: float) -> Ints:

@@ -166,7 +166,8 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
 
 def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     residual = residual_noise(fit)
-    ratio = np.where(residual > RESOLVED, residual / problem.noise, 0.0)
+    seen = (fit.collocation.counts > 0) & (residual > RESOLVED)
+    ratio = np.where(seen, residual / problem.noise, 0.0)
     misses = ~(ratio < MISFIT)
     # A curve without a law follows errors that last, too: they are no misfit.
     if misses.any() and wider.beyond.count and not wider.beyond.significant:
@@ -174,14 +175,13 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     if misses.any():
         j = int(np.where(misses, ratio, 0.0).argmax())
         told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
-        times = (
-            f"{ratio[j]:.1f}" if ratio[j] < BEYOND_COUNTING else f"more than {BEYOND_COUNTING:g}"
-        )
+        many = ratio[j] > BEYOND_COUNTING
+        times = f"more than {BEYOND_COUNTING:g}" if many else f"{ratio[j]:.1f}"
         yield (
             f"the curve misses the data of {problem.form.names[j]} by "
             f"{residual[j] * problem.units.scale[j]:.3g} ({100 * residual[j]:.3g} % of its spread, "
-            f"{times} times {told}): the law may lie outside the library (raise the degree), the "
-            "motion may not be autonomous, or errors last for several samples"
+            f"{times} times {told}): errors may last for several samples, the law may lie outside "
+            "the library (raise the degree), or the motion may not be autonomous"
         )
 
 

@@ -16,6 +16,9 @@ from .candidates import OTHERS, Library
 from .library import CLOCK, Function, closure, velocity_names
 from .polynomials import PolynomialSystem, parse_term
 
+SIZES, POINTS = (-3, 6), 64
+"""Decades of the sizes of points at which a function is asked whether it is none, and how many."""
+
 
 @dataclass(frozen=True, eq=False)
 class Form:
@@ -72,15 +75,20 @@ class Form:
         known[0, states:] = 1.0
         candidates, sought = np.zeros(known.shape, dtype=bool), slice(states - measured, states)
         candidates[[row[tuple(powers)] for powers in wanted.tolist()], sought] = True
-        shared, first = np.arange(candidates.size).reshape(d, -1), 0
+        shared, first = np.arange(candidates.size).reshape(d, -1), None
         alone = np.eye(wanted.shape[1], dtype=int)[d:].tolist()
         for powers, function in zip(alone, functions, strict=False):
             direction = function.direction
-            if direction is not None:
-                equation, here = states - measured + direction, row[tuple(powers)]
-                candidates[here, np.arange(d) != equation] = False
-                first = shared[equation, here] if direction == 0 else first
-                shared[equation, here] = first
+            if direction is None:
+                continue
+            equation, here = states - measured + direction, row[tuple(powers)]
+            candidates[here, np.arange(d) != equation] = False
+            first = None if direction == 0 else first
+            if _vanishes(function, d):
+                candidates[here, equation] = False
+                continue
+            first = shared[equation, here] if first is None else first
+            shared[equation, here] = first
         # A slope multiplies terms of its own equation alone.
         slopes = exponents[:, d + len(functions) :]
         candidates &= (slopes.sum(axis=1) == 0)[:, None] | (slopes > 0 if slopes.size else False)
@@ -90,42 +98,67 @@ class Form:
         still = origin == "data" or stays or library.given
         movable = (np.arange(d) < measured) & (not still)
         form = cls(names, exponents, functions, candidates, known, movable, shared.ravel())
-        for of, terms in library.given:
-            form = form._given(of, dict(terms), names[sought])
+        if library.given:
+            form = form._given({of: dict(terms) for of, terms in library.given}, names[sought])
         if not form.candidates.any():
             raise ValueError("library: must leave a term to be found, got all of them given")
         return form
 
     def _given(
-        self, equation: str, terms: dict[str, float | None], sought: tuple[str, ...]
+        self, equations: dict[str, dict[str, float | None]], sought: tuple[str, ...]
     ) -> Form:
-        """The same with some terms of an equation given, which is one of those that are sought."""
-        if equation not in sought:
+        """The same with some terms of equations given, which are among those that are sought.
+
+        What is said of a term counts more than what is said of all others.
+        """
+        if unknown := [equation for equation in equations if equation not in sought]:
             raise ValueError(
-                f"library: must give terms of an equation of {', '.join(sought)}, got {equation!r}"
+                f"library: must give terms of an equation of {', '.join(sought)}, "
+                f"got {unknown[0]!r}"
             )
+        candidates, known = self.candidates.T.ravel(), self.known.T.ravel()
+        told: dict[int, float | None] = {}
+
+        def tell(entry: int, value: float | None) -> None:
+            tied = self.shared == self.shared[entry]
+            candidates[tied], known[tied] = value is None, value or 0.0
+
+        for equation, terms in equations.items():
+            for entry in self._there(equation) if terms.get(OTHERS) is not None else ():
+                tell(entry, terms[OTHERS])
+        for equation, terms in equations.items():
+            for entry, value in self._named(equation, terms).items():
+                common = int(self.shared[entry])
+                if told.setdefault(common, value) != value:
+                    raise ValueError(
+                        "library: the directions of a vector have one coefficient, got "
+                        f"{told[common]} and {value} in the equation of {equation}"
+                    )
+                tell(entry, value)
+        shape = self.known.T.shape
+        return replace(self, candidates=candidates.reshape(shape).T, known=known.reshape(shape).T)
+
+    def _there(self, equation: str) -> list[int]:
+        """Places of an equation's candidates in the coefficients, equation by equation."""
         j = self.names.index(equation)
+        return (j * len(self.known) + np.flatnonzero(self.candidates[:, j])).tolist()
+
+    def _named(self, equation: str, terms: dict[str, float | None]) -> dict[int, float | None]:
+        """What is said of the terms of an equation that are named, by their places."""
+        there, size = self._there(equation), len(self.known)
         rows: dict[int, float | None] = {}
-        there = np.flatnonzero(self.candidates[:, j]).tolist()
         for term, value in terms.items():
             row = self._row(term)
-            if row is not None and row in there:
-                rows[row] = value
+            entry = self.names.index(equation) * size + (-1 if row is None else row)
+            if row is not None and entry in there:
+                rows[entry] = value
             elif term != OTHERS:
                 names = self.law(self.known).terms
                 raise ValueError(
                     f"library: {term!r} is no term of the equation of {equation}, which has "
-                    f"{', '.join(names[k] for k in there)}"
+                    f"{', '.join(names[entry % size] for entry in there)}"
                 )
-        if OTHERS in terms:
-            rows = {**dict.fromkeys(there, terms[OTHERS]), **rows}
-        candidates, known = self.candidates.T.ravel(), self.known.T.ravel()
-        for row, value in rows.items():
-            if value is not None:
-                tied = self.shared == self.shared[j * len(self.known) + row]
-                candidates[tied], known[tied] = False, value
-        shape = self.known.T.shape
-        return replace(self, candidates=candidates.reshape(shape).T, known=known.reshape(shape).T)
+        return rows
 
     def _row(self, term: str) -> int | None:
         """Where a term stands in the library; none if it is not there."""
@@ -163,3 +196,10 @@ class Form:
         """The candidates' places in the coefficients, equation by equation."""
         own = self.shared == np.arange(len(self.shared))
         return np.flatnonzero(self.candidates.T.ravel() & own)
+
+
+def _vanishes(function: Function, d: int) -> bool:
+    """Whether a function is zero at points of all sizes, as a vector along an axis of none."""
+    rng = np.random.default_rng(0)
+    sizes = 10.0 ** rng.uniform(*SIZES, (POINTS, 1))
+    return not function.value(sizes * rng.standard_normal((POINTS, d))).any()

@@ -37,7 +37,7 @@ DENSITY = 10
 
 def check_order(order: object, origin: str, library: Library) -> None:
     """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
-    if isinstance(order, bool) or order not in (1, 2, "auto"):
+    if isinstance(order, bool | float) or order not in (1, 2, "auto"):
         raise ValueError(f"order: must be 1, 2 or 'auto', got {order!r}")
     check_choice("origin", origin, ("learn", "data"))
 

@@ -105,8 +105,11 @@ class Physics:
     energy: tuple[Floats, ...]
     notes: tuple[str, ...]
 
+    def __iter__(self) -> Iterator[Quantity]:
+        return iter(self.quantities)
+
     def __getitem__(self, name: str) -> Quantity:
-        for quantity in self.quantities:
+        for quantity in self:
             if quantity.name == name:
                 return quantity
         names = ", ".join(quantity.name for quantity in self.quantities) or "nothing"

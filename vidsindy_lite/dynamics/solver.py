@@ -64,8 +64,9 @@ RICHEST = 2.0
 """Most terms of a law that refines another, over the terms of that."""
 DROWNED = 0.5
 """Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
-MOST_HALVINGS = 4
-"""Most halvings of the knot spans."""
+MOST_HALVINGS, MOST_CREEPING = 4, 2
+"""Most halvings of the knot spans, and those until a law must converge: a sharp turn that the first
+knots cannot follow takes two."""
 MOST_WEIGHINGS = 2
 """Most laws of which the precision of the measurements is learned."""
 LONGEST_DESCENT = 3
@@ -298,15 +299,19 @@ def _kicked(
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
-    fit = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
-    columns = np.flatnonzero(fit.state.free())
-    for _ in range(0 if fit.status is Status.MAX_STEPS else MOST_HALVINGS):
+    fit = first = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
+    columns, creeps = np.flatnonzero(fit.state.free()), first.status is Status.MAX_STEPS
+    for halving in range(MOST_HALVINGS):
+        if creeps and halving == MOST_CREEPING:
+            fit = first
+            break
         before = fit.state.flat()[columns]
         segments = [segment.refined() for segment in fit.collocation.segments]
         finer = problem.collocation(segments, problem.errors(fit))
         splines = fit.collocation.grid.splines(fit.state.control_points)
         state = replace(fit.state, control_points=fit_curves(finer, splines))
         fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
+        creeps = creeps and fit.status is Status.MAX_STEPS
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))
         # Half the spacing, a sixteenth of the error: so much is left of what it just was.
