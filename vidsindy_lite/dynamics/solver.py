@@ -368,7 +368,7 @@ def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
 def _refitted(
     problem: Problem, path: Path, goal: Sequence[Plateau], history: History
 ) -> Fit | None:
-    """The law of these plateaus; none if it is that of the path, or too rich."""
+    """The law of these plateaus; none if it is that of the path, too rich, or has a pole there."""
     if not _changed(path.fit, goal):
         return None
     active = path.fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
@@ -380,7 +380,7 @@ def _refitted(
     # Terms that come in may be those of a shift, and worth their price at these errors alone.
     fit = at_own_noise(problem, leave_home(problem, priced, history))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
-    return fit
+    return fit if np.isfinite(fit.collocation.objective(fit.state)) else None
 
 
 def _leaves(problem: Problem, fit: Fit, tolerated: float) -> bool:
