@@ -68,7 +68,7 @@ def test_a_term_that_may_be_as_large_as_one_of_the_law_is_named():
     absent[0], absent[2] = (-1.9, 1.0), (-0.5, 2.5)
     assert list(unseen(law, np.zeros(1), [path], absent)) == ["x^2 in dx/dt (-0.5 to 2.5)"]
     absent[0] = -np.inf, np.inf
-    assert list(unseen(law, np.zeros(1), [path], absent))[0] == "a constant in dx/dt (-inf to inf)"
+    assert list(unseen(law, np.zeros(1), [path], absent))[0] == "a constant in dx/dt (of any size)"
     absent[:] = 0
     assert not list(unseen(law, np.zeros(1), [path], absent))
 

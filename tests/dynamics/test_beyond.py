@@ -99,6 +99,28 @@ def test_a_polynomial_of_a_library_of_fractions_is_asked_for_more_as_well():
     assert any(WORDS in warning for warning in found.warnings)
 
 
+@pytest.mark.parametrize(("degree", "status"), [(1, "suspect"), (3, "ok")])
+def test_a_numerator_that_lacks_a_term_is_no_motion_that_is_kicked(degree, status):
+    """Drag over 1 + x^2 needs x^2 vx there; without it, what is missed looks like kicks."""
+    paths = [swung(lambda x, v: -3 * x / (1 + x**2) - 0.1 * v, start) for start in (3.0, 1.5)]
+    runs = [(TIMES, noisy(x, 0.01, seed)) for seed, x in enumerate(paths)]
+    library = Library.polynomial(degree) + Library.rational(2)
+    found = discover(runs, library=library, order=2)
+    assert found.status == status
+    if status == "suspect":
+        assert any(f"{WORDS} (x^2 vx in dvx/dt" in warning for warning in found.warnings)
+    else:
+        assert found.system.text(1) == "x'' = (-3 x - 0.1 vx - 0.1 x^2 vx) / (1 + x^2)"
+
+
+def test_a_function_that_is_a_monomial_is_no_rival_of_itself():
+    pull = {"pull": lambda x: x, "slow": lambda vx: vx}
+    x = noisy(swung(INSIDE["spring"][0], 1.5), 0.02)
+    found = discover(TIMES, x, order=2, library=Library.terms(pull))
+    assert found.system.text(1) == "x'' = -4 pull - 0.1 slow"
+    assert found.status == "ok"
+
+
 def test_a_degree_that_is_too_low_is_told():
     x = noisy(swung(lambda x, v: -4 * x - 0.2 * x**3 - 0.1 * v, 1.5), 0.01)
     found = discover(TIMES, x, order=2, library=Library.polynomial(1))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
@@ -131,6 +132,47 @@ def test_the_law_of_gravitation_is_found_from_positions():
     x += 0.01 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
     found = vl.discover(t, x, order=2, library=Library.polynomial(1) + pull)
     assert found.native.text(2) == "x'' = -r/r^3_x\ny'' = -r/r^3_y"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_an_orbit_with_drag_turns_sharply_at_its_lowest_point(noise):
+    """There the first knots are too wide for the law, and a fit on them does not converge."""
+
+    def slope(_, state):
+        place, velocity = state[:2], state[2:]
+        return [*velocity, *(-2 * place / np.hypot(*place) ** 3 - 0.03 * velocity)]
+
+    t = np.linspace(0, 25, 1000)
+    x = solve_ivp(slope, (0, 25), (1.5, 0, 0, 1.3), t_eval=t, rtol=1e-11, atol=1e-12).y[:2].T
+    x += noise * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
+    library = Library.terms(
+        {
+            "r/r^3": lambda x, y: np.array([x, y]) / np.hypot(x, y) ** 3,
+            "spring": lambda x, y: [x, y],
+            "drag": lambda vx, vy: [vx, vy],
+        }
+    )
+    found = vl.discover(t, x, library=library)
+    assert found.status == "ok"
+    assert found.system.text(2) == "x'' = -2 r/r^3_x - 0.03 drag_x\ny'' = -2 r/r^3_y - 0.03 drag_y"
+
+
+def test_a_law_of_the_path_with_a_pole_on_the_curve_is_none():
+    """Where above and below the line the same vanishes, any slope meets the law."""
+    law = PolynomialSystem.from_terms(
+        {
+            "x": {"1": 18.3, "x": -1, "xy": -1, "x^2": 8.784, "x^3": -0.48, "x^2 x'": -0.48},
+            "y": {"1": 11.23, "xy": -1, "x^2": 5.3904, "x^2 y'": -0.48},
+        },
+        library=Library.polynomial(3) + Library.rational(2),
+    )
+    t = np.linspace(0, 10, 512)
+    x = law.simulate(t, [0.1, 30.4])
+    x += 1e-5 * x.std(axis=0) * np.random.default_rng(0).normal(size=x.shape)
+    found = vl.discover(t, x, library=Library.polynomial(3) + Library.rational(2), order=1)
+    assert not any("not met along the curve" in warning for warning in found.warnings)
+    slopes = found.curves[0](t, 1)
+    assert np.abs(found.system(x) - slopes).max() < 0.1 * np.abs(slopes).max()
 
 
 FRACTION = Library.polynomial(3) + Library.rational(1)

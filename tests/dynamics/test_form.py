@@ -50,6 +50,28 @@ def test_directions_of_a_vector_are_given_together():
     posed = form(library.where({"vx": {"drag_x": 0.1}}), order=2)
     assert posed.law(posed.known).text() == "x'' = 0.1 drag_x\ny'' = 0.1 drag_y"
     assert posed.candidates.sum() == 2  # the constants
+    both = form(library.where({"vx": {"drag_x": 0.1}, "vy": {"drag_y": 0.1}}), order=2)
+    np.testing.assert_array_equal(both.known, posed.known)
+    with pytest.raises(ValueError, match=r"library: the directions of a vector have one coefficie"):
+        form(library.where({"vx": {"drag_x": 0.1}, "vy": {"drag_y": 0.2}}), order=2)
+    alone = form(library.where({"vx": {"drag_x": None, "...": 0}, "vy": {"...": 0}}), order=2)
+    assert alone.candidates.sum() == 2  # both directions: a name counts more than all others
+
+
+def test_a_direction_of_a_vector_that_is_empty_is_no_term():
+    library = Library.terms(
+        {
+            "lift": lambda y: [0 * y, np.maximum(y - 10, 0)],  # far up alone
+            "turn": lambda vx, vy: [-vy, vx],
+        }
+    )
+    posed = form(library, order=2)
+    terms = posed.law(posed.known).terms
+    assert [terms[k] for k in np.flatnonzero(posed.candidates[:, 2])] == ["turn_x"]
+    assert [terms[k] for k in np.flatnonzero(posed.candidates[:, 3])] == ["lift_y", "turn_y"]
+    assert len(posed.searched) == 2  # lift by itself, and the turn once
+    with pytest.raises(ValueError, match=r"'lift_x' is no term of the equation of vx, which has t"):
+        form(library.where({"vx": {"lift_x": 1}}), order=2)
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,7 @@ def test_g_its_direction_and_drag():
     # |a| changes by a / |a|, coefficient by coefficient.
     assert said["g"].error == pytest.approx(0.01 * np.hypot(0.3**2, 9.8**2) / g, rel=1e-5)
     assert said["direction"].value == pytest.approx([0.3 / g, -9.8 / g])
+    assert [quantity.name for quantity in said] == ["g", "direction", "drag"]
     # It turns by 0.3 * 9.8 / g^2 times the root of both relative variances.
     turn = 0.3 * 9.8 / g**2 * 0.01 * np.sqrt(2)
     assert np.linalg.norm(said["direction"].error) == pytest.approx(turn, rel=1e-5)

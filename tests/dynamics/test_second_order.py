@@ -257,7 +257,7 @@ def test_of_noise_alone_no_second_order_is_asked():
 
 def test_an_order_that_is_none():
     t = np.linspace(0, 1, 50)
-    for order in (3, 0, "second", True):
+    for order in (3, 0, 2.0, "second", True):
         with pytest.raises(ValueError, match=rf"order: must be 1, 2 or 'auto', got {order!r}"):
             discover(t, t[:, None] ** 2, order=order)
 
