@@ -236,6 +236,27 @@ def test_what_touches_other_things_must_be_where_the_motion_leads():
     assert fitting(frames, places, areas, inside, np.full(40, False)).all()  # nothing special
 
 
+@pytest.mark.parametrize(("off", "area"), [(15, 900.0), (0, 1800.0)])
+def test_what_touches_other_things_at_an_end_is_held_against_views_of_the_target_alone(off, area):
+    frames, inside, alone = np.arange(40), np.full(40, True), np.arange(40) > 2
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    areas = np.where(alone, 900.0, area)
+    places[:3] += [0, off]
+    frames[3:] += 4
+    places[3:] += [12, 0]
+    good = fitting(frames, places, areas, inside, alone)
+    np.testing.assert_array_equal(good, alone)
+
+
+def test_what_touches_other_things_and_has_no_views_beside_it_is_left_out():
+    frames, inside, alone = np.arange(40), np.full(40, True), np.arange(40) > 0
+    frames[1:] += 16
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    assert fitting(frames, places, np.full(40, 900.0), inside).all()
+    good = fitting(frames, places, np.full(40, 900.0), inside, alone)
+    np.testing.assert_array_equal(good, alone)
+
+
 def test_views_of_the_target_and_something_like_it_in_one_are_left_out():
     areas = np.linspace(100, 200, 60)
     areas[20:40] *= 2.5  # one beside the other

@@ -394,11 +394,11 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
-    inside &= ~hidden(outlines, steady, areas)
+    alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
+    inside &= ~hidden(outlines, steady, areas, alone)
     faint = np.array([view.faint for view in shown])
     if faint.mean() < _RARELY:  # else it is so everywhere
         inside &= ~faint
-    alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
     good = fitting(at, steady, areas, inside, alone)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):
