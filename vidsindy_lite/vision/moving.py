@@ -32,7 +32,7 @@ from .reducing import ReducedFrames, reduce, reduced, reduction
 from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
-from .video import VideoInfo, read_video, video_info
+from .video import VideoInfo, video_info
 
 _PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path
@@ -168,19 +168,19 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     found, lights = sighted(film)
     lens = lens_of(samples, film)
     if hint is None:
-        return _followed(path, film, lens, found, lights)
+        return _followed(film, lens, found, lights)
     pointer = Pointer.of(hint, found, film.factor, path)
     if pointer.one is not None:  # the plainest path may be the one that is meant
-        plain = _followed(path, film, lens, found, lights, hinted=True)
+        plain = _followed(film, lens, found, lights, hinted=True)
         if not pointer.missed(plain.pixels, plain.maps):
             return plain
-    followed = _followed(path, film, lens, found, lights, hinted=True, pointer=pointer)
+    followed = _followed(film, lens, found, lights, hinted=True, pointer=pointer)
     missed = pointer.missed(followed.pixels, followed.maps)
     return followed._replace(doubts=followed.doubts + missed)
 
 
 def _followed(
-    path: str | os.PathLike, film: "Film", lens: Lens, found: list[list[Candidate]],
+    film: "Film", lens: Lens, found: list[list[Candidate]],
     lights: list[Floats32], *, hinted: bool = False, pointer: Pointer | None = None,
 ) -> Followed:  # fmt: skip
     """What moves most plainly, of that at which a hint points, its gaps filled."""
@@ -203,13 +203,13 @@ def _followed(
         doubts += ("the background is too plain to tell whether the camera moves: if so, its "
                    "motion is part of the track",)  # fmt: skip
     rows = max(paths, key=lambda path: np.isin(path.rows, first).sum()).rows
-    views = viewed(path, film, lens, expected(seen, rows, film, len(found)), lights)
+    views = viewed(film, lens, expected(seen, rows, film, len(found)), lights)
     if pointer is not None and any(views):
         doubts += pointer.unlike(np.median([view.colour for view in views if view], axis=0))
     followed = finished(views, film.motion, doubts)
     start, last = seen.frame[rows[[0, -1]]]
     sure = np.s_[start : last + 1]
-    return remembered(path, lens, lights, followed, views, sure, told=hinted)
+    return remembered(film, lens, lights, followed, views, sure, told=hinted)
 
 
 def linked(
@@ -310,12 +310,10 @@ def lens_of(samples: Image, film: Film) -> Lens:
     return lens
 
 
-def viewed(
-    path: str | os.PathLike, film: Film, lens: Lens, ways: "Ways", lights: list[Floats32]
-) -> list[View | None]:
+def viewed(film: Film, lens: Lens, ways: "Ways", lights: list[Floats32]) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
     views = []
-    for i, (frame, here) in enumerate(zip(read_video(path), film.motion.maps, strict=False)):
+    for i, (frame, here) in enumerate(zip(film.frames.whole(), film.motion.maps, strict=False)):
         view = None
         if np.isfinite(ways.centre[i, 0]):
             view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])
@@ -418,7 +416,7 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
 
 
 def remembered(
-    path: str | os.PathLike, lens: Lens, lights: list[Floats32], found: Followed,
+    film: Film, lens: Lens, lights: list[Floats32], found: Followed,
     views: list[View | None], sure: slice, *, told: bool,
 ) -> Followed:  # fmt: skip
     """A track with its gaps filled; if somebody told the target, carried on beyond its ends."""
@@ -426,7 +424,9 @@ def remembered(
     inside = np.full_like(pixels, np.nan)
     inside[sure] = pixels[sure]
     if np.isfinite(inside[:, 0]).any():
-        places = recalled(path, lens, lights, inside, found.maps, entire(views)[0], told=told)
+        places = recalled(
+            film.frames.whole(), lens, lights, inside, found.maps, entire(views)[0], told=told
+        )
         known = np.isfinite(places[:, 0])
         pixels[known], errors[known] = places[known], _RECALLED
     return found._replace(pixels=pixels, errors=errors)
