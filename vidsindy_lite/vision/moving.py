@@ -32,6 +32,7 @@ from .reducing import ReducedFrames, reduce, reduced, reduction
 from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
+from .trembling import trembling
 from .video import VideoInfo, video_info
 
 _PATHS = 5  # paths among which the target's is chosen
@@ -134,7 +135,7 @@ def _camera(
 
     It is read from all frames, unless the sampled ones tell that the camera is at rest. Maps that
     say no more than their errors only add these, and so do maps by which the frames fit together
-    worse than they do at rest.
+    worse than they do at rest. All frames together may still tell that it trembles.
     """
     still, factor = stands_still(small), frames.factor
     if still is False:
@@ -147,6 +148,8 @@ def _camera(
             known = np.isfinite(motion.errors[at])
             if explains(small, reduced(motion.maps[at], factor), known):
                 return motion, True
+    if still is not True and (trembles := trembling(frames, small)) is not None:
+        return trembles, True
     return at_rest(info.frames), still is True or rests(small)
 
 
