@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -14,7 +15,7 @@ from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import moving
 from vidsindy_lite.vision.candidates import Candidate, Plate
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import _learned, finished, rate
+from vidsindy_lite.vision.moving import Rated, _learned, _rivals, finished, rate
 from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
 from vidsindy_lite.vision.steadying import CameraMotion, Steadying, _Relief, carry, stands_still
 
@@ -198,6 +199,17 @@ def test_relief_is_by_how_much_brighter_than_around_in_any_light():
     assert np.corrcoef(plain.ravel(), cloud[..., 0].ravel())[0, 1] > 0.8
     np.testing.assert_allclose(relief(200, 2).std(), 2 * plain.std(), rtol=0.1)
     np.testing.assert_allclose(relief(140, 1).std(), plain.std(), rtol=0.2)
+
+
+@pytest.mark.parametrize(("count", "rating", "told"), [(60, 4.9, 1), (60, 2.4, 0), (20, 1.9, 0)])
+def test_what_is_seen_less_often_but_is_as_plain_where_it_is_seen_is_told(count, rating, told):
+    frame = np.tile(np.arange(100), 2)
+    centre = np.column_stack([3.0 * frame, np.repeat([50.0, 150.0], 100)])
+    seen = Sightings(frame, frame, centre, np.full(200, 9.0), np.zeros((200, 3)),
+                     np.full(200, 0.8), np.zeros((200, 4)), 400.0)  # fmt: skip
+    paths = [Rated(np.arange(100), 10.0), Rated(100 + np.arange(count), rating)]
+    film = SimpleNamespace(places=[], factor=1)
+    assert len(_rivals(seen, paths, film)) == told
 
 
 def test_partial_views_and_jumps_are_left_out():

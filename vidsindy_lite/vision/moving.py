@@ -38,6 +38,7 @@ from .video import VideoInfo, video_info
 _PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path
 _AS_PLAIN = 0.5  # rating of another path, relative to the best, above which there is doubt
+_AS_OFTEN = 0.5  # share of its sightings, from which on another is rated by how plain each is
 _BEYOND = 3  # frames by which a path is carried on at its ends
 _PLAIN = 0.2  # quality of the candidates of a path that is worth anything
 _SWINGS = 0.1  # of its size, by which what lingers in its place moves at least
@@ -340,7 +341,13 @@ def _travels(seen: Sightings, rows: Ints, places: list[Place]) -> bool:
 
 def _rivals(seen: Sightings, paths: list[Rated], film: "Film") -> tuple[str, ...]:
     """What else moves about as plainly."""
-    plain = [p for p in paths[1:] if p.rating > _AS_PLAIN * paths[0].rating]
+    whole = len(paths[0].rows)
+    often = [max(len(p.rows), _AS_OFTEN * whole) for p in paths[1:]]  # what is rare is not plain
+    plain = [
+        p
+        for p, count in zip(paths[1:], often, strict=True)
+        if p.rating * max(whole / count, 1) > _AS_PLAIN * paths[0].rating
+    ]
     others = [p for p in plain if _travels(seen, p.rows, film.places)]
     if not others:
         return ()
