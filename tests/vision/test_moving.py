@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -14,7 +15,7 @@ from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import moving
 from vidsindy_lite.vision.candidates import Candidate, Plate
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import _learned, finished, rate
+from vidsindy_lite.vision.moving import Rated, _learned, _rivals, finished, rate
 from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
 from vidsindy_lite.vision.steadying import CameraMotion, Steadying, _Relief, carry, stands_still
 
@@ -200,6 +201,17 @@ def test_relief_is_by_how_much_brighter_than_around_in_any_light():
     np.testing.assert_allclose(relief(140, 1).std(), plain.std(), rtol=0.2)
 
 
+@pytest.mark.parametrize(("count", "rating", "told"), [(60, 4.9, 1), (60, 2.4, 0), (20, 1.9, 0)])
+def test_what_is_seen_less_often_but_is_as_plain_where_it_is_seen_is_told(count, rating, told):
+    frame = np.tile(np.arange(100), 2)
+    centre = np.column_stack([3.0 * frame, np.repeat([50.0, 150.0], 100)])
+    seen = Sightings(frame, frame, centre, np.full(200, 9.0), np.zeros((200, 3)),
+                     np.full(200, 0.8), np.zeros((200, 4)), 400.0)  # fmt: skip
+    paths = [Rated(np.arange(100), 10.0), Rated(100 + np.arange(count), rating)]
+    film = SimpleNamespace(places=[], factor=1)
+    assert len(_rivals(seen, paths, film)) == told
+
+
 def test_partial_views_and_jumps_are_left_out():
     frames = np.arange(40)
     places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
@@ -234,6 +246,27 @@ def test_what_touches_other_things_must_be_where_the_motion_leads():
     good = fitting(frames, places, areas, inside, alone)
     np.testing.assert_array_equal(np.flatnonzero(~good), [20])
     assert fitting(frames, places, areas, inside, np.full(40, False)).all()  # nothing special
+
+
+@pytest.mark.parametrize(("off", "area"), [(15, 900.0), (0, 1800.0)])
+def test_what_touches_other_things_at_an_end_is_held_against_views_of_the_target_alone(off, area):
+    frames, inside, alone = np.arange(40), np.full(40, True), np.arange(40) > 2
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    areas = np.where(alone, 900.0, area)
+    places[:3] += [0, off]
+    frames[3:] += 4
+    places[3:] += [12, 0]
+    good = fitting(frames, places, areas, inside, alone)
+    np.testing.assert_array_equal(good, alone)
+
+
+def test_what_touches_other_things_and_has_no_views_beside_it_is_left_out():
+    frames, inside, alone = np.arange(40), np.full(40, True), np.arange(40) > 0
+    frames[1:] += 16
+    places = np.column_stack([3.0 * frames, 50 + 20 * np.sin(frames / 6)])
+    assert fitting(frames, places, np.full(40, 900.0), inside).all()
+    good = fitting(frames, places, np.full(40, 900.0), inside, alone)
+    np.testing.assert_array_equal(good, alone)
 
 
 def test_views_of_the_target_and_something_like_it_in_one_are_left_out():

@@ -46,6 +46,17 @@ def test_where_nothing_hides_the_target_all_views_are_whole(sides):
     assert not hidden(*seen).any()
 
 
+def test_what_touches_other_things_does_not_say_where_the_target_is_hidden():
+    seen, centres, areas, _ = passing((40, 40))
+    alone = np.full(80, True)
+    alone[35:45], outlines = False, list(seen)  # two in one, whose outline is lean
+    for i in np.flatnonzero(~alone):
+        outlines[i], centres[i], areas[i] = view(centres[i], (240, 20), (0, 0))
+    found = hidden(outlines, centres, areas, alone)
+    assert hidden(outlines, centres, areas)[alone].any()
+    assert not found[alone].any()
+
+
 def test_a_large_ball_behind_a_post_is_seen_whole_or_not_at_all(tmp_path):
     phone = Phone("wood", 64, colour=(15, 225, 250), noise=4, occluder=True,
                   image_size=(320, 240), frames=60)  # fmt: skip

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite import Hint, track, write_video
+from vidsindy_lite import Hint, read_video, track, write_video
 from vidsindy_lite.vision.candidates import Plate
 from vidsindy_lite.vision.recalling import _FAR, recalled
 from vidsindy_lite.vision.refining import Lens, View
@@ -73,13 +73,13 @@ def test_beyond_its_views_a_target_is_carried_on_as_long_as_it_is_found(tmp_path
     path, lens, lights, maps, views = plain(tmp_path / "clip.mov", TRUTH, 11, shown=54)
     pixels = TRUTH.copy()
     pixels[:8], pixels[45:] = np.nan, np.nan
-    places = recalled(path, lens, lights, pixels, maps, views, told=True)
+    places = recalled(read_video(path), lens, lights, pixels, maps, views, told=True)
     found = np.isfinite(places[:, 0])
     np.testing.assert_array_equal(np.flatnonzero(found), [*range(8), *range(45, 54)])
     assert np.linalg.norm(places[found] - TRUTH[found], axis=1).max() < 0.5
-    assert np.isnan(recalled(path, lens, lights, pixels, maps, views, told=False)).all()
+    assert np.isnan(recalled(read_video(path), lens, lights, pixels, maps, views, told=False)).all()
     pixels[20:45] = np.nan  # farther than a view is carried
-    places = recalled(path, lens, lights, pixels, maps, views, told=True)
+    places = recalled(read_video(path), lens, lights, pixels, maps, views, told=True)
     np.testing.assert_array_equal(
         np.flatnonzero(np.isfinite(places[:, 0])), [*range(8), *range(20, 20 + _FAR)]
     )
@@ -93,5 +93,5 @@ def test_without_a_hint_a_gap_is_filled_where_its_motion_is_known_to_two_pixels(
     pixels = truth.copy()
     pixels[28:33] = np.nan
     for told in (True, False):
-        places = recalled(path, lens, lights, pixels, maps, views, told=told)
+        places = recalled(read_video(path), lens, lights, pixels, maps, views, told=told)
         assert np.isfinite(places[28:33, 0]).all() == (told or sharp < 2)

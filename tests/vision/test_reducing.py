@@ -30,15 +30,17 @@ def test_what_is_missing_of_the_last_squares_repeats_the_last_row_and_column(fac
     np.testing.assert_allclose(reduce(image, factor), means, atol=rounded(factor))
 
 
-@pytest.mark.parametrize(("room", "reads"), [(1.0, 1), (0.8, 2)])
-def test_reduced_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads):
+@pytest.mark.parametrize(("room", "reads"), [((1.0, 1.0), 1), ((1.0, 0.8), 3), ((0.8, 0.8), 4)])
+def test_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads):
     images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
     path = write_video(tmp_path / "clip.mov", iter(images))
     read, count = reducing.read_video, []
     monkeypatch.setattr(reducing, "read_video", lambda path: count.append(path) or read(path))
-    monkeypatch.setattr(reducing, "_KEPT", int(room * images.nbytes / 4))
+    monkeypatch.setattr(reducing, "_KEPT", (room[0] * images.nbytes / 4, room[1] * images.nbytes))
     frames = ReducedFrames(path, 2)
     for _ in range(2):
         for frame, image in zip(frames, images, strict=True):
             np.testing.assert_array_equal(frame, reduce(image, 2))
+        for frame, image in zip(frames.whole(), images, strict=True):
+            np.testing.assert_array_equal(frame, image)
     assert len(count) == reads

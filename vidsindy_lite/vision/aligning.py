@@ -25,6 +25,31 @@ _FAINT = 0.3  # grey levels; a deviation without any noise
 _BLOCKS = 12  # into which each side is cut: errors within one may be the same
 
 
+class Ground(NamedTuple):
+    """One level of a view on which others are laid.
+
+    Its grey levels, by what each pixel changes with shift, turn, scale and light, (6, h, w), how
+    much each may tell, and its pixels from the middle.
+    """
+
+    grey: Floats32
+    slopes: Floats32
+    share: Floats32
+    u: Floats32
+    v: Floats32
+
+    @classmethod
+    def of(cls, grey: Floats32) -> "Ground":
+        height, width = grey.shape
+        u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
+        v = (np.arange(height, dtype=np.float32) - np.float32((height - 1) / 2))[:, None]
+        slopes = _slopes(grey, u, v)
+        power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
+        fair = np.minimum(1, _FAIR * np.median(power) / np.maximum(power, 1e-9))
+        share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
+        return cls(grey, slopes, np.asarray(share, np.float32), u, v)
+
+
 class Aligned(NamedTuple):
     """The map (3, 3) of one view to another, and the standard error of the places it gives."""
 
@@ -41,17 +66,23 @@ def pyramid(small: Image) -> list[Floats32]:
     return [np.asarray(cv2.GaussianBlur(level, (0, 0), 1), np.float32) for level in levels[1:]]
 
 
-def align(before: list[Floats32], after: list[Floats32], guess: Floats) -> Aligned | None:
+def grounds(levels: list[Floats32]) -> list[Ground]:
+    """Of a `pyramid`."""
+    return [Ground.of(grey) for grey in levels]
+
+
+def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned | None:
     """The map of one view to another, from a guess; None where they have little in common.
 
     Parameters
     ----------
-    before, after : list of ndarray
+    before : list of Ground
+    after : list of ndarray
         Of `pyramid`.
     guess : ndarray, shape (3, 3)
         In pixels of the images of which the pyramids are.
     """
-    found, fitted = _similar(guess, 2 * np.array(before[0].shape[::-1])), None
+    found, fitted = _similar(guess, 2 * np.array(before[0].grey.shape[::-1])), None
     for level in range(len(before), 0, -1):
         scale, back = (np.diag([x, x, 1.0]) for x in (0.5**level, 2.0**level))
         here = scale @ found @ back
@@ -75,18 +106,15 @@ def _similar(guess: Floats, size: Ints) -> Floats:
     return np.array([[c, -s, right], [s, c, down], [0, 0, 1]])
 
 
-def _fit(key: Floats32, view: Floats32, here: Floats, scale: float, loose: float) -> Aligned | None:
+def _fit(
+    ground: Ground, view: Floats32, here: Floats, scale: float, loose: float
+) -> Aligned | None:
     """One level: Gauss-Newton steps of which each refines the map by what the key's slopes say."""
+    key, slopes, share, u, v = ground
     height, width = key.shape
     middle = np.array([[1, 0, (width - 1) / 2], [0, 1, (height - 1) / 2], [0, 0, 1.0]])
     to_middle = np.linalg.inv(middle)
-    u = np.arange(width, dtype=np.float32) - np.float32(middle[0, 2])
-    v = (np.arange(height, dtype=np.float32) - np.float32(middle[1, 2]))[:, None]
-    slopes = _slopes(key, u, v)
     steep = slopes.reshape(6, -1)
-    power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
-    fair = np.minimum(1, _FAIR * np.median(power) / np.maximum(power, 1e-9))
-    share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
     sure = np.array([_STEP, _STEP, _TURN, _TURN, 1, 100]) * [scale, scale, 1, 1, 1, 1]
     prior = np.diag(1 / sure**2)
     gain, offset = 1.0, 0.0

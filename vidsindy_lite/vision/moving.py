@@ -32,11 +32,13 @@ from .reducing import ReducedFrames, reduce, reduced, reduction
 from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
-from .video import VideoInfo, read_video, video_info
+from .trembling import trembling
+from .video import VideoInfo, video_info
 
 _PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path
 _AS_PLAIN = 0.5  # rating of another path, relative to the best, above which there is doubt
+_AS_OFTEN = 0.5  # share of its sightings, from which on another is rated by how plain each is
 _BEYOND = 3  # frames by which a path is carried on at its ends
 _PLAIN = 0.2  # quality of the candidates of a path that is worth anything
 _SWINGS = 0.1  # of its size, by which what lingers in its place moves at least
@@ -134,7 +136,7 @@ def _camera(
 
     It is read from all frames, unless the sampled ones tell that the camera is at rest. Maps that
     say no more than their errors only add these, and so do maps by which the frames fit together
-    worse than they do at rest.
+    worse than they do at rest. All frames together may still tell that it trembles.
     """
     still, factor = stands_still(small), frames.factor
     if still is False:
@@ -147,6 +149,8 @@ def _camera(
             known = np.isfinite(motion.errors[at])
             if explains(small, reduced(motion.maps[at], factor), known):
                 return motion, True
+    if still is not True and (trembles := trembling(frames, small)) is not None:
+        return trembles, True
     return at_rest(info.frames), still is True or rests(small)
 
 
@@ -168,19 +172,19 @@ def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) ->
     found, lights = sighted(film)
     lens = lens_of(samples, film)
     if hint is None:
-        return _followed(path, film, lens, found, lights)
+        return _followed(film, lens, found, lights)
     pointer = Pointer.of(hint, found, film.factor, path)
     if pointer.one is not None:  # the plainest path may be the one that is meant
-        plain = _followed(path, film, lens, found, lights, hinted=True)
+        plain = _followed(film, lens, found, lights, hinted=True)
         if not pointer.missed(plain.pixels, plain.maps):
             return plain
-    followed = _followed(path, film, lens, found, lights, hinted=True, pointer=pointer)
+    followed = _followed(film, lens, found, lights, hinted=True, pointer=pointer)
     missed = pointer.missed(followed.pixels, followed.maps)
     return followed._replace(doubts=followed.doubts + missed)
 
 
 def _followed(
-    path: str | os.PathLike, film: "Film", lens: Lens, found: list[list[Candidate]],
+    film: "Film", lens: Lens, found: list[list[Candidate]],
     lights: list[Floats32], *, hinted: bool = False, pointer: Pointer | None = None,
 ) -> Followed:  # fmt: skip
     """What moves most plainly, of that at which a hint points, its gaps filled."""
@@ -203,13 +207,13 @@ def _followed(
         doubts += ("the background is too plain to tell whether the camera moves: if so, its "
                    "motion is part of the track",)  # fmt: skip
     rows = max(paths, key=lambda path: np.isin(path.rows, first).sum()).rows
-    views = viewed(path, film, lens, expected(seen, rows, film, len(found)), lights)
+    views = viewed(film, lens, expected(seen, rows, film, len(found)), lights)
     if pointer is not None and any(views):
         doubts += pointer.unlike(np.median([view.colour for view in views if view], axis=0))
     followed = finished(views, film.motion, doubts)
     start, last = seen.frame[rows[[0, -1]]]
     sure = np.s_[start : last + 1]
-    return remembered(path, lens, lights, followed, views, sure, told=hinted)
+    return remembered(film, lens, lights, followed, views, sure, told=hinted)
 
 
 def linked(
@@ -310,12 +314,10 @@ def lens_of(samples: Image, film: Film) -> Lens:
     return lens
 
 
-def viewed(
-    path: str | os.PathLike, film: Film, lens: Lens, ways: "Ways", lights: list[Floats32]
-) -> list[View | None]:
+def viewed(film: Film, lens: Lens, ways: "Ways", lights: list[Floats32]) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
     views = []
-    for i, (frame, here) in enumerate(zip(read_video(path), film.motion.maps, strict=False)):
+    for i, (frame, here) in enumerate(zip(film.frames.whole(), film.motion.maps, strict=False)):
         view = None
         if np.isfinite(ways.centre[i, 0]):
             view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])
@@ -339,7 +341,13 @@ def _travels(seen: Sightings, rows: Ints, places: list[Place]) -> bool:
 
 def _rivals(seen: Sightings, paths: list[Rated], film: "Film") -> tuple[str, ...]:
     """What else moves about as plainly."""
-    plain = [p for p in paths[1:] if p.rating > _AS_PLAIN * paths[0].rating]
+    whole = len(paths[0].rows)
+    often = [max(len(p.rows), _AS_OFTEN * whole) for p in paths[1:]]  # what is rare is not plain
+    plain = [
+        p
+        for p, count in zip(paths[1:], often, strict=True)
+        if p.rating * max(whole / count, 1) > _AS_PLAIN * paths[0].rating
+    ]
     others = [p for p in plain if _travels(seen, p.rows, film.places)]
     if not others:
         return ()
@@ -394,11 +402,11 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     areas = np.array([view.area for view in shown])
     inside = np.array([view.inside for view in shown]) & np.isfinite(motion.errors[at])
     outlines = [carry(motion.maps[i], view.outline) for i, view in zip(at, shown, strict=True)]
-    inside &= ~hidden(outlines, steady, areas)
+    alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
+    inside &= ~hidden(outlines, steady, areas, alone)
     faint = np.array([view.faint for view in shown])
     if faint.mean() < _RARELY:  # else it is so everywhere
         inside &= ~faint
-    alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
     good = fitting(at, steady, areas, inside, alone)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):
@@ -418,7 +426,7 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
 
 
 def remembered(
-    path: str | os.PathLike, lens: Lens, lights: list[Floats32], found: Followed,
+    film: Film, lens: Lens, lights: list[Floats32], found: Followed,
     views: list[View | None], sure: slice, *, told: bool,
 ) -> Followed:  # fmt: skip
     """A track with its gaps filled; if somebody told the target, carried on beyond its ends."""
@@ -426,7 +434,9 @@ def remembered(
     inside = np.full_like(pixels, np.nan)
     inside[sure] = pixels[sure]
     if np.isfinite(inside[:, 0]).any():
-        places = recalled(path, lens, lights, inside, found.maps, entire(views)[0], told=told)
+        places = recalled(
+            film.frames.whole(), lens, lights, inside, found.maps, entire(views)[0], told=told
+        )
         known = np.isfinite(places[:, 0])
         pixels[known], errors[known] = places[known], _RECALLED
     return found._replace(pixels=pixels, errors=errors)

@@ -24,7 +24,9 @@ _TOUCHING = np.ones((7, 7), np.uint8)  # cells around a place that is missed: it
 _OFTEN = 2  # views that miss the target in a place where it is hidden
 
 
-def hidden(outlines: Sequence[Floats], centres: Floats, areas: Floats) -> Bools:
+def hidden(
+    outlines: Sequence[Floats], centres: Floats, areas: Floats, alone: Bools | None = None
+) -> Bools:
     """Which views (n,) reach where the target is never seen, though others of it reach there, too.
 
     Parameters
@@ -34,7 +36,11 @@ def hidden(outlines: Sequence[Floats], centres: Floats, areas: Floats) -> Bools:
     centres : ndarray, shape (n, 2)
         Their middles.
     areas : ndarray, shape (n,)
+    alone : ndarray, shape (n,), optional
+        Which views show nothing but the target: if these are most of them, only they say what the
+        target never covers.
     """
+    telling = np.ones(len(centres), bool) if alone is None or alone.mean() <= 0.5 else alone
     sides = np.sqrt(np.maximum(areas, 1))
     points = np.concatenate(outlines)
     low = points.min(axis=0) - _REACH * sides.max()
@@ -48,7 +54,7 @@ def hidden(outlines: Sequence[Floats], centres: Floats, areas: Floats) -> Bools:
     unseen = np.asarray(cv2.dilate(chart, np.ones((3, 3), np.uint8)) == 0)
     whole = np.maximum(sides, median_filter(sides, _AROUND))
     usual = whole[:, None, None] * _usual(outlines, centres, sides)
-    for centre, reach in zip(centres, usual, strict=True):
+    for centre, reach in zip(centres[telling], usual[telling], strict=True):
         patch, window = _drawn((centre + _INNER * reach - low) / cell)
         missed[window] += patch & unseen[window]
     never = np.asarray(cv2.dilate((missed >= _OFTEN).astype(np.uint8), _TOUCHING), np.uint8)

@@ -7,8 +7,7 @@ frame shows better than the ground does. One that was pointed at is carried on b
 and behind the last from frame to frame by its looks, as long as it is found.
 """
 
-import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -17,7 +16,6 @@ import numpy as np
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .refining import Lens, View
 from .steadying import carry
-from .video import read_video
 
 _FAR = 15  # frames from a view to which it is looked for at most
 _BESIDE = 4  # views on each side of a gap that say how it moves in between
@@ -82,14 +80,15 @@ def _peak(values: Floats32, i: int) -> float:
 
 
 def recalled(
-    path: str | os.PathLike, lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
+    frames: Iterable[Image], lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
     views: Sequence[View | None], *, told: bool,
 ) -> Floats:  # fmt: skip
     """Places (n, 2) of the target in the gaps of a track, NaN elsewhere.
 
     Parameters
     ----------
-    path : path
+    frames : iterable of ndarray
+        Whole ones, of which there are n.
     lens : Lens
     lights : sequence of ndarray
         How bright each frame is.
@@ -106,7 +105,7 @@ def recalled(
     places = np.full(pixels.shape, np.nan)
     if len(at) == (len(pixels) if told else np.ptp(at) + 1):
         return places
-    looks = _looks(path, lens, lights, pixels, maps, views)
+    looks = _looks(frames, lens, lights, pixels, maps, views)
     for order in (range(int(at[-1]), len(pixels)), range(int(at[0]), -1, -1)) if told else ():
         _carry_on(places, order, looks, pixels, maps, views)
     for before, after in zip(at[:-1].tolist(), at[1:].tolist(), strict=True):
@@ -115,7 +114,7 @@ def recalled(
 
 
 def _looks(
-    path: str | os.PathLike, lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
+    shown: Iterable[Image], lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
     views: Sequence[View | None],
 ) -> dict[int, Look]:  # fmt: skip
     """Parts of the frames in gaps that are not far from a view, and of the frames beside them."""
@@ -130,7 +129,7 @@ def _looks(
     speed = float(np.quantile(steps, 0.9))
     side = max(np.ptp(view.outline, axis=0).max() for view in views if view is not None)
     found = {}
-    for i, frame in enumerate(read_video(path)):
+    for i, frame in enumerate(shown):
         if i >= len(wanted) or not wanted[i]:
             continue
         outside = far[i] if i < at[0] or i > at[-1] else 0

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Image
 from .video import read_video
 
-_KEPT = 64_000_000  # bytes of reduced frames that are kept
+_KEPT = 64_000_000, 128_000_000  # bytes of reduced and of whole frames that are kept
 LONGEST = 480  # pixels of the longer side of a reduced frame
 
 
@@ -34,28 +34,48 @@ def reduce(image: Image, factor: int) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
+class _Kept:
+    """Images, as long as they fit into so many bytes."""
+
+    def __init__(self, room: int) -> None:
+        self.room = room
+        self.images: list[Image] = []
+
+    def add(self, image: Image) -> None:
+        self.room -= image.nbytes
+        if self.room >= 0:
+            self.images.append(image)
+        else:
+            self.images.clear()
+
+    def all(self) -> list[Image] | None:
+        """All that were added, None if they do not fit."""
+        return self.images if self.room >= 0 else None
+
+
 class ReducedFrames:
     """The frames of a video file, reduced by a factor; read once if they are few."""
 
     def __init__(self, path: str | os.PathLike, factor: int) -> None:
         self.path, self.factor = path, factor
         self.kept: list[Image] | None = None
+        self.kept_whole: list[Image] | None = None
 
     def __iter__(self) -> Iterator[Image]:
         if self.kept is not None:
             yield from self.kept
             return
-        kept: list[Image] = []
-        size = 0
+        kept, kept_whole = (_Kept(room) for room in _KEPT)
         for frame in read_video(self.path):
             small = reduce(frame, self.factor)
-            size += small.nbytes
-            if size <= _KEPT:
-                kept.append(small)
-            else:
-                kept.clear()
+            kept.add(small)
+            kept_whole.add(frame)
             yield small
-        self.kept = kept if size <= _KEPT else None
+        self.kept, self.kept_whole = kept.all(), kept_whole.all()
+
+    def whole(self) -> Iterator[Image]:
+        """The frames as they are in the file."""
+        return iter(self.kept_whole) if self.kept_whole is not None else read_video(self.path)
 
 
 def enlarged(factor: float) -> Floats:

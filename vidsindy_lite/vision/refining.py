@@ -157,25 +157,31 @@ def fitting(
 ) -> Bools:
     """Which views (n,) are of the whole target, on its way: by their sizes and places (n, 2).
 
-    If most of them show it `alone`, those that do not must be where the motion leads.
+    If most of them show it `alone`, these say how large it is and where its motion leads, and the
+    others, which may be wrong by the same, must be there.
     """
     inside = inside & ~joined(areas)
-    good = inside
+    good, telling = inside, np.ones(len(frames), bool)
+    if alone is not None and 2 * alone[inside].sum() > inside.sum():
+        telling = alone
     logs = np.log(np.maximum(areas, 1e-3))
     for _ in range(2):
-        use = np.flatnonzero(good)
+        use = np.flatnonzero(good & telling)
         if len(use) < 3:
-            return good
+            return good & telling
         usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="mirror"))
         good = inside & (np.abs(logs - usual) < np.log(_WHOLE))
-    room = _ASTRAY * np.sqrt(areas)
-    if alone is not None and alone[good].mean() > 0.5:
-        room[~alone] = 0
+    room = np.where(telling, _ASTRAY * np.sqrt(areas), 0)
     while (use := np.flatnonzero(good)).size >= 7:
-        told = [_leave_out(frames[use], places[use], i) for i in range(len(use))]
+        known = np.flatnonzero(good & telling)
+        told = [_leave_out(frames, places, i, known) for i in use.tolist()]
         off, unsure = np.array(told).T
         usual = max(float(np.median(off)), 0.05)
-        over = off / (np.maximum(10 * usual, 1 + room[use]) + unsure)
+        bound = np.maximum(10 * usual, 1 + room[use])
+        over = off / (bound + unsure)
+        for k in np.flatnonzero(~telling[use]):  # these must fit each other, and not stand alone
+            off, unsure = _leave_out(frames, places, int(use[k]), use)
+            over[k] = max(over[k], off / (bound[k] + unsure)) if np.isfinite(unsure) else np.inf
         # A wrong place spoils what its neighbours seem to be: the worst of them goes first.
         worst = (over > 1) & (over == maximum_filter1d(over, 7))
         if not worst.any():
@@ -217,17 +223,18 @@ def swapped(frames: Ints, areas: Floats) -> int | None:
     return None
 
 
-def _leave_out(frames: Floats, places: Floats, i: int) -> tuple[float, float]:
+def _leave_out(frames: Floats, places: Floats, i: int, witnesses: Ints) -> tuple[float, float]:
     """How far a place is from where the three on both sides of it say, and how unsure that is.
 
     A quartic through these says it. Where a target turns within a few frames, or some of them are
     missing, no polynomial is right, and a parabola says something else.
     """
-    first = min(max(i - 3, 0), max(len(frames) - 7, 0))
-    others = np.array([j for j in range(first, min(first + 7, len(frames))) if j != i])
+    others = witnesses[witnesses != i]
+    first = min(max(int(np.searchsorted(others, i)) - 3, 0), max(len(others) - 6, 0))
+    others = others[first : first + 6]
     t = frames[others] - frames[i]
-    if len(others) < 4 or np.ptp(t) > 15:
-        return 0.0, 0.0
+    if len(others) < 4 or max(t[-1], 0) - min(t[0], 0) > 15:
+        return 0.0, np.inf
     basis = np.vander(t / 3, min(5, len(others)))
     quartic, parabola = (
         np.linalg.lstsq(powers, places[others])[0][-1] for powers in (basis, basis[:, -3:])

@@ -70,7 +70,7 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     lens = lens_of(samples, film)
     for way, hidden in zip(ways, touching, strict=True):
         way.centre[hidden] = np.nan
-        followed = finished(viewed(path, film, lens, way, lights), film.motion, doubts)
+        followed = finished(viewed(film, lens, way, lights), film.motion, doubts)
         tracks.append(Track.of_motion(followed))
         doubts = ()
     missing = Track.of_motion(nothing(film.motion, len(found)))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .aligning import Aligned, align, pyramid
+from .aligning import Aligned, Ground, align, grounds, pyramid
 
 _PARTS = 12  # parts into which each side of the image is cut; one corner is followed in each
 _WIDTH = 21  # reduced pixels: what is smoother than this is light
@@ -149,7 +149,7 @@ def _widespread(points: Floats, shape: Sequence[int]) -> bool:
 
 def _drifted(before: _Relief, after: _Relief) -> bool | None:
     """Do all pixels tell of a motion, where corners are few? None if these are mute, too."""
-    found = align(before.levels, after.levels, np.eye(3))
+    found = align(grounds(before.levels), after.levels, np.eye(3))
     if found is None or found.error > _VAGUE:
         return None
     moved = displacement(found.map[None], before.fine.shape[::-1])[0]
@@ -187,6 +187,7 @@ class Steadying:
 
     def _start(self, relief: _Relief, base: Floats, error: float) -> None:
         self.key, self.points, self.base, self.drift = relief, _corners(relief.fine), base, error
+        self.grounds: list[Ground] | None = None  # of the key frame, once they are needed
         self.last = np.eye(3)  # from the key frame to the newest
 
     def _by_corners(self, relief: _Relief) -> tuple[Aligned | None, int]:
@@ -211,7 +212,9 @@ class Steadying:
         found, count = self._by_corners(relief)
         if found is not None and count >= _MANY and found.error < _EXACTLY:
             return found
-        direct = align(self.key.levels, relief.levels, self.last)
+        if self.grounds is None:
+            self.grounds = grounds(self.key.levels)
+        direct = align(self.grounds, relief.levels, self.last)
         both = [one for one in (found, direct) if one is not None and one.error < _VAGUE]
         best = min((one.error for one in both), default=0.0)
         good = [one for one in both if one.error <= _AS_SURE * best]
