@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -183,6 +184,32 @@ class Grid:
     def r(self) -> int:
         """Number of control points."""
         return int(self.starts[-1])
+
+    @cached_property
+    def _points(self) -> sparse.csr_array:
+        """`samples`, `nodes` and `slopes`, one below the other."""
+        return sparse.vstack([self.samples, self.nodes, self.slopes], format="csr")
+
+    @cached_property
+    def back(self) -> sparse.csc_array:
+        """`samples`, transposed."""
+        return self.samples.T
+
+    @cached_property
+    def columns(self) -> tuple[Ints, Ints]:
+        """Places and row ends of the sparse array, (k d, r d), of all that a node depends on."""
+        d = self.x.shape[1]
+        first = self.nodes.indices.reshape(-1, WIDTH)[:, :1].repeat(d, axis=0) * d
+        places = (first + np.arange(WIDTH * d)).astype(np.int32)
+        return places.ravel(), np.arange(0, places.size + 1, WIDTH * d, dtype=np.int32)
+
+    def along(self, control_points: Floats) -> tuple[Floats, Floats, Floats]:
+        """The curve at the samples, (n, d), and at the nodes with its slope there, (k, d) each.
+
+        In one product: three would take most of their time to begin.
+        """
+        (n, _), (k, _), every = self.samples.shape, self.nodes.shape, self._points @ control_points
+        return every[:n], every[n : n + k], every[n + k :]
 
     def splines(self, control_points: Floats) -> list[BSpline]:
         """The spline of every segment, from the control points of all, (r, d)."""
