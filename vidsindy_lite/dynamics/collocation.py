@@ -18,7 +18,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import LinAlgError, cholesky_banded
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Floats, Ints
 from .banded import normal_band, solve_factored
 from .library import Function, along_state, law_variables, monomials, shift_generators
 from .selection import RIDGE, equilibrated
@@ -207,11 +207,6 @@ class Collocation:
         return np.count_nonzero(self.precision, axis=0)
 
     @cached_property
-    def _seen(self) -> Bools:
-        """Whether a measurement counts, (n, d)."""
-        return self.precision > 0
-
-    @cached_property
     def sample_weights(self) -> Floats:
         """1 / variance of every measurement, shape (n, d)."""
         return self.precision * self.data_weights
@@ -255,18 +250,15 @@ class Collocation:
         return self._left(self.curve(control_points))
 
     def _left(self, curve: Floats) -> tuple[Floats, Floats]:
-        residual = np.where(self._seen, curve - self.grid.x, 0.0)
+        residual = np.where(self.precision > 0, curve - self.grid.x, 0.0)
         if not self.systematic.size:
             return residual, np.zeros(0)
         weighted, information = self._shared
         sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
-        return residual + self._seen * (self.systematic @ sizes), sizes
+        return residual + (self.precision > 0) * (self.systematic @ sizes), sizes
 
-    def data_loss(self, control_points: Floats) -> float:
+    def data_loss(self, curve: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
-        return self._loss(self.curve(control_points))
-
-    def _loss(self, curve: Floats) -> float:
         residual, sizes = self._left(curve)
         return float((residual**2 * self.sample_weights).sum() + sizes @ sizes)
 
@@ -288,7 +280,7 @@ class Collocation:
         """Data loss plus weighted physics loss, in chi-square units."""
         curve, x, slope = self.grid.along(state.control_points)
         squares = self.grid.node_weights @ self._missed(state, x, slope) ** 2
-        return self._loss(curve) + float(squares @ self.physics_weights)
+        return self.data_loss(curve) + float(squares @ self.physics_weights)
 
     def linearise(self, state: State, columns: Ints, damping: float = 0.0) -> WithCurve:
         """Linearise around a state and eliminate the control points.
@@ -377,17 +369,7 @@ class Collocation:
             place = np.flatnonzero(term_columns == first)
             unknowns[:, j, 1 + place] = -root[:, j, None] * terms[:, [k]]
         unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
-        return self._physics_rows(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
-
-    def _physics_rows(self, root: Floats, jacobian: Floats) -> sparse.csr_array:
-        """Jacobian of the weighted physics residual in the control points, (k d, r d)."""
-        d, grid = self.d, self.grid
-        values, slopes = (basis.data.reshape(-1, WIDTH) for basis in (grid.nodes, grid.slopes))
-        local = -jacobian[:, :, None, :] * values[:, None, :, None]
-        for i in range(d):
-            local[:, i, :, i] += root[:, i, None] * slopes
-        shape = len(values) * d, grid.r * d
-        return sparse.csr_array((local.ravel(), *grid.columns), shape=shape)
+        return self.grid.physics(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
 
     def _gram(self, left: Floats, solved: Floats, data_residual: Floats, sizes: Floats) -> Floats:
         """Gram matrix of what the curve cannot follow, in physics (``left``) and data.

@@ -196,8 +196,8 @@ class Grid:
         return self.samples.T
 
     @cached_property
-    def columns(self) -> tuple[Ints, Ints]:
-        """Places and row ends of the sparse array, (k d, r d), of all that a node depends on."""
+    def _columns(self) -> tuple[Ints, Ints]:
+        """Columns and row ends of `physics`."""
         d = self.x.shape[1]
         first = self.nodes.indices.reshape(-1, WIDTH)[:, :1].repeat(d, axis=0) * d
         places = (first + np.arange(WIDTH * d)).astype(np.int32)
@@ -210,6 +210,20 @@ class Grid:
         """
         (n, _), (k, _), every = self.samples.shape, self.nodes.shape, self._points @ control_points
         return every[:n], every[n : n + k], every[n + k :]
+
+    def physics(self, weights: Floats, jacobian: Floats) -> sparse.csr_array:
+        """Jacobian of a weighted physics residual in the control points, (k d, r d).
+
+        From the weights of the slopes at the nodes, (k, d), and what the law makes of the states
+        there, weighted, (k, d, d).
+        """
+        d = self.x.shape[1]
+        values, slopes = (part.data.reshape(-1, WIDTH) for part in (self.nodes, self.slopes))
+        local = -jacobian[:, :, None, :] * values[:, None, :, None]
+        for i in range(d):
+            local[:, i, :, i] += weights[:, i, None] * slopes
+        shape = len(values) * d, self.r * d
+        return sparse.csr_array((local.ravel(), *self._columns), shape=shape)
 
     def splines(self, control_points: Floats) -> list[BSpline]:
         """The spline of every segment, from the control points of all, (r, d)."""
