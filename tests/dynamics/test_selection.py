@@ -17,6 +17,7 @@ from vidsindy_lite.dynamics.selection import (
     closest_rival,
     equilibrated,
     inverse,
+    subset_path,
     subset_search,
 )
 
@@ -191,6 +192,32 @@ def test_a_newcomer_moves_others_if_a_fit_with_it_says_so(seed, m, price, batche
         least = min(cost for cost, _, _ in changes)
         assume(abs(least) > 1e-4)
         assert moved[number] == (least < 0)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 8), st.floats(0.1, 100))
+def test_a_path_is_a_search_of_each_share_that_begins_where_the_last_ended(seed, m, price):
+    information, pull, rng = random_problem(seed, m)
+    penalty, present, support = price * rng.uniform(0.5, 2, m), rng.standard_normal(m), np.ones(m)
+    penalty[0], support = rng.choice([penalty[0], -np.inf]), support.astype(bool)
+    shares = np.geomspace(1, 1e-4, 9).tolist()
+    path = subset_path(information, pull, present, penalty, support, shares)
+    for share, found in zip(shares, path, strict=True):
+        support, *_ = subset_search(share * information, share * pull, present, penalty, support)
+        assert (found == support).all()
+
+
+def test_a_path_solves_no_support_twice(monkeypatch):
+    information, pull, _ = random_problem(3, 8)
+    solved, fit = [], _Quadratic.fit
+
+    def counted(model, support):
+        solved.append(support.tobytes())
+        return fit(model, support)
+
+    monkeypatch.setattr(_Quadratic, "fit", counted)
+    shares = np.geomspace(1, 1e-2, 20).tolist()
+    subset_path(information, pull, 0 * pull, np.full(8, 1.0), np.ones(8, dtype=bool), shares)
+    assert len(solved) == len(set(solved))
 
 
 def test_a_descent_that_cannot_reach_its_goal_is_given_up():

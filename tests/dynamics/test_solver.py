@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers import posed
 from scipy.stats import kstest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics.candidates import Library
@@ -419,3 +420,16 @@ def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over(seed):
     found = discover(t[seen], x[seen], order=1)
     assert found.terms[np.flatnonzero(found.system.support[:, 0])[-1]] == "x^2"
     assert found.noise < 1e-3 * x.std()
+
+
+def test_a_discovery_has_one_thread_and_gives_the_others_back(monkeypatch):
+    def threads():
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    within = []
+    monkeypatch.setattr(solver, "_of_order", lambda *_: within.append(threads()))
+    t = np.linspace(0, 10, 50)
+    with threadpool_limits(limits=2, user_api="blas"):
+        discover(t, np.sin(t)[:, None])
+        assert threads() == {2}
+    assert within == [{1}]

@@ -22,7 +22,7 @@ from ..arrays import Floats, Ints
 from .banded import normal_band, solve_factored
 from .library import Function, along_state, law_variables, monomials, shift_generators
 from .selection import RIDGE, equilibrated
-from .splines import WIDTH, Grid, Segment, rows_from
+from .splines import WIDTH, Grid, Segment
 from .state import State
 
 CLEANEST = 1e-5
@@ -230,7 +230,7 @@ class Collocation:
     def _pull(self) -> Floats:
         """How the systematic errors pull at the control points, (r d, k)."""
         weighted, _ = self._shared
-        pull = self.grid.samples.T @ weighted.reshape(len(self.grid.x), -1)
+        pull = self.grid.back @ weighted.reshape(len(self.grid.x), -1)
         return np.asarray(pull).reshape(self.grid.r * self.d, -1)
 
     def curve(self, control_points: Floats) -> Floats:
@@ -239,28 +239,34 @@ class Collocation:
 
     def node_states(self, control_points: Floats) -> tuple[Floats, Floats]:
         """The curve and its slope at the collocation nodes, each of shape (k, d)."""
-        return self.grid.nodes @ control_points, self.grid.slopes @ control_points
+        _, x, slope = self.grid.along(control_points)
+        return x, slope
 
     def data_residual(self, control_points: Floats) -> tuple[Floats, Floats]:
         """Curve plus systematic errors minus data, (n, d), and the best sizes of these, (k,).
 
         What was not observed has residual 0.
         """
-        residual = np.where(self.precision > 0, self.curve(control_points) - self.grid.x, 0.0)
+        return self._left(self.curve(control_points))
+
+    def _left(self, curve: Floats) -> tuple[Floats, Floats]:
+        residual = np.where(self.precision > 0, curve - self.grid.x, 0.0)
         if not self.systematic.size:
             return residual, np.zeros(0)
         weighted, information = self._shared
         sizes = -np.linalg.solve(information, np.einsum("nik,ni->k", weighted, residual))
         return residual + (self.precision > 0) * (self.systematic @ sizes), sizes
 
-    def data_loss(self, control_points: Floats) -> float:
+    def data_loss(self, curve: Floats) -> float:
         """Weighted sum of squares of the data residual (chi-square), systematic errors included."""
-        residual, sizes = self.data_residual(control_points)
+        residual, sizes = self._left(curve)
         return float((residual**2 * self.sample_weights).sum() + sizes @ sizes)
 
     def physics_residual(self, state: State) -> Floats:
         """``dG P - phi(G P - offset) Lambda`` at the nodes, shape (k, d)."""
-        x, slope = self.node_states(state.control_points)
+        return self._missed(state, *self.node_states(state.control_points))
+
+    def _missed(self, state: State, x: Floats, slope: Floats) -> Floats:
         law = state.coefficients + self.known
         rows = law.any(axis=1)
         exponents, law = self.exponents[rows], law[rows]
@@ -272,8 +278,9 @@ class Collocation:
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def objective(self, state: State) -> float:
         """Data loss plus weighted physics loss, in chi-square units."""
-        squares = self.grid.node_weights @ self.physics_residual(state) ** 2
-        return self.data_loss(state.control_points) + float(squares @ self.physics_weights)
+        curve, x, slope = self.grid.along(state.control_points)
+        squares = self.grid.node_weights @ self._missed(state, x, slope) ** 2
+        return self.data_loss(curve) + float(squares @ self.physics_weights)
 
     def linearise(self, state: State, columns: Ints, damping: float = 0.0) -> WithCurve:
         """Linearise around a state and eliminate the control points.
@@ -292,12 +299,13 @@ class Collocation:
         scipy.linalg.LinAlgError
             If the banded normal matrix is not positive definite.
         """
-        physics, unknowns = self._derivatives(state, columns)
-        data_residual, sizes = self.data_residual(state.control_points)
+        curve, x, slope = self.grid.along(state.control_points)
+        physics, unknowns = self._derivatives(state, columns, x, slope)
+        data_residual, sizes = self._left(curve)
         factor = self._factor(physics, damping)
 
         response = physics.T @ unknowns
-        response[:, 0] += (self.grid.samples.T @ (data_residual * self.sample_weights)).ravel()
+        response[:, 0] += (self.grid.back @ (data_residual * self.sample_weights)).ravel()
         response[:, 1 + len(columns) :] = self._pull
         response *= -1
         solve_factored(factor, response)
@@ -325,18 +333,20 @@ class Collocation:
 
     def factor(self, state: State) -> tuple[Floats, sparse.csr_array]:
         """That factor at a state, and the Jacobian of the weighted physics residual, (k d, r d)."""
-        physics, _ = self._derivatives(state, np.array([], dtype=int))
+        nodes = self.node_states(state.control_points)
+        physics, _ = self._derivatives(state, np.array([], dtype=int), *nodes)
         return self._factor(physics), physics
 
-    def _derivatives(self, state: State, columns: Ints) -> tuple[sparse.csr_array, Floats]:
-        """The weighted physics residual around a state.
+    def _derivatives(
+        self, state: State, columns: Ints, x: Floats, slope: Floats
+    ) -> tuple[sparse.csr_array, Floats]:
+        """The weighted physics residual around a state, whose curve is at the nodes as given.
 
         Its Jacobian in the control points, (k d, r d); and, side by side, (k d, 1 + m + s), the
         residual itself, its derivatives in the columns, and zeros for the systematic errors.
         """
         d, l = self.d, len(self.exponents)
         law = state.coefficients + self.known
-        x, slope = self.node_states(state.control_points)
         z, below = law_variables(x - state.offset, self.functions, self.exponents, law)
         terms = monomials(z, self.exponents)
         root = np.sqrt(self.grid.node_weights[:, None] * self.physics_weights)
@@ -359,17 +369,7 @@ class Collocation:
             place = np.flatnonzero(term_columns == first)
             unknowns[:, j, 1 + place] = -root[:, j, None] * terms[:, [k]]
         unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
-        return self._physics_rows(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
-
-    def _physics_rows(self, root: Floats, jacobian: Floats) -> sparse.csr_array:
-        """Jacobian of the weighted physics residual in the control points, (k d, r d)."""
-        d, grid = self.d, self.grid
-        values, slopes = (basis.data.reshape(-1, WIDTH) for basis in (grid.nodes, grid.slopes))
-        local = -jacobian[:, :, None, :] * values[:, None, :, None]
-        for i in range(d):
-            local[:, i, :, i] += root[:, i, None] * slopes
-        first = grid.nodes.indices.reshape(-1, WIDTH)[:, 0] * d
-        return rows_from(np.repeat(first, d), local.reshape(-1, WIDTH * d), grid.r * d)
+        return self.grid.physics(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
 
     def _gram(self, left: Floats, solved: Floats, data_residual: Floats, sizes: Floats) -> Floats:
         """Gram matrix of what the curve cannot follow, in physics (``left``) and data.

@@ -20,7 +20,7 @@ from ..arrays import Bools, Floats
 from .collocation import Fit, WithCurve
 from .errors import effective_noise, residual_noise, time_inflation
 from .problem import Problem
-from .selection import minimiser, subset_search
+from .selection import minimiser, subset_path
 from .state import State
 
 TOLERATED = 0.03
@@ -143,11 +143,10 @@ def follow(problem: Problem, fit: Fit) -> Path:
     # What has to be tolerated is asked itself: a plateau may begin just below it.
     levels = np.union1d(np.geomspace(lowest, LARGEST, count + 1), min(level, LARGEST))
     paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
-    for low, high in zip(levels[:-1].tolist(), levels[1:].tolist(), strict=True):
-        share = (own / low) ** 2
-        support, _, _ = subset_search(
-            share * model.information, share * model.gradient, present, prices, support
-        )
+    lows, highs = levels[:-1].tolist(), levels[1:].tolist()
+    shares = [(own / low) ** 2 for low in lows]
+    searched = subset_path(model.information, model.gradient, present, prices, support, shares)
+    for low, high, support in zip(lows, highs, searched, strict=True):
         active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
         active.flat[problem.form.searched] = support[:terms_end]
         active = fit.state.whole(active.T).T

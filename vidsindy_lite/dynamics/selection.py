@@ -6,7 +6,9 @@ matrix: all matrices are scaled to a unit diagonal before they are solved or inv
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -63,13 +65,37 @@ def subset_search(
         The function with penalties.
     """
     model = _Quadratic.of(information, gradient, present, penalty)
-    starts = (start, np.isneginf(penalty))
-    best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
-    while (deeper := _through_newcomer(model, best)) is not None:
-        best = deeper
+    best = _search(model, start)
     solution = np.zeros(len(penalty))
     solution[best.inside] = best.fitted * model.scale[best.inside]
     return best.support, solution, best.value
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
+def subset_path(
+    information: Floats,
+    gradient: Floats,
+    present: Floats,
+    penalty: Floats,
+    start: Bools,
+    shares: Sequence[float],
+) -> list[Bools]:
+    """The supports that `subset_search` finds of shares of a function, each from the one before.
+
+    Nine of ten supports that such a search tries, one before it has tried: each is solved once.
+
+    Parameters
+    ----------
+    information, gradient, present, penalty, start
+        See `subset_search`.
+    shares : sequence of float
+        What the function is multiplied by; the penalties are not.
+    """
+    whole = _Quadratic.of(information, gradient, present, penalty)
+    model, supports = _Remembering(**vars(whole)), [start]
+    for share in shares:
+        supports.append(_search(replace(model, share=share), supports[-1]).support)
+    return supports[1:]
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
@@ -97,10 +123,10 @@ def closest_rival(
     """
     model = _Quadratic.of(information, gradient, present, penalty)
     fit = model.fit(support)
-    tableau = _Tableau.of(model, fit)
+    tableau = model.tableau(fit)
     moved = _moved_by_newcomers(model, tableau)
     # Those that move no others cost what they cost alone.
-    alone = model.penalty[tableau.outside] - _gain(tableau.left, tableau.room)
+    alone = model.penalty[tableau.outside] - tableau.gained
     alone[moved] = np.inf
     joined = [tableau.outside[moved], tableau.outside[[alone.argmin()]] if len(alone) else NONE]
     rivals = [_with_newcomer(model, support, entry) for entry in np.concatenate(joined)]
@@ -140,12 +166,13 @@ class _Fit:
     inverse: Floats
     fitted: Floats
     left: Floats
+    fall: float
     value: float
 
 
 @dataclass(frozen=True)
 class _Quadratic:
-    """A quadratic function with penalties, its entries scaled to a unit diagonal.
+    """A share of a quadratic function, with penalties, its entries scaled to a unit diagonal.
 
     Everything is reckoned from the present point: with data that are nearly exact the function
     itself has more digits than a computer, its changes do not.
@@ -156,6 +183,7 @@ class _Quadratic:
     gradient: Floats
     present: Floats
     penalty: Floats
+    share: float = 1.0
 
     @classmethod
     def of(
@@ -171,6 +199,13 @@ class _Quadratic:
         penalty[entry] = price
         return replace(self, penalty=penalty)
 
+    def paid(self, inside: Ints) -> float:
+        prices = self.penalty[inside]
+        return float(prices[np.isfinite(prices)].sum())
+
+    def tableau(self, fit: _Fit) -> _Tableau:
+        return _Tableau.of(self, fit)
+
     def fit(self, support: Bools) -> _Fit:
         inside = np.flatnonzero(support)
         block = self.matrix[inside[:, None], inside]
@@ -182,10 +217,37 @@ class _Quadratic:
         moved += inverse @ (target - block @ moved)
         step[inside] = moved
         left = self.gradient - self.matrix @ step
-        prices = self.penalty[inside]
-        paid = prices[np.isfinite(prices)].sum()
-        value = float(paid - step @ (left + self.gradient))
-        return _Fit(support, inside, inverse, self.present[inside] + moved, left, value)
+        fall, fitted = -float(step @ (left + self.gradient)), self.present[inside] + moved
+        value = self.paid(inside) + self.share * fall
+        return _Fit(support, inside, inverse, fitted, left, fall, value)
+
+
+@dataclass(frozen=True)
+class _Remembering(_Quadratic):
+    """The same, which remembers of each support what holds for all shares and penalties."""
+
+    fits: dict[bytes, _Fit] = field(default_factory=dict)
+    tableaus: dict[bytes, _Tableau] = field(default_factory=dict)
+
+    def fit(self, support: Bools) -> _Fit:
+        if (key := support.tobytes()) not in self.fits:
+            self.fits[key] = super().fit(support)
+        fit = self.fits[key]
+        return replace(fit, value=self.paid(fit.inside) + self.share * fit.fall)
+
+    def tableau(self, fit: _Fit) -> _Tableau:
+        if (key := fit.support.tobytes()) not in self.tableaus:
+            self.tableaus[key] = super().tableau(fit)
+        return self.tableaus[key]
+
+
+def _search(model: _Quadratic, start: Bools) -> _Fit:
+    """The lowest value from a support and from nothing, and through newcomers from there."""
+    starts = (start, np.isneginf(model.penalty))
+    best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
+    while (deeper := _through_newcomer(model, best)) is not None:
+        best = deeper
+    return best
 
 
 def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
@@ -195,7 +257,7 @@ def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
     """
     best = model.fit(start)
     while True:
-        changes = _single_changes(model, _Tableau.of(model, best))
+        changes = _single_changes(model, model.tableau(best))
         change, dropped, added = min(changes, key=lambda item: item[0])
         if not change < -PLATEAU or best.value + len(best.inside) * change > goal:
             return best
@@ -208,7 +270,7 @@ def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
 
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """A lower value reached by forcing one entry in, which may let several others go."""
-    tableau = _Tableau.of(model, best)
+    tableau = model.tableau(best)
     promising = _moved_by_newcomers(model, tableau)
     for entry in tableau.outside[promising]:
         trial = _with_newcomer(model, best.support, entry)
@@ -229,14 +291,14 @@ def _moved_by_newcomers(model: _Quadratic, tableau: _Tableau) -> Bools:
     As rank-one updates of the tableau tell, for many newcomers at once: first axis. Those that are
     combinations of the entries inside are among them: for these no update tells.
     """
-    outside, inside, room = tableau.outside, tableau.inside, tableau.room
+    outside, inside, room, size = tableau.outside, tableau.inside, tableau.room, model.share**0.5
     price, share = model.penalty[outside], np.maximum(room, COLLINEAR)[:, None]
     shared = model.matrix[outside[:, None], inside]
     common = model.matrix[outside[:, None], outside] - shared @ tableau.response.T
-    pull = tableau.left[:, None] / share
-    fitted, spread = tableau.fitted - tableau.response * pull, tableau.spread
+    pull = size * tableau.left[:, None] / share
+    fitted, spread = size * tableau.fitted - tableau.response * pull, tableau.spread
     spread = spread + tableau.response**2 / share
-    left, free = tableau.left - common * pull, room - common**2 / share
+    left, free = size * tableau.left - common * pull, room - common**2 / share
     np.fill_diagonal(free, 0.0)  # the newcomer itself is in
     loss = fitted**2 / spread - model.penalty[inside]
     gain = _gain(left, free)
@@ -315,26 +377,38 @@ class _Tableau:
             inside, outside, fit.fitted, fit.inverse.diagonal(), response, fit.left[outside], room
         )
 
+    @cached_property
+    def gained(self) -> Floats:
+        """What each newcomer explains."""
+        return _gain(self.left, self.room)
+
+    @cached_property
+    def gained_after(self) -> Floats:
+        """What it explains after each drop, (outside, inside).
+
+        A drop changes what the others leave over, and the room a newcomer has, by rank one.
+        """
+        left = self.response * (self.fitted / self.spread)
+        left += self.left[:, None]
+        room = self.response**2 / self.spread
+        room += self.room[:, None]
+        return _gain(left, room)
+
 
 def _single_changes(model: _Quadratic, tableau: _Tableau) -> list[Change]:
     """Best drop, add and swap."""
-    inside, outside, spread = tableau.inside, tableau.outside, tableau.spread
-    response, left, room = tableau.response, tableau.left, tableau.room
-    loss, price = tableau.fitted**2 / spread - model.penalty[inside], model.penalty[outside]
-    cost = price - _gain(left, room)
+    inside, outside, share = tableau.inside, tableau.outside, model.share
+    lost, price = tableau.fitted**2 / tableau.spread, model.penalty[outside]
+    loss = share * lost - model.penalty[inside]
+    cost = price - share * tableau.gained
     changes = [(np.inf, NONE, NONE)]
     if len(inside):
         changes.append((loss.min(), inside[[loss.argmin()]], NONE))
     if len(outside):
         changes.append((cost.min(), NONE, outside[[cost.argmin()]]))
     if len(inside) and len(outside):
-        # A drop changes what the others leave over, and the room a newcomer has, by rank one.
-        swapped_left = response * (tableau.fitted / spread)
-        swapped_left += left[:, None]
-        swapped_room = response**2 / spread
-        swapped_room += room[:, None]
         swap = loss + price[:, None]
-        swap -= _gain(swapped_left, swapped_room)
+        swap -= share * tableau.gained_after
         add, drop = divmod(int(swap.argmin()), len(inside))
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
     return changes

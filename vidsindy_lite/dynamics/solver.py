@@ -18,6 +18,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from ..arrays import Floats
@@ -157,9 +158,24 @@ def discover(
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
     measured = trajectories, shared, check_sigma(sigma, times, trajectories)
-    found = _of_order(measured, seed, progress, names, library, origin, order)
-    if orientation == "data":
-        return found
+    # Matrices this small gain nothing by threads, which wait for each other on a busy machine.
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = _of_order(measured, seed, progress, names, library, origin, order)
+        if orientation == "data":
+            return found
+        return _oriented(found, measured, seed, progress, names, library, origin)
+
+
+def _oriented(
+    found: Discovery,
+    measured: Measured,
+    seed: int,
+    progress: bool,
+    names: tuple[str, ...],
+    library: Library,
+    origin: str,
+) -> Discovery:
+    """The law in the axes in which it has fewest terms."""
     form = Form.of(names, library, found.system.order, origin)
 
     def posed(turn: Floats) -> Problem:
