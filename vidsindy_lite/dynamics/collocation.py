@@ -250,6 +250,7 @@ class Collocation:
         return self._left(self.curve(control_points))
 
     def _left(self, curve: Floats) -> tuple[Floats, Floats]:
+        """`data_residual` of a curve at the samples, (n, d)."""
         residual = np.where(self.precision > 0, curve - self.grid.x, 0.0)
         if not self.systematic.size:
             return residual, np.zeros(0)
@@ -267,6 +268,7 @@ class Collocation:
         return self._missed(state, *self.node_states(state.control_points))
 
     def _missed(self, state: State, x: Floats, slope: Floats) -> Floats:
+        """`physics_residual` of a curve that is at the nodes as given."""
         law = state.coefficients + self.known
         rows = law.any(axis=1)
         exponents, law = self.exponents[rows], law[rows]

@@ -91,8 +91,7 @@ def subset_path(
     shares : sequence of float
         What the function is multiplied by; the penalties are not.
     """
-    whole = _Quadratic.of(information, gradient, present, penalty)
-    model, supports = _Remembering(**vars(whole)), [start]
+    model, supports = _Remembering.of(information, gradient, present, penalty), [start]
     for share in shares:
         supports.append(_search(replace(model, share=share), supports[-1]).support)
     return supports[1:]
@@ -200,10 +199,11 @@ class _Quadratic:
         return replace(self, penalty=penalty)
 
     def paid(self, inside: Ints) -> float:
-        prices = self.penalty[inside]
-        return float(prices[np.isfinite(prices)].sum())
+        """What entries cost, but for those that must be there."""
+        return float(self.penalty[inside][np.isfinite(self.penalty[inside])].sum())
 
     def tableau(self, fit: _Fit) -> _Tableau:
+        """What can be read off around a fit."""
         return _Tableau.of(self, fit)
 
     def fit(self, support: Bools) -> _Fit:
