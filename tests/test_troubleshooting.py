@@ -208,7 +208,7 @@ TROUBLES = {
     "a sample lies far from those before and after it": jumping,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
     "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
-    "from a drive that nobody named": driven,
+    "from a drive or a force that nobody named": driven,
     "must be a new folder or hold an earlier report": occupied,
 }
 

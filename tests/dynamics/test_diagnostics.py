@@ -278,6 +278,38 @@ def test_errors_that_last_are_a_misfit_only_if_few_are_independent(samples, stat
     assert all("times the noise estimated beforehand" in warning for warning in found.warnings)
 
 
+def test_what_a_law_misses_is_no_error_that_lasts_if_it_is_a_large_part_of_the_motion():
+    # A line for a relaxation oscillation: what it misses of two runs does not swing back.
+    law = PolynomialSystem.from_terms({"x": {"vx": 1}, "vx": {"x": -1, "vx": 0.8, "x^2 vx": -0.8}})
+    t = np.linspace(0, 20, 500)
+    runs = [(t, law.simulate(t, [start, 0.0])[:, :1]) for start in (0.5, 3.0)]
+    found = discover(runs, degree=1, order=2)
+    assert any("the curve misses the data of x" in warning for warning in found.warnings)
+
+
+def test_a_wrong_force_on_few_turns_is_not_taken_for_kicks_in_silence():
+    pull = Library.terms({"r/r^3": lambda x, y: np.array([x, y]) / np.hypot(x, y) ** 3})
+    law = PolynomialSystem.from_terms(
+        {
+            "x": {"vx": 1},
+            "y": {"vy": 1},
+            "vx": {"r/r^3_x": -1, "vx": -0.02},
+            "vy": {"r/r^3_y": -1, "vy": -0.02},
+        },
+        library=pull,
+    )
+    t = np.linspace(0, 20, 400)
+    x = law.simulate(t, [1, 0, 0, 1.15])[:, :2]
+    x += 0.014 * np.random.default_rng(0).normal(size=x.shape)
+    wrong = {
+        "r/r^4": lambda x, y: np.array([x, y]) / np.hypot(x, y) ** 4,
+        "r": lambda x, y: np.array([x, y]),
+    }
+    found = discover(t, x, order=2, library=Library.terms(wrong))
+    words = r"kicked at random, which 3\.\d turns of \d+ samples each cannot tell from a drive or a"
+    assert any(re.search(words, warning) for warning in found.warnings)
+
+
 def test_a_drive_that_nobody_named_is_a_misfit():
     # x'' = -x + a cos 2.3 t: what the law misses is no function of the state, but has a period.
     t = np.linspace(0, 100, 1500)

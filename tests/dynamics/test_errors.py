@@ -115,9 +115,11 @@ def test_errors_pass_that_are_forgotten_and_do_not_rebound():
     missed = np.sin(t / 7) + 0.3 * white
     pushed = lfilter([1], [1, -1.97, 0.98], rng.standard_normal(1500))  # a spring, at random
     errors = np.stack([white, slow, averaged, filtered, missed, pushed, np.zeros(1500)], axis=1)
+    errors *= 0.09 / np.maximum(errors.std(axis=0), 1e-9)
     assert passing(fit_with(errors), 56).tolist() == [True] * 4 + [False] * 3
     assert passing(fit_with(errors[:, [1, 6]]), 56).tolist() == [True, True]  # the 2nd was not seen
     assert not passing(fit_with(errors[:, :4]), 2000).any()  # so many terms these cannot judge
+    assert not passing(fit_with(1.2 * errors), 56).any()  # a large part of the motion
 
 
 def test_errors_swing_as_theory_says():

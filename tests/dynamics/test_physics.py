@@ -10,6 +10,9 @@ from vidsindy_lite.dynamics.physics import Quantity, _diagonal, physics_of
 TIMES = np.linspace(0, 6, 300)
 DRAG = Library.terms({"|v|v": lambda vx, vy: np.hypot(vx, vy) * np.array([vx, vy])})
 
+DRY = Library.terms({"sign(vx)": lambda vx: np.sign(vx)})
+POLE = Library.terms({"1/x": lambda x: 1 / x})
+
 
 def law_of(library=None, **accelerations):
     """A law of motion; the first letter of a keyword is its coordinate."""
@@ -138,6 +141,8 @@ def test_the_energy_along_the_path():
         (PolynomialSystem.from_terms({"x": {"x": -1}}), [1], "first order"),
         (law_of(x={"x": 1.0}), [0.1, 0], "nothing holds it"),
         (law_of(x={"x": -1.0}, y={}), [1, 0, 0, 1], "nothing holds it"),
+        (law_of(DRY, x={"x": -1.0, "sign(vx)": -0.1}), [1, 0], "or a force jumps there: no spring"),
+        (law_of(POLE, x={"x": -4.0, "vx": -0.1}), [1, 0], "nothing holds it"),
         (law_of(x={"x": -1.0, "vx": -3.0}), [1, 0], "no period: it creeps back"),
         (law_of(x={"x": -1.0, "vx": 0.1}), [1, 0], "no period: what is near rest leaves it"),
         (law_of(x={"vx": -1.0}), [0, 1], "no constant force: no g"),

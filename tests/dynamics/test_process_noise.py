@@ -208,4 +208,4 @@ def test_kicks_of_few_samples_a_turn_may_be_a_drive():
     x += 0.05 * x.std() * np.random.default_rng(0).standard_normal(x.shape)
     found = vl.discover(times, x)
     assert found.model_error.any()
-    assert any("from a drive that nobody named" in text for text in found.warnings)
+    assert any("from a drive or a force that nobody named" in text for text in found.warnings)

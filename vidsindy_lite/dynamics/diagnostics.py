@@ -31,6 +31,8 @@ NEAR_TIE = 4.0
 """Two laws whose criteria differ by less than this (a likelihood ratio of 7) are not told apart."""
 TURNS = 1.5
 """Turns of the motion that a trajectory should cover."""
+REPEATED = 10.0
+"""Turns that tell kicks from a wrong law, which misses the same whenever the motion comes by."""
 LONGEST_STEP = 1.0
 """Longest typical time step, in time scales of the motion (about 6 to a turn)."""
 RESOLVED = 1e-2
@@ -112,10 +114,6 @@ def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
     ----------
     trajectories : sequence of Trajectory
         The data in the user's units.
-
-    Returns
-    -------
-    list of str
     """
     found = []
     for t, x in trajectories:
@@ -434,7 +432,7 @@ def _narrow(law: PolynomialSystem, margins: Floats) -> Iterator[str]:
 
 def _sampling(problem: Problem) -> Iterator[str]:
     form, step = problem.form, typical_step(problem.trajectories)
-    # On a line nothing turns; and a body need not turn, if it is seen from several starts.
+    # On a line nothing turns; a body need not, if it is seen from several starts.
     bound = form.states > 1 and (form.movable.all() or len(problem.trajectories) == 1)
     if problem.turns < TURNS and bound:
         yield (
@@ -443,8 +441,10 @@ def _sampling(problem: Problem) -> Iterator[str]:
         )
     if step > LONGEST_STEP:
         yield f"only {2 * np.pi / step:.1f} samples per turn of the motion: sample faster"
-    if problem.kicked and problem.samples_a_turn < COARSE:
+    coarse, short = problem.samples_a_turn < COARSE, problem.turns < REPEATED
+    if problem.kicked and (coarse or short):
+        few = f"{problem.turns:.1f} turns of {problem.samples_a_turn:.0f} samples each"
         yield (
-            f"the motion is taken for kicked at random, which {problem.samples_a_turn:.1f} samples "
-            "per turn cannot tell from a drive that nobody named: sample faster, or name the drive"
+            f"the motion is taken for kicked at random, which {few} cannot tell from a drive or a "
+            f"force that nobody named: {'sample faster' if coarse else 'record longer'}, or name it"
         )

@@ -15,6 +15,8 @@ ORDER = 40
 """Most errors that foretell the next."""
 LEAST = 1e-300
 """Keeps a quotient finite where nothing moves or is left."""
+LARGE = 0.1
+"""Errors that last, relative to the spread of the data, beyond which a law's may well be meant."""
 REBOUND = 0.3
 """Autocorrelation below zero from which on errors come back with the other sign, as a motion does:
 three standard errors of a hundred independent ones."""
@@ -137,13 +139,14 @@ def passing(fit: Fit, tried: int) -> Bools:
     """Which errors last but are none that the motion brings along, (d,).
 
     What a law misses swings with the motion; errors of a sensor or a filter are forgotten. More
-    must be independent than are ``tried`` as further terms, so that those could tell. Of a
-    coordinate that was never observed, what is true of all others.
+    must be independent than are ``tried`` as further terms, so that those could tell; and they are
+    no large part of the motion. Of a coordinate that was never observed, what is true of all
+    others.
     """
     seen, errors = fit.collocation.counts > 0, _errors_seen(fit)
     counts = np.array([sum(independent(piece[:, 0]) for piece in pieces) for pieces in errors])
     lowest = np.concatenate([rebound(pieces) for pieces in errors])
-    forgotten = (counts > tried) & (lowest > -REBOUND)
+    forgotten = (counts > tried) & (lowest > -REBOUND) & (residual_noise(fit) < LARGE)
     return np.where(seen, forgotten, forgotten[seen].all())
 
 

@@ -38,7 +38,12 @@ NEWTON = 20
 """Most steps to a place of rest."""
 ROUNDING = 1e-12
 """Step, over the extent of the motion, that is none."""
-NO_REST = "nothing holds it at a place near the motion: no spring constants and no periods"
+NO_REST = (
+    "nothing holds it at a place near the motion, or a force jumps there: no spring constants and "
+    "no periods"
+)
+BESIDE = 0.01
+"""How far beside a place of rest forces are asked for, over the extent of the motion."""
 LEAST = 1e-300
 """Keeps a quotient finite where no force is constant."""
 HEADLINES = ("g", "direction", "drag", "quadratic drag")
@@ -297,11 +302,14 @@ class _Body:
         for j in np.flatnonzero(values).tolist():
             yield Quantity.of(name + self.axes[j], values[j], covariance[j, j])
 
+    @np.errstate(divide="ignore", invalid="ignore")  # of functions that have no value there
     def settled(self, law: PolynomialSystem, place: Floats) -> Floats:
         """Where no force acts on a body at rest, by Newton steps from a place."""
         extent = np.ptp(self.states[:, : self.m], axis=0)
         for _ in range(NEWTON):
             force, slope, _ = self.at_rest(law, place)
+            if not np.isfinite(slope).all():
+                return np.full_like(place, np.nan)
             step = np.linalg.lstsq(slope, force, rcond=FAINT)[0]
             place = place - step
             if (np.abs(step) < ROUNDING * extent).all():
@@ -315,11 +323,21 @@ class _Body:
         margin = AROUND * (high - low)
         for start in (places.mean(axis=0), places[-1]):
             place = self.settled(self.law, start)
-            held = np.linalg.eigvals(-self.at_rest(self.law, place)[1]).real
             near = (place > low - margin) & (place < high + margin)
-            if near.all() and held.min() > FAINT * np.abs(held).max():
+            if not near.all() or self.jumps(place):
+                continue
+            held = np.linalg.eigvals(-self.at_rest(self.law, place)[1]).real
+            if held.min() > FAINT * np.abs(held).max():
                 return place
         return None
+
+    def jumps(self, place: Floats) -> bool:
+        """Whether a force is another close by, as dry friction: its slope is of no small motion."""
+        still = np.append(place, np.zeros(self.m))
+        beside = still + BESIDE * np.ptp(self.states[:, : 2 * self.m], axis=0)
+        _, *slopes = self.force(self.law, np.stack([still, beside]))
+        here, there = np.concatenate(slopes, axis=2)
+        return not np.abs(there - here).max() < 0.5 * np.abs(here).max()
 
     def swing(self, rest: Floats) -> Iterator[Quantity | str]:
         """Springs, damping and periods about a place of rest."""
