@@ -223,7 +223,8 @@ def test_an_edit_of_the_solver_makes_those_stale_that_discover(clone):
     assert not {"01", "08"} & stale
 
 
-NO_MATTER = {"tqdm", "joblib", "filelock", "distributed", "jinja2"}  # how it is run, not what
+# How it is run, not what.
+NO_MATTER = {"tqdm", "joblib", "threadpoolctl", "filelock", "distributed", "jinja2"}
 
 
 def test_every_pinned_library_that_results_come_from_counts():
