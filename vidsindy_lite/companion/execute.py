@@ -161,6 +161,7 @@ def _kernel_environment(environment: Mapping[str, str]) -> dict[str, str]:
     return {
         # Sums do not depend on the number of cores, and joblib's workers do not fight over them.
         "OMP_NUM_THREADS": "1",
+        "OPENCV_FOR_THREADS_NUM": "1",
         **os.environ,
         **environment,
         "PYTHONPATH": os.pathsep.join(filter(None, paths)),

@@ -1,4 +1,4 @@
-"""Run the notebooks: each notebooks/NN_name.py through papermill, two at a time, outputs cleaned.
+"""Run the notebooks: each notebooks/NN_name.py through papermill, three at a time, outputs cleaned.
 
 The .py half of a pair is the source. The .ipynb half is made here: executed, stripped of all that
 differs between two runs, and stamped with a hash of the code that it depends on. The full profile
@@ -32,7 +32,7 @@ from .ledger import enter, seconds_if_current
 from .readme import write_readme
 
 PROFILES = ("full", "quick")
-AT_ONCE = 2  # notebooks: most of them work on one core for most of their time
+AT_ONCE = 3  # notebooks: where one waits for the last task of a sweep, another goes on
 SYSTEMS_TABLE = "table_systems"  # printed after a run of its notebook, or if that is up to date
 
 
@@ -125,7 +125,7 @@ def run(
     dask: str | None = None,
     root: str | os.PathLike | None = None,
 ) -> Report:
-    """Execute notebooks, two at a time, and write what they make; goes on after a failure.
+    """Execute notebooks, three at a time, and write what they make; goes on after a failure.
 
     Parameters
     ----------

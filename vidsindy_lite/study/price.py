@@ -33,27 +33,32 @@ EXACT = 1e8
 
 @dataclass(frozen=True)
 class Case:
-    """One specimen, measured.
+    """One specimen, measured under some conditions: to draw it takes longer than to measure it.
 
     Parameters
     ----------
     number : int
         Of the specimen.
-    noise : float
-        Standard deviation, over that of each coordinate.
-    samples : int
-        How many.
+    conditions : tuple of (float, int)
+        Standard deviation of the noise, over that of each coordinate, and number of samples.
     """
 
     number: int
-    noise: float
-    samples: int
+    conditions: tuple[tuple[float, int], ...]
 
 
-def wrong_terms(case: Case) -> list[tuple[int, int]]:
-    """False and lost terms of the cheapest law at each of `CHANCES`."""
+def wrong_terms(case: Case) -> list[list[tuple[int, int]]]:
+    """False and lost terms of the cheapest law under each condition, at each of `CHANCES`."""
     law = specimen(case.number)
-    information, gradient, present = _around_truth(law, case)
+    return [
+        _counts(law, *_around_truth(law, case.number, *condition)) for condition in case.conditions
+    ]
+
+
+def _counts(
+    law: Benchmark, information: Floats, gradient: Floats, present: Floats
+) -> list[tuple[int, int]]:
+    """The same of one quadratic model."""
     right = law.support.T.ravel()
     counts = []
     for chance in CHANCES:
@@ -63,19 +68,21 @@ def wrong_terms(case: Case) -> list[tuple[int, int]]:
     return counts
 
 
-def _around_truth(law: Benchmark, case: Case) -> tuple[Floats, Floats, Floats]:
+def _around_truth(
+    law: Benchmark, number: int, noise: float, samples: int
+) -> tuple[Floats, Floats, Floats]:
     """The quadratic model of all terms around the fitted true ones: see `subset_search`.
 
     In units of the spread and of a radian of the period.
     """
-    rng = np.random.default_rng([case.number, case.samples])
-    t, clean = law.trajectory(case.samples, SAMPLES_PER_PERIOD)
+    rng = np.random.default_rng([number, samples])
+    t, clean = law.trajectory(samples, SAMPLES_PER_PERIOD)
     t, scale, time = t * (2 * np.pi / law.period), clean.std(axis=0), law.period / (2 * np.pi)
     true = law.coefficients / Units(np.zeros(law.d), scale, time).factors(law.exponents)
     control = smooth([(t, clean / scale)], rng).splines[0].c
     state = State(control, true, law.support, np.zeros(law.d), np.zeros(law.d, dtype=bool))
-    segment = Segment(t, add_noise(clean, case.noise, rng) / scale, t)
-    precision, physics = np.full((2, law.d), [[case.noise**-2], [EXACT]])
+    segment = Segment(t, add_noise(clean, noise, rng) / scale, t)
+    precision, physics = np.full((2, law.d), [[noise**-2], [EXACT]])
     fit = Collocation.of([segment], law.exponents, precision, physics).solve(state)
     model = fit.collocation.linearise(fit.state, np.arange(law.exponents.size))
     return model.information, model.gradient, fit.state.coefficients.T.ravel()
@@ -91,7 +98,7 @@ def price_curve(
     specimens : int
         How many laws, the first of the zoo.
     noises, lengths : sequence
-        See `Case`; each with each.
+        Of the conditions of a `Case`; each with each.
     jobs : int
         Processes.
 
@@ -102,10 +109,12 @@ def price_curve(
     """
     import pandas
 
-    cases = [Case(*case) for case in product(range(specimens), noises, lengths)]
+    conditions = tuple(product(noises, lengths))
+    cases = [Case(number, conditions) for number in range(specimens)]
     rows = [
-        (chance, 100 * case.noise, case.samples, *count)
-        for case, counts in zip(cases, sweep(wrong_terms, cases, jobs=jobs), strict=True)
+        (chance, 100 * noise, samples, *count)
+        for found in sweep(wrong_terms, cases, jobs=jobs, desc="specimens")
+        for (noise, samples), counts in zip(conditions, found, strict=True)
         for chance, count in zip(CHANCES, counts, strict=True)
     ]
     names = ["false alarm", "noise (%)", "samples", "false", "lost"]
