@@ -7,11 +7,10 @@ from scipy.spatial.transform import Rotation
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import solver, turning
 from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.orientation import TurnedLaw, _turns, apart, nearest, turned, with_turns
 from vidsindy_lite.dynamics.selection import inverse
-from vidsindy_lite.dynamics.solver import _solved
+from vidsindy_lite.dynamics.solver import _solved, _Task
 from vidsindy_lite.dynamics.turning import in_axes
 from vidsindy_lite.study import SYSTEMS
 
@@ -90,8 +89,9 @@ def solved(terms, degree, start, span=20.0, noise=0.01):
     law, t = vl.PolynomialSystem.from_terms(terms), np.linspace(0, span, 300)
     x = law.simulate(t, start)
     x += noise * x.std() * np.random.default_rng(0).normal(size=x.shape)
-    form = Form.of(law.names, Library.polynomial(degree))
-    return _solved(([(t, x)], [np.zeros((*x.shape, 0))], None), 0, False, form)
+    measured = [(t, x)], [np.zeros((*x.shape, 0))], None
+    task = _Task(measured, law.names, Library.polynomial(degree), "learn", 0, False)
+    return _solved(task, task.form(1))
 
 
 def own_errors(fit, model):

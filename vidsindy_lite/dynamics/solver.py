@@ -14,8 +14,7 @@ tolerated error, `polish` at the errors that are left, `settle` on the law that 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -158,54 +157,56 @@ def discover(
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
     measured = trajectories, shared, check_sigma(sigma, times, trajectories)
+    task = _Task(measured, names, library, origin, seed, progress)
     # Matrices this small gain nothing by threads, which wait for each other on a busy machine.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = _of_order(measured, seed, progress, names, library, origin, order)
-        if orientation == "data":
-            return found
-        return _oriented(found, measured, seed, progress, names, library, origin)
+        found = _of_order(task, order)
+        return found if orientation == "data" else _oriented(task, found)
 
 
-def _oriented(
-    found: Discovery,
-    measured: Measured,
-    seed: int,
-    progress: bool,
-    names: tuple[str, ...],
-    library: Library,
-    origin: str,
-) -> Discovery:
+@dataclass(frozen=True)
+class _Task:
+    """What is asked of a discovery: the data, and which laws they may have."""
+
+    measured: Measured
+    names: tuple[str, ...]
+    library: Library
+    origin: str
+    seed: int
+    progress: bool
+
+    def form(self, order: int) -> Form:
+        """That of laws of an order."""
+        return Form.of(self.names, self.library, order, self.origin)
+
+    def of(self, measured: Measured) -> _Task:
+        """The same of other data."""
+        return replace(self, measured=measured)
+
+
+def _oriented(task: _Task, found: Discovery) -> Discovery:
     """The law in the axes in which it has fewest terms."""
-    form = Form.of(names, library, found.system.order, origin)
+    form = task.form(found.system.order)
 
     def posed(turn: Floats) -> Problem:
-        probes = np.random.default_rng(seed)
-        paths, modes, errors = in_axes(measured, turn)
+        probes = np.random.default_rng(task.seed)
+        paths, modes, errors = in_axes(task.measured, turn)
         return foreseen(pose(paths, modes, form, probes, errors))
 
     def solved(turn: Floats) -> Solved:
-        return _solved(in_axes(measured, turn), seed, progress, form)
+        return _solved(task.of(in_axes(task.measured, turn)), form)
 
-    return in_sparsest_axes(found, posed, solved, np.random.default_rng(seed))
+    return in_sparsest_axes(found, posed, solved, np.random.default_rng(task.seed))
 
 
-def _of_order(
-    measured: Measured,
-    seed: int,
-    progress: bool,
-    names: tuple[str, ...],
-    library: Library,
-    origin: str,
-    order: int | str,
-) -> Discovery:
+def _of_order(task: _Task, order: int | str) -> Discovery:
     """The law of an order, or of the one that is to be trusted."""
-    if order == "auto" and library.moving(names):
+    if order == "auto" and task.library.moving(task.names):
         order = 2  # who names a velocity means a law of motion
-    solved = partial(_solved, measured, seed, progress)
-    found, problem, _ = solved(Form.of(names, library, 2 if order == 2 else 1, origin))
-    if order == 1 or library.given or not found.warnings:
+    found, problem, _ = _solved(task, task.form(2 if order == 2 else 1))
+    if order == 1 or task.library.given or not found.warnings:
         return found
-    swing = _swing(measured, problem, seed, progress)
+    swing = _swing(task, problem)
     drowned = problem.noise.max() > DROWNED
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
@@ -213,25 +214,25 @@ def _of_order(
     if not (found.system.timed or accelerated(problem.curves)):
         return found
     try:
-        second, *_ = solved(Form.of(names, library, 2, origin))
+        second, *_ = _solved(task, task.form(2))
     except ValueError:  # too few samples for a law of so many terms, or its names are taken
         return found
     return better(found, second)
 
 
-def _swing(measured: Measured, problem: Problem, seed: int, progress: bool) -> Swing | None:
+def _swing(task: _Task, problem: Problem) -> Swing | None:
     """The law of the angle of positions that are on a circle, if nothing but polynomials is given.
 
     None elsewhere, or if there is too little of it.
     """
-    trajectories, shared, _ = measured
+    trajectories, shared, _ = task.measured
     x = np.concatenate([values for _, values in trajectories])
     noise = (problem.noise * problem.units.scale)[: x.shape[1]]
     if problem.form.functions or not is_on_circle(x[np.isfinite(x).all(axis=1)], noise):
         return None
 
     def solved(angles: list[Trajectory], errors: list[Floats]) -> Discovery:
-        return _solved((angles, errors, None), seed, progress, Form.of((NAME,), LIBRARY, 2))[0]
+        return _solved(task.of((angles, errors, None)), Form.of((NAME,), LIBRARY, 2))[0]
 
     try:
         return swinging(trajectories, shared, solved)
@@ -239,14 +240,14 @@ def _swing(measured: Measured, problem: Problem, seed: int, progress: bool) -> S
         return None
 
 
-def _solved(measured: Measured, seed: int, progress: bool, form: Form) -> Solved:
+def _solved(task: _Task, form: Form) -> Solved:
     """The law of a form, the problem that it solves, and the last fit."""
-    trajectories, shared, sigma = measured
+    trajectories, shared, sigma = task.measured
     starts, probes = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
+        np.random.default_rng(child) for child in np.random.SeedSequence(task.seed).spawn(2)
     )
     history = History()
-    with tqdm(total=0, disable=not progress, desc="discover", leave=False) as bar:
+    with tqdm(total=0, disable=not task.progress, desc="discover", leave=False) as bar:
         outcomes = [
             _law(problem, starts, probes, history, bar)
             for problem in views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
