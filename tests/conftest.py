@@ -8,6 +8,8 @@ from pathlib import Path
 
 # Before numpy is imported: results then do not depend on the number of cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# Tests run side by side, one on each core.
+os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
 
 import pytest
 from helpers import TinyRepository
