@@ -35,6 +35,14 @@ def test_units_turn_a_law_back():
     np.testing.assert_allclose(law(units.point(z)), standard(z) * units.scale / units.time)
 
 
+def test_the_curve_is_in_the_units_of_the_data():
+    law = PolynomialSystem.from_terms({"x": {"y": 2}, "y": {"x": -1, "y": -0.1}})
+    t = 3.0 + 40.0 * np.linspace(0, 20, 300)
+    x = 500.0 + 70.0 * law.simulate((t - 3.0) / 40.0, (1.0, 0.0))
+    curve = discover(t, x, degree=1).curve(t)
+    np.testing.assert_allclose(curve, x, atol=1e-3)
+
+
 def test_equations_show_errors_in_both_frames(found):
     assert "±" in found.equations()
     assert found.equations("data") != found.equations("native")

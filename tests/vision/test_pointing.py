@@ -8,7 +8,7 @@ import pytest
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision.candidates import Candidate
 from vidsindy_lite.vision.linking import TOLD
-from vidsindy_lite.vision.pointing import Pointer, _fits, _overlap
+from vidsindy_lite.vision.pointing import Pointer, _boxed, _fits, _overlap
 
 
 def blob(u, v, size, colour=(30, 30, 200)):
@@ -120,3 +120,13 @@ def test_a_track_of_another_colour_than_was_told_is_doubted(tmp_path):
     for told, doubted in (((40, 90, 200), False), ((40, 150, 160), True)):
         warnings = track(path, target=Hint(colour=told)).warnings
         assert any("has the colour (40, 90, 200)" in warning for warning in warnings) == doubted
+
+
+def test_what_is_in_a_box_has_the_colour_of_its_inner_half():
+    frame = np.full((60, 80, 3), 90, np.uint8)
+    frame[20:31, 30:51] = (30, 60, 200)  # what is boxed, to the pixel
+    box = np.array([25.0, 15, 31, 21])  # twice as wide and high
+    one = _boxed(frame, box, box[:2] + (box[2:] - 1) / 2)
+    np.testing.assert_array_equal(one.colour, [30, 60, 200])
+    corner = _boxed(frame, np.array([-6.0, -6, 9, 9]), np.array([-2.0, -2]))
+    np.testing.assert_array_equal(corner.colour, [90, 90, 90])
