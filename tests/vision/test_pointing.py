@@ -125,7 +125,8 @@ def test_a_track_of_another_colour_than_was_told_is_doubted(tmp_path):
 def test_what_is_in_a_box_has_the_colour_of_its_inner_half():
     frame = np.full((60, 80, 3), 90, np.uint8)
     frame[20:31, 30:51] = (30, 60, 200)  # what is boxed, to the pixel
-    box = np.array([25.0, 15, 31, 21])  # twice as wide and high
+    frame[29:31, 45:51] = 0  # a corner of it is dark
+    box = np.array([25.0, 15, 31, 21])  # once more as wide and high
     one = _boxed(frame, box, box[:2] + (box[2:] - 1) / 2)
     np.testing.assert_array_equal(one.colour, [30, 60, 200])
     corner = _boxed(frame, np.array([-6.0, -6, 9, 9]), np.array([-2.0, -2]))
