@@ -133,6 +133,14 @@ def test_shift_leaves_no_remainder_where_terms_cancel():
     assert shifted.coefficients[shifted.terms.index("1"), 0] == 0
 
 
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e12])
+def test_shift_takes_for_a_remainder_what_is_small_beside_what_cancels(size):
+    law = PolynomialSystem.from_terms({"x": {"x^3": size, "x": -0.7 * size}})
+    again = law.shift([0.3]).shift([0.4]).shift([-0.7])
+    np.testing.assert_array_equal(again.support[:4, 0], [False, True, False, True])
+    np.testing.assert_allclose(again.coefficients[[1, 3], 0], [-0.7 * size, size], rtol=1e-9)
+
+
 def test_shift_matrix_of_a_line():
     exponents = monomial_exponents(1, 2)
     np.testing.assert_allclose(
