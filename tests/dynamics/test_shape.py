@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.shape import LAPS, _periods, cancelling, shapes, tied
+from vidsindy_lite.dynamics.shape import LAPS, _Orbit, _periods, cancelling, shapes, tied
 from vidsindy_lite.study import SYSTEMS
 
 TIMES = np.linspace(0, 12, 600)
@@ -95,6 +95,14 @@ def test_an_arc_that_is_passed_once_is_no_circle():
     x = 2 * np.stack([np.sin(angle), np.cos(angle)], axis=1)
     assert told(x) == ""
     assert "on a circle" in told(bob(2 * angle))  # more than half of it, in space
+
+
+@pytest.mark.parametrize("late", [0.0, 0.7, 2.0])
+def test_the_numbers_of_an_orbit_do_not_hang_on_when_it_was_first_seen(late):
+    t = np.linspace(0, 40, 800) + late
+    x = np.stack([np.cos(t) + 0.3 * np.cos(3 * t), np.sin(t)], 1)
+    x += 1e-3 * np.random.default_rng(0).normal(size=x.shape)
+    np.testing.assert_array_equal(_Orbit.near(t - late, x, 2 * np.pi).numbers(), [2, 1])
 
 
 def test_an_orbit_that_shrinks_or_is_rich_is_not_too_plain():
