@@ -5,7 +5,7 @@ import pytest
 from helpers import one_a_frame
 
 from vidsindy_lite.vision.candidates import Candidate
-from vidsindy_lite.vision.linking import TOLD, Sightings, _prices, best_path
+from vidsindy_lite.vision.linking import TOLD, Sightings, _prices, best_path, worth
 
 
 def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
@@ -143,3 +143,13 @@ def test_a_speed_is_that_of_a_frame_also_behind_a_gap():
     assert len(rows) == 10
     start = 2 * (1 - np.exp(-0.5 * (20 / (60 + 2 * np.sqrt(60))) ** 2))
     assert value == pytest.approx(10 * 0.75 - start - (0.3 + 3 * 0.04))
+
+
+def test_the_worth_of_a_path_is_the_value_that_it_was_found_by():
+    rng = np.random.default_rng(0)
+    places = np.column_stack([50 + 5 * np.arange(40), 100 + 20 * np.sin(np.arange(40) / 5)])
+    seen = one_a_frame(places + rng.normal(0, 1, places.shape), rng.uniform(0.4, 1, 40))
+    seen = seen.only(np.delete(np.arange(40), [7, 8, 30]))
+    rows, value = best_path(seen)
+    assert worth(seen, rows) == pytest.approx(value)
+    assert worth(seen, rows[:1]) == pytest.approx(seen.quality[rows[0]] - 0.15)

@@ -21,9 +21,10 @@ from .candidates import (
     uncommon,
 )
 from .colours import entire
+from .crossing import rejoined
 from .hints import Hint
 from .lingering import Place, lingering, uncover
-from .linking import TOLD, Sightings, best_path
+from .linking import TOLD, Sightings, best_path, worth
 from .occluders import hidden
 from .pixels import relit
 from .pointing import Pointer, alike
@@ -88,11 +89,10 @@ def plainest_paths(seen: Sightings, most: int = _PATHS) -> list[Rated]:
     """Several paths that have nothing in common, the plainest first."""
     left, found, boxes = np.arange(len(seen.frame)), [], seen.box
     for _ in range(most):
-        rows, value = best_path(seen.only(left))
-        rows = left[rows]
+        rows = left[best_path(seen.only(left))[0]]
         if len(rows) < _SHORTEST:
             break
-        found.append(Rated(rows, rate(seen, rows, value)))
+        found.append(rows)
         around = np.full((seen.frame[-1] + 1, 4), np.nan)
         around[seen.frame[rows]] = boxes[rows]
         low = around[seen.frame[left], :2]
@@ -100,7 +100,9 @@ def plainest_paths(seen: Sightings, most: int = _PATHS) -> list[Rated]:
         with np.errstate(invalid="ignore"):
             part = ((middle >= low) & (middle <= low + around[seen.frame[left], 2:])).all(axis=1)
         left = left[~part & ~np.isin(left, rows)]
-    return sorted(found, key=lambda path: -path.rating)
+    found = [rows for rows in rejoined(seen, found) if len(rows) >= _SHORTEST]
+    rated = [Rated(rows, rate(seen, rows, worth(seen, rows))) for rows in found]
+    return sorted(rated, key=lambda path: -path.rating)
 
 
 class Followed(NamedTuple):
