@@ -71,3 +71,19 @@ def test_a_ball_before_a_sky_is_tracked_with_a_camera_that_trembles(tmp_path, se
     assert np.nanmedian(error) < 0.4
     assert np.median(np.linalg.norm(there - here, axis=1)) > 0.9
     assert result.warnings == ()
+
+
+def test_errors_are_as_large_as_they_are_told(tmp_path):
+    ratios = []
+    for seed in range(1, 7):
+        phone = Phone(**(vars(SKY) | {"camera": "trembling", "bitrate": 2_000_000}))
+        here, there = write_phone(tmp_path / "clip.mp4", phone, seed)
+        motion = found(tmp_path / "clip.mp4")
+        if motion is None:
+            continue
+        known = np.isfinite(motion.errors) & (motion.errors > 0)
+        error = (carry(motion.maps, there) - here)[known]
+        ratios.append(np.sqrt((error**2).mean() / (motion.errors[known] ** 2).mean()))
+    print(ratios)
+    assert len(ratios) >= 4
+    assert 0.6 < np.exp(np.mean(np.log(ratios))) < 1.1
