@@ -6,6 +6,7 @@ import pytest
 from vidsindy_lite import write_video
 from vidsindy_lite.vision import reducing
 from vidsindy_lite.vision.reducing import ReducedFrames, reduce
+from vidsindy_lite.vision.reel import Reel
 
 
 def rounded(factor):
@@ -30,17 +31,15 @@ def test_what_is_missing_of_the_last_squares_repeats_the_last_row_and_column(fac
     np.testing.assert_allclose(reduce(image, factor), means, atol=rounded(factor))
 
 
-@pytest.mark.parametrize(("room", "reads"), [((1.0, 1.0), 1), ((1.0, 0.8), 3), ((0.8, 0.8), 4)])
-def test_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads):
+@pytest.mark.parametrize(("room", "times"), [(1.0, 1), (0.99, 2)])
+def test_frames_are_reduced_once_if_there_is_room(tmp_path, monkeypatch, room, times):
     images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
     path = write_video(tmp_path / "clip.mov", iter(images))
-    read, count = reducing.read_video, []
-    monkeypatch.setattr(reducing, "read_video", lambda path: count.append(path) or read(path))
-    monkeypatch.setattr(reducing, "_KEPT", (room[0] * images.nbytes / 4, room[1] * images.nbytes))
-    frames = ReducedFrames(path, 2)
+    shrink, count = reducing.reduce, []
+    monkeypatch.setattr(reducing, "reduce", lambda *a: count.append(a) or shrink(*a))
+    monkeypatch.setattr(reducing, "_ROOM", room * images.nbytes / 4)
+    frames = ReducedFrames(Reel(path), 2)
     for _ in range(2):
         for frame, image in zip(frames, images, strict=True):
             np.testing.assert_array_equal(frame, reduce(image, 2))
-        for frame, image in zip(frames.whole(), images, strict=True):
-            np.testing.assert_array_equal(frame, image)
-    assert len(count) == reads
+    assert len(count) == 5 * times

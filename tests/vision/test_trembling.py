@@ -8,6 +8,7 @@ from vidsindy_lite import track, write_video
 from vidsindy_lite.vision import trembling as module
 from vidsindy_lite.vision.background import sample_frames
 from vidsindy_lite.vision.reducing import ReducedFrames, reduce
+from vidsindy_lite.vision.reel import Reel
 from vidsindy_lite.vision.steadying import carry
 from vidsindy_lite.vision.trembling import trembling
 
@@ -23,7 +24,7 @@ def film(folder, seed, **change):
 
 
 def found(path):
-    return trembling(ReducedFrames(path, 1), sample_frames(path))
+    return trembling(ReducedFrames(Reel(path), 1), sample_frames(Reel(path)))
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -55,8 +56,8 @@ def test_what_is_too_plain_or_moves_too_far_is_not_told(tmp_path, background):
 
 def test_maps_are_those_of_whole_frames(tmp_path):
     path, here, there = film(tmp_path, 1, camera="trembling", image_size=(640, 480))
-    samples = np.array([reduce(sample, 2) for sample in sample_frames(path)])
-    motion = trembling(ReducedFrames(path, 2), samples)
+    samples = np.array([reduce(sample, 2) for sample in sample_frames(Reel(path))])
+    motion = trembling(ReducedFrames(Reel(path), 2), samples)
     error = np.linalg.norm(carry(motion.maps, there) - here, axis=1)
     assert np.median(error[np.isfinite(motion.errors)]) < 0.5
 
