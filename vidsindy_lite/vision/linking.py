@@ -76,19 +76,29 @@ class Sightings:
 
 def _prices(seen: Sightings, old: Ints, new: Ints, speed: Floats, moving: Floats) -> Floats:
     """What it costs to go on from states of old rows, of these speeds, to new rows, (old, new)."""
-    gap = (seen.frame[new] - seen.frame[old][:, None]).astype(float)
-    step = seen.centre[new] - seen.centre[old][:, None]
-    miss = np.linalg.norm(step - gap[..., None] * speed[:, None], axis=2)
-    size, travel = seen.size[old][:, None], np.linalg.norm(speed, axis=1)[:, None]
+    gap = seen.frame[new] - seen.frame[old][:, None]
+    along, down = (
+        seen.centre[new, k] - seen.centre[old, k][:, None] - gap * speed[:, k][:, None]
+        for k in (0, 1)
+    )
+    size, travel = seen.size[old][:, None], np.hypot(*speed.T)[:, None]
     known = 2 + 0.5 * size + 0.5 * travel * gap
     reach = np.where(moving[:, None], known, _START * seen.diagonal + 2 * size * gap)
-    far = 0.5 * (miss / reach) ** 2
+    far = 0.5 * (along**2 + down**2) / reach**2
     told = (seen.quality[new] >= TOLD) | (seen.quality[old] >= TOLD)[:, None]
     price = _JUMP * np.where(told, far, 1 - np.exp(-far))
-    price += np.where(gap > 1, _GAP + _SLOT * gap, 0)
-    price += np.abs(np.log(seen.size[new] / size))
-    apart = np.linalg.norm(seen.colour[new] - seen.colour[old][:, None], axis=2)
-    return price + np.minimum(apart / RECOLOUR, 2.0)
+    # All else is the same for all states of a row.
+    first = np.flatnonzero(np.diff(old, prepend=-1))
+    return price + np.repeat(_looks(seen, old[first], new), np.diff(first, append=len(old)), axis=0)
+
+
+def _looks(seen: Sightings, old: Ints, new: Ints) -> Floats:
+    """What gaps and changes of size and colour cost from old to new rows, (old, new)."""
+    gap = seen.frame[new] - seen.frame[old][:, None]
+    price = np.where(gap > 1, _GAP + _SLOT * gap, 0)
+    price += np.abs(np.log(seen.size[new] / seen.size[old][:, None]))
+    apart = sum((seen.colour[new, k] - seen.colour[old, k][:, None]) ** 2 for k in range(3))
+    return np.asarray(price + np.minimum(np.sqrt(apart) / RECOLOUR, 2.0), float)
 
 
 def best_path(seen: Sightings) -> tuple[Ints, float]:
