@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision import reducing
+from vidsindy_lite.vision import reducing, reel
 from vidsindy_lite.vision.reducing import ReducedFrames, reduce
 from vidsindy_lite.vision.reel import Reel
 
@@ -43,3 +43,24 @@ def test_frames_are_reduced_once_if_there_is_room(tmp_path, monkeypatch, room, t
         for frame, image in zip(frames, images, strict=True):
             np.testing.assert_array_equal(frame, reduce(image, 2))
     assert len(count) == 5 * times
+
+
+@pytest.mark.parametrize("few", [True, False])
+def test_frames_that_are_picked_leave_the_reduced_ones_if_there_is_room(tmp_path, monkeypatch, few):
+    images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
+    path = write_video(tmp_path / "clip.mov", iter(images))
+    monkeypatch.setattr(reel, "_ROOM", 0)
+    monkeypatch.setattr(reducing, "_ROOM", few * images.nbytes / 4)
+    count = {"read_video": 0, "pick_frames": 0}
+    for name, use in [(name, getattr(reel, name)) for name in count]:
+
+        def counted(*given, name=name, use=use):
+            count[name] += 1
+            return use(*given)
+
+        monkeypatch.setattr(reel, name, counted)
+    frames = ReducedFrames(Reel(path), 2)
+    np.testing.assert_array_equal(list(frames.pick([0, 2, 4, 7])), images[[0, 2, 4]])
+    for frame, image in zip(frames, images, strict=True):
+        np.testing.assert_array_equal(frame, reduce(image, 2))
+    assert count == {"read_video": 1, "pick_frames": not few}

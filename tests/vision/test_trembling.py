@@ -24,7 +24,7 @@ def film(folder, seed, **change):
 
 
 def found(path):
-    return trembling(ReducedFrames(Reel(path), 1), sample_frames(Reel(path)))
+    return trembling(ReducedFrames(Reel(path), 1), sample_frames(ReducedFrames.of(path)))
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -56,7 +56,7 @@ def test_what_is_too_plain_or_moves_too_far_is_not_told(tmp_path, background):
 
 def test_maps_are_those_of_whole_frames(tmp_path):
     path, here, there = film(tmp_path, 1, camera="trembling", image_size=(640, 480))
-    samples = np.array([reduce(sample, 2) for sample in sample_frames(Reel(path))])
+    samples = np.array([reduce(sample, 2) for sample in sample_frames(ReducedFrames.of(path))])
     motion = trembling(ReducedFrames(Reel(path), 2), samples)
     error = np.linalg.norm(carry(motion.maps, there) - here, axis=1)
     assert np.median(error[np.isfinite(motion.errors)]) < 0.5

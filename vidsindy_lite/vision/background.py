@@ -27,8 +27,7 @@ from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .pixels import dot, lengths
-from .reducing import reduce
-from .reel import Reel
+from .reducing import ReducedFrames, reduce
 
 SAMPLES = 21
 """Frames whose median is the background."""
@@ -60,12 +59,12 @@ _Look = tuple[Floats, float, float]
 # -------------------------------------------------------------------------------------- background
 
 
-def sample_frames(reel: Reel) -> NDArray[np.uint8]:
+def sample_frames(frames: ReducedFrames) -> NDArray[np.uint8]:
     """About `SAMPLES` frames spread evenly over the clip, (m, height, width, 3)."""
-    info = reel.info
+    info = frames.reel.info
     spread = np.unique(np.linspace(0, info.frames - 1, SAMPLES).round().astype(int)).tolist()
     samples, count = np.empty((len(spread), *info.size[::-1], 3), np.uint8), 0
-    for count, frame in enumerate(reel.pick(spread), 1):
+    for count, frame in enumerate(frames.pick(spread), 1):
         samples[count - 1] = frame
     return samples[:count]
 

@@ -28,8 +28,7 @@ from .occluders import hidden
 from .pixels import relit
 from .pointing import Pointer, alike
 from .recalling import recalled
-from .reducing import ReducedFrames, reduce, reduced, reduction
-from .reel import Reel
+from .reducing import ReducedFrames, reduce, reduced
 from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
@@ -165,17 +164,17 @@ def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:
     return bool(np.quantile(sure, _PUSHED) > PLAINLY)
 
 
-def follow(reel: Reel, samples: Image, hint: Hint | None = None) -> Followed:
+def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> Followed:
     """Track what moves in a film, the target if there is a hint which it is.
 
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
-    film = Film.of(reel, samples)
+    film = Film.of(frames, samples)
     found, lights = sighted(film)
     lens = lens_of(samples, film)
     if hint is None:
         return _followed(film, lens, found, lights)
-    pointer = Pointer.of(hint, found, film.factor, reel.path)
+    pointer = Pointer.of(hint, found, film.factor, frames.reel.path)
     if pointer.one is not None:  # the plainest path may be the one that is meant
         plain = _followed(film, lens, found, lights, hinted=True)
         if not pointer.missed(plain.pixels, plain.maps):
@@ -272,14 +271,13 @@ class Film(NamedTuple):
         return self.frames.factor
 
     @classmethod
-    def of(cls, reel: Reel, samples: Image, rests: bool = False) -> "Film":
+    def of(cls, frames: ReducedFrames, samples: Image, rests: bool = False) -> "Film":
         """From its sampled frames, and from all of them if its camera may move."""
-        info = reel.info
+        info, factor = frames.reel.info, frames.factor
         spread = np.linspace(0, info.frames - 1, SAMPLES).round().astype(int)
         sampled = np.unique(spread)[: len(samples)]
-        factor = reduction((samples.shape[2], samples.shape[1]))
         small = np.array([reduce(sample, factor) for sample in samples])
-        frames, motion, sure = ReducedFrames(reel, factor), at_rest(info.frames), True
+        motion, sure = at_rest(info.frames), True
         if not rests:
             motion, sure = _camera(frames, info, small, sampled)
         sampled = np.minimum(sampled, len(motion.maps) - 1)

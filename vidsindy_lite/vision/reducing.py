@@ -1,6 +1,8 @@
 """Frames reduced by a whole factor, and maps between their pixels."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
+from typing import Self
 
 import cv2
 import numpy as np
@@ -41,6 +43,24 @@ class ReducedFrames:
         width, height = reel.info.size
         self._few = 3 * width * height * reel.info.frames <= _ROOM * factor**2
         self._kept: list[Image] | None = None
+
+    @classmethod
+    def of(cls, path: str | os.PathLike) -> Self:
+        """The frames of a film, reduced as is usual for their size."""
+        reel = Reel(path)
+        return cls(reel, reduction(reel.info.size))
+
+    def pick(self, numbers: Sequence[int]) -> Iterator[Image]:
+        """The whole frames of these increasing numbers; on the way the reduced ones are kept."""
+        if self.reel.few or not self._few:
+            yield from self.reel.pick(numbers)
+            return
+        kept: list[Image] = []
+        for i, frame in enumerate(self.reel):
+            kept.append(reduce(frame, self.factor))
+            if i in numbers:
+                yield frame
+        self._kept = kept
 
     def __iter__(self) -> Iterator[Image]:
         if self._kept is not None:

@@ -26,7 +26,7 @@ from .moving import (
     sighted,
     viewed,
 )
-from .reel import Reel
+from .reducing import ReducedFrames
 from .tracking import Track
 
 _MEETINGS = 8  # paths of a target that may follow each other
@@ -58,10 +58,10 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
         If the file is missing or no video.
     """
     check_integer("count", count, least=1)
-    reel = Reel(path)
-    samples = sample_frames(reel)
+    frames = ReducedFrames.of(path)
+    samples = sample_frames(frames)
     # Before a plain background, all that could tell of a camera's motion may be the targets.
-    film = Film.of(reel, samples, BackgroundModel(samples).camera_rests)
+    film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
     found, lights = sighted(film, count)
     seen, paths = linked(found, film, most=count * _MEETINGS)
     lanes, strange = _lanes(seen, paths, count)

@@ -25,6 +25,7 @@ from .background import BackgroundModel, sample_frames, track_blobs, view_distan
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
 from .moving import Followed, follow
+from .reducing import ReducedFrames
 from .reel import Reel
 from .refining import scatter
 from .steadying import carry
@@ -137,18 +138,18 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     """The track, its doubts without the name of the file."""
     if detector not in ("auto", "background"):
         return _link_detections(path, detector)
-    reel = Reel(path)
-    samples = sample_frames(reel)
+    frames = ReducedFrames.of(path)
+    samples = sample_frames(frames)
     model = BackgroundModel(samples)
     if detector == "auto" and model.unrest:
         del model  # its images are large
-        return _follow(reel, samples, target)
+        return _follow(frames, samples, target)
     model.learn_target(samples)
     if detector == "auto" and model.several_colours:
-        return _follow(reel, samples, target)
-    found, blurred = _track_blobs(reel, model)
+        return _follow(frames, samples, target)
+    found, blurred = _track_blobs(frames.reel, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
-        return _follow(reel, samples, target)
+        return _follow(frames, samples, target)
     return replace(found, warnings=model.unrest)
 
 
@@ -161,9 +162,9 @@ def _lost(found: Track) -> tuple[str, ...]:
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
 
 
-def _follow(reel: Reel, samples: Image, hint: Hint | None) -> Track:
+def _follow(frames: ReducedFrames, samples: Image, hint: Hint | None) -> Track:
     """The plainest motion, with the camera's taken out."""
-    return Track.of_motion(follow(reel, samples, hint))
+    return Track.of_motion(follow(frames, samples, hint))
 
 
 def _plausible(found: Track, hint: Hint | None) -> bool:
