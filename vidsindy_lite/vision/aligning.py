@@ -22,7 +22,6 @@ _STEP, _TURN = 8.0, 0.03  # pixels and radians by which the guess may be wrong
 _FAIR = 4.0  # times what a usual block tells, that one block may tell at most
 _WIDELY = 0.1  # share of the blocks that must tell: what few of them tell may move on its own
 _FAINT = 0.3  # grey levels; a deviation without any noise
-_FEW = 2000  # values whose median is that of all
 _BLOCKS = 12  # into which each side is cut: errors within one may be the same
 
 
@@ -157,8 +156,8 @@ def _fit(
 
 
 def _middle(values: Floats | Floats32) -> float:
-    """The median of some thousand values, spread evenly."""
-    return float(np.median(values[:: len(values) // _FEW | 1]))
+    """The median of every other value."""
+    return float(np.median(values[::2]))
 
 
 def _symmetric(matrix: Floats) -> Floats:
