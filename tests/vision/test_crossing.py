@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision import crossing
+from vidsindy_lite.vision import crossing, moving
 from vidsindy_lite.vision.crossing import rejoined
 from vidsindy_lite.vision.linking import Sightings
+from vidsindy_lite.vision.moving import plainest_paths
 
 BALL, PERSON = ((180, 35, 200), 20), ((75, 55, 45), 90)
 N = 60
@@ -113,3 +114,19 @@ def test_too_few_sightings_say_nothing():
                  np.append(person[:39], ball[24 : 24 + few])]  # fmt: skip
         one, _ = rejoined(seen, wrong)
         assert (one < N).all() == told
+
+
+def test_the_plainest_path_is_that_of_the_ball_alone(monkeypatch):
+    # While the ball is hidden its path gains more by going on as the person, seen as plainly.
+    seen = crossing_of((BALL, PERSON))
+    ball, person = paths(seen, swap=False)
+    seen.quality[N + np.arange(39, N)] = 0.4
+    shown = seen.only(np.concatenate([ball, person])[np.argsort(seen.frame[[*ball, *person]])])
+
+    def frames_of_ball():
+        rows = plainest_paths(shown)[0].rows
+        return shown.frame[rows[shown.size[rows] == BALL[1]]].tolist()
+
+    assert frames_of_ball() == seen.frame[ball].tolist()
+    monkeypatch.setattr(moving, "rejoined", lambda seen, paths: paths)
+    assert frames_of_ball() != seen.frame[ball].tolist()
