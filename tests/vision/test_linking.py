@@ -1,14 +1,13 @@
 """The most plausible path through candidates: what it gains and what it pays."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from helpers import one_a_frame
 
 from vidsindy_lite.vision.candidates import Candidate
-from vidsindy_lite.vision.linking import _GAIN, TOLD, Sightings, _prices, best_path
+from vidsindy_lite.vision.linking import TOLD, Sightings, _prices, best_path, worth
 
 
 def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
@@ -27,23 +26,6 @@ def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
     np.testing.assert_array_equal(seen.which[rows], 0)
     assert value > 15
     assert best_path(seen.only(np.zeros(0, int)))[1] == 0
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_value_of_a_path_is_what_its_rows_gain_and_pay(seed):
-    rng = np.random.default_rng(seed)
-    places = np.repeat(np.column_stack([20 + 6.0 * np.arange(30), np.full(30, 60.0)]), 4, axis=0)
-    seen = one_a_frame(places + rng.normal(0, 4, places.shape), rng.uniform(0.3, 0.9, 120))
-    seen = replace(seen, frame=np.arange(120) // 4)  # four in each frame
-    rows, value = best_path(seen)
-    total, speed, moving = seen.quality[rows[0]] - _GAIN, np.zeros(2), False
-    for old, new in pairwise(rows):
-        price = _prices(seen, np.array([old]), np.array([new]), speed[None], np.array([moving]))
-        total += seen.quality[new] - _GAIN - price.item()
-        step = seen.centre[new] - seen.centre[old]
-        speed, moving = step / (seen.frame[new] - seen.frame[old]), True
-    assert len(rows) > 15
-    assert value == pytest.approx(total)
 
 
 def test_a_path_ends_where_nothing_that_follows_is_worth_it():
@@ -163,3 +145,18 @@ def test_a_speed_is_that_of_a_frame_also_behind_a_gap():
     assert len(rows) == 10
     start = 2 * (1 - np.exp(-0.5 * (20 / (60 + 2 * np.sqrt(60))) ** 2))
     assert value == pytest.approx(10 * 0.75 - start - (0.3 + 3 * 0.04))
+
+
+@pytest.mark.parametrize("crowd", [1, 4])
+def test_the_worth_of_a_path_is_the_value_that_it_was_found_by(crowd):
+    for seed in range(5):
+        rng, k = np.random.default_rng(seed), np.arange(40)
+        places = np.column_stack([50 + 5 * k, 100 + 20 * np.sin(k / 5)]).repeat(crowd, axis=0)
+        places += rng.normal(0, 3, places.shape)
+        seen = one_a_frame(places, rng.uniform(0.4, 1, len(places)))
+        seen = replace(seen, frame=np.arange(len(places)) // crowd)
+        seen = seen.only(np.flatnonzero(~np.isin(seen.frame, [7, 8, 30])))
+        rows, value = best_path(seen)
+        assert len(rows) > 20
+        assert worth(seen, rows) == pytest.approx(value)
+        assert worth(seen, rows[:1]) == pytest.approx(seen.quality[rows[0]] - 0.15)

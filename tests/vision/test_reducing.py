@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision import reducing
+from vidsindy_lite.vision import reducing, reel
 from vidsindy_lite.vision.reducing import ReducedFrames, reduce
+from vidsindy_lite.vision.reel import Reel
 
 
 def rounded(factor):
@@ -30,17 +31,36 @@ def test_what_is_missing_of_the_last_squares_repeats_the_last_row_and_column(fac
     np.testing.assert_allclose(reduce(image, factor), means, atol=rounded(factor))
 
 
-@pytest.mark.parametrize(("room", "reads"), [((1.0, 1.0), 1), ((1.0, 0.8), 3), ((0.8, 0.8), 4)])
-def test_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads):
+@pytest.mark.parametrize(("room", "times"), [(1.0, 1), (0.99, 2)])
+def test_frames_are_reduced_once_if_there_is_room(tmp_path, monkeypatch, room, times):
     images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
     path = write_video(tmp_path / "clip.mov", iter(images))
-    read, count = reducing.read_video, []
-    monkeypatch.setattr(reducing, "read_video", lambda path: count.append(path) or read(path))
-    monkeypatch.setattr(reducing, "_KEPT", (room[0] * images.nbytes / 4, room[1] * images.nbytes))
-    frames = ReducedFrames(path, 2)
+    shrink, count = reducing.reduce, []
+    monkeypatch.setattr(reducing, "reduce", lambda *a: count.append(a) or shrink(*a))
+    monkeypatch.setattr(reducing, "_ROOM", room * images.nbytes / 4)
+    frames = ReducedFrames(Reel(path), 2)
     for _ in range(2):
         for frame, image in zip(frames, images, strict=True):
             np.testing.assert_array_equal(frame, reduce(image, 2))
-        for frame, image in zip(frames.whole(), images, strict=True):
-            np.testing.assert_array_equal(frame, image)
-    assert len(count) == reads
+    assert len(count) == 5 * times
+
+
+@pytest.mark.parametrize("few", [True, False])
+def test_frames_that_are_picked_leave_the_reduced_ones_if_there_is_room(tmp_path, monkeypatch, few):
+    images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
+    path = write_video(tmp_path / "clip.mov", iter(images))
+    monkeypatch.setattr(reel, "_ROOM", 0)
+    monkeypatch.setattr(reducing, "_ROOM", few * images.nbytes / 4)
+    count = {"read_video": 0, "pick_frames": 0}
+    for name, use in [(name, getattr(reel, name)) for name in count]:
+
+        def counted(*given, name=name, use=use):
+            count[name] += 1
+            return use(*given)
+
+        monkeypatch.setattr(reel, name, counted)
+    frames = ReducedFrames(Reel(path), 2)
+    np.testing.assert_array_equal(list(frames.pick([0, 2, 4, 7])), images[[0, 2, 4]])
+    for frame, image in zip(frames, images, strict=True):
+        np.testing.assert_array_equal(frame, reduce(image, 2))
+    assert count == {"read_video": 1, "pick_frames": not few}

@@ -8,6 +8,7 @@ from vidsindy_lite import track, write_video
 from vidsindy_lite.vision import trembling as module
 from vidsindy_lite.vision.background import sample_frames
 from vidsindy_lite.vision.reducing import ReducedFrames, reduce
+from vidsindy_lite.vision.reel import Reel
 from vidsindy_lite.vision.steadying import carry
 from vidsindy_lite.vision.trembling import trembling
 
@@ -23,7 +24,7 @@ def film(folder, seed, **change):
 
 
 def found(path):
-    return trembling(ReducedFrames(path, 1), sample_frames(path))
+    return trembling(ReducedFrames(Reel(path), 1), sample_frames(ReducedFrames.of(path)))
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -55,8 +56,8 @@ def test_what_is_too_plain_or_moves_too_far_is_not_told(tmp_path, background):
 
 def test_maps_are_those_of_whole_frames(tmp_path):
     path, here, there = film(tmp_path, 1, camera="trembling", image_size=(640, 480))
-    samples = np.array([reduce(sample, 2) for sample in sample_frames(path)])
-    motion = trembling(ReducedFrames(path, 2), samples)
+    samples = np.array([reduce(sample, 2) for sample in sample_frames(ReducedFrames.of(path))])
+    motion = trembling(ReducedFrames(Reel(path), 2), samples)
     error = np.linalg.norm(carry(motion.maps, there) - here, axis=1)
     assert np.median(error[np.isfinite(motion.errors)]) < 0.5
 
@@ -71,3 +72,19 @@ def test_a_ball_before_a_sky_is_tracked_with_a_camera_that_trembles(tmp_path, se
     assert np.nanmedian(error) < 0.4
     assert np.median(np.linalg.norm(there - here, axis=1)) > 0.9
     assert result.warnings == ()
+
+
+def test_errors_are_as_large_as_they_are_told(tmp_path):
+    ratios = []
+    for seed in range(1, 7):
+        phone = Phone(**(vars(SKY) | {"camera": "trembling", "bitrate": 2_000_000}))
+        here, there = write_phone(tmp_path / "clip.mp4", phone, seed)
+        motion = found(tmp_path / "clip.mp4")
+        if motion is None:
+            continue
+        known = np.isfinite(motion.errors) & (motion.errors > 0)
+        error = (carry(motion.maps, there) - here)[known]
+        ratios.append(np.sqrt((error**2).mean() / (motion.errors[known] ** 2).mean()))
+    print(ratios)
+    assert len(ratios) >= 4
+    assert 0.6 < np.exp(np.mean(np.log(ratios))) < 1.1

@@ -16,7 +16,6 @@ than the target. It also has another *shape*, whereas whole views are alike up t
 that is how `view_distances` tells the one from the other.
 """
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -28,8 +27,7 @@ from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .pixels import dot, lengths
-from .reducing import reduce
-from .video import pick_frames, video_info
+from .reducing import ReducedFrames, reduce
 
 SAMPLES = 21
 """Frames whose median is the background."""
@@ -61,12 +59,12 @@ _Look = tuple[Floats, float, float]
 # -------------------------------------------------------------------------------------- background
 
 
-def sample_frames(path: str | os.PathLike) -> NDArray[np.uint8]:
+def sample_frames(frames: ReducedFrames) -> NDArray[np.uint8]:
     """About `SAMPLES` frames spread evenly over the clip, (m, height, width, 3)."""
-    info = video_info(path)
+    info = frames.reel.info
     spread = np.unique(np.linspace(0, info.frames - 1, SAMPLES).round().astype(int)).tolist()
     samples, count = np.empty((len(spread), *info.size[::-1], 3), np.uint8), 0
-    for count, frame in enumerate(pick_frames(path, spread), 1):
+    for count, frame in enumerate(frames.pick(spread), 1):
         samples[count - 1] = frame
     return samples[:count]
 

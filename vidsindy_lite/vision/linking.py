@@ -19,8 +19,8 @@ _GAP = 0.3  # price of a gap
 _SLOT = 0.04  # price of each frame of it
 _JUMP = 2.0  # highest price of leaving a motion
 _START = 0.06  # of the image's diagonal: a first step of a motion that is nothing special
-_MEMORY = 20  # frames after which a path ends
-_RECOLOUR = 60.0  # grey levels of a change of colour that costs 1
+MEMORY = 20  # frames after which a path ends
+RECOLOUR = 60.0  # grey levels of a change of colour that costs 1
 _STATES = 4  # states of a candidate that are kept
 
 
@@ -76,19 +76,29 @@ class Sightings:
 
 def _prices(seen: Sightings, old: Ints, new: Ints, speed: Floats, moving: Floats) -> Floats:
     """What it costs to go on from states of old rows, of these speeds, to new rows, (old, new)."""
-    gap = (seen.frame[new] - seen.frame[old][:, None]).astype(float)
-    step = seen.centre[new] - seen.centre[old][:, None]
-    miss = np.linalg.norm(step - gap[..., None] * speed[:, None], axis=2)
-    size, travel = seen.size[old][:, None], np.linalg.norm(speed, axis=1)[:, None]
+    gap = seen.frame[new] - seen.frame[old][:, None]
+    along, down = (
+        seen.centre[new, k] - seen.centre[old, k][:, None] - gap * speed[:, k][:, None]
+        for k in (0, 1)
+    )
+    size, travel = seen.size[old][:, None], np.hypot(*speed.T)[:, None]
     known = 2 + 0.5 * size + 0.5 * travel * gap
     reach = np.where(moving[:, None], known, _START * seen.diagonal + 2 * size * gap)
-    far = 0.5 * (miss / reach) ** 2
+    far = 0.5 * (along**2 + down**2) / reach**2
     told = (seen.quality[new] >= TOLD) | (seen.quality[old] >= TOLD)[:, None]
     price = _JUMP * np.where(told, far, 1 - np.exp(-far))
-    price += np.where(gap > 1, _GAP + _SLOT * gap, 0)
-    price += np.abs(np.log(seen.size[new] / size))
-    apart = np.linalg.norm(seen.colour[new] - seen.colour[old][:, None], axis=2)
-    return price + np.minimum(apart / _RECOLOUR, 2.0)
+    # All else is the same for all states of a row.
+    first = np.flatnonzero(np.diff(old, prepend=-1))
+    return price + np.repeat(_looks(seen, old[first], new), np.diff(first, append=len(old)), axis=0)
+
+
+def _looks(seen: Sightings, old: Ints, new: Ints) -> Floats:
+    """What gaps and changes of size and colour cost from old to new rows, (old, new)."""
+    gap = seen.frame[new] - seen.frame[old][:, None]
+    price = np.where(gap > 1, _GAP + _SLOT * gap, 0)
+    price += np.abs(np.log(seen.size[new] / seen.size[old][:, None]))
+    apart = sum((seen.colour[new, k] - seen.colour[old, k][:, None]) ** 2 for k in range(3))
+    return np.asarray(price + np.minimum(np.sqrt(apart) / RECOLOUR, 2.0), float)
 
 
 def best_path(seen: Sightings) -> tuple[Ints, float]:
@@ -104,8 +114,8 @@ def best_path(seen: Sightings) -> tuple[Ints, float]:
     bounds = np.searchsorted(seen.frame, np.arange(seen.frame[-1] + 2))
     for i in np.unique(seen.frame):
         new = np.arange(bounds[i], bounds[i + 1])
-        states = np.flatnonzero(np.isfinite(value[bounds[max(i - _MEMORY, 0)] : bounds[i]].ravel()))
-        states += bounds[max(i - _MEMORY, 0)] * _STATES
+        states = np.flatnonzero(np.isfinite(value[bounds[max(i - MEMORY, 0)] : bounds[i]].ravel()))
+        states += bounds[max(i - MEMORY, 0)] * _STATES
         if not len(states):
             continue
         old = states // _STATES
@@ -133,3 +143,14 @@ def best_path(seen: Sightings) -> tuple[Ints, float]:
         rows.append(state // _STATES)
         state = before.ravel()[state]
     return np.array(rows[::-1]), float(value.max())
+
+
+def worth(seen: Sightings, rows: Ints) -> float:
+    """The value of a path, as `best_path` counts it."""
+    total = float((seen.quality[rows] - _GAIN).sum())
+    speed, moving = np.zeros((1, 2)), np.zeros(1, bool)
+    for old, new in zip(rows[:-1, None], rows[1:, None], strict=True):
+        total -= float(_prices(seen, old, new, speed, moving)[0, 0])
+        gap = seen.frame[new] - seen.frame[old]
+        speed, moving = (seen.centre[new] - seen.centre[old]) / gap, np.ones(1, bool)
+    return total

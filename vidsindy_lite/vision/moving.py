@@ -5,7 +5,6 @@ target's, and its places are refined in whole frames (`refining`). The camera's 
 is taken out, so that tracks come in the first frame's pixels.
 """
 
-import os
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,19 +20,20 @@ from .candidates import (
     uncommon,
 )
 from .colours import entire
+from .crossing import rejoined
 from .hints import Hint
 from .lingering import Place, lingering, uncover
-from .linking import TOLD, Sightings, best_path
+from .linking import TOLD, Sightings, best_path, worth
 from .occluders import hidden
 from .pixels import relit
 from .pointing import Pointer, alike
 from .recalling import recalled
-from .reducing import ReducedFrames, reduce, reduced, reduction
+from .reducing import ReducedFrames, reduce, reduced
 from .refining import Lens, View, fitting, scatter, swapped
 from .resting import explains, rests
 from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
 from .trembling import trembling
-from .video import VideoInfo, video_info
+from .video import VideoInfo
 
 _PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path
@@ -88,11 +88,10 @@ def plainest_paths(seen: Sightings, most: int = _PATHS) -> list[Rated]:
     """Several paths that have nothing in common, the plainest first."""
     left, found, boxes = np.arange(len(seen.frame)), [], seen.box
     for _ in range(most):
-        rows, value = best_path(seen.only(left))
-        rows = left[rows]
+        rows = left[best_path(seen.only(left))[0]]
         if len(rows) < _SHORTEST:
             break
-        found.append(Rated(rows, rate(seen, rows, value)))
+        found.append(rows)
         around = np.full((seen.frame[-1] + 1, 4), np.nan)
         around[seen.frame[rows]] = boxes[rows]
         low = around[seen.frame[left], :2]
@@ -100,7 +99,9 @@ def plainest_paths(seen: Sightings, most: int = _PATHS) -> list[Rated]:
         with np.errstate(invalid="ignore"):
             part = ((middle >= low) & (middle <= low + around[seen.frame[left], 2:])).all(axis=1)
         left = left[~part & ~np.isin(left, rows)]
-    return sorted(found, key=lambda path: -path.rating)
+    found = [rows for rows in rejoined(seen, found) if len(rows) >= _SHORTEST]
+    rated = [Rated(rows, rate(seen, rows, worth(seen, rows))) for rows in found]
+    return sorted(rated, key=lambda path: -path.rating)
 
 
 class Followed(NamedTuple):
@@ -163,17 +164,17 @@ def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:
     return bool(np.quantile(sure, _PUSHED) > PLAINLY)
 
 
-def follow(path: str | os.PathLike, samples: Image, hint: Hint | None = None) -> Followed:
+def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> Followed:
     """Track what moves in a film, the target if there is a hint which it is.
 
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
-    film = Film.of(path, samples)
+    film = Film.of(frames, samples)
     found, lights = sighted(film)
     lens = lens_of(samples, film)
     if hint is None:
         return _followed(film, lens, found, lights)
-    pointer = Pointer.of(hint, found, film.factor, path)
+    pointer = Pointer.of(hint, found, film.factor, frames.reel.path)
     if pointer.one is not None:  # the plainest path may be the one that is meant
         plain = _followed(film, lens, found, lights, hinted=True)
         if not pointer.missed(plain.pixels, plain.maps):
@@ -270,14 +271,13 @@ class Film(NamedTuple):
         return self.frames.factor
 
     @classmethod
-    def of(cls, path: str | os.PathLike, samples: Image, rests: bool = False) -> "Film":
+    def of(cls, frames: ReducedFrames, samples: Image, rests: bool = False) -> "Film":
         """From its sampled frames, and from all of them if its camera may move."""
-        info = video_info(path)
+        info, factor = frames.reel.info, frames.factor
         spread = np.linspace(0, info.frames - 1, SAMPLES).round().astype(int)
         sampled = np.unique(spread)[: len(samples)]
-        factor = reduction((samples.shape[2], samples.shape[1]))
         small = np.array([reduce(sample, factor) for sample in samples])
-        frames, motion, sure = ReducedFrames(path, factor), at_rest(info.frames), True
+        motion, sure = at_rest(info.frames), True
         if not rests:
             motion, sure = _camera(frames, info, small, sampled)
         sampled = np.minimum(sampled, len(motion.maps) - 1)
@@ -317,7 +317,7 @@ def lens_of(samples: Image, film: Film) -> Lens:
 def viewed(film: Film, lens: Lens, ways: "Ways", lights: list[Floats32]) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
     views = []
-    for i, (frame, here) in enumerate(zip(film.frames.whole(), film.motion.maps, strict=False)):
+    for i, (frame, here) in enumerate(zip(film.frames.reel, film.motion.maps, strict=False)):
         view = None
         if np.isfinite(ways.centre[i, 0]):
             view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])
@@ -435,7 +435,7 @@ def remembered(
     inside[sure] = pixels[sure]
     if np.isfinite(inside[:, 0]).any():
         places = recalled(
-            film.frames.whole(), lens, lights, inside, found.maps, entire(views)[0], told=told
+            film.frames.reel, lens, lights, inside, found.maps, entire(views)[0], told=told
         )
         known = np.isfinite(places[:, 0])
         pixels[known], errors[known] = places[known], _RECALLED

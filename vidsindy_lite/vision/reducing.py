@@ -1,15 +1,16 @@
 """Frames reduced by a whole factor, and maps between their pixels."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Self
 
 import cv2
 import numpy as np
 
 from ..arrays import Floats, Image
-from .video import read_video
+from .reel import Reel
 
-_KEPT = 64_000_000, 128_000_000  # bytes of reduced and of whole frames that are kept
+_ROOM = 96_000_000  # bytes of reduced frames that are kept
 LONGEST = 480  # pixels of the longer side of a reduced frame
 
 
@@ -34,48 +35,44 @@ def reduce(image: Image, factor: int) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-class _Kept:
-    """Images, as long as they fit into so many bytes."""
-
-    def __init__(self, room: int) -> None:
-        self.room = room
-        self.images: list[Image] = []
-
-    def add(self, image: Image) -> None:
-        self.room -= image.nbytes
-        if self.room >= 0:
-            self.images.append(image)
-        else:
-            self.images.clear()
-
-    def all(self) -> list[Image] | None:
-        """All that were added, None if they do not fit."""
-        return self.images if self.room >= 0 else None
-
-
 class ReducedFrames:
-    """The frames of a video file, reduced by a factor; read once if they are few."""
+    """The frames of a film, reduced by a factor once if they are few."""
 
-    def __init__(self, path: str | os.PathLike, factor: int) -> None:
-        self.path, self.factor = path, factor
-        self.kept: list[Image] | None = None
-        self.kept_whole: list[Image] | None = None
+    def __init__(self, reel: Reel, factor: int) -> None:
+        self.reel, self.factor = reel, factor
+        width, height = reel.info.size
+        self._few = 3 * width * height * reel.info.frames <= _ROOM * factor**2
+        self._kept: list[Image] | None = None
+
+    @classmethod
+    def of(cls, path: str | os.PathLike) -> Self:
+        """The frames of a film, reduced as is usual for their size."""
+        reel = Reel(path)
+        return cls(reel, reduction(reel.info.size))
+
+    def pick(self, numbers: Sequence[int]) -> Iterator[Image]:
+        """The whole frames of these increasing numbers; on the way the reduced ones are kept."""
+        if self.reel.few or not self._few:
+            yield from self.reel.pick(numbers)
+            return
+        kept: list[Image] = []
+        for i, frame in enumerate(self.reel):
+            kept.append(reduce(frame, self.factor))
+            if i in numbers:
+                yield frame
+        self._kept = kept
 
     def __iter__(self) -> Iterator[Image]:
-        if self.kept is not None:
-            yield from self.kept
+        if self._kept is not None:
+            yield from self._kept
             return
-        kept, kept_whole = (_Kept(room) for room in _KEPT)
-        for frame in read_video(self.path):
+        kept: list[Image] = []
+        for frame in self.reel:
             small = reduce(frame, self.factor)
-            kept.add(small)
-            kept_whole.add(frame)
+            if self._few:
+                kept.append(small)
             yield small
-        self.kept, self.kept_whole = kept.all(), kept_whole.all()
-
-    def whole(self) -> Iterator[Image]:
-        """The frames as they are in the file."""
-        return iter(self.kept_whole) if self.kept_whole is not None else read_video(self.path)
+        self._kept = kept if self._few else None
 
 
 def enlarged(factor: float) -> Floats:

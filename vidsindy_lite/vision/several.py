@@ -26,6 +26,7 @@ from .moving import (
     sighted,
     viewed,
 )
+from .reducing import ReducedFrames
 from .tracking import Track
 
 _MEETINGS = 8  # paths of a target that may follow each other
@@ -57,9 +58,10 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
         If the file is missing or no video.
     """
     check_integer("count", count, least=1)
-    samples = sample_frames(path)
+    frames = ReducedFrames.of(path)
+    samples = sample_frames(frames)
     # Before a plain background, all that could tell of a camera's motion may be the targets.
-    film = Film.of(path, samples, BackgroundModel(samples).camera_rests)
+    film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
     found, lights = sighted(film, count)
     seen, paths = linked(found, film, most=count * _MEETINGS)
     lanes, strange = _lanes(seen, paths, count)

@@ -25,6 +25,8 @@ from .background import BackgroundModel, sample_frames, track_blobs, view_distan
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
 from .moving import Followed, follow
+from .reducing import ReducedFrames
+from .reel import Reel
 from .refining import scatter
 from .steadying import carry
 from .video import read_video
@@ -136,17 +138,18 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     """The track, its doubts without the name of the file."""
     if detector not in ("auto", "background"):
         return _link_detections(path, detector)
-    samples = sample_frames(path)
+    frames = ReducedFrames.of(path)
+    samples = sample_frames(frames)
     model = BackgroundModel(samples)
     if detector == "auto" and model.unrest:
         del model  # its images are large
-        return _follow(path, samples, target)
+        return _follow(frames, samples, target)
     model.learn_target(samples)
     if detector == "auto" and model.several_colours:
-        return _follow(path, samples, target)
-    found, blurred = _track_blobs(path, model)
+        return _follow(frames, samples, target)
+    found, blurred = _track_blobs(frames.reel, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
-        return _follow(path, samples, target)
+        return _follow(frames, samples, target)
     return replace(found, warnings=model.unrest)
 
 
@@ -159,9 +162,9 @@ def _lost(found: Track) -> tuple[str, ...]:
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
 
 
-def _follow(path: str | os.PathLike, samples: Image, hint: Hint | None) -> Track:
+def _follow(frames: ReducedFrames, samples: Image, hint: Hint | None) -> Track:
     """The plainest motion, with the camera's taken out."""
-    return Track.of_motion(follow(path, samples, hint))
+    return Track.of_motion(follow(frames, samples, hint))
 
 
 def _plausible(found: Track, hint: Hint | None) -> bool:
@@ -197,13 +200,13 @@ def check_detector(name: str | os.PathLike) -> None:
         raise FileNotFoundError(f"detector: no such file, got '{name}'")
 
 
-def _track_blobs(path: str | os.PathLike, model: BackgroundModel) -> tuple[Track, bool]:
+def _track_blobs(reel: Reel, model: BackgroundModel) -> tuple[Track, bool]:
     """The background model's track, and whether outlines are too blurred for it.
 
     It tells whole views by their outlines: where these are blurred, by motion or a codec, and many
     views are left out, it is by the blur that they differ.
     """
-    blobs = list(track_blobs(model, read_video(path)))
+    blobs = list(track_blobs(model, reel))
     distance = view_distances(blobs)
     whole = whole_views(distance)
     centroids = np.array([b.centroid if b else (np.nan, np.nan) for b in blobs], float)

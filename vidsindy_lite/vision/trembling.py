@@ -4,7 +4,9 @@ Two frames of a sky share little but noise, and corners of noise tell no motion.
 many frames of a camera that trembles is that sky nearly without noise, only a little blurred, and
 each frame laid on it (`aligning`) tells its own small motion. Whether that is one is for the halves
 of the image to say: if the camera moves, both move alike; noise, a codec's errors and what moves on
-its own are not the same in both.
+its own are not the same in both. By how much the halves differ also says how exact the motion is:
+errors of a codec and of the plate itself reach over many pixels, which no pixel's misfit tells.
+What a codec of few bits leaves where it was, instead of moving it along, both tell alike, though.
 """
 
 from collections.abc import Sequence
@@ -37,9 +39,11 @@ def trembling(frames: ReducedFrames, samples: Image) -> CameraMotion | None:
         maps = _maps(laid)
         if displacement(maps, samples.shape[2:0:-1]).max() > _FAR:
             return None
-    if _alike(ground, views, maps) < _ALIKE:
+    alike, error = _halves(ground, views, maps)
+    if alike < _ALIKE:
         return None
-    return _motion(ground, frames)
+    usual = np.sqrt(np.mean([one.error**2 for one in laid if np.isfinite(one.error)]))
+    return _motion(ground, frames, max(error / usual, 1.0))
 
 
 def _ground(plate: Plate) -> list[Ground]:
@@ -67,11 +71,13 @@ def _maps(laid: Sequence[Aligned]) -> Floats:
     return np.asarray(np.linalg.inv([one.map for one in laid]), float)
 
 
-def _alike(ground: list[Ground], views: Sequence[list[Floats32]], maps: Floats) -> float:
-    """The correlation of the motions that two halves of the image tell.
+def _halves(
+    ground: list[Ground], views: Sequence[list[Floats32]], maps: Floats
+) -> tuple[float, float]:
+    """The correlation of the motions that two halves of the image tell, and the error of both.
 
     A half are two quarters that touch in the middle, which tell all of a motion, and what moves on
-    its own is in one half at a time.
+    its own is in one half at a time. The error is that of the places of their mean, rms, per axis.
     """
     height, width = ground[0].grey.shape
     left, upper = np.arange(width) < width / 2, (np.arange(height) < height / 2)[:, None]
@@ -84,15 +90,16 @@ def _alike(ground: list[Ground], views: Sequence[list[Floats32]], maps: Floats) 
         ends = np.array([carry(one.map, grid).ravel() for one in laid])
         told.append(ends - np.median(ends, axis=0))
     one, other = told
-    return float((one * other).sum() / np.sqrt((one**2).sum() * (other**2).sum()))
+    alike = (one * other).sum() / np.sqrt((one**2).sum() * (other**2).sum())
+    return float(alike), float(np.sqrt(np.mean((one - other) ** 2)) / 2)
 
 
-def _motion(ground: list[Ground], frames: ReducedFrames) -> CameraMotion:
-    """All frames laid on the ground, and so on the first of them."""
+def _motion(ground: list[Ground], frames: ReducedFrames, larger: float) -> CameraMotion:
+    """All frames laid on the ground, and so on the first; errors are `larger` than they tell."""
     laid = [_laid(ground, pyramid(frame), np.eye(3)) for frame in frames]
     maps, errors = _maps(laid), np.array([one.error for one in laid])
-    larger = enlarged(frames.factor)
-    steady = larger @ np.linalg.inv(maps[0]) @ maps @ np.linalg.inv(larger)
-    sure = np.hypot(errors, errors[0])
+    whole = enlarged(frames.factor)
+    steady = whole @ np.linalg.inv(maps[0]) @ maps @ np.linalg.inv(whole)
+    sure = larger * np.hypot(errors, errors[0])
     sure[0] = 0.0
     return CameraMotion(steady / steady[:, 2:, 2:], frames.factor * sure)
