@@ -88,12 +88,13 @@ class Library:
         ----------
         functions : mapping of str to callable
             Names and functions. The arguments of a function are named like the variables that it
-            needs (``x, y``; of a law of second order also ``vx, vy``); it takes and returns arrays
-            of shape (n,). Derivatives are taken by differences of fourth order. If it returns as
-            many arrays as there are measured coordinates, these are the directions of a vector,
-            and the term has the same coefficient in all of them. An argument ``t``, which no
-            coordinate is named, is the time, as in ``lambda t: np.cos(3 * t)``; it then is the last
-            variable of the law, with ``dt/dt = 1``.
+            needs (``x, y``; of a law of second order also ``vx, vy``; one with a default is no
+            variable); it takes and returns arrays of shape (n,). Derivatives are taken by
+            differences of fourth order. If it returns as many arrays as there are measured
+            coordinates, these are the directions of a vector, and the term has the same coefficient
+            in all of them. An argument ``t``, which no coordinate is named, is the time, as in
+            ``lambda t: np.cos(3 * t)``; it then is the last variable of the law, with
+            ``dt/dt = 1``.
 
         Raises
         ------
