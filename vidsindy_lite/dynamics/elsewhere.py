@@ -25,8 +25,6 @@ NEAR_TIE = 4.0
 """Two laws whose criteria differ by less than this (a likelihood ratio of 7) are not told apart."""
 AWAY = "another origin"
 """That of a law is said to be elsewhere than where it was found."""
-LEAST = 1e-300
-"""Keeps a logarithm finite where the data tell nothing of an origin."""
 VANISHED = 1e-6
 """What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
 
@@ -95,7 +93,7 @@ def pinned(
             continue
         variance *= tolerated**2
         room = (high - low)[axis] ** 2 / (2 * np.pi * variance)
-        price = min(np.log(max(room, LEAST)), problem.axis_penalty)
+        price = min(np.log(room), problem.axis_penalty)
         cost = float(price - place**2 / variance)
         if cost < NEAR_TIE:
             yield AWAY, problem.form.names[axis], cost
@@ -127,7 +125,8 @@ def _freed(
 ) -> Iterator[tuple[int, float, float, Floats]]:
     """Axes at home, where each would be if it alone left, and the variance of that.
 
-    With what the move does to the law in the frame of the data, (l, d).
+    With what the move does to the law in the frame of the data, (l, d). Without those whose move
+    the terms of the law make up for.
     """
     own = np.flatnonzero(state.free()[model.columns])
     generators = shift_generators(problem.exponents)
@@ -139,7 +138,8 @@ def _freed(
         (place,), (variance,) = newcomers(
             rows @ model.information @ rows.T, rows @ model.gradient, len(own)
         )
-        yield axis, place, variance, forth @ rate
+        if np.isfinite(variance):
+            yield axis, place, variance, forth @ rate
 
 
 def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:

@@ -296,13 +296,15 @@ def _law(
 
 
 def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
-    """The fit with an axis off home that the errors which are left tell from there."""
+    """The fit with those axes off home that the errors which are left tell from there."""
     if not (problem.form.movable & ~fit.state.moving).any():
         return fit
     model = path.model if path.fit is fit else problem.model(fit)
     state = off_home(problem, fit.state, model, max(path.level / path.own, 1.0))
-    moved = fit if state is fit.state else fit.collocation.solve(state, EXACT)
-    return moved if moved.status is Status.CONVERGED else fit
+    if state is fit.state:
+        return fit
+    moved = fit.collocation.solve(state, EXACT)
+    return _off_home(problem, moved, path) if moved.status is Status.CONVERGED else fit
 
 
 def _kicked(
