@@ -23,6 +23,9 @@ from .state import State
 
 NEAR_TIE = 4.0
 """Two laws whose criteria differ by less than this (a likelihood ratio of 7) are not told apart."""
+CLAIMED = 6.0
+"""Twice the logarithm of the odds, 20 to 1, at which a coincidence is believed (strong evidence by
+Kass and Raftery 1995)."""
 AWAY = "another origin"
 """That of a law is said to be elsewhere than where it was found."""
 VANISHED = 1e-6
@@ -76,8 +79,8 @@ def pinned(
 ) -> Iterator[Rival]:
     """Axes that may as well be a little off home, by which the law would have other terms.
 
-    Where other axes have left, none is at home for the asking: then a move costs what the box is
-    wider than the origin is uncertain, twice its logarithm.
+    Where other axes have left, none is at home for the asking: then to be there is a coincidence,
+    as much as the box is wider than the origin is uncertain. A move costs twice its logarithm.
 
     Parameters
     ----------
@@ -92,10 +95,9 @@ def pinned(
         if not (state.moving.any() and new.any()):
             continue
         variance *= tolerated**2
-        room = (high - low)[axis] ** 2 / (2 * np.pi * variance)
-        price = min(np.log(room), problem.axis_penalty)
-        cost = float(price - place**2 / variance)
-        if cost < NEAR_TIE:
+        room = np.log((high - low)[axis] ** 2 / (2 * np.pi * variance))
+        cost = float(room - place**2 / variance)
+        if cost < CLAIMED:
             yield AWAY, problem.form.names[axis], cost
 
 
