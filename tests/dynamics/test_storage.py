@@ -46,6 +46,6 @@ def test_functions_that_the_law_has_not_may_be_missing(pendulum, tmp_path):
     np.testing.assert_array_equal(again.simulate(state[0], T).x, pendulum.simulate(state[0], T).x)
     assert again.equations() == pendulum.equations()
     assert np.isnan(again.system.library(state)[:, again.terms.index("away")]).all()
-    assert "g" in str(again.physics()) or str(again)
+    assert str(again).startswith(pendulum.equations())
     again.save(tmp_path / "copy")
     assert str(vl.Discovery.load(tmp_path / "copy", HELD)) == str(pendulum)
