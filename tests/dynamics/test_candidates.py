@@ -256,6 +256,14 @@ def test_a_degree_is_short_for_a_polynomial_library():
     assert short.equations() == long.equations()
 
 
+def test_what_an_argument_is_by_default_is_no_variable():
+    library = Library.terms({"plain": np.sin, "twice": lambda x, k=2: np.sin(k * x)})
+    _, (plain, twice) = library.resolve(("x", "y"), 2)
+    x = np.random.default_rng(0).normal(size=(5, 2))
+    np.testing.assert_array_equal(plain.value(x), np.sin(x[:, 0]))
+    np.testing.assert_array_equal(twice.value(x), np.sin(2 * x[:, 0]))
+
+
 @pytest.mark.parametrize("size", [0.5, 4.0])
 def test_functions_in_standard_units_are_those_of_the_data_and_know_their_slopes(size):
     library = Library.fourier(2) + Library.terms({"|v|v": drag})
@@ -331,6 +339,9 @@ def test_a_law_is_saved_and_its_own_functions_are_given_again(tmp_path):
         (Library(), "library: must hold a term"),
         ("polynomial(3)", "library: must be of type Library"),
         (Library.terms({"a": lambda q: q}), r"arguments of 'a' must be named .*\(x, y\), .* got q"),
+        (Library.terms({"a": np.hypot}), r"arguments of 'a' .* as in lambda .*, got x1, x2$"),
+        (Library.polynomial(60), r"library: must have at most 1000 monomials, got 1891 of degree"),
+        (Library.polynomial(1) + Library.rational(60), r"at most 1000 monomials, got 1891"),
         (Library.terms({"x": lambda x: x**2}), "a term must have a name of its own, got 'x' twice"),
         (
             Library.terms({"s": lambda x: math.sin(x)}),

@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 from vidsindy_lite.dynamics import discover
 from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import CLEANEST, Collocation, Status
-from vidsindy_lite.dynamics.diagnostics import diagnose, outliers, untold_origins
+from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.integrate import runge_kutta_4
 from vidsindy_lite.dynamics.persistence import Plateau, follow
@@ -240,14 +240,6 @@ def test_the_constant_is_a_word_and_the_ends_of_a_range_differ(duffing):
     (warning,) = [one for one in told if "is settled by" in one]
     assert "stays the same at 0.03 of the spread of the data" in warning
     assert "with a constant from 0.03 to 0.031;" in warning
-
-
-def test_axes_whose_origin_the_data_do_not_tell_share_a_line():
-    found = [("another origin", name, cost) for name, cost in (("x", 0.4), ("x", -0.2), ("z", 3))]
-    first, second = untold_origins([*found, ("the origin of the data", "y", 1)], "longer ones")
-    assert "origin is in x and in z: other terms around another origin" in first
-    assert "(criterion -0.2); use longer ones" in first
-    assert "origin is in y: other terms around the origin of the data" in second
 
 
 @pytest.mark.parametrize("seed", [2, 3, 5, 6, 8])  # all but 5: the next law at home, not the first

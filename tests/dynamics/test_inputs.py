@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
-from vidsindy_lite import Library
+from vidsindy_lite import Library, PolynomialSystem
 from vidsindy_lite.dynamics.discovery import Discovery
 from vidsindy_lite.dynamics.inputs import Input
 
@@ -115,6 +115,18 @@ def test_a_law_with_an_input_is_saved_and_read_with_its_library(tmp_path):
         Discovery.load(tmp_path / "law.json")
     with pytest.raises(ValueError, match=r"t: must lie where u is known, got 42"):
         found.simulate((0, 0), np.linspace(30, 42, 5))
+
+
+def test_slopes_are_refused_where_an_input_of_the_law_is_not_known():
+    found = vl.discover(T, noisy(FORCED[:, :1], 0.01), library=CUBIC + U, order=2)
+    for states in ([0.1, 0.2, 42.0], [[0.1, 0.2, 3.0], [0.1, 0.2, 42.0]]):
+        with pytest.raises(ValueError, match=r"t: must lie where u is known, got 42"):
+            found.predict(states)
+    idle = Library.inputs(T, {"idle": np.cos(9.1 * T)})
+    x = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1, "x^3": -1}}).simulate(T, (1, 0))
+    free = vl.discover(T, noisy(x[:, :1], 0.01), library=CUBIC + idle, order=2)
+    assert terms(free.system, "vx") == {"x", "x^3"}
+    assert np.isfinite(free.predict([0.1, 0.2, 42.0])).all()  # nothing of it hangs on the input
 
 
 def test_an_input_is_a_spline_and_unknown_outside():

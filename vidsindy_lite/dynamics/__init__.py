@@ -8,8 +8,8 @@ selection of terms, origin, gaps, errors that last, precision (whom to trust how
 process_noise (is the motion kicked?), and persistence: which law stays the same while more error
 is tolerated
 discovery: the result; conclusion makes it, with error bars, from the last fit; diagnostics: all its
-warnings, of which shape looks at where the motion takes place and beyond at terms that the library
-lacks; absent: what candidates that are not in the law could be
+warnings, of which shape looks at where the motion takes place, beyond at terms that the library
+lacks, and elsewhere at other origins; absent: what candidates that are not in the law could be
 physics: what a law of motion says of a body, in named numbers
 history: how a discovery went
 rounds: circles and spheres, whose angles are coordinates; swing: the law of the angle, by itself

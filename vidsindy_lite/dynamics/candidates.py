@@ -88,12 +88,13 @@ class Library:
         ----------
         functions : mapping of str to callable
             Names and functions. The arguments of a function are named like the variables that it
-            needs (``x, y``; of a law of second order also ``vx, vy``); it takes and returns arrays
-            of shape (n,). Derivatives are taken by differences of fourth order. If it returns as
-            many arrays as there are measured coordinates, these are the directions of a vector,
-            and the term has the same coefficient in all of them. An argument ``t``, which no
-            coordinate is named, is the time, as in ``lambda t: np.cos(3 * t)``; it then is the last
-            variable of the law, with ``dt/dt = 1``.
+            needs (``x, y``; of a law of second order also ``vx, vy``; one with a default is no
+            variable); it takes and returns arrays of shape (n,). Derivatives are taken by
+            differences of fourth order. If it returns as many arrays as there are measured
+            coordinates, these are the directions of a vector, and the term has the same coefficient
+            in all of them. An argument ``t``, which no coordinate is named, is the time, as in
+            ``lambda t: np.cos(3 * t)``; it then is the last variable of the law, with
+            ``dt/dt = 1``.
 
         Raises
         ------
@@ -332,33 +333,6 @@ def harmonic(names: tuple[str, ...], axis: int, multiple: int, kind: str) -> Fun
     )
 
 
-def restored(
-    names: tuple[str, ...], measured: int, written: Sequence[str], library: Library | None
-) -> tuple[Function, ...]:
-    """The functions of a law by their names; one's own from a library that holds them.
-
-    Raises
-    ------
-    ValueError
-        If a function is none of the library's.
-    """
-    _, held = (library or Library()).resolve(names, measured)
-    known = {function.name: function for function in held}
-    functions = []
-    for name in written:
-        match = re.fullmatch(r"(sin|cos)\((?:(\d+) )?(\w+)\)", name)
-        if name in known:
-            functions.append(known[name])
-        elif match and match[3] in names:
-            functions.append(harmonic(names, names.index(match[3]), int(match[2] or 1), match[1]))
-        else:
-            raise ValueError(
-                f"library: must hold the function {name!r} of the law, as a file holds its name "
-                f"alone; got {library or 'none'}"
-            )
-    return tuple(functions)
-
-
 def own(
     names: tuple[str, ...],
     measured: int,
@@ -426,11 +400,12 @@ def _checked_arguments(
 
 
 def _arguments(rule: Callable[..., ArrayLike]) -> list[str]:
-    """Names of the arguments of a function; none of some functions in C."""
+    """Names of the arguments that a function needs; none of some functions in C."""
     try:
-        return list(inspect.signature(rule).parameters)
+        parameters = inspect.signature(rule).parameters
     except (TypeError, ValueError):
         return []
+    return [name for name, known in parameters.items() if known.default is known.empty]
 
 
 def _differences(value: Callable[[Floats], Floats], x: Floats, axes: Sequence[int]) -> Floats:

@@ -23,6 +23,8 @@ from .units import Units
 
 KEPT = 1e-12
 """Price of a term that stays whatever its error."""
+LEAST = 1e-300
+"""Keeps a logarithm finite."""
 HOLDS = 3
 """Steps to the likeliest law of which a term is zero."""
 
@@ -57,7 +59,8 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     moved, moved_covariance, margins = _pruned(*native, prices)
     margins /= np.repeat(tolerated**2, l)
     dearer = problem.cautious.prices - problem.prices
-    margins += np.where(moved.T.ravel() != 0, -dearer, dearer)
+    by_chance = _coincidence(*native, np.repeat(tolerated, l), units.scale) - problem.prices
+    margins += np.where(moved.T.ravel() != 0, -dearer, np.minimum(dearer, by_chance))
     margins[weighed] = np.inf
     law = form.law(moved + form.known)
     seen = collocation.counts > 0
@@ -160,6 +163,26 @@ def _powers(exponents: Ints, coefficients: Floats, offset: Floats) -> Ints:
     left = np.where(divides(exponents, offset != 0), lowered, len(exponents))
     powers = [left[:, column != 0].min(axis=1, initial=len(exponents)) for column in coefficients.T]
     return np.maximum(np.concatenate(powers), 1)
+
+
+def _coincidence(
+    exponents: Ints,
+    coefficients: Floats,
+    offset: Floats,
+    covariance: Floats,
+    tolerated: Floats,
+    scale: Floats,
+) -> Floats:
+    """Twice the log odds that a term in the data's frame is no nearer to zero by chance, (l d,).
+
+    A moved origin leaves the sum of some parts, anywhere up to their size, of which its error is a
+    share. The parts are at least those of an origin as far away as the data spread.
+    """
+    variance = np.diag(_carried(exponents, coefficients, offset, covariance)) * tolerated**2
+    reach = np.maximum(np.abs(offset), scale)
+    parts = (np.abs(shift_matrix(exponents, reach)) @ np.abs(coefficients)).T.ravel()
+    odds = parts**2 / (2 * np.pi * np.where(variance > 0, variance, np.inf))
+    return np.where(odds > 0, np.log(np.maximum(odds, LEAST)), np.inf)
 
 
 def _pruned(

@@ -6,7 +6,6 @@ A warning is a necessary sign of trouble, not a sufficient one: a law without on
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -14,21 +13,18 @@ from scipy.stats import chi2
 from ..arrays import Floats
 from .beyond import Wider, beyond_the_library, place, spoken, widened
 from .collocation import CLEANEST, Fit, Linearisation, Status
+from .elsewhere import NEAR_TIE, elsewhere, pinned, untold_origins
 from .errors import passing, residual_noise
-from .library import shift_generators, shift_matrix
 from .persistence import Path
 from .polynomials import PolynomialSystem
 from .problem import COARSE, Problem
-from .search import away
-from .selection import closest_rival, minimiser, subset_search
+from .selection import closest_rival
 from .shape import cancelling, shapes, tied
 from .state import State
 from .trajectories import Trajectory, typical_step
 
 MISFIT = 1.5
 """Residual over estimated noise beyond which the law does not fit."""
-NEAR_TIE = 4.0
-"""Two laws whose criteria differ by less than this (a likelihood ratio of 7) are not told apart."""
 TURNS = 1.5
 """Turns of the motion that a trajectory should cover."""
 REPEATED = 10.0
@@ -54,8 +50,6 @@ WILD = 2.0
 APART = 0.2
 """Root mean square distance of the law's two frames along the curve, relative to the speed: more
 than terms that cannot be told from zero make."""
-VANISHED = 1e-6
-"""What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
 MEANING = {
     Status.MAX_STEPS: "its coefficients may be off by more than their errors",
     Status.STALLED: "terms may be indistinguishable on these data",
@@ -238,13 +232,14 @@ def _selection(
         return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
     yield from beyond_the_library(wider, noisy=not tolerant)
-    if tolerant:
-        return  # weaker errors than those tolerated say nothing about the law
-    # The offset stays where it is: with it free, the same law in another frame would count.
-    model = model.of(problem.form.searched)
-    yield from _left_over(model, fit.state)
-    yield from _near_tie(wider, remedy)
-    yield from _elsewhere(problem.cautious, fit.state, model, law, remedy)
+    tolerated = max(path.level / path.own, 1.0)
+    origins = list(pinned(problem, fit.state, model, law, tolerated))
+    if not tolerant:  # weaker errors than those tolerated say nothing about the law
+        # The offset stays where it is: with it free, the same law in another frame would count.
+        yield from _left_over(model.of(problem.form.searched), fit.state)
+        yield from _near_tie(wider, remedy)
+        origins += elsewhere(problem.cautious, fit.state, model, law)
+    yield from untold_origins(origins, remedy)
 
 
 def _is_clean(fit: Fit) -> bool:
@@ -332,84 +327,6 @@ def _near_tie(wider: Wider, remedy: str) -> Iterator[str]:
         f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
         f"do not settle it: use {remedy}"
     )
-
-
-def _elsewhere(
-    problem: Problem, state: State, model: Linearisation, law: PolynomialSystem, remedy: str
-) -> Iterator[str]:
-    """Would another law fit almost as well, one axis nearer home or one away from it?"""
-    exponents = problem.exponents
-    found: list[tuple[str, str, float]] = []
-    own = problem.price(state)
-    for axis, there in _neighbours(problem, state):
-        for value, rival in _cheapest_two(problem, state, model, there):
-            cost = value + problem.axis_penalty * there.moving.sum() - own
-            if not cost < NEAR_TIE:
-                break  # the next costs more
-            matrix = shift_matrix(exponents, rival.offset - problem.home)
-            parts = np.abs(matrix) @ np.abs(rival.coefficients)
-            terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
-            if (terms != law.support).any():
-                where = "another origin" if there.moving[axis] else "the origin of the data"
-                found.append((where, problem.form.names[axis], cost))
-                break
-    yield from untold_origins(found, remedy)
-
-
-def untold_origins(found: Sequence[tuple[str, str, float]], remedy: str) -> Iterator[str]:
-    """One line for all axes along which other terms fit almost as well around another origin.
-
-    Parameters
-    ----------
-    found : sequence of (str, str, float)
-        Which other origin, along which axis, and by how much the criterion rises there.
-    remedy : str
-        What to do about it.
-    """
-    for where in dict.fromkeys(where for where, _, _ in found):
-        axes = dict.fromkeys(name for other, name, _ in found if other == where)
-        least = min(cost for other, _, cost in found if other == where)
-        yield (
-            f"the data hardly tell where the law's origin is in {' and in '.join(axes)}: other "
-            f"terms around {where} fit almost as well (criterion {least:+.1f}); use {remedy}"
-        )
-
-
-def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
-    """The same law with an axis at home that is not, or away from where it is, and which."""
-    axes = np.eye(problem.d, dtype=bool)[state.moving]
-    nearer = [(np.where(home, problem.home, state.offset), state.moving & ~home) for home in axes]
-    for origin, moving in [*nearer, *away(problem, state)]:
-        moved = shift_matrix(problem.exponents, state.offset - origin) @ state.coefficients
-        axis = int(np.argmax(moving != state.moving))
-        yield axis, replace(state, coefficients=moved, offset=origin, moving=moving)
-
-
-def _cheapest_two(
-    problem: Problem, state: State, model: Linearisation, there: State
-) -> Iterator[tuple[float, State]]:
-    """The cheapest law around a state in another frame and its closest rival, with their costs."""
-    # The quadratic model around the law knows them: what a move does to polynomials is exact.
-    columns, size = problem.columns(there), state.coefficients.size
-    back = shift_matrix(problem.exponents, there.offset - state.offset)
-    axes = np.flatnonzero(there.moving)
-    rates = -shift_generators(problem.exponents)[axes] @ there.coefficients
-    changes = np.vstack([np.eye(size), rates.transpose(0, 2, 1).reshape(-1, size)])
-    changes = changes[np.append(problem.form.searched, np.arange(size, len(changes)))]
-    changes = (changes @ np.kron(np.eye(problem.d), back.T))[:, model.columns]
-    step = (back @ there.coefficients - state.coefficients).T.ravel()[model.columns]
-    pull, present = model.gradient - model.information @ step, there.flat()[columns]
-    quadratic = changes @ model.information @ changes.T, changes @ pull, present
-    risen = float(-step @ (model.gradient + pull))
-    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
-    support, solution, value = subset_search(*quadratic, prices, (present != 0) | (columns >= size))
-    flat = there.flat()
-    flat[columns] = solution
-    yield risen + value, there.moved(there.control_points, flat)
-    cost, dropped, added = closest_rival(*quadratic, prices, support)
-    support[dropped], support[added] = False, True
-    flat[columns] = minimiser(*quadratic, support)
-    yield risen + value + cost, there.moved(there.control_points, flat)
 
 
 def _standstill(law: PolynomialSystem, remedy: str) -> Iterator[str]:

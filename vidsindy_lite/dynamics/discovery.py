@@ -185,8 +185,16 @@ class Discovery:
         return values
 
     def predict(self, x: Floats) -> Floats:
-        """Time derivative at states, shape (n, d) or (d,), in units of the data."""
-        return self.system(x)
+        """Time derivative at states, shape (n, d) or (d,), in units of the data.
+
+        Raises
+        ------
+        ValueError
+            If the states have another shape, or an input of the law is not known at their times.
+        """
+        slopes = self.system(x)
+        self.system.check_inputs(np.atleast_2d(x)[:, -1])
+        return slopes
 
     def simulate(self, x0: Floats, t: Floats) -> Simulation:
         """Follow the law from the state ``x0`` at ``t[0]``.
@@ -265,14 +273,14 @@ class Discovery:
             The file.
         library : Library, optional
             That holds the functions of one's own in the law, if there are any: a file holds their
-            names alone.
+            names, and enough of their values to tell others.
 
         Raises
         ------
         FileNotFoundError
             If there is no such file.
         ValueError
-            If the file holds none, or the library not all functions of the law.
+            If the file holds none, or the library not all functions of the law, or others.
         """
         from .storage import read  # which needs this class
 

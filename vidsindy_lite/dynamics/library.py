@@ -65,6 +65,11 @@ class Function:
     direction: int | None = None
     of_time: bool = False
 
+    @classmethod
+    def unknown(cls, name: str) -> Function:
+        """A function of which nothing but the name is known: NaN everywhere."""
+        return cls(name, name, lambda x: np.full(len(x), np.nan), np.zeros_like)
+
     def standardised(self, centre: Floats, scale: Floats, size: float) -> Function:
         """The same function over ``size``, of points less ``centre``, over ``scale``."""
         return replace(

@@ -97,9 +97,9 @@ class PolynomialSystem:
             raise ValueError("coefficients: must be finite, got NaN or infinity")
         for array in (exponents, coefficients):
             array.setflags(write=False)
-        object.__setattr__(self, "names", names)
-        object.__setattr__(self, "exponents", exponents)
-        object.__setattr__(self, "coefficients", coefficients)
+        checked = {"names": names, "exponents": exponents, "coefficients": coefficients}
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
     @classmethod
     def from_terms(
@@ -223,19 +223,21 @@ class PolynomialSystem:
         """Where a coefficient is not zero, bool, shape (l, d)."""
         return self.coefficients != 0
 
+    @cached_property
+    def _own(self) -> PolynomialSystem:
+        """The same without functions that it has not: they may be infinite."""
+        used = self.support.any(axis=1) | self.is_polynomial
+        return replace(self, exponents=self.exponents[used], coefficients=self.coefficients[used])
+
     def library(self, x: Floats) -> Floats:
         """Candidate terms ``phi(x)``: (n, d) points to (n, l) values; slopes are the law's."""
-        z, _ = self._variables(self._points(x))
+        z, _ = law_variables(self._points(x), self.functions, self.exponents, self.coefficients)
         return monomials(z, self.exponents)
-
-    def _variables(self, x: Floats) -> tuple[Floats, Floats]:
-        """See `law_variables`."""
-        return law_variables(x, self.functions, self.exponents, self.coefficients)
 
     def __call__(self, x: Floats) -> Floats:
         """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
         x = check_array("x", x)
-        return (self.library(np.atleast_2d(x)) @ self.coefficients).reshape(x.shape)
+        return (self._own.library(np.atleast_2d(x)) @ self._own.coefficients).reshape(x.shape)
 
     def gradient(self, x: Floats) -> Floats:
         """Jacobian of the right-hand side.
@@ -250,10 +252,10 @@ class PolynomialSystem:
         ndarray, shape (n, d, d) or (d, d)
             ``[..., j, i]`` is the derivative of equation j with respect to variable i.
         """
-        x = check_array("x", x)
+        x, own = check_array("x", x), self._own
         points = self._points(np.atleast_2d(x))
-        z, below = self._variables(points)
-        rates = np.einsum("nli,lj->nji", monomial_gradients(z, self.exponents), self.coefficients)
+        z, below = law_variables(points, own.functions, own.exponents, own.coefficients)
+        rates = np.einsum("nli,lj->nji", monomial_gradients(z, own.exponents), own.coefficients)
         jacobian = along_state(rates, points, self.functions) / below[:, :, None]
         return jacobian.reshape(*x.shape, self.d)
 
@@ -288,9 +290,8 @@ class PolynomialSystem:
         # What cancels in exact arithmetic must not survive as a term of 1e-16.
         shifted[np.abs(shifted) <= 1e-13 * (np.abs(matrix) @ np.abs(closed))] = 0.0
         # A slope by itself belongs to the constant of a denominator, which is 1.
-        slopes = (exponents.sum(axis=1) == 1) & exponents[:, self.d + len(self.functions) :].any(
-            axis=1
-        )
+        slopes = exponents[:, self.d + len(self.functions) :].any(axis=1)
+        slopes &= exponents.sum(axis=1) == 1
         below = 1 - shifted[slopes].sum(axis=0)
         if (np.abs(below) <= 1e-13).any():
             raise ValueError(f"offset: no denominator may vanish there, got {offset!r:.60}")
@@ -324,7 +325,7 @@ class PolynomialSystem:
         if self.timed and np.shape(x0) != (self.d,):
             x0 = np.append(check_vector("x0", x0, self.states), t[0])
         x0 = check_vector("x0", x0, self.d)
-        self._check_inputs(x0[-1] + t - t[0])
+        self.check_inputs(x0[-1] + t - t[0])
         fraction, size = bool(self.implicit.any()), self.d + len(self.functions)
         above, below = (
             one_by_one(self.exponents[rows, :size], self.coefficients[rows])
@@ -340,8 +341,8 @@ class PolynomialSystem:
 
         return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
 
-    def _check_inputs(self, t: Floats) -> None:
-        """Refuse times at which an input in the law is not known."""
+    def check_inputs(self, t: Floats) -> None:
+        """Refuse times (n,) at which an input in the law is not known."""
         used = self.exponents[self.support.any(axis=1), self.d :].sum(axis=0)
         for function, times in zip(self.functions, used.tolist(), strict=False):
             if function.of_time and times:

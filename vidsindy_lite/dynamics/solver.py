@@ -27,6 +27,7 @@ from .coarse import evidence, views
 from .collocation import Fit, Status
 from .conclusion import conclude
 from .discovery import Discovery
+from .elsewhere import off_home
 from .form import Form
 from .history import History
 from .order import accelerated, better, check_order
@@ -292,7 +293,19 @@ def _law(
         bar.update()
     fit, path = settle(problem, fit, history)
     bar.update()
-    return problem, fit, path
+    return problem, _off_home(problem, fit, path), path
+
+
+def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
+    """The fit with those axes off home that the errors which are left tell from there."""
+    if not (problem.form.movable & ~fit.state.moving).any():
+        return fit
+    model = path.model if path.fit is fit else problem.model(fit)
+    state = off_home(problem, fit.state, model, max(path.level / path.own, 1.0))
+    if state is fit.state:
+        return fit
+    moved = fit.collocation.solve(state, EXACT)
+    return _off_home(problem, moved, path) if moved.status is Status.CONVERGED else fit
 
 
 def _kicked(
