@@ -116,7 +116,9 @@ def along_state(rates: Floats, x: Floats, functions: Sequence[Function]) -> Floa
     d = x.shape[1]
     total = rates[:, :, :d]
     for k, function in enumerate(functions):
-        total = total + rates[:, :, d + k, None] * function.gradient(x)[:, None, :]
+        rate = rates[:, :, d + k, None]
+        if rate.any():  # those that are in no term may be infinite
+            total = total + rate * function.gradient(x)[:, None, :]
     return total
 
 
