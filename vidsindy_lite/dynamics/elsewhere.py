@@ -89,22 +89,17 @@ def pinned(
     tolerated : float
         Errors that have to be tolerated, over those that the law leaves.
     """
-    low, high = problem.box
-    for axis, place, variance, moved in _freed(problem, state, model):
+    for axis, gain, room, moved in _freed(problem, state, model, tolerated):
         new = (np.abs(moved) > VANISHED * np.abs(moved).max(initial=0.0)) & ~law.support
-        if not (state.moving.any() and new.any()):
-            continue
-        variance *= tolerated**2
-        room = np.log((high - low)[axis] ** 2 / (2 * np.pi * variance))
-        cost = float(room - place**2 / variance)
-        if cost < CLAIMED:
-            yield AWAY, problem.form.names[axis], cost
+        if state.moving.any() and new.any() and room - gain < CLAIMED:
+            yield AWAY, problem.form.names[axis], room - gain
 
 
 def off_home(problem: Problem, state: State, model: Linearisation, tolerated: float) -> State:
-    """The state with the axis off home by which its law gains most, if that is worth the price.
+    """The state with the axis off home by which its law gains most, if that is worth it.
 
-    Its terms were chosen at larger errors, at which it may have been too near home to tell.
+    Its terms were chosen at larger errors, at which it may have been too near home to tell. What it
+    gains has to be worth the price of an axis, and more than its place would be a coincidence.
 
     Parameters
     ----------
@@ -113,23 +108,24 @@ def off_home(problem: Problem, state: State, model: Linearisation, tolerated: fl
     tolerated : float
         Errors that have to be tolerated, over those that the law leaves.
     """
-    gains = [
-        (place**2 / variance, axis) for axis, place, variance, _ in _freed(problem, state, model)
-    ]
+    freed = _freed(problem, state, model, tolerated)
+    gains = [(gain - max(room, problem.axis_penalty), axis) for axis, gain, room, _ in freed]
     gain, axis = max(gains, default=(0.0, 0))
-    if not gain > problem.axis_penalty * tolerated**2:
+    if not gain > 0:
         return state
     return replace(state, moving=state.moving | (np.arange(problem.d) == axis))
 
 
 def _freed(
-    problem: Problem, state: State, model: Linearisation
+    problem: Problem, state: State, model: Linearisation, tolerated: float
 ) -> Iterator[tuple[int, float, float, Floats]]:
-    """Axes at home, where each would be if it alone left, and the variance of that.
+    """Axes at home, what the law would gain if each alone left, and what a place is worth.
 
-    With what the move does to the law in the frame of the data, (l, d). Without those whose move
-    the terms of the law make up for.
+    That is twice the logarithm of how much wider the box of the data is than the origin is
+    uncertain. And what the move does to the law in the frame of the data, (l, d). Without those
+    whose move the terms of the law make up for.
     """
+    low, high = problem.box
     own = np.flatnonzero(state.free()[model.columns])
     generators = shift_generators(problem.exponents)
     forth = shift_matrix(problem.exponents, state.offset - problem.home)
@@ -141,7 +137,9 @@ def _freed(
             rows @ model.information @ rows.T, rows @ model.gradient, len(own)
         )
         if np.isfinite(variance):
-            yield axis, place, variance, forth @ rate
+            variance *= tolerated**2
+            room = np.log((high - low)[axis] ** 2 / (2 * np.pi * variance))
+            yield axis, float(place**2 / variance), float(room), forth @ rate
 
 
 def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:

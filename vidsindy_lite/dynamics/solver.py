@@ -175,14 +175,12 @@ class _Task:
     origin: str
     seed: int
     progress: bool
+    turned: bool = False
+    """Whether the axes are a guess: a wrong one looks like an origin that is a little off."""
 
     def form(self, order: int) -> Form:
         """That of laws of an order."""
         return Form.of(self.names, self.library, order, self.origin)
-
-    def of(self, measured: Measured) -> _Task:
-        """The same of other data."""
-        return replace(self, measured=measured)
 
 
 def _oriented(task: _Task, found: Discovery) -> Discovery:
@@ -195,7 +193,7 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
         return foreseen(pose(paths, modes, form, probes, errors))
 
     def solved(turn: Floats) -> Solved:
-        return _solved(task.of(in_axes(task.measured, turn)), form)
+        return _solved(replace(task, measured=in_axes(task.measured, turn), turned=True), form)
 
     return in_sparsest_axes(found, posed, solved, np.random.default_rng(task.seed))
 
@@ -232,8 +230,10 @@ def _swing(task: _Task, problem: Problem) -> Swing | None:
     if problem.form.functions or not is_on_circle(x[np.isfinite(x).all(axis=1)], noise):
         return None
 
+    form = Form.of((NAME,), LIBRARY, 2)
+
     def solved(angles: list[Trajectory], errors: list[Floats]) -> Discovery:
-        return _solved(task.of((angles, errors, None)), Form.of((NAME,), LIBRARY, 2))[0]
+        return _solved(replace(task, measured=(angles, errors, None)), form)[0]
 
     try:
         return swinging(trajectories, shared, solved)
@@ -254,6 +254,8 @@ def _solved(task: _Task, form: Form) -> Solved:
             for problem in views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
         ]
     problem, fit, path = min(outcomes, key=lambda outcome: evidence(*outcome[:2]))
+    if not task.turned:
+        fit = _off_home(problem, fit, path)
     return conclude(problem, fit, path, history), problem, fit
 
 
@@ -293,7 +295,7 @@ def _law(
         bar.update()
     fit, path = settle(problem, fit, history)
     bar.update()
-    return problem, _off_home(problem, fit, path), path
+    return problem, fit, path
 
 
 def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
@@ -301,7 +303,7 @@ def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
     if not (problem.form.movable & ~fit.state.moving).any():
         return fit
     model = path.model if path.fit is fit else problem.model(fit)
-    state = off_home(problem, fit.state, model, max(path.level / path.own, 1.0))
+    state = off_home(problem.cautious, fit.state, model, max(path.level / path.own, 1.0))
     if state is fit.state:
         return fit
     moved = fit.collocation.solve(state, EXACT)
