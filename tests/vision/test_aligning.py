@@ -4,10 +4,12 @@ import cv2
 import numpy as np
 import pytest
 from footage import Phone, write_phone
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vidsindy_lite import track
+from vidsindy_lite.vision.aligning import _middle, grounds, pyramid
 from vidsindy_lite.vision.aligning import align as align_on
-from vidsindy_lite.vision.aligning import grounds, pyramid
 from vidsindy_lite.vision.steadying import Steadying
 
 SIZE = 320, 240
@@ -166,3 +168,9 @@ def test_a_turn_alone_is_followed_to_its_end(turn):
         views.append([cv2.warpAffine(clouds, middle[:2], (160, 120), flags=flags)])
     found = align(*[[np.float32(100 + level) for level in view] for view in views], np.eye(3))
     assert np.arctan2(found.map[1, 0], found.map[0, 0]) == pytest.approx(turn, abs=1e-4)
+
+
+@given(st.lists(st.floats(-1e3, 1e3, width=32), min_size=3, max_size=60))
+def test_the_middle_is_the_median_of_every_other_value(values):
+    values = np.array(values, np.float32)
+    assert _middle(values) == np.median(values[::2])

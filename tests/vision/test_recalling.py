@@ -4,9 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite import Hint, read_video, track, write_video
+from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision.candidates import Plate
 from vidsindy_lite.vision.recalling import _FAR, recalled
+from vidsindy_lite.vision.reel import Reel
 from vidsindy_lite.vision.refining import Lens, View
 
 N = 60
@@ -73,13 +74,13 @@ def test_beyond_its_views_a_target_is_carried_on_as_long_as_it_is_found(tmp_path
     path, lens, lights, maps, views = plain(tmp_path / "clip.mov", TRUTH, 11, shown=54)
     pixels = TRUTH.copy()
     pixels[:8], pixels[45:] = np.nan, np.nan
-    places = recalled(read_video(path), lens, lights, pixels, maps, views, told=True)
+    places = recalled(Reel(path), lens, lights, pixels, maps, views, told=True)
     found = np.isfinite(places[:, 0])
     np.testing.assert_array_equal(np.flatnonzero(found), [*range(8), *range(45, 54)])
     assert np.linalg.norm(places[found] - TRUTH[found], axis=1).max() < 0.5
-    assert np.isnan(recalled(read_video(path), lens, lights, pixels, maps, views, told=False)).all()
+    assert np.isnan(recalled(Reel(path), lens, lights, pixels, maps, views, told=False)).all()
     pixels[20:45] = np.nan  # farther than a view is carried
-    places = recalled(read_video(path), lens, lights, pixels, maps, views, told=True)
+    places = recalled(Reel(path), lens, lights, pixels, maps, views, told=True)
     np.testing.assert_array_equal(
         np.flatnonzero(np.isfinite(places[:, 0])), [*range(8), *range(20, 20 + _FAR)]
     )
@@ -93,5 +94,20 @@ def test_without_a_hint_a_gap_is_filled_where_its_motion_is_known_to_two_pixels(
     pixels = truth.copy()
     pixels[28:33] = np.nan
     for told in (True, False):
-        places = recalled(read_video(path), lens, lights, pixels, maps, views, told=told)
+        places = recalled(Reel(path), lens, lights, pixels, maps, views, told=told)
         assert np.isfinite(places[28:33, 0]).all() == (told or sharp < 2)
+
+
+def test_only_frames_in_and_beside_gaps_are_looked_at(tmp_path):
+    class Picked(Reel):
+        def pick(self, numbers):
+            self.numbers = list(numbers)
+            return super().pick(numbers)
+
+    path, lens, lights, maps, views = plain(tmp_path / "clip.mov", TRUTH, 11)
+    pixels = TRUTH.copy()
+    pixels[28:31] = np.nan
+    reel = Picked(path)
+    places = recalled(reel, lens, lights, pixels, maps, views, told=False)
+    assert reel.numbers == [27, 28, 29, 30, 31]
+    np.testing.assert_allclose(places[28:31], TRUTH[28:31], atol=0.5)

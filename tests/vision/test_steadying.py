@@ -74,7 +74,7 @@ def test_what_a_few_of_the_corners_share_is_chance_and_tells_no_motion(share, to
             after[v : v + 60, u : u + 80] = moved[v : v + 60, u : u + 80]
     steadying = Steadying(1)
     steadying.add(before)
-    found, count = steadying._by_corners(_Relief.of(after))
+    found, count = steadying.by_corners(_Relief.of(after))
     assert (found is not None) is told
     assert (count > 0) is told
 
@@ -115,5 +115,7 @@ def test_pixels_say_it_better_than_many_corners_in_noise():
         steadying.add(np.clip(noisy, 0, 255).astype(np.uint8))
         here = carry(steadying.maps[-1], np.array([[160.0, 120]]))
         misses.append(np.linalg.norm(here + shift - [160, 120]))
-    assert steadying._by_corners(_Relief.of(np.clip(noisy, 0, 255).astype(np.uint8)))[1] >= _MANY
+    assert (
+        steadying.by_corners(_Relief.of(np.clip(noisy, 0, 255).astype(np.uint8))).agreeing >= _MANY
+    )
     assert np.median(misses) < 0.05

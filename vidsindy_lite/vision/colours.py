@@ -14,6 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..arrays import Bools, Floats32
+from .pixels import hull
 
 if TYPE_CHECKING:
     from .refining import View
@@ -62,8 +63,7 @@ def whole(
     inside = np.bincount(labels[own], minlength=2)
     label = labels == 1 + int(inside[1:].argmax()) if inside[1:].any() else own
     core = cv2.erode(label.astype(np.uint8), _CORE) > 0
-    at = np.argwhere(label)[:, ::-1].astype(np.int32)
-    outline = cv2.fillConvexPoly(np.zeros(label.shape, np.uint8), cv2.convexHull(at), 1)
+    outline = cv2.fillConvexPoly(np.zeros(label.shape, np.uint8), hull(label), 1)
     if not core.any() or label.sum() < _SOLID * outline.sum():
         return None
     _, nearest = cv2.distanceTransformWithLabels(

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
 from .background import SAMPLES, light
+from .camera import LOOSE, camera_motion
 from .candidates import (
     Candidate,
     Difference,
@@ -30,10 +31,11 @@ from .pointing import Pointer, alike
 from .recalling import recalled
 from .reducing import ReducedFrames, reduce, reduced
 from .refining import Lens, View, fitting, scatter, swapped
-from .resting import explains, rests
-from .steadying import PLAINLY, CameraMotion, Steadying, at_rest, carry, displacement, stands_still
-from .trembling import trembling
-from .video import VideoInfo
+from .steadying import (
+    CameraMotion,
+    at_rest,
+    carry,
+)
 
 _PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path
@@ -43,10 +45,7 @@ _BEYOND = 3  # frames by which a path is carried on at its ends
 _PLAIN = 0.2  # quality of the candidates of a path that is worth anything
 _SWINGS = 0.1  # of its size, by which what lingers in its place moves at least
 _SCARCE = 0.05  # share of the frames in which a target must be seen
-_TOLD_OFTEN = 0.5  # share of the frames that tell of the camera's motion, if it is known
-_LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
 _RECALLED = 2.0  # pixels, about, to which a target is recalled that is not seen whole
-_PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
 _DENSE = 640  # pixels in a row of which the noise is known well
 _RARELY = 0.5  # share of the views before ground of about the target's colour, which are of parts
 _LARGE = 0.01  # share of the image that a target hardly fills
@@ -128,40 +127,6 @@ def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
                 1.4826 * np.median(np.abs(now - relit(then, light(now, then, known)))[known])
             )
     return float(np.median(found)) if found else 0.0
-
-
-def _camera(
-    frames: ReducedFrames, info: VideoInfo, small: Image, sampled: Ints
-) -> tuple[CameraMotion, bool]:
-    """The camera's motion, and whether that is sure.
-
-    It is read from all frames, unless the sampled ones tell that the camera is at rest. Maps that
-    say no more than their errors only add these, and so do maps by which the frames fit together
-    worse than they do at rest. All frames together may still tell that it trembles.
-    """
-    still, factor = stands_still(small), frames.factor
-    if still is False:
-        steadying = Steadying(factor)
-        for frame in frames:
-            steadying.add(frame)
-        motion = steadying.motion()
-        if _plainly(motion, info.size, factor):
-            at = np.minimum(sampled, len(motion.maps) - 1)
-            known = np.isfinite(motion.errors[at])
-            if explains(small, reduced(motion.maps[at], factor), known):
-                return motion, True
-    if still is not True and (trembles := trembling(frames, small)) is not None:
-        return trembles, True
-    return at_rest(info.frames), still is True or rests(small)
-
-
-def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:
-    """Does a camera move by far more than the errors of its maps, and are these small?"""
-    told = motion.errors[1:] < factor * _LOOSE
-    if told.mean() < _TOLD_OFTEN:
-        return False
-    sure = displacement(motion.maps[1:], size) / np.maximum(motion.errors[1:], 1e-3)
-    return bool(np.quantile(sure, _PUSHED) > PLAINLY)
 
 
 def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> Followed:
@@ -279,7 +244,7 @@ class Film(NamedTuple):
         small = np.array([reduce(sample, factor) for sample in samples])
         motion, sure = at_rest(info.frames), True
         if not rests:
-            motion, sure = _camera(frames, info, small, sampled)
+            motion, sure = camera_motion(frames, small, sampled)
         sampled = np.minimum(sampled, len(motion.maps) - 1)
         maps = reduced(motion.maps, factor)
         known = np.isfinite(motion.errors[sampled])
@@ -419,7 +384,7 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
                    "perhaps it is something else",)  # fmt: skip
     pixels[at[good]] = steady[good]
     errors[at[good]] = np.hypot(scatter(at[good], steady[good]), motion.errors[at[good]])
-    if np.median(motion.errors[at[good]]) > _LOOSE:
+    if np.median(motion.errors[at[good]]) > LOOSE:
         error = np.median(motion.errors[at[good]])
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
     return Followed(pixels, errors, motion.maps[:n], doubts)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ..arrays import Bools, Floats, Image
+from .pixels import hull
 
 _CELLS = 32  # into which the side of a target is cut
 _LARGEST = 2000  # cells of the longer side of a chart
@@ -74,9 +75,8 @@ def _usual(outlines: Sequence[Floats], centres: Floats, sides: Floats) -> Floats
         around = np.clip((outline - centre) / size, -_REACH, _REACH)
         patch, window = _drawn((around + _REACH) * _CELLS)
         count[window] += patch
-    at = np.argwhere(count >= min(_USUAL * len(outlines), count.max()))[:, ::-1]
-    hull = np.asarray(cv2.convexHull(at.astype(np.int32)))[:, 0]
-    return np.asarray(hull / _CELLS - _REACH, float)
+    usual = hull(count >= min(_USUAL * len(outlines), count.max()))
+    return np.asarray(usual / _CELLS - _REACH, float)
 
 
 def _drawn(outline: Floats) -> tuple[Image, tuple[slice, slice]]:

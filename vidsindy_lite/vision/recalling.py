@@ -7,13 +7,14 @@ frame shows better than the ground does. One that was pointed at is carried on b
 and behind the last from frame to frame by its looks, as long as it is found.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
+from .reel import Reel
 from .refining import Lens, View
 from .steadying import carry
 
@@ -80,15 +81,15 @@ def _peak(values: Floats32, i: int) -> float:
 
 
 def recalled(
-    frames: Iterable[Image], lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
+    reel: Reel, lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
     views: Sequence[View | None], *, told: bool,
 ) -> Floats:  # fmt: skip
     """Places (n, 2) of the target in the gaps of a track, NaN elsewhere.
 
     Parameters
     ----------
-    frames : iterable of ndarray
-        Whole ones, of which there are n.
+    reel : Reel
+        Of n frames.
     lens : Lens
     lights : sequence of ndarray
         How bright each frame is.
@@ -105,7 +106,7 @@ def recalled(
     places = np.full(pixels.shape, np.nan)
     if len(at) == (len(pixels) if told else np.ptp(at) + 1):
         return places
-    looks = _looks(frames, lens, lights, pixels, maps, views)
+    looks = _looks(reel, lens, lights, pixels, maps, views)
     for order in (range(int(at[-1]), len(pixels)), range(int(at[0]), -1, -1)) if told else ():
         _carry_on(places, order, looks, pixels, maps, views)
     for before, after in zip(at[:-1].tolist(), at[1:].tolist(), strict=True):
@@ -114,7 +115,7 @@ def recalled(
 
 
 def _looks(
-    shown: Iterable[Image], lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
+    reel: Reel, lens: Lens, lights: Sequence[Floats32], pixels: Floats, maps: Floats,
     views: Sequence[View | None],
 ) -> dict[int, Look]:  # fmt: skip
     """Parts of the frames in gaps that are not far from a view, and of the frames beside them."""
@@ -129,9 +130,8 @@ def _looks(
     speed = float(np.quantile(steps, 0.9))
     side = max(np.ptp(view.outline, axis=0).max() for view in views if view is not None)
     found = {}
-    for i, frame in enumerate(shown):
-        if i >= len(wanted) or not wanted[i]:
-            continue
+    numbers = np.flatnonzero(wanted).tolist()
+    for i, frame in zip(numbers, reel.pick(numbers), strict=False):
         outside = far[i] if i < at[0] or i > at[-1] else 0
         reach = 2 * side + _ASTRAY[1] + outside * speed
         low = np.clip(np.floor(centres[i] - reach), 0, lens.plate.size - 1).astype(int)

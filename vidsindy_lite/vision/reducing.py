@@ -55,23 +55,22 @@ class ReducedFrames:
         if self.reel.few or not self._few:
             yield from self.reel.pick(numbers)
             return
-        kept: list[Image] = []
-        for i, frame in enumerate(self.reel):
-            kept.append(reduce(frame, self.factor))
-            if i in numbers:
-                yield frame
-        self._kept = kept
+        yield from (frame for i, (frame, _) in enumerate(self._both()) if i in numbers)
 
     def __iter__(self) -> Iterator[Image]:
         if self._kept is not None:
             yield from self._kept
-            return
+        else:
+            yield from (small for _, small in self._both())
+
+    def _both(self) -> Iterator[tuple[Image, Image]]:
+        """All frames, whole and reduced; of these few are kept."""
         kept: list[Image] = []
         for frame in self.reel:
             small = reduce(frame, self.factor)
             if self._few:
                 kept.append(small)
-            yield small
+            yield frame, small
         self._kept = kept if self._few else None
 
 

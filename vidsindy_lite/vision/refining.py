@@ -15,7 +15,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .candidates import Plate
 from .colours import shadowed, whole
-from .pixels import dot, lengths, relit
+from .pixels import dot, hull, lengths, relit
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
@@ -132,10 +132,9 @@ class Lens:
         first = low + [columns[0], rows[0]]
         last = low + [columns[-1], rows[-1]]
         inside = bool((first > 0).all() and (last < self.plate.size - 1).all())
-        faint = bool((square[rim] < (_FAINT * bound[rim]) ** 2).mean() > _RIM)
+        faint = bool((square[rim] < (_FAINT * bound[rim]) ** 2).sum() > _RIM * max(rim.sum(), 1))
         shade = now[core if core.any() else label].mean(axis=0)
-        at = np.argwhere(label)[:, ::-1].astype(np.int32)
-        outline = low + np.asarray(cv2.convexHull(at))[:, 0].astype(float)
+        outline = low + hull(label).astype(float)
         return View(low + centroid, area, shade, inside, outline, faint=faint)
 
 
