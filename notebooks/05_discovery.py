@@ -497,7 +497,8 @@ under = {m: run_trial(Trial(names[0], "noise", noise, seed, m, frames=frames)).s
 print(*(f"{method}: {scored}" for method, scored in under.items()), sep="\n")
 assert under["ours"].exact
 assert under["ours"].max_coefficient_error <= min(scored.max_coefficient_error for scored in under.values())
-assert sum(scored.exact for scored in under.values()) < len(under) or not full
+if full:  # with few frames all methods may be exact
+    assert not all(scored.exact for scored in under.values())
 
 # %% [markdown]
 # <details><summary>Solution</summary>

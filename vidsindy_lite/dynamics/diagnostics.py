@@ -232,8 +232,7 @@ def _selection(
         return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(fit.state.active)) > path.lowest
     yield from beyond_the_library(wider, noisy=not tolerant)
-    tolerated = max(path.level / path.own, 1.0)
-    origins = list(pinned(problem, fit.state, model, law, tolerated))
+    origins = list(pinned(problem, fit.state, model, law, path.tolerated))
     if not tolerant:  # weaker errors than those tolerated say nothing about the law
         # The offset stays where it is: with it free, the same law in another frame would count.
         yield from _left_over(model.of(problem.form.searched), fit.state)

@@ -93,6 +93,11 @@ class Path:
         """The smallest tolerated error."""
         return self.plateaus[0][0].low
 
+    @property
+    def tolerated(self) -> float:
+        """Errors that have to be tolerated, times those that the fit was weighted with."""
+        return max(self.level / self.own, 1.0)
+
     def width(self, plateau: Plateau) -> float:
         """How far a plateau reaches beyond the errors there are, in decades."""
         return max(float(np.log10(plateau.high / max(plateau.low, self.own))), 0.0)

@@ -303,7 +303,7 @@ def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
     if not (problem.form.movable & ~fit.state.moving).any():
         return fit
     model = path.model if path.fit is fit else problem.model(fit)
-    state = off_home(problem.cautious, fit.state, model, max(path.level / path.own, 1.0))
+    state = off_home(problem.cautious, fit.state, model, path.tolerated)
     if state is fit.state:
         return fit
     moved = fit.collocation.solve(state, EXACT)

@@ -29,7 +29,7 @@ from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .pixels import dot, lengths
 from .reducing import ReducedFrames, reduce
 
-SAMPLES = 21
+_SAMPLES = 21
 """Frames whose median is the background."""
 
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
@@ -59,10 +59,15 @@ _Look = tuple[Floats, float, float]
 # -------------------------------------------------------------------------------------- background
 
 
+def sampled(frames: int) -> Ints:
+    """The numbers of about `_SAMPLES` frames spread evenly over a clip of so many."""
+    return np.unique(np.linspace(0, frames - 1, _SAMPLES).round().astype(int))
+
+
 def sample_frames(frames: ReducedFrames) -> NDArray[np.uint8]:
-    """About `SAMPLES` frames spread evenly over the clip, (m, height, width, 3)."""
+    """The frames that are `sampled`, as far as the clip holds them, (m, height, width, 3)."""
     info = frames.reel.info
-    spread = np.unique(np.linspace(0, info.frames - 1, SAMPLES).round().astype(int)).tolist()
+    spread = sampled(info.frames).tolist()
     samples, count = np.empty((len(spread), *info.size[::-1], 3), np.uint8), 0
     for count, frame in enumerate(frames.pick(spread), 1):
         samples[count - 1] = frame

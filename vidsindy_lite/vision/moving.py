@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .background import SAMPLES, light
+from .background import light, sampled
 from .camera import LOOSE, camera_motion
 from .candidates import (
     Candidate,
@@ -239,20 +239,19 @@ class Film(NamedTuple):
     def of(cls, frames: ReducedFrames, samples: Image, rests: bool = False) -> "Film":
         """From its sampled frames, and from all of them if its camera may move."""
         info, factor = frames.reel.info, frames.factor
-        spread = np.linspace(0, info.frames - 1, SAMPLES).round().astype(int)
-        sampled = np.unique(spread)[: len(samples)]
+        numbers = sampled(info.frames)[: len(samples)]
         small = np.array([reduce(sample, factor) for sample in samples])
         motion, sure = at_rest(info.frames), True
         if not rests:
-            motion, sure = camera_motion(frames, small, sampled)
-        sampled = np.minimum(sampled, len(motion.maps) - 1)
+            motion, sure = camera_motion(frames, small, numbers)
+        numbers = np.minimum(numbers, len(motion.maps) - 1)
         maps = reduced(motion.maps, factor)
-        known = np.isfinite(motion.errors[sampled])
-        plate = Plate(small, maps[sampled], known)
-        noise = _noise(small, maps[sampled], plate)
-        places = lingering(plate, small, maps[sampled], known, tolerance(plate, noise))
-        uncover(plate, small, maps[sampled], known, places)
-        return cls(frames, motion, maps, plate, noise, sampled, places, sure)
+        known = np.isfinite(motion.errors[numbers])
+        plate = Plate(small, maps[numbers], known)
+        noise = _noise(small, maps[numbers], plate)
+        places = lingering(plate, small, maps[numbers], known, tolerance(plate, noise))
+        uncover(plate, small, maps[numbers], known, places)
+        return cls(frames, motion, maps, plate, noise, numbers, places, sure)
 
 
 def sighted(film: Film, targets: int = 1) -> tuple[list[list[Candidate]], list[Floats32]]:
