@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import track, write_video
-from vidsindy_lite.vision.colours import entire, whole
-from vidsindy_lite.vision.refining import View
+from vidsindy_lite.vision.colours import whole
+from vidsindy_lite.vision.refining import View, entire
 from vidsindy_lite.vision.scenery import BACKGROUNDS
 
 SIZE = 200, 150

@@ -249,7 +249,7 @@ class Discovery:
         """
         from .drawing import draw_path  # which imports matplotlib
 
-        return draw_path(self)
+        return draw_path(self.path, self.native.support, self.system.sides())
 
     def save(self, path: str | os.PathLike) -> None:
         """Write everything to a text file (JSON), with all digits; `load` reads it.

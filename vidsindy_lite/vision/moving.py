@@ -20,7 +20,6 @@ from .candidates import (
     tolerance,
     uncommon,
 )
-from .colours import entire
 from .crossing import rejoined
 from .hints import Hint
 from .lingering import Place, lingering, uncover
@@ -30,7 +29,7 @@ from .pixels import relit
 from .pointing import Pointer, alike
 from .recalling import recalled
 from .reducing import ReducedFrames, reduce, reduced
-from .refining import Lens, View, fitting, scatter, swapped
+from .refining import Lens, View, entire, fitting, scatter, swapped
 from .steadying import (
     CameraMotion,
     at_rest,

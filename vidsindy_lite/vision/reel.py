@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from ..arrays import Image
 from .video import pick_frames, read_video, video_info
 
-_ROOM = 400_000_000  # bytes of frames that are kept
+_ROOM = 300_000_000  # bytes of frames that are kept
 
 
 class Reel:

@@ -6,6 +6,7 @@ view whose size or place does not fit those around it is of a part, of something
 in one, and is left out.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -24,6 +25,10 @@ _ROOM = 8  # pixels more
 _FAINT, _RIM = 2.0, 0.9  # tolerances by which a ground differs from the target; share of its rim
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
+_SOME_OF = 0.9  # share of the whole that one colour covers at most, if there are several
+_TURNS = 0.1  # of its radius, by which the middle of one colour goes about that of the whole
+_SIZE = 1.5  # factor by which its area differs from those around it at most, if it is whole
+_MOSTLY = 0.8  # share of the views that must show it whole
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
 _ASTRAY = 0.3  # of its size, by which a view may be off the way
 _BESIDE = 5  # views before and after such a meeting, which show how large it was and is
@@ -149,6 +154,36 @@ def _nearest(mask: Bools, centre: Floats) -> Bools | None:
     if stats[best, cv2.CC_STAT_AREA] < 4:
         return None
     return labels == best
+
+
+def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, ...]]:
+    """Views of the whole target, in place of those of one of its colours, and doubts.
+
+    A shadow stays on its side of the target. Where the colour goes round the middle of the whole,
+    and the whole keeps its size, that is the target.
+
+    Parameters
+    ----------
+    views : sequence of View or None
+        By the target's colour, one a frame.
+    """
+    parts = [one if one is not None and one.area > 0 else None for one in views]
+    both = [(one, one.whole) for one in views if one is not None and one.whole is not None]
+    areas = np.array([[one.area, all_.area] for one, all_ in both]).reshape(-1, 2)
+    offset = np.array([one.centroid - all_.centroid for one, all_ in both]).reshape(-1, 2)
+    offset = (offset / np.sqrt(areas[:, 1:] / np.pi))[areas[:, 0] > 0]
+    count = sum(one is not None for one in views)
+    if not len(offset) or len(both) < _MOSTLY * count:
+        return parts, ()
+    turns = np.linalg.norm(offset - np.median(offset, axis=0), axis=1).mean() > _TURNS
+    if not turns or np.median(areas[:, 0] / areas[:, 1]) > _SOME_OF:
+        return parts, ()
+    size = np.log(areas[:, 1])
+    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(_SIZE)
+    if keeps.mean() > _MOSTLY:
+        return [one and (one.whole or one) for one in views], ()
+    return parts, ("the target has several colours, or touches other things: perhaps only a part "
+                   "of it is followed",)  # fmt: skip
 
 
 def fitting(
