@@ -150,7 +150,7 @@ def test_a_plate_reaches_as_far_as_all_frames_but_the_outermost_do():
     plate = panned(3, -2)
     assert plate.image.shape == (36 + 36, 48 + 54, 3)
     np.testing.assert_array_equal(plate.shift @ [3, -38, 1], [0, 0, 1])
-    # All of them is shown by three frames at least, but where the camera was only at the ends.
+    # In its corners it is shown by less than three frames.
     assert plate.valid[40, 50] == 255
     assert plate.valid[0, 0] == plate.valid[-1, -1] == 0
 
