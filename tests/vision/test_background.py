@@ -55,6 +55,26 @@ def test_a_displaced_view_is_measured(texture, shift):
     np.testing.assert_array_equal(camera_motion(texture, still, 1e3), 0)
 
 
+def test_a_displaced_view_is_measured_beside_what_differs_from_it(texture):
+    slope = np.gradient(texture, axis=(1, 0))
+    change = (-0.12 * slope[0] + 0.16 * slope[1]).astype(np.float32)
+    change[10:20, 30:45] += 500  # the target, before a texture whose changes are below 100
+    assert np.delete(np.abs(change), np.s_[10:20], axis=0).max() < 50
+    np.testing.assert_allclose(camera_motion(texture, [change], 100.0), 4 * 0.2, rtol=0.05)
+
+
+def test_where_there_is_little_to_see_a_view_is_hardly_displaced_by_more_than_a_pixel():
+    """Of ramps that tell it to 1 / sqrt(30) of a coarse pixel 30 / 31 of a displacement is left."""
+    v, u = np.mgrid[:60, :80]
+    steep = np.sqrt(30 * 0.05 / (60 * 80))  # the variance of rounding is 0.05
+    ground = (100 + steep * np.stack([u, v, 0 * u], axis=2)).astype(np.float32)
+    change = np.zeros_like(ground)
+    change[..., 0] = -2 * steep
+    found = camera_motion(ground.astype(np.float64), [change], 8.0)
+    np.testing.assert_allclose(found, 4 * 2 * 30 / 31, rtol=0.02)
+    np.testing.assert_array_equal(camera_motion(ground, [change / 2], 8.0), 0)  # it may be noise
+
+
 def test_what_differs_far_from_the_target_is_told():
     change = np.zeros((60, 80, 3), np.float32)
     change[10:20, 10:20] = 50  # the target, 100 coarse pixels
@@ -83,6 +103,17 @@ def test_one_push_or_one_change_of_light_is_unrest(texture):
     assert ["camera moves" in doubt for doubt in unrest(pushed)] == [True]
     dimmed = [*changes[:20], changes[20] - 0.05 * ground]
     assert any("light changes, by up to 5 %" in doubt for doubt in unrest(dimmed))
+    lit = [*changes[:20], changes[20] + 0.9 * ground]
+    assert any("light changes, by up to 90 %" in doubt for doubt in unrest(lit))
+
+
+def test_in_how_many_frames_something_else_differs_is_said_in_percent(texture):
+    ground = 100 + texture / 20
+    changes = [np.zeros_like(ground) for _ in range(20)]
+    for k, change in enumerate(changes):
+        change[10:20, 10:20] = change[40 : 40 + 10 * (k < 5), 60:70] = 50
+    (doubt,) = _unrest(ground, changes, np.zeros(20), 8.0)
+    assert "there is another in 25 % of the sampled frames" in doubt
 
 
 def test_light_is_measured_where_most_of_the_image_agrees():
@@ -90,6 +121,10 @@ def test_light_is_measured_where_most_of_the_image_agrees():
     now = 0.9 * then
     now[10:20, 10:20] = 255
     np.testing.assert_allclose(light(now, then, np.ones((60, 80), bool)), 0.9, rtol=1e-6)
+    now[30:50] = 1.006 * then[30:50]  # what rounding does
+    know = np.zeros((60, 80), bool)
+    know[30:50] = True
+    np.testing.assert_array_equal(light(now, then, know), 1)
     dark = np.full((60, 80, 3), 5, np.float32)
     np.testing.assert_array_equal(light(2 * dark, dark, np.ones((60, 80), bool)), 1)
 
@@ -120,6 +155,13 @@ def test_distances_of_views_from_the_commonest_one():
     assert np.isinf(view_distances([None, None])).all()
     many = view_distances([*[blob()] * 250, blob((0, 0.3, 0, 0))])
     np.testing.assert_allclose(many, [*[0] * 250, 10])
+
+
+def test_sizes_are_held_against_those_of_views_that_are_alike():
+    views = [blob()] * 20 + [blob((0, 0.3, 0, 0), area=900)] * 12 + [blob(area=900)]
+    distance = view_distances(views)
+    np.testing.assert_allclose(distance[:20], 0)
+    assert distance[-1] == pytest.approx(np.log(900 / 400) * 30 / 0.6)
 
 
 def test_views_beside_a_distant_one_must_be_twice_as_close():
@@ -203,6 +245,13 @@ def test_shapes_are_told_by_complex_moments():
     cube = c11**1.5 / np.sqrt(area)
     expected = [np.log(c11 / area**2), abs(c20) / c11, abs(c21) / cube, abs(c30) / cube]
     np.testing.assert_allclose(_shape(alpha, u, v), expected, rtol=1e-12)
+
+
+def test_no_shape_is_more_compact_than_a_sixteenth_of_a_disc():
+    """Nearly all in one point, 2 pixels of coverage: their moment is below that of two pixels."""
+    near = np.array([-0.05, 0.05])
+    found = _shape(np.array([[1.0, 1.0]]), near, np.zeros(1))
+    np.testing.assert_allclose(found[:2], [np.log(0.01), 2 * 0.05**2 / (0.01 * 2**2)])
 
 
 # ---------------------------------------------------------- squares on a plain ground: all is known
@@ -311,6 +360,65 @@ def test_a_target_beside_ground_of_its_own_colour_has_no_shape():
     frame = squares((20, 40, 16))
     frame[:, 56:60] = np.add(TARGET, 3)
     assert model.measure(frame, np.array([27.5, 47.5]), 14).shape is not None
+
+
+def test_search_is_not_misled_by_what_changes_on_ground_of_the_colour_of_the_target():
+    frames = np.array([squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)])
+    frames[:, 48:, :40] = np.add(TARGET, 3)
+    model = learned(frames)
+    frame = frames[12].copy()
+    frame[60:88, 8:32] = np.add(TARGET, (60, 60, 20))  # larger than the target
+    np.testing.assert_array_equal(model.search(frame)[0], [4 + 5 * 12 + 7.5, 4 + 3 * 12 + 7.5])
+
+
+def test_what_is_faint_beside_a_target_and_has_another_colour_is_no_part_of_it(plain):
+    frame = squares((40, 24, 16))
+    beside = squares((56, 24, 16), colour=np.add(GROUND, (24, -28, 0)))
+    frame[:, 56:] = beside[:, 56:]
+    blob = plain.measure(frame, np.array([47.5, 31.5]), 26)
+    assert blob.area == pytest.approx(16**2, rel=1e-3)
+    np.testing.assert_allclose(blob.centroid, [47.5, 31.5], atol=0.02)
+
+
+def test_a_faint_square_is_measured_no_larger_than_it_is():
+    colour = np.add(GROUND, (0, 20, 0))  # the floor is at 12 grey levels
+    frames = [squares((4 + 5 * i, 4 + 3 * i, 16), colour=colour) for i in range(20)]
+    blob = learned(np.array(frames)).measure(frames[10], np.array([61.5, 41.5]), 14)
+    assert 0.96 * 16**2 < blob.area <= 16**2
+    np.testing.assert_allclose(blob.centroid, [61.5, 41.5], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("colour", "share"), [((120, 100, 110), 0.25), ((30, 50, 180), 0), (TARGET, 0)]
+)
+def test_how_much_of_a_square_has_another_colour(plain, colour, share):
+    """Of a square without its rim, 12 pixels wide, three columns, also if they are faint."""
+    frame = squares((40, 24, 16))
+    frame[24:40, 51:56] = colour
+    found, area, other = plain._look(frame, np.array([47.5, 31.5]), 14)
+    np.testing.assert_array_equal(found, TARGET)
+    assert area == 16 * (11 if share else 16)
+    assert other == pytest.approx(share)
+
+
+def test_a_target_of_several_colours_is_told():
+    def film(width):
+        frames = [squares((4 + 5 * i, 4 + 3 * i, 16)) for i in range(20)]
+        for i, frame in enumerate(frames):
+            frame[4 + 3 * i : 20 + 3 * i, 4 + 5 * i : 4 + 5 * i + width] = (120, 100, 10)
+        return np.array(frames)
+
+    assert not learned(film(0)).several_colours
+    assert not learned(film(4)).several_colours
+    assert learned(film(6)).several_colours
+
+
+@pytest.mark.parametrize("step", [0, 4])
+def test_a_camera_that_moves_now_and_then_does_not_rest(step):
+    scene = render([[np.nan, np.nan]], Scene("bricks", image_size=(140, 96)), 1)
+    scene = cv2.GaussianBlur(next(scene), (0, 0), 2)
+    samples = np.array([scene[:, step * (k == 9) :][:, :128] for k in range(21)])
+    assert BackgroundModel(samples).camera_rests == (step == 0)
 
 
 @pytest.mark.parametrize(("left", "top"), [(40, 24), (37, 51), (0, 0), (112, 80)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision import crossing, moving
-from vidsindy_lite.vision.crossing import rejoined
+from vidsindy_lite.vision.crossing import _meetings, _off, rejoined
 from vidsindy_lite.vision.linking import Sightings
 from vidsindy_lite.vision.moving import plainest_paths
 
@@ -79,6 +79,45 @@ def test_looks_must_differ_plainly(monkeypatch):
     monkeypatch.setattr(crossing, "_PLAINLY", 0.5)
     one, _ = rejoined(seen, paths(seen, swap=True))
     np.testing.assert_array_equal(one, paths(seen, swap=False)[0])
+
+
+def test_things_of_one_colour_are_told_by_their_sizes():
+    seen = crossing_of((BALL, (BALL[0], 90)))
+    right = paths(seen, swap=False)
+    for found, true in zip(rejoined(seen, paths(seen, swap=True)), right, strict=True):
+        np.testing.assert_array_equal(found, true)
+
+
+def test_two_that_look_alike_behind_a_meeting_keep_their_places():
+    # Both come out of it in the shade: neither of the two ways to go on is better.
+    seen = crossing_of((BALL, PERSON))
+    late = seen.frame > 35
+    seen.colour[late], seen.size[late] = (0, 60, 0), 50
+    given = paths(seen, swap=False)
+    for found, true in zip(rejoined(seen, given), given, strict=True):
+        np.testing.assert_array_equal(found, true)
+
+
+def test_a_look_is_off_by_its_colour_and_by_the_logarithm_of_its_size():
+    seen = crossing_of((BALL, PERSON))
+    seen.colour[:3], seen.size[:3] = [[9, 20, 30], [10, 20, 30], [10, 20, 32]], [8, 9, 10]
+    seen.colour[5], seen.size[5] = (10, 20, 120), 9  # 90 grey levels off, of which 60 cost 1
+    seen.colour[6], seen.size[6] = (10, 20, 30), 18
+    seen.colour[7], seen.size[7] = (40, 20, 30), 3
+    off = _off(seen, np.arange(3), np.array([5, 6, 7]))
+    np.testing.assert_allclose(off, [1.5, np.log(2), 0.5 + np.log(3)])
+    np.testing.assert_array_equal(_off(seen, np.arange(2), np.array([5, 6, 7])), 0)
+
+
+def test_boxes_meet_from_the_first_to_the_last_frame_in_which_less_than_two_pixels_part_them():
+    # Of 20 and 90 pixels, 12 nearer in each frame: less than 57 apart in frames 26 to 34.
+    seen = crossing_of((BALL, PERSON))
+    one, other = np.arange(N), N + np.arange(N)
+    np.testing.assert_array_equal(_meetings(seen, one, other), [[26, 34]])
+    # A path rests where it ends, and is remembered for 20 frames.
+    np.testing.assert_array_equal(_meetings(seen, one[:31], other[:29]), [[26, 48]])
+    np.testing.assert_array_equal(_meetings(seen, one[29:], other[28:]), [[9, 34]])
+    assert _meetings(seen, one[:10], other[51:]).shape == (0, 2)
 
 
 def test_a_path_that_goes_on_as_another_one_ends_there():

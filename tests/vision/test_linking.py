@@ -81,6 +81,8 @@ def test_prices_by_hand():
     assert priced((6, 0), True, step=(6, 9)) == pytest.approx(unusual)
     # A first step may be of 6 % of the diagonal and two sizes: 6 + 16 = 22.
     assert priced((0, 0), False, step=(0, 22)) == pytest.approx(unusual)
+    # And of two sizes for each frame of a gap: 6 + 3 x 16 = 54.
+    assert priced((0, 0), False, gap=3, step=(54, 0)) == pytest.approx(0.42 + unusual)
     # After a gap of three frames: .3 + 3 x .04, and more may happen in it: 2 + 4 + 9 = 15.
     assert priced((6, 0), True, gap=3, step=(18, 0)) == pytest.approx(0.42)
     assert priced((6, 0), True, gap=3, step=(18, 15)) == pytest.approx(0.42 + unusual)

@@ -14,10 +14,31 @@ import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import moving
 from vidsindy_lite.vision.candidates import Candidate, Plate
+from vidsindy_lite.vision.lingering import Place
 from vidsindy_lite.vision.linking import Sightings, best_path
-from vidsindy_lite.vision.moving import Rated, _learned, _rivals, finished, rate
+from vidsindy_lite.vision.moving import (
+    Film,
+    Rated,
+    _learned,
+    _noise,
+    _rivals,
+    _travels,
+    expected,
+    finished,
+    linked,
+    plainest_paths,
+    rate,
+)
+from vidsindy_lite.vision.reducing import ReducedFrames
 from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
-from vidsindy_lite.vision.steadying import CameraMotion, Steadying, _Relief, carry, stands_still
+from vidsindy_lite.vision.steadying import (
+    CameraMotion,
+    Steadying,
+    _Relief,
+    at_rest,
+    carry,
+    stands_still,
+)
 
 REAL = Path(vidsindy_lite.__file__).parents[2] / "shared" / "real"
 SMALL = {"image_size": (320, 240), "frames": 60}
@@ -177,6 +198,193 @@ def test_what_travels_and_stays_what_it_is_is_plainest():
     assert 0 < min(ratings) < max(ratings) < 0.6 * best < 12
 
 
+def even(n=21, step=(10.0, 0.0), gap=2):
+    """A path of one thing of 10 pixels in a huge image, seen in every other frame."""
+    k = np.arange(n)
+    centre = np.outer(k, step)
+    box = np.column_stack([centre - 5, np.full((n, 2), 20.0)])
+    return Sightings(gap * k, k, centre, np.full(n, 10.0), np.full((n, 3), 100.0),
+                     np.full(n, 0.9), box, 1e6)  # fmt: skip
+
+
+def test_what_a_path_is_rated_by():
+    rows = np.arange(21)
+    # In the middle 90 % of its steps it travels 18 times its size: 18 / (18 + 2) of its value.
+    plain = even()
+    assert rate(plain, rows, 20.0) == pytest.approx(18)
+    assert rate(even(step=(0, -6)), rows, 20.0) == pytest.approx(20 * 10.8 / 12.8)
+    assert rate(replace(plain, diagonal=100.0), rows, 20.0) == pytest.approx(9)  # 1 % of it
+    colour = plain.colour.copy()
+    colour[::3] += [18, 24, 0]
+    colour[1::3] -= [24, 0, 18]  # 30 grey levels in two of three frames
+    assert rate(replace(plain, colour=colour), rows, 20.0) == pytest.approx(9)
+    box = plain.box.copy()
+    box[::2, 3] = 25  # 3 pixels more than is usual: 15 % or 12 %, where 3 % are much
+    assert rate(replace(plain, box=box), rows, 20.0) == pytest.approx(18 / (1 + 13.5 / 3))
+
+
+def test_what_zigzags_is_rated_lower():
+    # At 2.5 pixels a frame, of which 0.7 to the one and the other side: turns of 1.4.
+    seen = even(step=(4.8, 0))
+    seen.centre[1::2, 1] = 1.4
+    straight = rate(even(step=(4.8, 0)), np.arange(21), 20.0)
+    assert rate(seen, np.arange(21), 20.0) == pytest.approx(straight / (1 + 1.4 / 3), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("beside", "count"),
+    [((15, 7), 1), ((-15, -7), 1), ((15, -7), 1), ((-15, 7), 1),
+     ((25, 0), 2), ((-25, 0), 2), ((0, 13), 2), ((0, -13), 2)],
+)  # fmt: skip
+def test_what_has_its_middle_in_the_box_of_a_path_is_no_other_path(beside, count):
+    """Something of 12 x 8 pixels that travels along with something of 40 x 20."""
+    n = 30
+    frame = np.arange(n).repeat(2)
+    large = np.tile([True, False], n)
+    middle = np.column_stack([60 + 4.0 * frame, 80 + 3.0 * frame])
+    middle[~large] += beside
+    sides = np.where(large[:, None], [40.0, 20], [12, 8])
+    seen = Sightings(frame, (~large).astype(int), middle, np.where(large, 28.0, 10.0),
+                     np.full((2 * n, 3), 100.0), np.where(large, 0.9, 0.7),
+                     np.column_stack([middle - sides / 2, sides]), 500.0)  # fmt: skip
+    found = plainest_paths(seen)
+    assert len(found) == count
+    assert {len(path.rows) for path in found} == {n}
+    assert [large[path.rows].all() for path in found].count(True) == 1
+
+
+@pytest.mark.parametrize("light", [1.0, 0.8])
+def test_the_noise_of_a_film_is_that_of_its_samples(light):
+    rng = np.random.default_rng(0)
+    ground = rng.uniform(80, 200, (90, 120, 3))
+    samples = light ** (np.arange(21) % 2)[:, None, None, None] * ground
+    samples = (samples + rng.normal(0, 6, samples.shape)).round().astype(np.uint8)
+    maps = np.array([np.eye(3)] * 21)
+    plate = Plate(samples, maps, np.ones(21, bool))
+    plate.image = ground.round().astype(np.uint8)
+    assert _noise(samples, maps, plate) == pytest.approx(6, rel=0.1)
+
+
+@pytest.mark.parametrize(("steps", "travels"), [(0.39, False), (0.41, True)])
+def test_a_path_travels_if_it_leaves_its_place_by_its_own_size(steps, travels):
+    # Of a thing of 10 pixels, in 20 steps of (1, 0.75): 25 pixels.
+    seen = even(step=(steps, 0.75 * steps))
+    assert _travels(seen, np.arange(21), []) == travels
+    faint = replace(seen, quality=np.full(21, 0.19))
+    assert not _travels(faint, np.arange(21), [])
+    # In a place where something lingers a tenth of it will do.
+    there = [Place(np.array([0, 0]), np.ones((9, 9), bool), np.zeros((9, 9), bool))]
+    assert _travels(seen, np.arange(21), there)
+    seen.centre[:] = 3 + 0.1 * seen.centre
+    assert _travels(seen, np.arange(21), there) == travels
+
+
+def followed_to(n=30, factor=1, maps=None, at=(6, 7, 8, 9, 12, 13, 14)):
+    """Where a thing is expected that is seen in a few of n frames, on a parabola."""
+    at = np.array(at)
+    m = len(at)
+    centre = np.column_stack([20 + 3.0 * at, 90 - 2.0 * at + 0.25 * at**2])
+    box = np.column_stack([centre - 50, np.full(m, 12.0), np.full(m, 6.0)])  # boxes lag behind
+    colour = np.where(np.arange(m)[:, None] < 1, [50.0, 80, 20], [90.0, 80, 20])
+    seen = Sightings(at, at, centre, np.full(m, 8.0), colour, np.full(m, 0.9), box, 500.0)
+    maps = np.tile(np.eye(3), (n, 1, 1)) if maps is None else maps
+    return expected(seen, np.arange(m), SimpleNamespace(maps=maps, factor=factor), n)
+
+
+def test_a_target_is_expected_on_its_way_between_its_sightings_and_three_frames_beyond():
+    ways, k = followed_to(), np.arange(30)
+    near = (k >= 3) & (k <= 17)
+    np.testing.assert_array_equal(np.isfinite(ways.centre[:, 0]), near)
+    np.testing.assert_array_equal(np.isfinite(ways.box[:, 0]), near)
+    parabola = np.column_stack([20 + 3.0 * k, 90 - 2.0 * k + 0.25 * k**2])
+    within = (k >= 10) & (k <= 11)  # in a straight line
+    np.testing.assert_allclose(ways.centre[near & ~within], parabola[near & ~within], atol=1e-6)
+    line = parabola[9] + np.array([[1], [2]]) / 3 * (parabola[12] - parabola[9])
+    np.testing.assert_allclose(ways.centre[within], line)
+    np.testing.assert_allclose(ways.box[near, :2], ways.centre[near] - [6, 3])
+    np.testing.assert_allclose(ways.box[near, 2:], [[12, 6]] * near.sum())
+
+
+def test_a_target_is_expected_in_frames_of_the_film_only():
+    last = followed_to(n=16)
+    np.testing.assert_array_equal(np.isfinite(last.centre[:, 0]), np.arange(16) >= 3)
+    first = followed_to(at=(1, 2, 3, 4, 5))
+    np.testing.assert_array_equal(np.isfinite(first.centre[:, 0]), np.arange(30) <= 8)
+
+
+def test_a_path_of_two_sightings_is_carried_on_in_a_line():
+    before, first, last, after = followed_to(at=(6, 8)).centre[4:11:2]
+    np.testing.assert_allclose(before, 2 * first - last)
+    np.testing.assert_allclose(after, 2 * last - first)
+
+
+def test_a_target_is_expected_where_the_camera_sees_it_in_whole_frames():
+    plain = followed_to()
+    k = np.arange(30)
+    maps = np.tile(np.eye(3), (30, 1, 1))
+    maps[:, 0, 2], maps[:, 1, 2] = 2 * k, -k
+    turned = followed_to(maps=maps)
+    near = np.isfinite(plain.centre[:, 0])
+    moved = plain.centre - np.column_stack([2 * k, -k])
+    np.testing.assert_allclose(turned.centre[near], moved[near])
+    # Pixel 10 of frames that are reduced by 3 is made of pixels 30 to 32.
+    whole = followed_to(factor=3)
+    np.testing.assert_allclose(whole.centre[near], 3 * plain.centre[near] + 1)
+    np.testing.assert_allclose(whole.box[near], 3 * plain.box[near])
+
+
+def test_the_colour_that_is_expected_is_half_that_of_the_path_and_half_the_nearest():
+    # It is (50, 80, 20) in its first frame, 6, then (90, 80, 20).
+    colour = followed_to().colour
+    np.testing.assert_allclose(colour[[0, 3, 6, 7, 14, 29], 0], [90, 70, 70, 90, 90, 90])
+    np.testing.assert_allclose(colour[:, 1:], [[80, 20]] * 30)
+
+
+def test_only_paths_through_what_somebody_points_at_are_left():
+    places = np.column_stack([30 + 5.0 * np.arange(25), np.full(25, 50.0)])
+    found = [
+        [Candidate(at, np.array([*at - 4, 9, 9]), 60.0, np.array([30.0, 30, 200]), quality)
+         for at, quality in ((place, 0.8), (place + [0, 90], 0.6))]
+        for place in places
+    ]  # fmt: skip
+    film = SimpleNamespace(maps=np.tile(np.eye(3), (25, 1, 1)),
+                           plate=SimpleNamespace(size=np.array([300, 200])))  # fmt: skip
+    assert len(linked(found, film)[1]) == 2
+    one = replace(found[12][1], quality=100.0)
+    pinned = [[one] if i == 12 else some for i, some in enumerate(found)]
+    pointer = SimpleNamespace(one=one, pinned=lambda _: pinned)
+    seen, (path,) = linked(found, film, pointer)
+    np.testing.assert_array_equal(seen.centre[path.rows, 1], 140)
+    assert len(path.rows) == 25
+
+
+def test_candidates_of_another_colour_than_the_path_are_worth_less():
+    red, green = np.array([30.0, 30, 200]), np.array([30.0, 200, 30])
+    found = [
+        [Candidate(np.array([5.0 * i, 50]), np.zeros(4), 60.0, colour, quality)
+         for colour, quality in ((red, 0.4), (green, 0.4), (red, 0.1))]
+        for i in range(9)
+    ]  # fmt: skip
+    places = [np.array([c.centre for c in some]) for some in found]
+    learned = _learned(found, Sightings.of(found, places, 400.0), np.arange(0, 27, 3))
+    for some in learned:
+        assert some[0].quality == pytest.approx(1)  # as plain as it usually is
+        assert some[1].quality < 0.1
+        assert some[2].quality == pytest.approx(0.25)
+
+
+def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch):
+    ground = np.full((48, 64, 3), 100, np.uint8)
+    frames = ReducedFrames.of(write_video(tmp_path / "clip.mov", [ground] * 41))
+    samples = np.array([ground] * 21)
+    film = Film.of(frames, samples, rests=True)
+    np.testing.assert_array_equal(film.sampled, np.arange(0, 41, 2))
+    # Where fewer frames can be read than the file tells, the last one stands for the others.
+    monkeypatch.setattr(moving, "camera_motion", lambda *_: (at_rest(36), True))
+    film = Film.of(frames, samples)
+    np.testing.assert_array_equal(film.sampled, np.minimum(np.arange(0, 41, 2), 35))
+
+
 @pytest.mark.parametrize(("top", "area"), [(28, 100), (30, 56)])
 def test_of_several_parts_the_largest_for_its_distance_is_taken(top, area):
     # 100 pixels count half where they are as far away as their side and two pixels more.
@@ -208,8 +416,13 @@ def test_what_is_seen_less_often_but_is_as_plain_where_it_is_seen_is_told(count,
     seen = Sightings(frame, frame, centre, np.full(200, 9.0), np.zeros((200, 3)),
                      np.full(200, 0.8), np.zeros((200, 4)), 400.0)  # fmt: skip
     paths = [Rated(np.arange(100), 10.0), Rated(100 + np.arange(count), rating)]
-    film = SimpleNamespace(places=[], factor=1)
-    assert len(_rivals(seen, paths, film)) == told
+    film = SimpleNamespace(places=[], factor=2)
+    doubts = _rivals(seen, paths, film)
+    assert len(doubts) == told
+    middle = count // 2
+    assert [f"in frame {middle} at ({6 * middle}, 300)" in doubt for doubt in doubts] == [
+        True
+    ] * told
 
 
 def test_partial_views_and_jumps_are_left_out():
@@ -319,6 +532,15 @@ def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are()
         ]
         seen = np.isfinite(finished(views, CameraMotion(maps, np.zeros(20)), ()).pixels[:, 0])
         np.testing.assert_array_equal(seen, (np.arange(20) >= faint) | (faint == 20))
+
+
+@pytest.mark.parametrize(("seen", "found"), [(9, False), (11, True)])
+def test_a_target_is_seen_in_a_twentieth_of_the_frames_at_least(seen, found):
+    square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
+    places = [np.array([20.0 + 3 * k, 50]) for k in range(seen)]
+    views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
+    followed = finished(views + [None] * (200 - seen), at_rest(200), ())
+    assert np.isfinite(followed.pixels[:, 0]).sum() == found * seen
 
 
 def dashing(frames, turn, width):
