@@ -216,3 +216,10 @@ def test_a_candidate_of_three_times_the_size_is_worth_less_than_half_of_one_of_t
     assert same == pytest.approx(1)
     assert large == pytest.approx(small) == pytest.approx(np.exp(-((np.log(9) / 2.2) ** 2)))
     assert 0.98 < near < 1
+
+
+def test_the_smallest_box_has_the_colour_of_its_pixels():
+    frame = np.full((60, 80, 3), 90, np.uint8)
+    frame[30:32, 20:22] = (30, 60, 200)
+    one = _boxed(frame, np.array([20.0, 30, 2, 2]), np.array([20.5, 30.5]))
+    np.testing.assert_array_equal(one.colour, [30, 60, 200])

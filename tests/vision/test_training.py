@@ -288,3 +288,16 @@ def test_the_larger_a_target_the_more_anchors_are_to_be_sure_of_it():
             for factor in (0.8, 1.0, 1.25)
         ]  # fmt: skip
         assert losses[1] < 1e-4 < min(losses[0], losses[2])
+
+
+def test_middles_of_targets_are_drawn_from_one_edge_of_the_frame_to_the_other():
+    drawn = []
+
+    class Noted(np.random.Generator):
+        def uniform(self, low=0.0, high=1.0, size=None):
+            drawn.append((low, high, size))
+            return super().uniform(low, high, size)
+
+    pool = np.full((1, 512, 512, 3), 128, np.uint8)
+    training.training_frame(Noted(np.random.PCG64(0)), pool)
+    assert (-0.5, training.SIDE - 0.5, 2) in drawn
