@@ -333,3 +333,13 @@ def test_a_new_key_frame_adds_its_error_to_all_that_follow():
     assert followed.drift > 0
     assert (np.array(followed.errors[fresh[0] + 2 :]) > followed.drift).all()
     assert max(followed.errors) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("error", "drifted"), [(0.1, True), (0.15, True), (0.25, False), (2.0, False), (4.0, None)]
+)
+def test_a_shift_of_five_standard_errors_is_a_motion(monkeypatch, error, drifted):
+    shift = np.array([[1, 0, 0.6], [0, 1, -0.8], [0, 0, 1.0]])  # by a pixel
+    monkeypatch.setattr(steadying, "align", lambda ground, levels, guess: Aligned(shift, error))
+    relief = _Relief.of(np.full((48, 64, 3), 100, np.uint8))
+    assert _drifted(relief, relief) is drifted

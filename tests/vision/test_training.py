@@ -301,3 +301,19 @@ def test_middles_of_targets_are_drawn_from_one_edge_of_the_frame_to_the_other():
     pool = np.full((1, 512, 512, 3), 128, np.uint8)
     training.training_frame(Noted(np.random.PCG64(0)), pool)
     assert (-0.5, training.SIDE - 0.5, 2) in drawn
+
+
+def test_a_checkpoint_is_written_after_every_so_many_steps(tmp_path, monkeypatch):
+    saved = []
+    batch = (torch.zeros(1, 3, 32, 32), *(torch.full((1, k), 9.0) for k in (2, 2)), torch.ones(1))
+    monkeypatch.setattr(training, "background_pool", lambda rng: None)
+    monkeypatch.setattr(training, "_batch", lambda seed, step, pool: batch)
+    monkeypatch.setattr(training, "_CHECKPOINT", 3)
+    monkeypatch.setattr(
+        training,
+        "_save",
+        lambda path, state: saved.append((path.suffix, len(state.get("losses", [])))),
+    )
+    log = training.train(tmp_path / "a.pt", seed=1, steps=7)
+    assert saved == [(".checkpoint", 3), (".checkpoint", 6), (".pt", 0)]
+    assert log["steps"] == 7
