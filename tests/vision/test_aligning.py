@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vidsindy_lite import track
-from vidsindy_lite.vision.aligning import _middle, grounds, pyramid
+from vidsindy_lite.vision.aligning import Ground, _error, _middle, _similar, grounds, pyramid
 from vidsindy_lite.vision.aligning import align as align_on
 from vidsindy_lite.vision.steadying import Steadying
 
@@ -174,3 +174,129 @@ def test_a_turn_alone_is_followed_to_its_end(turn):
 def test_the_middle_is_the_median_of_every_other_value(values):
     values = np.array(values, np.float32)
     assert _middle(values) == np.median(values[::2])
+
+
+def plane(width, height, right, down, middle=50.0):
+    """Grey levels that grow evenly, with so much in the middle."""
+    v, u = np.mgrid[:height, :width].astype(np.float32)
+    plain = middle + right * (u - (width - 1) / 2) + down * (v - (height - 1) / 2)
+    return plain.astype(np.float32)
+
+
+def test_the_slopes_of_a_plane_are_what_shift_scale_turn_and_light_change():
+    ground = Ground.of(plane(36, 25, 2.0, -3.0))
+    np.testing.assert_array_equal(ground.u, np.arange(36) - 17.5)
+    np.testing.assert_array_equal(ground.v, (np.arange(25) - 12)[:, None])
+    shift_u, shift_v, scale, turn, gain, offset = (by[1:-1, 1:-1] for by in ground.slopes)
+    u, v = (ground.u + 0 * ground.v)[1:-1, 1:-1], (ground.v + 0 * ground.u)[1:-1, 1:-1]
+    np.testing.assert_allclose(shift_u, 2, atol=1e-4)
+    np.testing.assert_allclose(shift_v, -3, atol=1e-4)
+    np.testing.assert_allclose(scale, 2 * u - 3 * v, atol=1e-2)
+    np.testing.assert_allclose(turn, -3 * u - 2 * v, atol=1e-2)
+    np.testing.assert_allclose(gain, 50 + 2 * u - 3 * v, atol=1e-4)
+    assert (offset == 1).all()
+
+
+@pytest.mark.parametrize(("right", "down"), [(1, 0), (0, 1), (0.6, 0.8)])
+def test_no_block_may_tell_more_than_four_times_as_much_as_a_usual_one(right, down):
+    v, u = np.mgrid[:96, :120]
+    steep = (abs(u - 60) < 12) & (abs(v - 48) < 10)
+    for factor, share in ((1.6, 1.0), (4.0, 0.25), (10.0, 0.04)):
+        way = right * (u - 60) + down * (v - 48)
+        ground = Ground.of(np.where(steep, factor * way, way).astype(np.float32))
+        assert ground.share[48, 60] == pytest.approx(share, rel=1e-3)
+        assert ground.share[5, 5] == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("size", "levels"),
+    [((320, 240), [(120, 160), (60, 80), (30, 40)]),
+     ((32, 64), [(32, 16)]), ((31, 200), []),
+     ((640, 530), [(265, 320), (133, 160), (67, 80), (34, 40)])],
+)  # fmt: skip
+def test_a_pyramid_has_four_levels_as_long_as_there_are_32_pixels_to_halve(size, levels):
+    image = np.full((*size[::-1], 3), 77, np.uint8)
+    found = pyramid(image)
+    assert [level.shape for level in found] == levels
+    assert all(np.allclose(level, 77) for level in found)
+
+
+def test_the_similar_map_nearest_to_a_guess():
+    # Over the corners of 200 x 100 pixels the places spread four times as much along u.
+    size = np.array([200, 100])
+    same = similar(3, -7, 0.2, 1.1)
+    np.testing.assert_allclose(_similar(same, size), same, atol=1e-9)
+    np.testing.assert_allclose(_similar(2 * same, size), same, atol=1e-9)
+    wide = np.array([[1.2, 0, 0], [0, 1, 0], [0, 0, 1]])
+    nearest = [[1.16, 0, 120 - 116], [0, 1.16, 50 - 58], [0, 0, 1]]
+    np.testing.assert_allclose(_similar(wide, size), nearest, atol=1e-9)
+    skew = np.array([[1, 0.2, 0], [0, 1, 0], [0, 0, 1]])
+    nearest = [[1, 0.04, 110 - 102], [-0.04, 1, 50 - 46], [0, 0, 1]]
+    np.testing.assert_allclose(_similar(skew, size), nearest, atol=1e-9)
+
+
+def test_errors_of_one_block_add_up_and_those_of_different_ones_do_not():
+    # Blocks of 3 x 2 pixels; what all told pulls by 6 in one block, or by 1 in each of six.
+    u, v = np.arange(36, dtype=np.float32) - 17.5, (np.arange(24, dtype=np.float32) - 11.5)[:, None]
+    far = np.mean(u**2) + np.mean(v**2)
+    information = np.diag([2.0, 2, 4, 4, 1, 1])
+    one, six = np.zeros((24, 36), np.float32), np.zeros((24, 36), np.float32)
+    one[6:8, 9:12] = 1
+    six[6:18:2, 9] = 1
+    for channel, variance in ((0, 0.25), (1, 0.25), (2, far / 16), (3, far / 16)):
+        slopes = np.zeros((6, 24, 36), np.float32)
+        slopes[channel] = 1
+        known = 0.5 + 0.5 + far * (0.25 + 0.25)
+        own = 0.5 if channel < 2 else far * 0.25
+        for pull, square in ((one, 36), (six, 6)):
+            wanted = np.sqrt((known - own + max(own, variance * square)) / 2)
+            assert _error(slopes, pull, information, (u, v)) == pytest.approx(wanted, rel=1e-5)
+    odd = np.pad(one, ((0, 5), (0, 7)))  # what is over is left out
+    slopes = np.zeros((6, 29, 43), np.float32)
+    slopes[0] = 1
+    wanted = np.sqrt((0.25 * 36 + 0.5 + far * 0.5) / 2)
+    assert _error(slopes, odd, information, (u, v)) == pytest.approx(wanted, rel=1e-5)
+    assert _error(slopes[:, :11], odd[:11], information, (u, v)) == np.inf
+    assert _error(slopes[..., :11], odd[:, :11], information, (u, v)) == np.inf
+
+
+@pytest.mark.parametrize(("gone", "found"), [(0.55, True), (0.8, False)])
+@pytest.mark.parametrize("across", [True, False])
+def test_two_views_must_share_three_tenths_of_what_they_show(across, gone, found):
+    rng = np.random.default_rng(0)
+    cloud = cv2.GaussianBlur(rng.normal(size=(560, 640)).astype(np.float32), (0, 0), 6)
+    scene = (100 + 20 * cloud / cloud.std()).astype(np.float32)
+    u, v = (round(gone * 160), 0) if across else (0, round(gone * 120))
+    before, after = scene[200:320, 200:360], scene[200 + v : 320 + v, 200 + u : 360 + u]
+    guess = similar(-2.0 * u, -2.0 * v)
+    told = align_on(grounds([before]), [after], guess)
+    assert (told is not None) == found
+    if told:
+        np.testing.assert_allclose(told.map, guess, atol=0.05)
+
+
+@pytest.mark.parametrize(("width", "told"), [(20, False), (110, True)])
+def test_what_few_blocks_tell_may_move_on_its_own(width, told):
+    rng = np.random.default_rng(0)
+    cloud = cv2.GaussianBlur(rng.normal(size=(130, 170)).astype(np.float32), (0, 0), 3)
+    cloud *= 20 / cloud.std()
+    views = []
+    for u in (5, 6):
+        view = np.full((120, 160), 100, np.float32)
+        view[40 : 40 + width // 2, 30 : 30 + width] += cloud[
+            45 : 45 + width // 2, 30 + u : 30 + u + width
+        ]
+        views.append(view + rng.normal(0, 0.5, view.shape).astype(np.float32))
+    found = align_on(grounds(views[:1]), views[1:], np.eye(3))
+    assert np.isfinite(found.error) == told
+
+
+def test_the_error_of_a_map_is_about_that_by_which_it_misses():
+    errors, misses = [], []
+    for seed in range(12):
+        move = similar(1.3, -0.8, 0.004)
+        found = align(pyramid(sight(seed, noise=4)), pyramid(sight(seed, move, noise=4)), np.eye(3))
+        points = np.array([[u, v, 1.0] for u in (20, 160, 300) for v in (20, 120, 220)])
+        errors.append(found.error)
+        misses.append(np.mean(((points @ (found.map - move).T) ** 2).sum(axis=1)) / 2)
+    assert 0.5 < np.sqrt(np.mean(misses) / np.mean(np.square(errors))) < 2

@@ -8,7 +8,7 @@ import pytest
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision.candidates import Candidate
 from vidsindy_lite.vision.linking import TOLD
-from vidsindy_lite.vision.pointing import Pointer, _boxed, _fits, _overlap
+from vidsindy_lite.vision.pointing import Pointer, _boxed, _fits, _overlap, alike
 
 
 def blob(u, v, size, colour=(30, 30, 200)):
@@ -131,3 +131,95 @@ def test_what_is_in_a_box_has_the_colour_of_its_inner_half():
     np.testing.assert_array_equal(one.colour, [30, 60, 200])
     corner = _boxed(frame, np.array([-6.0, -6, 9, 9]), np.array([-2.0, -2]))
     np.testing.assert_array_equal(corner.colour, [90, 90, 90])
+
+
+def test_boxes_overlap_by_what_they_share_to_both_sides():
+    one, other = np.array([10.0, 20, 4, 6]), np.array([12.0, 23, 5, 8])
+    assert _overlap(one, other) == _overlap(other, one) == pytest.approx(2 * 3 / (24 + 40 - 6))
+    assert _overlap(one, one) == 1
+    assert _overlap(one, np.array([12.0, 21, 1, 2])) == pytest.approx(2 / 24)
+    assert _overlap(one, one + [5, 7, 0, 0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("light", "far"),
+    # Light from 0.7 to 1.4 of it changes no colour.
+    [(0.7, 0.0), (1.0, 0.0), (1.4, 0.0), (0.5, 0.2), (0.2, 0.5), (2.0, 0.6)],
+)
+def test_colours_are_alike_in_another_light(light, far):
+    colour = np.array([20.0, 60, 110])
+    apart = far * np.linalg.norm(colour) / 70
+    assert alike(colour, light * colour) == pytest.approx(np.exp(-(apart**2)))
+
+
+def test_colours_of_another_hue_are_the_less_alike_the_farther_they_are_apart():
+    colour = np.array([0.0, 0, 100])
+    for off in (30, 70, 140):
+        assert alike(colour, colour + [off, 0, 0]) == pytest.approx(np.exp(-((off / 70) ** 2)))
+    assert alike(np.zeros(3), np.array([0.0, 35, 0])) == pytest.approx(np.exp(-0.25))
+
+
+def test_what_is_told_of_a_box_is_its_middle_its_size_and_most_of_its_area():
+    frame = np.full((60, 80, 3), 90, np.uint8)
+    box = np.array([20.0, 30, 12, 8])
+    one = _boxed(frame, box, np.array([25.5, 33.5]))
+    assert one.area == pytest.approx(0.8 * 96)
+    np.testing.assert_array_equal(one.centre, [25.5, 33.5])
+    np.testing.assert_array_equal(one.box, box)
+
+
+def test_a_box_in_a_reduced_film_holds_what_is_there_in_a_quarter_of_the_pixels(tmp_path):
+    frames = np.full((2, 120, 200, 3), 90, np.uint8)
+    frames[:, 40:64, 100:140] = (30, 60, 200)
+    path = write_video(tmp_path / "a.mov", frames)
+    one = Pointer.of(Hint(0, (100, 40, 40, 24)), [[], []], 4, path).one
+    # The reduced pixels 25 to 34 and 10 to 15, to half a pixel.
+    np.testing.assert_allclose(one.centre, [29.5, 12.5], atol=0.5)
+    np.testing.assert_allclose(one.box, [25, 10, 10, 6], atol=0.5)
+    np.testing.assert_allclose(one.colour, [30, 60, 200], atol=3)
+    there = blob(29.5, 12.5, 8)
+    assert Pointer.of(Hint(0, (100, 40, 40, 24)), [[there], []], 4, path).one.area == 64
+    tiny = blob(29.5, 12.5, 3)  # covers too little of it
+    assert Pointer.of(Hint(0, (100, 40, 40, 24)), [[tiny], []], 4, path).one.area > 40
+
+
+@pytest.mark.parametrize(
+    ("left", "top", "good"),
+    [(-14, 40, True), (-15, 40, False), (185, 40, True), (186, 40, False),
+     (90, -9, True), (90, -10, False), (90, 110, True), (90, 111, False)],
+)  # fmt: skip
+def test_the_middle_pixel_of_a_box_lies_in_the_image(tmp_path, left, top, good):
+    path = write_video(tmp_path / "a.mov", np.zeros((2, 120, 200, 3), np.uint8))
+    hint = Hint(0, (left, top, 30, 20))
+    if good:
+        assert Pointer.of(hint, [[], []], 1, path).one is not None
+    else:
+        with pytest.raises(ValueError, match="must have its middle in the image"):
+            Pointer.of(hint, [[], []], 1, path)
+
+
+@pytest.mark.parametrize(
+    ("u", "v", "missed"),
+    # The middle of the box is (40, 52): a pixel beyond its edges.
+    [(45.4, 52, 0), (45.6, 52, 1), (34.6, 52, 0), (34.4, 52, 1),
+     (40, 59.4, 0), (40, 59.6, 1), (40, 44.6, 0), (40, 44.4, 1)],
+)  # fmt: skip
+def test_a_track_may_be_a_pixel_outside_the_box(u, v, missed):
+    pointer = Pointer.of(Hint(0, (36, 46, 9, 13)), FOUND, 1, "none.mov")
+    assert len(pointer.missed(np.array([[u, v]]), np.eye(3)[None])) == missed
+
+
+def test_a_candidate_of_three_times_the_size_is_worth_less_than_half_of_one_of_the_same():
+    pointer = Pointer.of(Hint(0, (36, 46, 9, 9)), FOUND, 1, "none.mov")
+    some = [[blob(40.0, 50.0, size) for size in (9, 27, 3, 10)]]
+    same, large, small, near = (c.quality / 0.8 for c in pointer.like(some)[0])
+    assert same == pytest.approx(1)
+    assert large == pytest.approx(small) == pytest.approx(np.exp(-((np.log(9) / 2.2) ** 2)))
+    assert 0.98 < near < 1
+
+
+def test_the_smallest_box_has_the_colour_of_its_pixels():
+    frame = np.full((60, 80, 3), 90, np.uint8)
+    frame[30:32, 20:22] = (30, 60, 200)
+    one = _boxed(frame, np.array([20.0, 30, 2, 2]), np.array([20.5, 30.5]))
+    np.testing.assert_array_equal(one.colour, [30, 60, 200])

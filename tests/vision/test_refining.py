@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision.candidates import Plate
-from vidsindy_lite.vision.refining import _BESIDE, Lens, joined, swapped
+from vidsindy_lite.vision.refining import (
+    _BESIDE,
+    Lens,
+    _leave_out,
+    _nearest,
+    fitting,
+    joined,
+    scatter,
+    swapped,
+)
 
 
 @pytest.mark.parametrize("missing", [0, 1])
@@ -77,3 +86,373 @@ def test_a_shadow_that_touches_the_target_is_no_part_of_it_unless_they_look_alik
     )
     off = np.linalg.norm(view.centroid - [38, 28])
     assert off < 2 if colour == (75, 130, 110) else off > 4
+
+
+class Asked(Plate):
+    """A plain grey plate that remembers which window of it was asked for."""
+
+    def __init__(self, image):
+        super().__init__(np.stack([image] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
+
+    def seen_from(self, here, corner, size, step=1):
+        self.window = [*map(int, corner), *map(int, size)]
+        return super().seen_from(here, corner, size, step)
+
+
+@pytest.mark.parametrize(
+    ("box", "window"),
+    [
+        # Half of the longer side, 6, and 8 pixels more on each side; to whole pixels; in the image.
+        ((30.5, 25.25, 12, 7), (16, 11, 41, 36)),
+        ((4.0, 20, 6, 10), (0, 7, 23, 36)),
+        ((68.0, 44, 10, 10), (55, 31, 25, 29)),
+        ((120.0, 90, 8, 8), (79, 59, 1, 1)),
+        ((-60.0, -40, 8, 8), (0, 0, 1, 1)),
+    ],
+)
+def test_a_box_is_looked_at_with_its_surroundings_as_far_as_the_image_goes(box, window):
+    ground = np.full((60, 80, 3), 90, np.uint8)
+    plate = Asked(ground)
+    box = np.array(box)
+    view = Lens(plate, 0.0).look(
+        ground, np.eye(3), box, box[:2] + box[2:] / 2, np.full(3, 200.0), np.ones(3, np.float32)
+    )
+    assert view is None
+    assert plate.window == list(window)
+
+
+def test_what_differs_grows_with_the_noise_and_with_the_edges_of_the_ground():
+    ground = np.full((60, 80, 3), 90, np.uint8)
+    ground[:, 40:] = 130
+    resting = Asked(ground)
+    for noise, least in ((0.0, 8), (1.0, 8), (2.5, 10), (5.0, 20), (40.0, 60)):
+        assert Lens(resting, noise).least == least
+    assert Lens(resting, 3.0).blur > Lens(resting, 1.0).blur
+    moving = Plate(np.stack([ground] * 3), np.stack([np.eye(3), np.diag([1.1, 1, 1]), np.eye(3)]),
+                   np.ones(3, bool))  # fmt: skip
+    for plate, share in ((resting, 0.15), (moving, 0.35)):
+        found = Lens(plate, 2.5)._tolerance(ground)
+        np.testing.assert_allclose(found[:, [10, 70]], 10)
+        np.testing.assert_allclose(found[:, 39:41], 10 + share * 40, rtol=1e-5)
+
+
+GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
+
+
+def look(frame, box, colour, centre=None, noise=0.0):
+    """What a lens sees near a box before the ground."""
+    box = np.array(box, float)
+    centre = box[:2] + (box[2:] - 1) / 2 if centre is None else np.array(centre, float)
+    return Lens(Asked(GROUND), noise).look(
+        frame, np.eye(3), box, centre, np.array(colour, float), np.ones(3, np.float32)
+    )
+
+
+def painted(*blocks):
+    """The ground with rectangles (left, top, width, height) of some colours."""
+    frame = GROUND.copy()
+    for (left, top, width, height), colour in blocks:
+        frame[top : top + height, left : left + width] = colour
+    return frame
+
+
+RED, GREEN = (30, 50, 230), (60, 220, 90)
+
+
+def test_of_two_things_of_the_targets_colour_the_nearer_one_is_seen():
+    frame = painted(((30, 20, 9, 9), RED), ((50, 30, 9, 9), RED))
+    for centre in ((34.0, 24.0), (54.0, 34.0)):
+        view = look(frame, (36, 18, 18, 26), RED, centre)
+        np.testing.assert_allclose(view.centroid, centre, atol=0.05)
+
+
+def test_of_two_things_of_another_colour_the_nearer_one_is_the_whole():
+    # Neither has the target's colour: the view has no area, its whole has one of them.
+    frame = painted(((30, 20, 11, 11), GREEN), ((50, 30, 11, 11), GREEN))
+    for centre in ((35.0, 25.0), (55.0, 35.0)):
+        view = look(frame, (36, 18, 18, 26), RED, centre)
+        assert view.area == 0
+        np.testing.assert_allclose(view.whole.centroid, centre, atol=0.05)
+        assert view.whole.area == pytest.approx(121, rel=0.02)
+        np.testing.assert_allclose(view.whole.colour, GREEN, atol=1)
+
+
+def test_the_whole_of_a_thing_of_two_colours_has_the_area_and_centroid_of_both():
+    frame = painted(((30, 20, 10, 15), RED), ((40, 20, 10, 15), GREEN))
+    view = look(frame, (30, 20, 20, 15), RED)
+    assert view.area == pytest.approx(150, rel=0.1)
+    assert view.centroid[0] == pytest.approx(34.5, abs=0.5)
+    assert view.whole.area == pytest.approx(300, rel=0.02)
+    np.testing.assert_allclose(view.whole.centroid, (39.5, 27), atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("contrast", "off", "same"),
+    # Off the line from ground to target by 0.45 of its length, or by 16 grey levels.
+    [(130, 45, True), (130, 75, False), (25, 12, True), (25, 25, False)],
+)
+def test_what_is_far_off_the_line_from_ground_to_target_has_another_colour(contrast, off, same):
+    red, green = np.array([0, 0, contrast]), np.array([0, off, 0])
+    box = (28, 18, 26, 26)  # of which its blurred rim is a part that is no test
+    area = look(painted((box, GROUND[0, 0] + red + green)), box, GROUND[0, 0] + red).area
+    assert area > 0.9 * 26**2 if same else area < 0.7 * 26**2
+
+
+def test_what_differs_from_the_ground_the_other_way_round_is_another_colour():
+    ground, box = GROUND[0, 0].astype(int), (30, 20, 20, 15)
+    for width, whole in ((10, 300), (18, 270)):  # a tenth of another colour is no part of it
+        rest = ((30 + width, 20, 20 - width, 15), ground // 10)
+        view = look(painted(((30, 20, width, 15), 2 * ground), rest), box, 2 * ground)
+        assert view.area == pytest.approx(15 * width, rel=0.1)
+        assert view.whole.area == pytest.approx(whole, rel=0.05)
+
+
+def test_the_outline_of_a_view_is_that_of_its_pixels_in_the_frame():
+    view = look(painted(((31, 22, 12, 8), RED)), (31, 22, 12, 8), RED)
+    corners = {tuple(map(int, corner)) for corner in view.outline}
+    assert corners == {(31, 22), (42, 22), (42, 29), (31, 29)}
+
+
+@pytest.mark.parametrize(
+    ("corner", "inside"),
+    [((3, 20), True), ((0, 20), False), ((30, 0), False), ((30, 3), True),
+     ((65, 20), True), ((68, 20), False), ((30, 45), True), ((30, 48), False)],
+)  # fmt: skip
+def test_what_reaches_the_border_of_the_image_is_not_inside(corner, inside):
+    box = (*corner, 12, 12)
+    assert look(painted((box, RED)), box, RED).inside is inside
+
+
+def parts(*blocks):
+    mask = np.zeros((70, 120), bool)
+    for left, top, width, height in blocks:
+        mask[top : top + height, left : left + width] = True
+    return mask
+
+
+@pytest.mark.parametrize(("apart", "large"), [(22, True), (34, False)])
+def test_a_larger_part_is_taken_unless_it_is_much_farther_away(apart, large):
+    # 100 pixels weigh as much as 16 at 2.3 times their reach, of twelve pixels.
+    place = np.array([20.5, 30.5])
+    small, big = (19, 29, 4, 4), (16 + apart, 26, 10, 10)
+    found = _nearest(parts(small, big), place)
+    np.testing.assert_array_equal(found, parts(big if large else small))
+
+
+@pytest.mark.parametrize("place", [(20.5, 12.5), (80.5, 50.5)])
+def test_of_parts_that_are_as_large_the_nearer_one_is_taken(place):
+    here = (int(place[0]) - 2, int(place[1]) - 2, 6, 6)
+    mask = parts((18, 10, 6, 6), (78, 48, 6, 6), (48, 30, 6, 6))
+    np.testing.assert_array_equal(_nearest(mask, np.array(place)), parts(here))
+
+
+def test_a_part_of_less_than_four_pixels_is_none():
+    assert _nearest(parts(), np.zeros(2)) is None
+    assert _nearest(parts((40, 30, 3, 1)), np.array([41.0, 30])) is None
+    assert _nearest(parts((40, 30, 2, 2)), np.array([41.0, 30])).sum() == 4
+
+
+FRAMES = np.arange(30.0)
+WAY = np.column_stack([20 + 3 * FRAMES, 90 - 2 * FRAMES + 0.1 * FRAMES**2])
+ALL = np.ones(30, bool)
+
+
+def test_views_of_another_size_than_those_around_them_do_not_fit():
+    areas = np.linspace(100, 250, 30)  # a target that comes closer
+    areas[[7, 12, 18, 23]] *= [1.4, 1.6, 1 / 1.4, 1 / 1.6]
+    np.testing.assert_array_equal(np.flatnonzero(~fitting(FRAMES, WAY, areas, ALL)), [12, 23])
+    border = ALL.copy()
+    border[4] = False
+    assert np.flatnonzero(~fitting(FRAMES, WAY, areas, border)).tolist() == [4, 12, 23]
+
+
+@pytest.mark.parametrize("side", [10.0, 40.0])
+def test_a_view_may_be_off_its_way_by_a_part_of_its_size(side):
+    # A pixel, and three tenths of the side of the target.
+    areas = np.full(30, side**2)
+    for off, fits in ((0.7 * (1 + 0.3 * side), True), (1.4 * (1 + 0.3 * side), False)):
+        places = WAY.copy()
+        places[15, 1] += off
+        assert fitting(FRAMES, places, areas, ALL)[15] == fits
+        assert fitting(FRAMES, places, areas, ALL).sum() == 29 + fits
+
+
+def test_where_all_places_are_rough_one_may_be_off_by_more():
+    rough = WAY + np.random.default_rng(0).normal(0, 1, WAY.shape)
+    areas = np.full(30, 25.0)
+    assert fitting(FRAMES, rough, areas, ALL).all()
+    for off, astray, fits in ((8, WAY, False), (8, rough, True), (80, rough, False)):
+        places = astray.copy()
+        places[15, 0] += off
+        assert fitting(FRAMES, places, areas, ALL)[15] == fits
+
+
+def test_seven_views_are_needed_to_say_that_one_of_them_is_astray():
+    for n, left in ((6, 6), (7, 6)):
+        places, alone = WAY[:n].copy(), ALL[:n].copy()
+        places[3] += 40
+        alone[3] = False
+        assert fitting(FRAMES[:n], places, np.full(n, 100.0), ALL[:n], alone).sum() == left
+
+
+def test_two_views_say_nothing_of_their_size():
+    areas = np.array([100.0, 300.0])
+    assert fitting(FRAMES[:2], WAY[:2], areas, ALL[:2]).all()
+    assert fitting(FRAMES[:3], WAY[:3], np.array([100.0, 100, 300]), ALL[:3]).sum() == 2
+
+
+def test_views_of_a_target_alone_say_where_it_is_if_they_are_most():
+    # The last ten views, where it is not alone, are wrong by the same.
+    alone = FRAMES < 20
+    places, areas = WAY.copy(), np.full(30, 100.0)
+    areas[~alone] = 200
+    np.testing.assert_array_equal(fitting(FRAMES, places, areas, ALL, alone), alone)
+    # Of so few alone nothing is made: the others fit each other.
+    few = FRAMES < 12
+    areas = np.where(few, 200.0, 100.0)
+    np.testing.assert_array_equal(
+        fitting(FRAMES, places, areas, ALL, few), fitting(FRAMES, places, areas, ALL)
+    )
+
+
+def test_what_is_not_alone_must_be_where_the_others_say_to_a_pixel():
+    alone = np.ones(30, bool)
+    alone[[10, 14, 21]] = False
+    places, areas = WAY.copy(), np.full(30, 400.0)  # a room of six pixels for those alone
+    places[10, 0] += 0.6
+    places[14, 1] += 3
+    places[25, 1] -= 3
+    bad = np.flatnonzero(~fitting(FRAMES, places, areas, ALL, alone))
+    assert bad.tolist() == [14]
+
+
+def test_what_is_not_alone_may_be_as_rough_as_the_others():
+    alone = np.ones(30, bool)
+    alone[[6, 10, 14, 18, 22]] = False
+    rough = WAY + np.random.default_rng(1).normal(0, 1, WAY.shape)
+    assert fitting(FRAMES, rough, np.full(30, 100.0), ALL, alone).all()
+
+
+@pytest.mark.parametrize(("speed", "fits"), [(2.0, True), (9.0, False)])
+def test_what_is_not_alone_may_be_less_exact_where_the_target_bounces(speed, fits):
+    # Six tenths of the speed off what a quartic says, a quarter of it between the two.
+    places = np.column_stack([3 * FRAMES, 80 - speed * np.abs(FRAMES - 15)])
+    alone = FRAMES != 15
+    found = fitting(FRAMES, places, np.full(30, 900.0), ALL, alone)
+    assert found[alone].all()
+    assert found[15] == fits
+
+
+@pytest.mark.parametrize(("factor", "one"), [(1.4, False), (1.6, True)])
+def test_two_in_one_are_clearly_larger_than_either(factor, one):
+    before, after = [50.0] * 6, [100.0] * 6
+    during = [50 * 2.1] * 2 + [100 * factor] * 5 + [100 * 2.1] * 2
+    found = joined(np.array(before + during + after))
+    assert found.tolist() == [False] * 6 + [one] * 9 + [False] * 6
+
+
+def test_it_is_the_middle_one_of_all_views_in_one_that_is_clearly_larger():
+    areas = np.array([100.0] * 6 + [205, 140, 145, 170, 205] + [100] * 6)
+    assert np.flatnonzero(joined(areas)).tolist() == [6, 7, 8, 9, 10]
+    areas[9] = 145
+    assert not joined(areas).any()
+
+
+@pytest.mark.parametrize(("factor", "at"), [(1.8, None), (2.2, 20)])
+def test_what_grows_at_once_to_twice_its_size_is_something_else(factor, at):
+    areas = np.where(np.arange(40) < 20, 130.0, 130 * factor)
+    assert swapped(np.arange(40), areas) == at
+    assert swapped(np.arange(40), areas[::-1]) == at
+
+
+def test_the_time_between_two_views_is_that_before_the_change():
+    # Three times as large after a pause of ten frames is no sudden change; a pause elsewhere is.
+    areas = np.where(np.arange(40) < 20, 100.0, 300.0)
+    for pause, at in ((19, 20), (20, None), (21, 20), (22, 20)):
+        frames = np.arange(40) + 10 * (np.arange(40) >= pause)
+        assert swapped(frames, areas) == at
+
+
+def test_a_place_on_a_quartic_is_where_the_others_say():
+    frames = np.array([3.0, 4, 6, 7, 8, 10, 11, 13, 14])
+    t = frames - 7
+    places = np.column_stack([5 + t - 0.2 * t**3, 30 - 2 * t**2 + 0.01 * t**4])
+    every = np.arange(9)
+    off, unsure = _leave_out(frames, places, 3, every)
+    assert off == pytest.approx(0, abs=1e-9)
+    # By hand: at the frames 3, 4, 6, 8, 10, 11 the parabola is off by what is cubic and quartic.
+    use = [0, 1, 2, 4, 5, 6]
+    rest = places[3] - [np.polyval(np.polyfit(t[use], x[use], 2), 0) for x in places.T]
+    assert unsure == pytest.approx(np.linalg.norm(rest))
+    moved = places.copy()
+    moved[3] += [3, -4]
+    assert _leave_out(frames, moved, 3, every)[0] == pytest.approx(5)
+    assert _leave_out(frames, moved, 3, every)[1] == pytest.approx(unsure)
+    moved[[7, 8]] += 100  # beyond the three on each side
+    assert _leave_out(frames, moved, 3, every)[0] == pytest.approx(5)
+    moved[2] += 10  # the nearest of them
+    assert _leave_out(frames, moved, 3, every)[0] > 6
+
+
+@pytest.mark.parametrize("i", [0, 8])
+def test_beyond_the_first_and_the_last_of_the_others_a_place_is_twice_as_unsure(i):
+    frames = np.arange(9.0)
+    places = np.column_stack([0.1 * (frames - 4) ** 3, 0 * frames])
+    off, unsure = _leave_out(frames, places, i, np.arange(9))
+    use = np.delete(np.arange(9), i)[:6] if i == 0 else np.arange(2, 8)
+    parabola = np.polyval(np.polyfit(frames[use], places[use, 0], 2), frames[i])
+    assert off == pytest.approx(0, abs=1e-7)
+    assert unsure == pytest.approx(2 * abs(parabola - places[i, 0]))
+
+
+@pytest.mark.parametrize(
+    ("frames", "i", "known"),
+    [
+        ([0, 1, 2, 3, 4], 2, True),
+        ([0, 1, 2, 3], 2, False),  # three others
+        ([0, 1, 2, 8, 13, 14, 15], 3, True),
+        ([0, 1, 2, 8, 14, 15, 16], 3, False),  # over 15 frames
+        ([0, 10, 11, 12, 13, 14, 15], 0, True),
+        ([0, 11, 12, 13, 14, 15, 16], 0, False),
+        ([1, 2, 3, 4, 5, 6, 17], 6, False),
+    ],
+)
+def test_a_place_is_told_by_four_others_within_fifteen_frames(frames, i, known):
+    frames = np.array(frames, float)
+    places = np.column_stack([frames, -2 * frames])
+    off, unsure = _leave_out(frames, places, i, np.arange(len(frames)))
+    assert np.isfinite(unsure) == known
+    assert off == pytest.approx(0, abs=1e-6)
+
+
+def test_the_scatter_is_that_of_the_noise_whatever_cubic_the_motion_is():
+    frames = np.arange(3000)
+    t = frames / 500
+    way = np.column_stack([t**3 - 200 * t, 40 * t**2])
+    assert scatter(frames, way) < 1e-3
+    noisy = way + np.random.default_rng(0).normal(0, 0.7, way.shape)
+    assert scatter(frames, noisy) == pytest.approx(0.7, rel=0.05)
+    jumps = np.where(frames % 50 == 49, 300, 0)[:, None]  # a few wrong places spoil nothing
+    assert scatter(frames, noisy + jumps) == pytest.approx(0.7, rel=0.25)
+
+
+def test_the_scatter_is_told_by_three_runs_of_five_frames():
+    way = np.column_stack([np.arange(9.0) % 2, np.zeros(9)])
+    assert scatter(np.arange(6), way[:6]) == np.inf
+    assert np.isfinite(scatter(np.arange(7), way[:7]))
+    assert scatter(np.arange(7), np.column_stack([np.arange(7.0) ** 3, 5 * np.ones(7)])) < 1e-9
+    assert scatter(np.array([0, 1, 2, 3, 4, 5, 7]), way[:7]) == np.inf
+    assert scatter(2 * np.arange(9), way) == np.inf
+
+
+@pytest.mark.parametrize(("left", "faint"), [(30, True), (40, False)])
+def test_a_view_is_faint_if_its_whole_rim_is_before_ground_like_it(left, faint):
+    ground = np.full((60, 80, 3), 90, np.uint8)
+    ground[:, left:] = 192
+    frame = ground.copy()
+    frame[20:36, 34:50] = 200
+    view = Lens(Asked(ground), 0.0).look(
+        frame, np.eye(3), np.array([34.0, 20, 16, 16]), np.array([41.5, 27.5]), np.full(3, 200.0),
+        np.ones(3, np.float32),
+    )  # fmt: skip
+    assert view.faint is faint

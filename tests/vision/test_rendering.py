@@ -7,9 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vidsindy_lite.vision import rendering
 from vidsindy_lite.vision.rendering import (
     _NORMAL,
+    _blend,
     _poses,
+    coverage,
     draw_frames,
     render,
     render_labelled,
@@ -235,3 +238,124 @@ def test_masked_rows_of_a_track_are_frames_without_target():
     empty = next(render([[np.nan, np.nan]], scene))
     assert not np.array_equal(seen, empty)
     assert np.array_equal(hidden, empty)
+
+
+@settings(max_examples=30)
+@given(
+    edges=st.tuples(*[st.integers(-320, 320)] * 2, *[st.integers(1, 160)] * 2),
+    clockwise=st.booleans(),
+    first=st.integers(0, 3),
+)
+def test_a_rectangle_covers_each_pixel_by_its_common_part(edges, clockwise, first):
+    left, top, width, height = np.array(edges) / 16  # along v to a sixteenth of a pixel
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [width, height] + [left, top]
+    alpha, corner = coverage(np.roll(corners[:: 1 if clockwise else -1], first, axis=0))
+    pixels = [corner[k] + np.arange(alpha.shape[1 - k]) for k in (0, 1)]
+    u, v = (
+        np.clip(np.minimum(x + 0.5, low + side) - np.maximum(x - 0.5, low), 0, 1)
+        for x, low, side in zip(pixels, (left, top), (width, height), strict=True)
+    )
+    np.testing.assert_allclose(alpha, np.outer(v, u), atol=1e-9)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**20))
+def test_a_triangle_covers_its_area_about_its_centroid(seed):
+    points = np.random.default_rng(seed).uniform([-20, 5], [10, 25], (3, 2))
+    alpha, (left, top) = coverage(points)
+    (a, b), (c, d) = points[1:] - points[0]
+    area = abs(a * d - b * c) / 2
+    assert alpha.sum() == pytest.approx(area, abs=0.05 + 0.01 * area)
+    v, u = np.mgrid[top : top + alpha.shape[0], left : left + alpha.shape[1]]
+    centroid = [(alpha * x).sum() for x in (u, v)]
+    np.testing.assert_allclose(centroid, area * points.mean(axis=0), atol=1 + 0.01 * area)
+
+
+@pytest.mark.parametrize(
+    ("left", "top", "seen"),
+    [(20, 30, 1), (-4, 30, 0.6), (20, -3, 0.5), (90, 30, 0.6), (20, 77, 0.5), (90, 77, 0.3),
+     (-10, 30, 0), (96, 30, 0), (20, -6, 0), (20, 80, 0)],
+)  # fmt: skip
+def test_a_polygon_is_drawn_as_far_as_the_image_shows_it(left, top, seen):
+    frame, visible = np.full((80, 96, 3), 100, np.uint8), np.ones((80, 96), np.float32)
+    corners = np.array([[0, 0], [10, 0], [10, 6], [0, 6]]) + [left - 0.5, top - 0.5]
+    share = _blend(frame, visible, corners, np.array([10, 20, 250], np.float32))
+    assert share == pytest.approx(seen)
+    inside = (frame == [10, 20, 250]).all(axis=2)
+    wanted = np.zeros((80, 96), bool)
+    wanted[max(top, 0) : max(top + 6, 0), max(left, 0) : max(left + 10, 0)] = True
+    np.testing.assert_array_equal(inside, wanted)
+    assert (frame[~inside] == 100).all()
+
+
+def test_a_pixel_that_is_half_covered_is_half_of_both_colours():
+    frame, visible = np.full((80, 96, 3), 100, np.uint8), np.ones((80, 96), np.float32)
+    visible[:, 35:] = 0
+    corners = np.array([[30.0, 40], [39, 40], [39, 44], [30, 44]])
+    share = _blend(frame, visible, corners, np.array([0, 50, 240], np.float32))
+    np.testing.assert_array_equal(frame[42, 29:37], [[100] * 3, [50, 75, 170]] + 4 * [[0, 50, 240]]
+                                  + 2 * [[100] * 3])  # fmt: skip
+    np.testing.assert_array_equal(frame[40, 30], [75, 88, 135])
+    assert share == pytest.approx(4.5 / 9)
+
+
+@pytest.mark.parametrize("shape", ["polygon", "irregular"])
+def test_the_outline_is_turned_enlarged_mapped_and_carried_to_its_place(monkeypatch, shape):
+    angle, scale, move = 0.7, 1.3, np.array([[1.2, 0.3], [-0.1, 0.8]])
+    monkeypatch.setattr(
+        rendering, "_poses", lambda scene, n, rng: (np.full(n, angle), np.full(n, scale))
+    )
+    scene = Scene("plain", shape, 24, shape_seed=3, image_size=SMALL)
+    empty = next(render([[np.nan, np.nan]], scene))
+    (frame,) = render([[48.3, 40.6]], scene, shapes=[move])
+    # From u to v by the angle, as numbers u + i v.
+    turned = scene.outline() @ [1, 1j] * scale * np.exp(1j * angle)
+    polygon = np.array([move @ [z.real, z.imag] + [48.3, 40.6] for z in turned])
+    wanted, visible = empty.copy(), np.ones(empty.shape[:2], np.float32)
+    _blend(wanted, visible, polygon, np.array(COLOURS["red"], np.float32))
+    np.testing.assert_allclose(frame.astype(float), wanted, atol=1)
+
+
+def test_of_several_targets_the_later_ones_are_in_front():
+    scene = Scene("plain", size=20, image_size=SMALL)
+    track = np.array([[30.0, 40, 60, 44, 33, 40], [30, 40, np.nan, np.nan, 80, 40]])
+    drawn = list(render_labelled(track, scene))
+    empty = next(render([[np.nan, np.nan]], scene))
+    changed = [(labelled.frame != empty).any(axis=2) for labelled in drawn]
+    assert changed[0][40, 21:43].all()
+    assert changed[0][44, 51:69].all()
+    assert not changed[1][44, 51:69].any()
+    assert drawn[0].visible == pytest.approx(1)
+    assert changed[1].sum() == pytest.approx(2 * np.pi * 100, rel=0.15)
+
+
+def test_a_track_of_an_odd_number_of_columns_is_told_of_the_even_one_below():
+    for width, even in ((1, 2), (3, 2), (5, 4)):
+        with pytest.raises(ValueError, match=rf"track: must have shape \(n, {even}\)"):
+            render(np.zeros((4, width)), Scene())
+
+
+@pytest.mark.parametrize(
+    ("box", "brown"),
+    [((20, 10, 12, 40), True), ((20, 10, 40, 40), True), ((20, 10, 40, 39), False)],
+)
+def test_posts_are_brown_and_hedges_are_green(box, brown):
+    left, top, width, height = box
+    frame = next(render([[np.nan, np.nan]], Scene("plain", occluders=(box,), image_size=SMALL)))
+    blue, green, red = frame[top : top + height, left : left + width].reshape(-1, 3).mean(axis=0)
+    assert green > blue + 10
+    assert (red > green + 10) == brown
+    assert (red < green - 10) != brown
+    plain = next(render([[np.nan, np.nan]], Scene("plain", image_size=SMALL)))
+    changed = np.abs(frame.astype(int) - plain).max(axis=2) > 20
+    assert np.flatnonzero(changed.any(axis=0)).tolist() == [*range(left, left + width)]
+    assert np.flatnonzero(changed.any(axis=1)).tolist() == [*range(top, top + height)]
+
+
+def test_the_view_moves_over_as_much_background_as_it_needs():
+    scene, track = Scene("sky", image_size=SMALL), np.full((3, 2), np.nan)
+    shifts = np.array([[-7, 4], [6, 1], [0, -9]])
+    frames = list(render_restless(track, scene, shifts, seed=4))
+    large = BACKGROUNDS["sky"](np.random.default_rng(4), (96 + 13, 80 + 13))
+    for frame, (u, v) in zip(frames, [(0, 13), (13, 10), (7, 0)], strict=True):
+        np.testing.assert_array_equal(frame, large[v : v + 80, u : u + 96])

@@ -73,3 +73,18 @@ def test_joints_part_all_bricks():
     rows, columns = np.mgrid[:192, :256]
     shifts = 32 * (rows // 32 % 2)  # every second course begins half a brick on
     np.testing.assert_array_equal(red, (rows % 32 >= 3) & ((columns + shifts) % 64 >= 3))
+
+
+def test_joints_are_pale_and_not_all_the_same():
+    """As they were, in the second row of each course: green, from 161 to 175."""
+    image = scenery.BACKGROUNDS["bricks"](np.random.default_rng(7), (256, 192))
+    joints = (
+        "166 173 164 165 171 172 167 166 170 166 165 169 173 166 169 166 167 163 165 170 173 168 "
+        "166 164"
+    )
+    np.testing.assert_allclose(image[1::32, 30::60, 1].ravel(), numbers(joints), atol=2)
+    plain = image[1::32].astype(int)
+    assert (plain[..., 0] - plain[..., 1] == -8).all()
+    assert (plain[..., 2] - plain[..., 1] == 6).all()
+    assert 161 <= plain[..., 1].min() < 164
+    assert 173 < plain[..., 1].max() <= 175

@@ -4,11 +4,20 @@ import cv2
 import numpy as np
 import pytest
 
+from vidsindy_lite.vision import steadying
+from vidsindy_lite.vision.aligning import Aligned
 from vidsindy_lite.vision.steadying import (
     _MANY,
     Steadying,
+    _ByCorners,
+    _corners,
+    _drifted,
+    _follow,
     _Relief,
+    _similar,
+    _widespread,
     carry,
+    corners_tell,
     displacement,
     stands_still,
 )
@@ -26,10 +35,10 @@ def grains(seed=0):
 
 def followed(*frames):
     """The map of the first frame to the last."""
-    steadying = Steadying(1)
+    following = Steadying(1)
     for frame in frames:
-        steadying.add(frame)
-    return np.linalg.inv(steadying.motion().maps[-1])
+        following.add(frame)
+    return np.linalg.inv(following.motion().maps[-1])
 
 
 def test_a_plane_that_is_seen_more_from_the_side_has_a_map_of_eight_numbers():
@@ -72,9 +81,9 @@ def test_what_a_few_of_the_corners_share_is_chance_and_tells_no_motion(share, to
             here = np.array([[1, 0, move[0]], [0, 1, move[1]]])
             moved = cv2.warpAffine(before, here, SIZE)
             after[v : v + 60, u : u + 80] = moved[v : v + 60, u : u + 80]
-    steadying = Steadying(1)
-    steadying.add(before)
-    found, count = steadying.by_corners(_Relief.of(after))
+    following = Steadying(1)
+    following.add(before)
+    found, count = following.by_corners(_Relief.of(after))
     assert (found is not None) is told
     assert (count > 0) is told
 
@@ -106,16 +115,231 @@ def test_pixels_say_it_better_than_many_corners_in_noise():
     rng = np.random.default_rng(0)
     scene = cv2.GaussianBlur(rng.normal(0, 1, (280, 360)).astype(np.float32), (0, 0), 6)
     scene = 130 + 10 * scene / scene.std()
-    steadying, misses = Steadying(1), []
+    following, misses = Steadying(1), []
     for k in range(12):
         shift = np.array([1.5 * np.sin(k), 1.5 * np.cos(2 * k) - 1.5])
         move = np.array([[1, 0, shift[0] - 20], [0, 1, shift[1] - 20]])
         view = cv2.warpAffine(scene, move, (320, 240))[..., None]
         noisy = view + rng.normal(0, 6, (240, 320, 3))
-        steadying.add(np.clip(noisy, 0, 255).astype(np.uint8))
-        here = carry(steadying.maps[-1], np.array([[160.0, 120]]))
+        following.add(np.clip(noisy, 0, 255).astype(np.uint8))
+        here = carry(following.maps[-1], np.array([[160.0, 120]]))
         misses.append(np.linalg.norm(here + shift - [160, 120]))
     assert (
-        steadying.by_corners(_Relief.of(np.clip(noisy, 0, 255).astype(np.uint8))).agreeing >= _MANY
+        following.by_corners(_Relief.of(np.clip(noisy, 0, 255).astype(np.uint8))).agreeing >= _MANY
     )
     assert np.median(misses) < 0.05
+
+
+def squares(places, contrast=80, size=(250, 130)):
+    """A grey picture with squares of five pixels about some places."""
+    picture = np.full(size[::-1], 100, np.uint8)
+    for u, v in places:
+        picture[v - 2 : v + 3, u - 2 : u + 3] += np.uint8(contrast)
+    return picture
+
+
+def test_each_part_of_an_image_has_at_most_one_corner():
+    # Parts of 20 x 10 pixels; those to the right of 240 and below 120 are in none.
+    places = [(10, 5), (49, 25), (52, 25), (190, 74), (230, 113), (70, 15), (245, 60), (100, 126)]
+    found = _corners(squares(places))
+    parts = {(int(u) // 20, int(v) // 10) for u, v in found}
+    assert len(parts) == len(found)
+    for u, v in places[:6]:
+        assert np.linalg.norm(found - [u, v], axis=1).min() < 6
+        assert (u // 20, v // 10) in parts
+    near = np.linalg.norm(found[:, None] - np.array(places), axis=2).min(axis=1)
+    assert near.max() < 12
+    assert not len(_corners(squares(places, contrast=2)))
+    assert not len(_corners(squares([(5, 5)], size=(250, 11))))
+
+
+@pytest.mark.parametrize("shift", [(-9, 0), (9, 0), (0, -9), (0, 9), (3, -2)])
+def test_corners_are_followed_as_long_as_they_are_in_the_image(shift):
+    before = cv2.cvtColor(grains(), cv2.COLOR_BGR2GRAY)[200:320, 200:360].copy()
+    move = np.array([[1, 0, shift[0]], [0, 1, shift[1]]], float)
+    whole = cv2.warpAffine(cv2.cvtColor(grains(), cv2.COLOR_BGR2GRAY), move, SIZE)
+    after = whole[200:320, 200:360].copy()
+    points = np.array([[80.0, 60], [4, 60], [155, 60], [80, 4], [80, 115]])
+    ends, found = _follow(before, after, points, points + shift)
+    there = points + shift
+    inside = ((there >= 0) & (there < [160, 120])).all(axis=1)
+    np.testing.assert_array_equal(found, inside)
+    np.testing.assert_allclose(ends[0], there[0], atol=0.1)
+    nothing, none = _follow(before, after, points[:0], points[:0])
+    assert nothing.shape == (0, 2)
+    assert none.shape == (0,)
+
+
+@pytest.mark.parametrize("light", [0.4, 0.7, 1.3])
+def test_what_stands_out_does_so_in_any_light(light):
+    picture = np.full((90, 120, 3), 120, np.uint8)
+    picture[30:34, 50:54] = 150
+    picture[60:64, 80:84] = 90
+    fine = _Relief.of(picture).fine.astype(int)
+    assert fine[5, 5] == 128
+    assert fine[32, 52] > 150
+    assert fine[62, 82] < 106
+    dimmed = _Relief.of(np.rint(light * picture).astype(np.uint8)).fine.astype(int)
+    contrast, seen = fine[32, 52] - 128, dimmed[32, 52] - 128
+    # The grey levels below which all is dark take a part of the contrast of a dark image.
+    assert 0.7 < seen / contrast < 1.2
+
+
+def test_what_stands_out_of_the_dark_is_bright():
+    picture = np.full((90, 120, 3), 8, np.uint8)
+    picture[30:38, 50:58] = 14
+    fine = _Relief.of(picture).fine.astype(int)
+    # By about four or five grey levels, of 30, times 250.
+    assert 128 + 20 < fine[34, 54] < 128 + 60
+
+
+@pytest.mark.parametrize(
+    ("pairs", "still"),
+    [([False] * 4, True), ([None, False, False, False], True), ([None, None, False, False], None),
+     ([None, False, None, None], None), ([None, False, False, True], False),
+     ([True, None, None, None], False)],
+)  # fmt: skip
+def test_a_camera_stands_still_if_most_pairs_say_so_and_none_the_contrary(
+    monkeypatch, pairs, still
+):
+    told = iter(pairs)
+    monkeypatch.setattr(steadying, "_moved", lambda before, after: next(told))
+    assert stands_still([np.zeros((48, 64, 3), np.uint8)] * 3) is still
+
+
+def test_corners_tell_the_motion_if_they_do_between_most_samples():
+    full, plain = grains()[:240, :320], np.full((240, 320, 3), 128, np.uint8)
+    for samples, told in (
+        ([full, full], True), ([full, full, full, plain], True), ([full, full, plain], False),
+        ([full, full, plain, plain], False), ([plain, plain], False),
+    ):  # fmt: skip
+        assert corners_tell(samples) is told
+
+
+@pytest.mark.parametrize(("half", "wide"), [((60, 66), True), ((60, 57), False), ((0, 92), True),
+                                            ((92, 0), True), ((80, 0), False)])  # fmt: skip
+def test_points_that_are_wide_spread_have_six_tenths_of_the_spread_of_the_image(half, wide):
+    # The diagonal, of 500, by the root of twelve, is 144; six tenths of it are 87.
+    points = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) * half + np.array([40, 200.0])
+    assert _widespread(points, (300, 400)) is wide
+
+
+def clouds(u, noise, contrast, seed):
+    """A picture of clouds without corners, moved to the right; new noise each."""
+    scene = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(240, 320)), (0, 0), 12)
+    scene = cv2.warpAffine(120 + contrast * scene / scene.std(), np.array([[1.0, 0, u], [0, 1, 0]]),
+                           (320, 240), borderMode=cv2.BORDER_REFLECT)  # fmt: skip
+    rng = np.random.default_rng(seed)
+    picture = scene[..., None] + rng.normal(0, noise, (240, 320, 3))
+    return np.clip(picture, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("u", "noise", "contrast", "drifted"),
+    [(3, 1, 20, True), (0, 2, 20, False), (3, 1, 0, None)],
+    ids=["moves", "rests", "plain"],
+)
+def test_all_pixels_tell_of_a_motion_where_there_are_no_corners(u, noise, contrast, drifted):
+    views = clouds(0, noise, contrast, seed=1), clouds(u, noise, contrast, seed=2)
+    assert _drifted(*map(_Relief.of, views)) is drifted
+
+
+def test_eight_corners_are_needed_for_a_map():
+    rng = np.random.default_rng(0)
+    a = rng.uniform(0, 300, (9, 2))
+    turn = np.array([[0.9, -0.2], [0.2, 0.9]])
+    for n, told in ((7, False), (8, True), (9, True)):
+        found, obey = _similar(a[:n], a[:n] @ turn.T + [5, -8], 0.5)
+        assert (found is not None) is told
+        assert obey.sum() == n * told
+    np.testing.assert_allclose(found, [[0.9, -0.2, 5], [0.2, 0.9, -8], [0, 0, 1]], atol=1e-4)
+
+
+@pytest.mark.parametrize("off", [0.1, 0.3])
+def test_the_error_of_a_map_by_corners_is_that_of_the_mean_of_a_quarter_of_them(monkeypatch, off):
+    # Four numbers of n corners: 144 of them, that miss by `off` to all sides.
+    angle = np.random.default_rng(0).uniform(0, 2 * np.pi, 144)
+    miss = off * np.column_stack([np.cos(angle), np.sin(angle)])
+    monkeypatch.setattr(
+        steadying, "_follow", lambda before, after, points, guess:
+        (points + [4, -7] + miss[: len(points)], np.ones(len(points), bool)),
+    )  # fmt: skip
+    followed = Steadying(1)
+    followed.add(grains())
+    told = followed.by_corners(_Relief.of(grains()))
+    assert told.agreeing == 144
+    assert told.found.error == pytest.approx(off / 6, rel=0.1)
+    np.testing.assert_allclose(told.found.map[:2, 2], [4, -7], atol=0.2)
+    assert told.alone is (off < 0.2)
+
+
+@pytest.mark.parametrize(("agreeing", "error", "alone"), [(60, 0.04, True), (59, 0.04, False),
+                                                          (90, 0.06, False)])  # fmt: skip
+def test_corners_need_no_other_witness_if_they_are_many_and_exact(agreeing, error, alone):
+    assert _ByCorners(Aligned(np.eye(3), error), agreeing).alone is alone
+    assert not _ByCorners(None, agreeing).alone
+
+
+@pytest.mark.parametrize("u", [-0.7, -0.3, 0.0, 0.45, 0.9, 1.2])
+@pytest.mark.parametrize("v", [-0.55, 0.0, 0.2])
+def test_the_share_of_a_key_frame_that_is_in_view(u, v):
+    followed = Steadying(1)
+    followed.add(grains())
+    here = np.array([[1, 0, u * SIZE[0]], [0, 1, v * SIZE[1]], [0, 0, 1]])
+    share = max(1 - abs(u), 0) * (1 - abs(v))
+    assert followed._shared(here) == pytest.approx(share, abs=0.22 * (share > 0))
+
+
+def test_the_step_of_a_map_is_by_how_much_it_differs_from_the_last_one():
+    followed = Steadying(1)
+    followed.add(grains())
+    followed.last = np.array([[1, 0, 30], [0, 1, -20], [0, 0, 1.0]])
+    here = np.array([[1, 0, 33], [0, 1, -24], [0, 0, 1.0]])
+    assert followed._step(here) == pytest.approx(5)
+    assert followed._step(followed.last) == pytest.approx(0, abs=1e-9)
+
+
+def test_reduced_maps_and_their_errors_become_those_of_whole_pixels():
+    followed = Steadying(4)
+    shift = np.array([[1, 0, 2], [0, 1, -3], [0, 0, 1.0]])
+    tilt = np.array([[1, 0, 0], [0, 1, 0], [0.001, 0, 1.0]])
+    followed.maps = [np.eye(3), shift, np.diag([1.2, 0.9, 1]), 2 * tilt]
+    followed.errors = [0.0, 0.25, 1, np.inf]
+    motion = followed.motion()
+    np.testing.assert_allclose(motion.errors, [0, 1, 4, np.inf])
+    assert motion.moves
+    # The reduced pixels (10, 20) lie at (41.5, 81.5), in the middle of four by four.
+    for here, (u, v) in zip(
+        motion.maps, [(10, 20), (12, 17), (12, 18), (10 / 1.01, 20 / 1.01)], strict=True
+    ):
+        end = carry(here, np.array([[41.5, 81.5]]))[0]
+        np.testing.assert_allclose(end, [4 * u + 1.5, 4 * v + 1.5])
+        assert here[2, 2] == pytest.approx(1)
+
+
+def test_a_new_key_frame_adds_its_error_to_all_that_follow():
+    # By a tenth of the width each: little is left of the first frame after seven of them.
+    scene = cv2.resize(grains(), (1600, 720))
+    followed, keys = Steadying(1), []
+    for k in range(9):
+        followed.add(scene[:240, 32 * k : 32 * k + 320])
+        keys.append(followed.base[0, 2])
+    places = np.array(followed.maps)[:, :2, 2]
+    np.testing.assert_allclose(places, np.column_stack([32 * np.arange(9), 0 * np.arange(9)]),
+                               atol=0.3)  # fmt: skip
+    fresh = np.flatnonzero(np.diff(keys) > 100)
+    assert len(fresh) == 1
+    assert 4 <= fresh[0] <= 6
+    assert followed.drift > 0
+    assert (np.array(followed.errors[fresh[0] + 2 :]) > followed.drift).all()
+    assert max(followed.errors) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("error", "drifted"), [(0.1, True), (0.15, True), (0.25, False), (2.0, False), (4.0, None)]
+)
+def test_a_shift_of_five_standard_errors_is_a_motion(monkeypatch, error, drifted):
+    shift = np.array([[1, 0, 0.6], [0, 1, -0.8], [0, 0, 1.0]])  # by a pixel
+    monkeypatch.setattr(steadying, "align", lambda ground, levels, guess: Aligned(shift, error))
+    relief = _Relief.of(np.full((48, 64, 3), 100, np.uint8))
+    assert _drifted(relief, relief) is drifted

@@ -196,3 +196,124 @@ def test_white_balance_of_a_camera():
     for rest in ([0.1, 1.0, same], [same, 0.1, 90]):
         seen = training._seen_by_a_camera(frame, Given(same, same, 1.0, np.ones(3), 0.0, *rest))
         np.testing.assert_allclose(seen.astype(float), frame, atol=2)
+
+
+class Farthest(Given):
+    """A source of random numbers that are the largest of their ranges, or given."""
+
+    def integers(self, low, high=None, size=None):
+        largest = (low if high is None else high) - 1
+        return largest if size is None else np.full(size, largest)
+
+
+@pytest.mark.parametrize("size", [48, 96, 192, 512])
+def test_a_piece_of_a_background_reaches_to_its_last_pixel_and_not_beyond(size):
+    v, u = np.mgrid[:512, :512]
+    pool = np.stack([np.zeros((512, 512, 3)), np.dstack([u // 4, v // 4, (u + v) // 8])])
+    pool = pool.astype(np.uint8)
+    rng = Farthest(np.log(size / training.SIDE), np.zeros((3, 3)), 1.0)
+    piece = training._background(rng, pool)
+    corner = pool[1, -size:, -size:].astype(float)
+    step = size / training.SIDE
+    for k in (0, 1):
+        line = piece.astype(float).mean(axis=k)[:, k]
+        wanted = corner.mean(axis=k)[:, k]
+        assert line.shape == (training.SIDE,)
+        np.testing.assert_allclose(line[[0, -1]], wanted[[0, -1]], atol=1 + step / 4)
+        assert line.mean() == pytest.approx(wanted.mean(), abs=0.6)
+
+
+def test_pieces_are_of_half_the_frame_to_the_whole_background():
+    asked = []
+
+    class Ranges(Farthest):
+        def uniform(self, low, high, size=None):
+            asked.append((low, high))
+            return high if size is None else np.full(size, high)
+
+    pool = np.full((1, 512, 512, 3), (40, 80, 120), np.uint8)
+    piece = training._background(Ranges(), pool)
+    np.testing.assert_allclose(np.exp(asked[0]), [0.5, 512 / 96])
+    # A quarter of the other colours each, 1.3 times as bright.
+    mixed = 1.3 * (np.array([40, 80, 120]) + 0.25 * 240) / 1.75
+    np.testing.assert_allclose(piece[50, 50], mixed, atol=1)
+
+
+def test_the_loss_of_a_place_is_that_of_the_anchors_around_the_target():
+    # A small target on an anchor: those beside it are to be sure to 0.61, diagonally to 0.37.
+    place = anchors(4, 4)
+    centre, size = place[5:6], torch.tensor([[6.0, 10.0]])
+    steps = (place - centre).square().sum(dim=1) / training.STRIDE**2
+    near = steps < 2.5
+    assert near.sum() == 9
+    quality = torch.exp(-steps / 2)
+    right = torch.cat([centre, size], dim=1).T.expand(4, 16).clone()
+
+    perfect = quality.clamp(1e-6, 1 - 1e-6).logit()
+
+    def loss(boxes, logit=perfect):
+        return training.detection_loss(
+            torch.cat([boxes, logit[None]])[None], centre, size, torch.ones(1)
+        ).item()
+
+    least = loss(right)
+    off = right + torch.tensor([training.STRIDE, -0.5 * training.STRIDE, 0, 0])[:, None]
+    assert loss(off) == pytest.approx(least + 1.5, abs=1e-3)
+    large = right * torch.tensor([1, 1, np.e, np.exp(-0.4)])[:, None]
+    assert loss(large) == pytest.approx(least + 0.5 * 1.4, abs=1e-3)
+    far = torch.where(near, right, off)  # whose place matters to nobody
+    assert loss(far) == pytest.approx(least, abs=1e-3)
+    # Of the nine, the corners have the weight of e^-1 each, of all of which the sum is 4.9.
+    corners = torch.where((steps > 1.5) & near, off, right)
+    weights = np.exp(-np.array([0, 0.5, 1])) * [1, 4, 4]
+    assert loss(corners) == pytest.approx(least + 1.5 * weights[2] / weights.sum(), abs=1e-3)
+    # Of undecided anchors each costs ln 2, by the square of how far it is from decided.
+    undecided = ((quality - 0.5) ** 2).sum() * np.log(2) / quality.sum()
+    assert loss(right, torch.zeros(16)) == pytest.approx(undecided.item(), rel=1e-4)
+
+
+def test_the_larger_a_target_the_more_anchors_are_to_be_sure_of_it():
+    place = anchors(16, 16)
+    centre = place[120:121]
+    squared = (place - centre).square().sum(dim=1)
+    for size, spread in ((10.0, 4.0), (40.0, 8.0), (80.0, 16.0)):
+        sides = torch.tensor([[1.2 * size, 0.8 * size]])
+        boxes = torch.cat([centre, sides], dim=1).T.expand(4, 256)
+        losses = [
+            training.detection_loss(
+                torch.cat([boxes, torch.exp(-squared / (2 * (factor * spread) ** 2))
+                           .clamp(1e-6, 1 - 1e-6).logit()[None]])[None],
+                centre, sides, torch.ones(1),
+            ).item()
+            for factor in (0.8, 1.0, 1.25)
+        ]  # fmt: skip
+        assert losses[1] < 1e-4 < min(losses[0], losses[2])
+
+
+def test_middles_of_targets_are_drawn_from_one_edge_of_the_frame_to_the_other():
+    drawn = []
+
+    class Noted(np.random.Generator):
+        def uniform(self, low=0.0, high=1.0, size=None):
+            drawn.append((low, high, size))
+            return super().uniform(low, high, size)
+
+    pool = np.full((1, 512, 512, 3), 128, np.uint8)
+    training.training_frame(Noted(np.random.PCG64(0)), pool)
+    assert (-0.5, training.SIDE - 0.5, 2) in drawn
+
+
+def test_a_checkpoint_is_written_after_every_so_many_steps(tmp_path, monkeypatch):
+    saved = []
+    batch = (torch.zeros(1, 3, 32, 32), *(torch.full((1, k), 9.0) for k in (2, 2)), torch.ones(1))
+    monkeypatch.setattr(training, "background_pool", lambda rng: None)
+    monkeypatch.setattr(training, "_batch", lambda seed, step, pool: batch)
+    monkeypatch.setattr(training, "_CHECKPOINT", 3)
+    monkeypatch.setattr(
+        training,
+        "_save",
+        lambda path, state: saved.append((path.suffix, len(state.get("losses", [])))),
+    )
+    log = training.train(tmp_path / "a.pt", seed=1, steps=7)
+    assert saved == [(".checkpoint", 3), (".checkpoint", 6), (".pt", 0)]
+    assert log["steps"] == 7
