@@ -173,9 +173,9 @@ def test_a_box_in_a_reduced_film_holds_what_is_there_in_a_quarter_of_the_pixels(
     frames[:, 40:64, 100:140] = (30, 60, 200)
     path = write_video(tmp_path / "a.mov", frames)
     one = Pointer.of(Hint(0, (100, 40, 40, 24)), [[], []], 4, path).one
-    # The reduced pixels 25 to 34 and 10 to 15, to half a pixel.
-    np.testing.assert_allclose(one.centre, [29.5, 12.5], atol=0.5)
-    np.testing.assert_allclose(one.box, [25, 10, 10, 6], atol=0.5)
+    # The reduced pixels 25 to 34 and 10 to 15.
+    np.testing.assert_allclose(one.centre, [29.5, 12.5], atol=1e-9)
+    np.testing.assert_allclose(one.box, [25, 10, 10, 6], atol=1e-9)
     np.testing.assert_allclose(one.colour, [30, 60, 200], atol=3)
     there = blob(29.5, 12.5, 8)
     assert Pointer.of(Hint(0, (100, 40, 40, 24)), [[there], []], 4, path).one.area == 64

@@ -42,7 +42,7 @@ class Pointer:
             return cls(hint, None)
         if hint.frame >= len(found):
             raise ValueError(f"target: its frame must be one of {len(found)}, got {hint.frame}")
-        box = (np.array(hint.box) - [(factor - 1) / 2, (factor - 1) / 2, 0, 0]) / factor
+        box = np.array(hint.box) / factor  # it begins at its first pixel
         middle = box[:2] + (box[2:] - 1) / 2
         here = [(_overlap(c.box, box), c) for c in found[hint.frame] if _fits(c, box, middle)]
         share, one = max(here, key=lambda pair: pair[0], default=(0.0, None))
