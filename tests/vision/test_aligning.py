@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vidsindy_lite import track
+from vidsindy_lite.vision import aligning
 from vidsindy_lite.vision.aligning import Ground, _error, _middle, _similar, grounds, pyramid
 from vidsindy_lite.vision.aligning import align as align_on
 from vidsindy_lite.vision.steadying import Steadying
@@ -289,6 +290,21 @@ def test_what_few_blocks_tell_may_move_on_its_own(width, told):
         views.append(view + rng.normal(0, 0.5, view.shape).astype(np.float32))
     found = align_on(grounds(views[:1]), views[1:], np.eye(3))
     assert np.isfinite(found.error) == told
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_frames_that_share_mere_noise_tell_no_map(seed):
+    before, after = np.random.default_rng(seed).normal(128, 3, (2, 360, 480, 3))
+    views = [np.clip(one, 0, 255).astype(np.uint8) for one in (before, after)]
+    assert not np.isfinite(align(*map(pyramid, views), np.eye(3)).error)
+
+
+@pytest.mark.parametrize(("error", "known"), [(3.9, True), (4.1, False)])
+def test_a_map_that_is_known_no_better_than_its_guess_is_not_known(monkeypatch, error, known):
+    # The guess to 8 pixels; the finest level is of half the size.
+    monkeypatch.setattr(aligning, "_error", lambda *_: error)
+    views = pyramid(sight(0)), pyramid(sight(0, similar(0.7, -0.4)))
+    assert np.isfinite(align(*views, np.eye(3)).error) == known
 
 
 def test_the_error_of_a_map_is_about_that_by_which_it_misses():

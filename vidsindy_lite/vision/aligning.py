@@ -15,7 +15,7 @@ from ..arrays import Floats, Floats32, Image, Ints
 
 _RIM = 2  # pixels of each level that depend on what lies beyond the image
 _LEVELS = 4  # of the pyramid, the first of half the size
-_BEYOND = -1e6  # in place of grey levels, where nothing is shown
+_BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
 _ITERATIONS = 6
 _CLOSE = 0.01  # pixels of a level of a step that is no longer worth another
 _LOOSE, _FIRM = 40.0, 3.0  # grey levels, and deviations, from which on a pixel is left aside
@@ -75,6 +75,8 @@ def grounds(levels: list[Floats32]) -> list[Ground]:
 def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned | None:
     """The map of one view to another, from a guess; None where they have little in common.
 
+    Its error is infinite where the views tell no more than the guess.
+
     Parameters
     ----------
     before : list of Ground
@@ -91,7 +93,10 @@ def align(before: list[Ground], after: list[Floats32], guess: Floats) -> Aligned
         if fitted is None:
             return None
         found = back @ fitted.map @ scale
-    return fitted and Aligned(found, 2 * fitted.error)
+    if fitted is None:  # images too small for a pyramid
+        return None
+    error = 2 * fitted.error
+    return Aligned(found, error if error < _STEP else np.inf)
 
 
 def _similar(guess: Floats, size: Ints) -> Floats:
@@ -122,10 +127,10 @@ def _fit(
     framed = np.full_like(view, _BEYOND)
     inner = np.s_[_RIM:-_RIM, _RIM:-_RIM]
     framed[inner] = view[inner]
-    within = framed > _BEYOND / 2
+    within = framed >= 0
     for step in range(_ITERATIONS):
         shown = _moved(framed, here[:2])
-        known = within & (shown > -1.0)
+        known = within & (shown >= 0)
         if np.count_nonzero(known) < 0.3 * known.size:
             return None
         miss = shown - gain * key - offset
@@ -153,8 +158,8 @@ def _fit(
     value, direction = np.linalg.eigh(_symmetric(heavy @ seen.reshape(6, -1).T))
     information = (direction * np.maximum(value, 0)) @ direction.T / spread**2 + prior
     telling = _by_blocks(weight * (seen[0] * slopes[0] + seen[1] * slopes[1]))
-    telling = np.maximum(telling, 0)
-    if telling.mean() ** 2 <= _WIDELY * (telling**2).mean():
+    # Blocks of mere noise tell as much for the map as against it.
+    if telling.mean() <= np.sqrt(_WIDELY * (telling**2).mean()):
         return Aligned(here, np.inf)
     return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
 
