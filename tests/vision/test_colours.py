@@ -6,7 +6,6 @@ import pytest
 
 from vidsindy_lite import track, write_video
 from vidsindy_lite.vision.colours import whole
-from vidsindy_lite.vision.refining import View, entire
 from vidsindy_lite.vision.scenery import BACKGROUNDS
 
 SIZE = 200, 150
@@ -52,42 +51,6 @@ def test_a_ball_of_two_halves_that_turns(tmp_path, colours, rate, flicker):
     error = np.linalg.norm(track(path).pixels - places(), axis=1)
     assert np.isfinite(error).mean() > 0.8
     assert np.nanpercentile(error, 90) < 1
-
-
-def views(parts, areas, middles=None):
-    """Views of a part of area 100, in its places, each of a whole of its area."""
-    square = np.array([[-5, -5], [5, -5], [5, 5], [-5, 5.0]])
-    middles = np.zeros_like(parts) if middles is None else middles
-    wholes = [
-        View(middle, area, np.zeros(3), True, middle + square)
-        for middle, area in zip(middles, areas, strict=True)
-    ]
-    return [
-        View(part, 100.0, np.zeros(3), True, part + square, one)
-        for part, one in zip(parts, wholes, strict=True)
-    ]
-
-
-def test_what_turns_about_a_whole_that_keeps_its_size_is_a_part_of_it():
-    angle = np.linspace(0, 9, 40)
-    around = 4 * np.column_stack([np.cos(angle), np.sin(angle)])
-    shown = views(around, np.full(40, 220.0))
-    assert entire(shown) == ([one.whole for one in shown], ())
-
-
-def test_what_stays_on_one_side_is_not_its_part():
-    shown = views(np.tile([4.0, 2.0], (40, 1)), np.full(40, 220.0))
-    assert entire(shown) == (shown, ())
-
-
-def test_a_whole_that_changes_its_size_is_doubted():
-    rng = np.random.default_rng(0)
-    angle = np.linspace(0, 9, 40)
-    around = 4 * np.column_stack([np.cos(angle), np.sin(angle)])
-    shown = views(around, 220 * np.exp(rng.normal(0, 1, 40)))
-    kept, doubts = entire(shown)
-    assert kept == shown
-    assert "several colours" in doubts[0]
 
 
 @pytest.mark.parametrize(("level", "plain"), [(60.0, True), (200.0, False)])

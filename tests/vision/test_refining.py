@@ -7,8 +7,10 @@ from vidsindy_lite.vision.candidates import Plate
 from vidsindy_lite.vision.refining import (
     _BESIDE,
     Lens,
+    View,
     _leave_out,
     _nearest,
+    entire,
     fitting,
     joined,
     scatter,
@@ -456,3 +458,39 @@ def test_a_view_is_faint_if_its_whole_rim_is_before_ground_like_it(left, faint):
         np.ones(3, np.float32),
     )  # fmt: skip
     assert view.faint is faint
+
+
+def parts_of_wholes(parts, areas, middles=None):
+    """Views of a part of area 100, in its places, each of a whole of its area."""
+    square = np.array([[-5, -5], [5, -5], [5, 5], [-5, 5.0]])
+    middles = np.zeros_like(parts) if middles is None else middles
+    wholes = [
+        View(middle, area, np.zeros(3), True, middle + square)
+        for middle, area in zip(middles, areas, strict=True)
+    ]
+    return [
+        View(part, 100.0, np.zeros(3), True, part + square, one)
+        for part, one in zip(parts, wholes, strict=True)
+    ]
+
+
+def test_what_turns_about_a_whole_that_keeps_its_size_is_a_part_of_it():
+    angle = np.linspace(0, 9, 40)
+    around = 4 * np.column_stack([np.cos(angle), np.sin(angle)])
+    shown = parts_of_wholes(around, np.full(40, 220.0))
+    assert entire(shown) == ([one.whole for one in shown], ())
+
+
+def test_what_stays_on_one_side_is_not_its_part():
+    shown = parts_of_wholes(np.tile([4.0, 2.0], (40, 1)), np.full(40, 220.0))
+    assert entire(shown) == (shown, ())
+
+
+def test_a_whole_that_changes_its_size_is_doubted():
+    rng = np.random.default_rng(0)
+    angle = np.linspace(0, 9, 40)
+    around = 4 * np.column_stack([np.cos(angle), np.sin(angle)])
+    shown = parts_of_wholes(around, 220 * np.exp(rng.normal(0, 1, 40)))
+    kept, doubts = entire(shown)
+    assert kept == shown
+    assert "several colours" in doubts[0]

@@ -9,6 +9,7 @@ from vidsindy_lite.vision.aligning import Aligned
 from vidsindy_lite.vision.steadying import (
     _MANY,
     Steadying,
+    _by_corners,
     _ByCorners,
     _corners,
     _drifted,
@@ -83,14 +84,15 @@ def test_what_a_few_of_the_corners_share_is_chance_and_tells_no_motion(share, to
             after[v : v + 60, u : u + 80] = moved[v : v + 60, u : u + 80]
     following = Steadying(1)
     following.add(before)
-    found, count = following.by_corners(_Relief.of(after))
+    found, count = _by_corners(following.key, following.points, _Relief.of(after), following.last)
     assert (found is not None) is told
     assert (count > 0) is told
 
 
 @pytest.mark.parametrize(("width", "told"), [(0.3, False), (1.0, True)])
 def test_what_one_large_thing_shares_is_its_own_motion_not_the_cameras(width, told):
-    # Before noise that is new in each frame: what moves is as wide as a share of the image.
+    # Before noise that is new in each frame: what moves is as wide as a share of the image. It must
+    # fill less than a tenth of it, else it may be the wall before which the camera moves.
     def frame(place):
         picture = np.random.default_rng(place).normal(128, 3, (*SIZE[::-1], 3))
         side = (int(width * SIZE[0]), int(width * SIZE[1]))
@@ -124,9 +126,8 @@ def test_pixels_say_it_better_than_many_corners_in_noise():
         following.add(np.clip(noisy, 0, 255).astype(np.uint8))
         here = carry(following.maps[-1], np.array([[160.0, 120]]))
         misses.append(np.linalg.norm(here + shift - [160, 120]))
-    assert (
-        following.by_corners(_Relief.of(np.clip(noisy, 0, 255).astype(np.uint8))).agreeing >= _MANY
-    )
+    last = _Relief.of(np.clip(noisy, 0, 255).astype(np.uint8))
+    assert _by_corners(following.key, following.points, last, following.last).agreeing >= _MANY
     assert np.median(misses) < 0.05
 
 
@@ -266,7 +267,7 @@ def test_the_error_of_a_map_by_corners_is_that_of_the_mean_of_a_quarter_of_them(
     )  # fmt: skip
     followed = Steadying(1)
     followed.add(grains())
-    told = followed.by_corners(_Relief.of(grains()))
+    told = _by_corners(followed.key, followed.points, _Relief.of(grains()), followed.last)
     assert told.agreeing == 144
     assert told.found.error == pytest.approx(off / 6, rel=0.1)
     np.testing.assert_allclose(told.found.map[:2, 2], [4, -7], atol=0.2)

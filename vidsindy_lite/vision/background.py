@@ -29,9 +29,7 @@ from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .pixels import dot, lengths
 from .reducing import ReducedFrames, reduce
 
-_SAMPLES = 21
-"""Frames whose median is the background."""
-
+_SAMPLES = 21  # frames whose median is the background
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 _DENSE = 640  # pixels in a row, of every third of which the noise is known well
 _STRIP = 32  # rows of an image that are sorted at once

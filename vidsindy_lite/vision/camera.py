@@ -34,19 +34,24 @@ def camera_motion(frames: ReducedFrames, small: Image, sampled: Ints) -> tuple[C
     still = stands_still(small)
     ways: list[Callable[[], CameraMotion | None]] = []
     if still is not True:
-        ways.append(partial(trembling, frames, small))
+        ways = [partial(trembling, frames, small)]
     if still is False:
-        first = corners_tell(small)
-        ways.insert(0 if first else 1, partial(_steadied, frames, small, sampled))
+        ways += [partial(_steadied, frames, small, sampled)]
+        if corners_tell(small):
+            ways.reverse()
     found: list[CameraMotion] = []
     for way in ways:
         if (motion := way()) is not None:
             found.append(motion)
-            if np.median(motion.errors) < LOOSE:
+            if _usual_error(motion) < LOOSE:
                 break
     if found:
-        return min(found, key=lambda motion: float(np.median(motion.errors))), True
+        return min(found, key=_usual_error), True
     return at_rest(frames.reel.info.frames), still is True or rests(small)
+
+
+def _usual_error(motion: CameraMotion) -> float:
+    return float(np.median(motion.errors))
 
 
 def _steadied(frames: ReducedFrames, small: Image, sampled: Ints) -> CameraMotion | None:

@@ -30,11 +30,7 @@ from .pointing import Pointer, alike
 from .recalling import recalled
 from .reducing import ReducedFrames, reduce, reduced
 from .refining import Lens, View, entire, fitting, scatter, swapped
-from .steadying import (
-    CameraMotion,
-    at_rest,
-    carry,
-)
+from .steadying import CameraMotion, at_rest, carry
 
 _PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path

@@ -137,7 +137,8 @@ class Lens:
         first = low + [columns[0], rows[0]]
         last = low + [columns[-1], rows[-1]]
         inside = bool((first > 0).all() and (last < self.plate.size - 1).all())
-        faint = bool((square[rim] < (_FAINT * bound[rim]) ** 2).sum() > _RIM * max(rim.sum(), 1))
+        alike = square[rim] < (_FAINT * bound[rim]) ** 2
+        faint = bool(alike.any() and alike.mean() > _RIM)
         shade = now[core if core.any() else label].mean(axis=0)
         outline = low + hull(label).astype(float)
         return View(low + centroid, area, shade, inside, outline, faint=faint)

@@ -127,11 +127,11 @@ def stands_still(samples: Iterable[Image]) -> bool | None:
 
 def corners_tell(samples: Iterable[Image]) -> bool:
     """Do corners alone tell how most reduced samples lie on the next one?"""
-    reliefs, told = [_Relief.of(sample) for sample in samples], []
-    for before, after in zip(reliefs, reliefs[1:], strict=False):
-        pair = Steadying(1)
-        pair.start(before, np.eye(3), 0.0)
-        told.append(pair.by_corners(after).alone)
+    reliefs = [_Relief.of(sample) for sample in samples]
+    told = [
+        _by_corners(before, _corners(before.fine), after, np.eye(3)).alone
+        for before, after in zip(reliefs, reliefs[1:], strict=False)
+    ]
     return sum(told) > len(told) / 2
 
 
@@ -184,7 +184,7 @@ def _similar(a: Floats, b: Floats, exact: float) -> tuple[Floats | None, Bools]:
 
 
 class _ByCorners(NamedTuple):
-    """Where a key frame lies in another, by its corners, and how many of them say so."""
+    """Where a frame lies in another, by its corners, and how many of them say so."""
 
     found: Aligned | None
     agreeing: int
@@ -193,6 +193,23 @@ class _ByCorners(NamedTuple):
     def alone(self) -> bool:
         """Need they no other witness?"""
         return self.found is not None and self.agreeing >= _MANY and self.found.error < _EXACTLY
+
+
+def _by_corners(before: _Relief, points: Floats, after: _Relief, last: Floats) -> _ByCorners:
+    """Where a frame lies in another, by its corners, from a map that is about right."""
+    guess = carry(last, points) if len(points) else points
+    ends, found = _follow(before.fine, after.fine, points, guess)
+    a, b = points[found], ends[found]
+    best, good = _similar(a, b, 2 * _EXACT)
+    if best is None or good.sum() < max(_SOME, _AGREE * len(a)):
+        return _ByCorners(None, 0)
+    if good.sum() >= _MANY:
+        full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
+        if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
+            best, good = np.asarray(full, float), obey[:, 0] > 0
+    miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
+    error = float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))
+    return _ByCorners(Aligned(best, error), len(miss))
 
 
 class Steadying:
@@ -207,33 +224,15 @@ class Steadying:
         self.maps: list[Floats] = []
         self.errors: list[float] = []
 
-    def start(self, relief: _Relief, base: Floats, error: float) -> None:
-        """A key frame, where it lies in the first one and with what error."""
+    def _start(self, relief: _Relief, base: Floats, error: float) -> None:
         self.key, self.points, self.base, self.drift = relief, _corners(relief.fine), base, error
         self.grounds: list[Ground] | None = None  # of the key frame, once they are needed
         self.last = np.eye(3)  # from the key frame to the newest
 
-    def by_corners(self, relief: _Relief) -> _ByCorners:
-        """Where the key frame lies in another, by its corners."""
-        assert self.key is not None
-        guess = carry(self.last, self.points) if len(self.points) else self.points
-        ends, found = _follow(self.key.fine, relief.fine, self.points, guess)
-        a, b = self.points[found], ends[found]
-        best, good = _similar(a, b, 2 * _EXACT)
-        if best is None or good.sum() < max(_SOME, _AGREE * len(a)):
-            return _ByCorners(None, 0)
-        if good.sum() >= _MANY:
-            full, obey = cv2.findHomography(a, b, cv2.RANSAC, _EXACT)
-            if full is not None and obey.sum() >= max(_MANY, 0.8 * good.sum()):
-                best, good = np.asarray(full, float), obey[:, 0] > 0
-        miss = np.linalg.norm(carry(best, a[good]) - b[good], axis=1)
-        error = float(np.sqrt(np.mean(miss**2) * 4 / len(miss)))
-        return _ByCorners(Aligned(best, error), len(miss))
-
     def _locate(self, relief: _Relief) -> Aligned | None:
         """Where the key frame lies in another: by corners; if these are few, perhaps by pixels."""
         assert self.key is not None
-        told = self.by_corners(relief)
+        told = _by_corners(self.key, self.points, relief, self.last)
         if told.alone:
             return told.found
         if self.grounds is None:
@@ -263,13 +262,13 @@ class Steadying:
         relief = _Relief.of(small)
         if self.key is None:
             self.before = relief, np.eye(3), 0.0
-            self.start(*self.before)
+            self._start(*self.before)
             self.maps.append(np.eye(3))
             self.errors.append(0.0)
             return
         located = self._locate(relief)
         if located is None:  # little in common with the key frame: more with the last one known
-            self.start(*self.before)
+            self._start(*self.before)
             located = self._locate(relief)
         if located is None:
             self.maps.append(self.maps[-1])
@@ -280,7 +279,7 @@ class Steadying:
         self.errors.append(float(np.hypot(self.drift, located.error)))
         self.before = relief, self.maps[-1], self.errors[-1]
         if self._shared(self.last) < _LEFT:
-            self.start(*self.before)
+            self._start(*self.before)
 
     def motion(self) -> CameraMotion:
         """The motion so far, in pixels of the frames."""
