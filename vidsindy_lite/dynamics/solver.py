@@ -30,6 +30,7 @@ from .discovery import Discovery
 from .elsewhere import off_home
 from .form import Form
 from .history import History
+from .library import closure_mask
 from .order import accelerated, better, check_order
 from .persistence import Path, Plateau, follow, typical
 from .posing import pose
@@ -410,7 +411,9 @@ def _refitted(
     fit = at_own_noise(problem, fit.collocation.solve(fit.state, EXACT))
     priced = replace(fit, criterion=problem.criterion(fit.collocation, fit.state))
     # Terms that come in may be those of a shift, and worth their price at these errors alone.
-    fit = at_own_noise(problem, leave_home(problem, priced, history))
+    shifts = closure_mask(problem.exponents, active, problem.form.movable)
+    shifted = replace(problem, form=replace(problem.form, candidates=shifts))
+    fit = at_own_noise(problem, leave_home(shifted, priced, history))
     history.add("another law of the path", problem, fit, FINAL_WEIGHT)
     return fit if np.isfinite(fit.collocation.objective(fit.state)) else None
 
