@@ -4,11 +4,19 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vidsindy_lite.dynamics import persistence, search
+from vidsindy_lite.dynamics import persistence, search, solver
 from vidsindy_lite.dynamics.persistence import LARGEST, Plateau
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, OdeContest, add_noise, corruption, score
+from vidsindy_lite.study import (
+    REFERENCE_OFFSET,
+    SYSTEMS,
+    FlowContest,
+    OdeContest,
+    add_noise,
+    corruption,
+    score,
+)
 
 DUFFING = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5}}, degree=3)
 
@@ -62,6 +70,37 @@ def test_a_bent_space_does_not_become_terms(swing, share):
     t, x = swing
     found = discover(t, bent(x, share))
     assert score(found, DUFFING).exact
+
+
+@pytest.mark.slow
+def test_an_origin_that_moves_brings_no_terms_but_those_of_the_shift(monkeypatch):
+    """The path of a bent motion leads to the law at home; its origin is told at its own errors."""
+    data = FlowContest("NoseHoover", "bent space 0.3 %", seed=3).data()
+    found = discover(data.t, data.x, degree=data.degree)
+    assert score(found, data.truth).exact
+    assert found.offset.all()
+    monkeypatch.setattr(solver, "closure_mask", lambda exponents, active, _: active | True)
+    assert not score(discover(data.t, data.x, degree=data.degree), data.truth).exact
+
+
+def test_a_law_is_settled_where_the_path_around_it_leads_nowhere_else(monkeypatch):
+    """A first path, around terms that a bend of space made, leads past the law."""
+    data = FlowContest("SprottE", "bent space 0.3 %", seed=7).data()
+    settled, persistent = [], solver._persistent
+
+    def noted(problem, fit, history):
+        settled.append((fit, *persistent(problem, fit, history)))
+        return settled[-1][1:]
+
+    monkeypatch.setattr(solver, "_persistent", noted)
+    found = discover(data.t, data.x, degree=data.degree)
+    assert score(found, data.truth).exact
+    assert 2 < len(settled) < solver.MOST_PATHS + 1
+    start, law, path = settled[-1]
+    assert law is start
+    assert path.fit is law
+    monkeypatch.setattr(solver, "MOST_PATHS", 1)
+    assert not score(discover(data.t, data.x, degree=data.degree), data.truth).exact
 
 
 def test_a_drift_does_not_become_terms(swing):

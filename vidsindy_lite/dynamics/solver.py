@@ -73,6 +73,8 @@ MOST_WEIGHINGS = 2
 """Most laws of which the precision of the measurements is learned."""
 LONGEST_DESCENT = 3
 """Most laws at smaller errors."""
+MOST_PATHS = 4
+"""Most paths that are followed, each around the law to which the one before led."""
 MOST_PLATEAUS = 4
 """Most choices of plateaus that are fitted until one leaves no more than it tolerates."""
 
@@ -368,7 +370,17 @@ def at_own_noise(problem: Problem, fit: Fit) -> Fit:
 
 
 def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
-    """The law with the widest plateau in each equation, and the path on which it lies.
+    """The law that has the widest plateau of each equation on the path around it, and that path."""
+    for _ in range(MOST_PATHS):
+        start = fit
+        fit, path = _persistent(problem, start, history)
+        if fit is start:
+            break
+    return fit, path
+
+
+def _persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
+    """The law with the widest plateau of each equation around a fit, and the path that tells.
 
     The richer laws below the errors that a law leaves are fitted first, and the path followed from
     the last of them: a missing term leaves smooth errors, too, and only its own law tells.
@@ -410,7 +422,8 @@ def _refitted(
     fit = tightened(problem, path.fit.collocation, path.restricted(active))
     fit = at_own_noise(problem, fit.collocation.solve(fit.state, EXACT))
     priced = replace(fit, criterion=problem.criterion(fit.collocation, fit.state))
-    # Terms that come in may be those of a shift, and worth their price at these errors alone.
+    # Terms that come in may be those of a shift, and worth their price at these errors alone; no
+    # others, since those of the path are the ones that are no errors.
     shifts = closure_mask(problem.exponents, active, problem.form.movable)
     shifted = replace(problem, form=replace(problem.form, candidates=shifts))
     fit = at_own_noise(problem, leave_home(shifted, priced, history))
