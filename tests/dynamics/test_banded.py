@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import cholesky_banded
 
+from vidsindy_lite.dynamics import banded
 from vidsindy_lite.dynamics.banded import BLOCK, normal_band, solve_factored
 from vidsindy_lite.dynamics.splines import rows_from
 
@@ -37,3 +38,16 @@ def test_many_right_hand_sides_are_solved_for(n, reach):
     solved = right.copy()
     solve_factored(cholesky_banded(band, lower=True), solved)
     np.testing.assert_allclose(full @ solved, right, atol=1e-10)
+
+
+@pytest.mark.parametrize("held", [1, 2, 3])
+def test_a_solution_is_the_same_however_many_blocks_are_held_at_once(held, monkeypatch):
+    rng = np.random.default_rng(held)
+    band = np.vstack((np.ones(5 * BLOCK - 7), rng.uniform(-0.2, 0.2, (3, 5 * BLOCK - 7))))
+    right = rng.normal(size=(band.shape[1], 4))
+    at_once, in_parts = right.copy(), right.copy()
+    solve_factored(band, at_once)
+    monkeypatch.setattr(banded, "UNROLLED", held)
+    solve_factored(band, in_parts)
+    assert (at_once == in_parts).all()
+    assert not np.allclose(at_once, right)

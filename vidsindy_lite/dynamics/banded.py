@@ -14,6 +14,8 @@ from ..arrays import Floats
 
 BLOCK = 48
 """Rows that `solve_factored` takes at once, at least."""
+UNROLLED = 400
+"""Blocks of which the triangles are held at once."""
 
 
 def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: int = 1) -> Floats:
@@ -43,22 +45,44 @@ def solve_factored(factor: Floats, right: Floats) -> None:
     reach, n = len(factor) - 1, len(right)
     size = max(BLOCK, 2 * reach)
     blocks = [right[start : start + size] for start in range(0, n, size)]
-    count, last = len(blocks), len(blocks) - 1
-    # Rows of one more than a block, read as rows of a block: so each column of L begins one place
-    # further on than the last. What reaches on to the next block then lies before the diagonal.
+    last, parts = len(blocks) - 1, range(0, len(blocks), UNROLLED)
+
+    def unrolled(part: int) -> list[tuple[int, Floats, Floats, Floats]]:
+        """Blocks of a part: number, triangle, what reaches on to the next, and right-hand side."""
+        rows = _unrolled(factor[:, part * size : (part + UNROLLED) * size], size)
+        numbered = enumerate(zip(rows, blocks[part : part + UNROLLED], strict=True), part)
+        return [
+            (k, row[: len(here), : len(here)].T, row[size + 1 - reach :, :reach], here)
+            for k, (row, here) in numbered
+        ]
+
+    there: list[tuple[int, Floats, Floats, Floats]] = []
+    for part in parts:
+        there = unrolled(part)
+        for k, triangle, onward, here in there:
+            dtrsm(1.0, triangle, here.T, 1, 1, 1, overwrite_b=1)
+            if k < last:
+                after = blocks[k + 1][:reach]
+                after -= onward.T[: len(after)] @ here[-reach:]
+    for part in reversed(parts):
+        if part != parts[-1]:
+            there = unrolled(part)
+        for k, triangle, onward, here in reversed(there):
+            if k < last:
+                after = blocks[k + 1][:reach]
+                here[-reach:] -= onward[:, : len(after)] @ after
+            dtrsm(1.0, triangle, here.T, 1, 1, overwrite_b=1)
+
+
+def _unrolled(factor: Floats, size: int) -> Floats:
+    """Columns of a banded matrix in blocks of a size, each as rows, (blocks, size + 1, size).
+
+    Rows of one more than a block, read as rows of a block: so each column begins one place further
+    on than the last. What reaches on to the next block then lies before the diagonal.
+    """
+    width, n = factor.shape
+    count = -(-n // size)
     columns = np.zeros((count, size, size + 1))
     padded = np.pad(factor, ((0, 0), (0, count * size - n)))
-    columns[:, :, : reach + 1] = padded.reshape(reach + 1, count, size).transpose(1, 2, 0)
-    rows = columns.reshape(count, size + 1, size)
-    triangles = [rows[k, : len(here), : len(here)].T for k, here in enumerate(blocks)]
-    onward = rows[:, size + 1 - reach :, :reach]
-    for k, here in enumerate(blocks):
-        dtrsm(1.0, triangles[k], here.T, 1, 1, 1, overwrite_b=1)
-        if k < last:
-            after = blocks[k + 1][:reach]
-            after -= onward[k].T[: len(after)] @ here[-reach:]
-    for k, here in reversed(list(enumerate(blocks))):
-        if k < last:
-            after = blocks[k + 1][:reach]
-            here[-reach:] -= onward[k][:, : len(after)] @ after
-        dtrsm(1.0, triangles[k], here.T, 1, 1, overwrite_b=1)
+    columns[:, :, :width] = padded.reshape(width, count, size).transpose(1, 2, 0)
+    return columns.reshape(count, size + 1, size)

@@ -33,6 +33,8 @@ converged all the same: a tenth of a standard error, squared."""
 FAITHFUL = 1e-2
 """A step whose fall missed what it promised by so little was the last: of a miss ``m`` of a promise
 ``p``, third order in the step, the next step would promise some ``9 m^2 / p``."""
+AT_ONCE = 10_000
+"""Rows that are multiplied at once where their product would be as large as what it is added to."""
 STRONGEST_DAMPING = 1e2
 """Relative Levenberg-Marquardt damping at which a fit that still finds no lower point stops."""
 
@@ -315,7 +317,8 @@ class Collocation:
         objective = (data_residual**2 * self.sample_weights).sum()
         objective += (unknowns[:, 0] ** 2).sum()
         objective += sizes @ sizes
-        unknowns += physics @ response
+        for k in range(0, len(unknowns), AT_ONCE):
+            unknowns[k : k + AT_ONCE] += physics[k : k + AT_ONCE] @ response
         gram = self._gram(unknowns, response, data_residual, sizes)
         gram, shared = _without_systematic(gram, 1 + len(columns))
         return WithCurve(
