@@ -263,23 +263,19 @@ def _range(low: float, high: float) -> str:
 
 
 def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Iterator[str]:
-    """Is another plateau nearly as wide, or, where errors last, one of larger errors wider?"""
+    """Is another plateau nearly as wide, where errors last also one of larger errors?"""
     lasting, law = problem.shared or path.level > path.lowest, problem.law(state)
     for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
         near = [plateau for plateau in plateaus if plateau.low <= path.level]
         same = [plateau for plateau in near if (plateau.terms == own.terms).all()]
         own = max(same, key=path.width, default=own)
-        # Of errors larger than there are, a plateau tells less.
-        weights = [
-            (1.0 if plateau in near else RIVAL) * path.width(plateau) for plateau in plateaus
-        ]
         others = [
-            (weight, plateau)
-            for weight, plateau in zip(weights, plateaus, strict=True)
-            if (plateau.terms != own.terms).any() and (lasting and same or plateau in near)
+            plateau
+            for plateau in plateaus
+            if (plateau.terms != own.terms).any() and (plateau in near or lasting and same)
         ]
-        standing, rival = max(others, key=lambda other: other[0], default=(0.0, own))
-        if standing > RIVAL * path.width(own):
+        rival = max(others, key=path.width, default=None)
+        if rival and path.width(rival) > RIVAL * path.width(own):
             changed = np.flatnonzero(rival.terms != own.terms).tolist()
             change = ", ".join(
                 f"{'with' if rival.terms[k] else 'without'} {spoken(law, k, own.equation)}"
