@@ -5,8 +5,8 @@ known)
 -> solver -> discovery (diagnostics)
 solver: `discover`; its stages (search, then polish and settle) use collocation on splines,
 selection of terms, origin, gaps, errors that last, precision (whom to trust how far),
-process_noise (is the motion kicked?), and persistence: which law stays the same while more error
-is tolerated
+process_noise (is the motion kicked?), persistence (which law stays the same while more error is
+tolerated?), and settling on that law
 discovery: the result; conclusion makes it, with error bars, from the last fit; diagnostics: all its
 warnings, of which shape looks at where the motion takes place, beyond at terms that the library
 lacks, and elsewhere at other origins; absent: what candidates that are not in the law could be

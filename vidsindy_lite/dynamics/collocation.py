@@ -180,8 +180,7 @@ class Collocation:
         grid = Grid.of(segments)
         shared = np.empty((*grid.x.shape, 0)) if systematic is None else systematic
         data, physics = (np.asarray(w, dtype=float) for w in (data_weights, physics_weights))
-        relative = np.ones(grid.x.shape) if precision is None else precision
-        seen = np.where(np.isnan(grid.x), 0.0, relative)
+        seen = np.where(np.isnan(grid.x), 0.0, 1.0 if precision is None else precision)
         given = np.zeros((len(exponents), grid.x.shape[1])) if known is None else known
         return cls(grid, exponents, data, seen, physics, shared, given, functions)
 
@@ -414,8 +413,7 @@ class Collocation:
             After so many steps it ends anyway.
         """
         columns = np.flatnonzero(state.free())
-        value, promise = self.objective(state), np.inf
-        damping = 0.0
+        value, promise, damping = self.objective(state), np.inf, 0.0
         for _ in range(max_steps):
             try:
                 model = self.linearise(state, columns, damping)
@@ -425,8 +423,7 @@ class Collocation:
             step, promise = model.newton(damping)
             if damping == 0.0 and promise < tolerance:
                 last = model.along(state, step, 1.0)
-                lower = self.objective(last) < value
-                return Fit(last if lower else state, self, Status.CONVERGED)
+                return Fit(last if self.objective(last) < value else state, self, Status.CONVERGED)
             for fraction in (1.0, 0.3, 0.1):
                 trial = model.along(state, step, fraction)
                 trial_value = self.objective(trial)

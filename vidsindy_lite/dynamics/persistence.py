@@ -12,7 +12,7 @@ To tolerate an error ``s`` times that of the data is to divide the quadratic mod
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,14 +100,24 @@ class Path:
 
     def width(self, plateau: Plateau) -> float:
         """How far a plateau reaches beyond the errors there are, in decades."""
-        return max(float(np.log10(plateau.high / max(plateau.low, self.own))), 0.0)
+        return max(replace(plateau, low=max(plateau.low, self.own)).decades, 0.0)
 
     def ranked(self) -> list[list[Plateau]]:
         """The plateaus of each equation that begin at or below the level, the widest first."""
         return [
-            sorted((p for p in path if p.low <= self.level), key=lambda p: -p.decades)
+            sorted((p for p in path if p.low <= self.level), key=self.width, reverse=True)
             for path in self.plateaus
         ]
+
+    def persistence(self, active: Bools) -> float:
+        """Over how many decades all equations have the terms of a law, (l, d).
+
+        Nothing if another plateau of one of them is wider.
+        """
+        widest = [plateau for plateau, *_ in self.ranked()]
+        if any((best.terms != active[:, best.equation]).any() for best in widest):
+            return 0.0
+        return min(map(self.width, widest))
 
     def of(self, active: Bools) -> list[Plateau]:
         """The lowest plateau with the terms of each equation of a law, or the lowest of all."""

@@ -51,9 +51,11 @@ LONGEST_CLIMB = 4
 """Most searches, each at larger errors than the one before."""
 
 
-def search(problem: Problem, rng: np.random.Generator, history: History) -> Fit:
+def search(
+    problem: Problem, rng: np.random.Generator, history: History, tolerated: float = TOLERATED
+) -> Fit:
     """The terms that make the motion: the cheapest law at the least error that is tolerated."""
-    return _tolerating(problem, _tolerable(problem), rng, history)
+    return _tolerating(problem, _tolerable(problem, tolerated), rng, history)
 
 
 def consistent(problem: Problem, fit: Fit) -> bool:
@@ -77,9 +79,9 @@ def climb(problem: Problem, fit: Fit, rng: np.random.Generator, history: History
     return fit
 
 
-def _tolerable(problem: Problem) -> Floats:
-    """Errors that a first search tolerates, (d,); kicks are tolerated as they are."""
-    return problem.noise if problem.kicked else np.maximum(problem.noise, TOLERATED)
+def _tolerable(problem: Problem, least: float = TOLERATED) -> Floats:
+    """Errors that a search tolerates, (d,); kicks are tolerated as they are."""
+    return problem.noise if problem.kicked else np.maximum(problem.noise, least)
 
 
 def _tolerating(

@@ -8,7 +8,7 @@ weight that is raised until the law holds exactly. Nothing is set by hand per sy
 
 The stages, in order: `pose` (`posing`), twice where samples are few (`coarse`), `search` at a
 tolerated error, `polish` at the errors that are left, `settle` on the law that persists
-(`persistence`).
+(`settling`); where errors last, also from a search that tolerates them all.
 """
 
 from __future__ import annotations
@@ -30,9 +30,8 @@ from .discovery import Discovery
 from .elsewhere import off_home
 from .form import Form
 from .history import History
-from .library import closure_mask
 from .order import accelerated, better, check_order
-from .persistence import Path, Plateau, follow, typical
+from .persistence import NOISELESS, TOLERATED, Path
 from .posing import pose
 from .precision import foreseen, with_precision
 from .problem import Problem, fit_curves
@@ -42,11 +41,10 @@ from .search import (
     FINAL_WEIGHT,
     climb,
     consistent,
-    leave_home,
     search,
-    tightened,
 )
 from .selection import inverse
+from .settling import EXACT, persistence, settle
 from .shape import is_on_circle
 from .swing import LIBRARY, NAME, Swing, swinging
 from .trajectories import (
@@ -60,10 +58,6 @@ from .turning import Measured, Solved, check_orientation, in_axes, in_sparsest_a
 
 SPLINE_ERROR = 3e-7
 """Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
-EXACT = 1e-4
-"""Tolerance of the last fits: a hundredth of a standard error, squared."""
-RICHEST = 2.0
-"""Most terms of a law that refines another, over the terms of that."""
 DROWNED = 0.5
 """Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
 MOST_HALVINGS, MOST_CREEPING = 4, 2
@@ -71,12 +65,6 @@ MOST_HALVINGS, MOST_CREEPING = 4, 2
 knots cannot follow takes two."""
 MOST_WEIGHINGS = 2
 """Most laws of which the precision of the measurements is learned."""
-LONGEST_DESCENT = 3
-"""Most laws at smaller errors."""
-MOST_PATHS = 4
-"""Most paths that are followed, each around the law to which the one before led."""
-MOST_PLATEAUS = 4
-"""Most choices of plateaus that are fitted until one leaves no more than it tolerates."""
 
 
 def discover(
@@ -298,7 +286,31 @@ def _law(
         bar.update()
     fit, path = settle(problem, fit, history)
     bar.update()
+    if not problem.kicked and _unsettled(fit, path):
+        bar.total += 1
+        fit, path = _tolerating_more(problem, fit, path, starts, history)
+        bar.update()
     return problem, fit, path
+
+
+def _unsettled(fit: Fit, path: Path) -> bool:
+    """Whether no law persists, or more has to be tolerated than a search has; not of exact data."""
+    tolerated_less = path.level > CONSISTENT * max(path.own, TOLERATED)
+    return path.own > NOISELESS and (tolerated_less or not persistence(fit, path))
+
+
+def _tolerating_more(
+    problem: Problem, fit: Fit, path: Path, starts: np.random.Generator, history: History
+) -> tuple[Fit, Path]:
+    """The law settled on, or that of a search at errors that have to be tolerated.
+
+    Whichever persists longer: errors that last may have made terms from which no path leads back.
+    """
+    found = polish(problem, search(problem, starts, history, path.level), history)
+    if found.status is not Status.CONVERGED:
+        return fit, path  # around what has not converged nothing is told
+    outcomes = (fit, path), settle(problem, found, history)
+    return max(outcomes, key=lambda outcome: persistence(*outcome))
 
 
 def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
@@ -355,87 +367,3 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
             break
     history.add("polish", problem, fit, FINAL_WEIGHT)
     return fit
-
-
-def at_own_noise(problem: Problem, fit: Fit) -> Fit:
-    """The same fit, weighted with the errors that it leaves."""
-    collocation = fit.collocation
-    weighted = collocation.weighted(problem.errors(fit) ** -2, collocation.physics_weights)
-    own = weighted.solve(fit.state, EXACT)
-    if own.status is Status.CONVERGED:
-        return own
-    looser = tightened(problem, weighted, own.state)
-    again = looser.collocation.solve(looser.state, EXACT)
-    return again if again.status is Status.CONVERGED else own
-
-
-def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
-    """The law that has the widest plateau of each equation on the path around it, and that path."""
-    for _ in range(MOST_PATHS):
-        start = fit
-        fit, path = _persistent(problem, start, history)
-        if fit is start:
-            break
-    return fit, path
-
-
-def _persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
-    """The law with the widest plateau of each equation around a fit, and the path that tells.
-
-    The richer laws below the errors that a law leaves are fitted first, and the path followed from
-    the last of them: a missing term leaves smooth errors, too, and only its own law tells.
-    """
-    deepest, path = fit, follow(problem, fit)
-    for _ in range(LONGEST_DESCENT):
-        lowest = [plateaus[0] for plateaus in path.plateaus]
-        trial = _refitted(problem, path, lowest, history)
-        if trial is None or trial.status is not Status.CONVERGED:
-            break  # around what has not converged nothing is told
-        if not _leaves(problem, trial, path.lowest):
-            break
-        deepest, path = trial, follow(problem, trial)
-    ranked = path.ranked()
-    for _ in range(MOST_PLATEAUS):
-        best = [widest for widest, *_ in ranked]
-        for known in (fit, deepest):
-            if not _changed(known, best):
-                return known, path
-        found = _refitted(problem, path, best, history)
-        largest = max(_changed(path.fit, best), key=lambda plateau: plateau.low)
-        if found and _leaves(problem, found, max(path.own, largest.low)):
-            return found, path
-        ranked[largest.equation].remove(largest)  # it leaves more than it was said to
-        if not ranked[largest.equation]:
-            break
-    return fit, path
-
-
-def _refitted(
-    problem: Problem, path: Path, goal: Sequence[Plateau], history: History
-) -> Fit | None:
-    """The law of these plateaus; none if it is that of the path, too rich, or has a pole there."""
-    if not _changed(path.fit, goal):
-        return None
-    active = path.fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
-    if active.sum() > RICHEST * path.fit.state.active.sum():
-        return None
-    fit = tightened(problem, path.fit.collocation, path.restricted(active))
-    fit = at_own_noise(problem, fit.collocation.solve(fit.state, EXACT))
-    priced = replace(fit, criterion=problem.criterion(fit.collocation, fit.state))
-    # Terms that come in may be those of a shift, and worth their price at these errors alone; no
-    # others, since those of the path are the ones that are no errors.
-    shifts = closure_mask(problem.exponents, active, problem.form.movable)
-    shifted = replace(problem, form=replace(problem.form, candidates=shifts))
-    fit = at_own_noise(problem, leave_home(shifted, priced, history))
-    history.add("another law of the path", problem, fit, FINAL_WEIGHT)
-    return fit if np.isfinite(fit.collocation.objective(fit.state)) else None
-
-
-def _leaves(problem: Problem, fit: Fit, tolerated: float) -> bool:
-    """Whether a law leaves no larger errors than were tolerated when it was chosen."""
-    return typical(problem.errors(fit)) <= CONSISTENT * tolerated
-
-
-def _changed(fit: Fit, goal: Sequence[Plateau]) -> list[Plateau]:
-    """The plateaus whose terms are not those of a fit."""
-    return [p for p in goal if (p.terms != fit.state.active[:, p.equation]).any()]
