@@ -51,6 +51,14 @@ def test_the_lorenz_grid_is_that_of_its_authors():
     assert (data.x - clean).std() == pytest.approx(0.4 * 12.75, rel=0.1)
 
 
+def test_where_the_origin_is_known_no_other_is_sought():
+    """Of the same samples, those that look like a law around another origin."""
+    (sought,) = run_contest(LorenzContest(4, 0.4, seed=1))
+    (known,) = run_contest(LorenzContest(4, 0.4, seed=1, origin="data"))
+    assert not sought.exact
+    assert known.exact
+
+
 @pytest.mark.parametrize("error", [*ERRORS, *MOTIONS])
 def test_flows_are_seen_from_one_origin_whatever_the_error(error):
     contest = FlowContest("Lorenz", error, samples=300)
@@ -86,7 +94,7 @@ def test_outcomes_are_counted(monkeypatch):
     """Of a right law, a wrong one, and none at all."""
     truth = LorenzContest(4, 0.1).data().truth
 
-    def find(method, t, x, systematic, seed, degree):
+    def find(method, t, x, systematic, seed, degree, origin):
         if method == "PySINDy":
             raise ValueError("x: is too short")
         return truth if method == "ours" else truth.shift((1, 0, 0))

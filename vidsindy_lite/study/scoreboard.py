@@ -101,6 +101,8 @@ class Data(NamedTuple):
         None if no polynomial is right.
     clean : tuple of ndarray, or None
         Times and states of the motion without errors, if a law is to follow it from its start.
+    origin : {"learn", "data"}
+        Whether the law's own origin is sought, or known to be that of the data; see `discover`.
     """
 
     t: Floats
@@ -108,6 +110,7 @@ class Data(NamedTuple):
     degree: int
     truth: PolynomialSystem | None
     clean: tuple[Floats, Floats] | None = None
+    origin: str = "learn"
 
 
 @dataclass(frozen=True)
@@ -178,12 +181,15 @@ class LorenzContest:
     seed : int
     methods
         See `OdeContest`.
+    origin
+        See `Data`.
     """
 
     length: float
     noise: float
     seed: int = 0
     methods: tuple[str, ...] = ("ours",)
+    origin: str = "learn"
 
     @property
     def condition(self) -> str:
@@ -198,7 +204,8 @@ class LorenzContest:
         t = np.arange(round(100 * self.length)) / 100
         clean = law.simulate(t, np.array([-8.0, 8.0, 27.0]))
         rng = np.random.default_rng([self.seed, round(1000 * self.noise), round(100 * self.length)])
-        return Data(t, clean + self.noise * clean.std() * rng.standard_normal(clean.shape), 2, law)
+        x = clean + self.noise * clean.std() * rng.standard_normal(clean.shape)
+        return Data(t, x, 2, law, origin=self.origin)
 
 
 @dataclass(frozen=True)
@@ -306,7 +313,7 @@ def _outcome(contest: Contest, method: str, data: Data) -> Outcome:
     check_choice("methods", method, CONTESTANTS)
     began = time.process_time()
     try:
-        found = find_law(method, data.t, data.x, None, contest.seed, data.degree)
+        found = find_law(method, data.t, data.x, None, contest.seed, data.degree, data.origin)
     except ValueError:  # of data that no law can be found from
         return Outcome(contest, method, None, False, "refused", time.process_time() - began)
     seconds = time.process_time() - began

@@ -210,11 +210,20 @@ def _reconstructed(filmed: FilmResult, tracks: list[Floats]) -> tuple[Floats, Fl
 
 
 def find_law(
-    method: str, t: Floats, x: Floats, systematic: Floats | None, seed: int, degree: int = 3
+    method: str,
+    t: Floats,
+    x: Floats,
+    systematic: Floats | None,
+    seed: int,
+    degree: int = 3,
+    origin: str = "learn",
 ) -> Discovery | PolynomialSystem:
-    """What one of the `METHODS` finds; only ours can use what is known of systematic errors."""
+    """What one of the `METHODS` finds.
+
+    Only ours can use what is known of systematic errors, and looks for the law's origin.
+    """
     if method == "ours":
-        return discover(t, x, degree=degree, systematic=systematic, order=1)
+        return discover(t, x, degree=degree, systematic=systematic, order=1, origin=origin)
     from .baselines import BASELINES  # pysindy takes seconds to import
 
     options = {"seed": seed} if method in RANDOM_METHODS else {}
