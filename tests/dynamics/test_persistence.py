@@ -56,6 +56,7 @@ def test_a_plateau_is_measured_in_decades():
         (0.02, 0.1, [0, 1], 0.6),
         (0.05, 0.1, [1], 0.4),  # what a plateau covers below the errors there are is nothing
         (0.05, 0.3, [], 0.6),
+        (2.0, 2.0, [0, 1], 0.0),  # of errors larger than all that are tolerated
     ],
 )
 def test_the_law_is_the_plateau_that_reaches_farthest_beyond_the_errors(

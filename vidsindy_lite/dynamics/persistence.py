@@ -103,11 +103,17 @@ class Path:
         return max(replace(plateau, low=max(plateau.low, self.own)).decades, 0.0)
 
     def ranked(self) -> list[list[Plateau]]:
-        """The plateaus of each equation that begin at or below the level, the widest first."""
+        """The plateaus of each equation that begin at or below the level, the widest first.
+
+        Of those that do not reach beyond the errors there are, all of the width counts.
+        """
         return [
-            sorted((p for p in path if p.low <= self.level), key=self.width, reverse=True)
+            sorted((p for p in path if p.low <= self.level), key=self._standing, reverse=True)
             for path in self.plateaus
         ]
+
+    def _standing(self, plateau: Plateau) -> tuple[float, float]:
+        return self.width(plateau), plateau.decades
 
     def persistence(self, active: Bools) -> float:
         """Over how many decades all equations have the terms of a law, (l, d).
