@@ -834,11 +834,10 @@ for s in np.geomspace(0.001, 1, 13):
 # %% [markdown]
 # At a thousandth many terms pay; with every step up some go, until those remain that make the motion. They stay
 # over more than a decade. Such a range of tolerated errors, over which the terms stay the same, is a *plateau*.
-# `discover` takes the plateau that reaches farthest beyond the errors there are, equation by equation, refines
-# the law with its terms alone, and follows the path around that law again, until it leads nowhere else. Where
-# errors last, it searches once more with all of them tolerated, and of both laws takes the one that persists
-# longer. The last path is `Discovery.path`. Where another plateau reaches more than half as far, a warning names
-# both.
+# `discover` takes the widest plateau, equation by equation, refines the law with its terms alone, and follows
+# the path around that law again, until it leads nowhere else. Where no law persists in that way, it searches once
+# more with all errors tolerated that have to be. The last path is `Discovery.path`. Where another plateau is more
+# than half as wide, a warning names both.
 
 # %%
 persistent = discover(t, bent)

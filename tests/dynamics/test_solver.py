@@ -13,7 +13,6 @@ from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.persistence import Path
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.posing import pose
 from vidsindy_lite.dynamics.problem import fit_curves, term_penalties
@@ -402,39 +401,10 @@ def test_a_discovery_has_one_thread_and_gives_the_others_back(monkeypatch):
     assert within == [{1}]
 
 
-def test_a_search_that_tolerates_more_leads_to_the_law_that_persists_longest(monkeypatch):
+@pytest.mark.slow
+def test_where_no_law_persists_a_search_that_tolerates_more_finds_it(monkeypatch):
     """A bend of space made terms at the errors first tolerated, and no path leads past them."""
-    data = FlowContest("SprottE", "bent space 0.3 %", seed=23).data()
+    data = FlowContest("Roessler", "bent space 0.3 %", seed=15).data()
     assert score(discover(data.t, data.x, degree=data.degree), data.truth).exact
-    monkeypatch.setattr(solver, "persistence", lambda fit, path: 0.0)  # the first is kept
+    monkeypatch.setattr(solver, "persists", lambda fit, path: True)
     assert not score(discover(data.t, data.x, degree=data.degree), data.truth).exact
-
-
-@pytest.mark.parametrize(
-    ("own", "level", "decades", "unsettled"),
-    [
-        (0.02, 0.1, 1.0, True),
-        (0.08, 0.1, 1.0, False),  # the first search has tolerated as much
-        (0.02, 0.04, 1.0, False),  # so it does where errors are small
-        (0.08, 0.1, 0.0, True),
-        (5e-5, 0.1, 0.0, False),
-    ],
-)
-def test_a_law_is_unsettled_if_more_has_to_be_tolerated_or_it_does_not_persist(
-    own, level, decades, unsettled, monkeypatch
-):
-    monkeypatch.setattr(solver, "persistence", lambda fit, path: decades)
-    path = Path(None, None, own, level, ())
-    assert solver._unsettled(None, path) is unsettled
-
-
-@pytest.mark.parametrize(("share", "searches"), [(0.0, 0), (0.003, 1)])
-def test_only_errors_that_last_are_tolerated_in_a_second_search(share, searches, monkeypatch):
-    truth, t, x = measured("SprottE", 0.0)
-    asked, again = [], solver._tolerating_more
-    monkeypatch.setattr(
-        solver, "_tolerating_more", lambda *given: asked.append(given) or again(*given)
-    )
-    drift = np.sin(2 * np.pi * (0.7 * t / t[-1])[:, None] + np.arange(3))
-    assert score(discover(t, x + share * x.std(axis=0) * drift), truth).exact
-    assert len(asked) == searches

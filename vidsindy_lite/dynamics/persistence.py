@@ -103,27 +103,11 @@ class Path:
         return max(replace(plateau, low=max(plateau.low, self.own)).decades, 0.0)
 
     def ranked(self) -> list[list[Plateau]]:
-        """The plateaus of each equation that begin at or below the level, the widest first.
-
-        Of those that do not reach beyond the errors there are, all of the width counts.
-        """
+        """The plateaus of each equation that begin at or below the level, the widest first."""
         return [
-            sorted((p for p in path if p.low <= self.level), key=self._standing, reverse=True)
+            sorted((p for p in path if p.low <= self.level), key=lambda p: -p.decades)
             for path in self.plateaus
         ]
-
-    def _standing(self, plateau: Plateau) -> tuple[float, float]:
-        return self.width(plateau), plateau.decades
-
-    def persistence(self, active: Bools) -> float:
-        """Over how many decades all equations have the terms of a law, (l, d).
-
-        Nothing if another plateau of one of them is wider.
-        """
-        widest = [plateau for plateau, *_ in self.ranked()]
-        if any((best.terms != active[:, best.equation]).any() for best in widest):
-            return 0.0
-        return min(map(self.width, widest))
 
     def of(self, active: Bools) -> list[Plateau]:
         """The lowest plateau with the terms of each equation of a law, or the lowest of all."""

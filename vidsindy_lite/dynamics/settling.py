@@ -43,9 +43,10 @@ def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
     return fit, path
 
 
-def persistence(fit: Fit, path: Path) -> float:
-    """Over how many decades a law persists on its path; nothing if it has not converged."""
-    return path.persistence(fit.state.active) if fit.status is Status.CONVERGED else 0.0
+def persists(fit: Fit, path: Path) -> bool:
+    """Whether a law has converged, and has the widest plateau of each equation on its path."""
+    widest = [plateau for plateau, *_ in path.ranked()]
+    return fit.status is Status.CONVERGED and not _changed(fit, widest)
 
 
 def _persistent(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:

@@ -8,7 +8,7 @@ weight that is raised until the law holds exactly. Nothing is set by hand per sy
 
 The stages, in order: `pose` (`posing`), twice where samples are few (`coarse`), `search` at a
 tolerated error, `polish` at the errors that are left, `settle` on the law that persists
-(`settling`); where errors last, also from a search that tolerates them all.
+(`settling`); where none persists, also from a search that tolerates all that has to be.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .elsewhere import off_home
 from .form import Form
 from .history import History
 from .order import accelerated, better, check_order
-from .persistence import NOISELESS, TOLERATED, Path
+from .persistence import Path
 from .posing import pose
 from .precision import foreseen, with_precision
 from .problem import Problem, fit_curves
@@ -44,7 +44,7 @@ from .search import (
     search,
 )
 from .selection import inverse
-from .settling import EXACT, persistence, settle
+from .settling import EXACT, persists, settle
 from .shape import is_on_circle
 from .swing import LIBRARY, NAME, Swing, swinging
 from .trajectories import (
@@ -286,31 +286,15 @@ def _law(
         bar.update()
     fit, path = settle(problem, fit, history)
     bar.update()
-    if not problem.kicked and _unsettled(fit, path):
+    if not (problem.kicked or persists(fit, path)):
+        # Errors that last may have made terms from which no path leads to the law that persists.
         bar.total += 1
-        fit, path = _tolerating_more(problem, fit, path, starts, history)
+        found = polish(problem, search(problem, starts, history, path.level), history)
+        if found.status is Status.CONVERGED:  # around what has not, nothing is told
+            other = settle(problem, found, history)
+            fit, path = other if persists(*other) else (fit, path)
         bar.update()
     return problem, fit, path
-
-
-def _unsettled(fit: Fit, path: Path) -> bool:
-    """Whether no law persists, or more has to be tolerated than a search has; not of exact data."""
-    tolerated_less = path.level > CONSISTENT * max(path.own, TOLERATED)
-    return path.own > NOISELESS and (tolerated_less or not persistence(fit, path))
-
-
-def _tolerating_more(
-    problem: Problem, fit: Fit, path: Path, starts: np.random.Generator, history: History
-) -> tuple[Fit, Path]:
-    """The law settled on, or that of a search at errors that have to be tolerated.
-
-    Whichever persists longer: errors that last may have made terms from which no path leads back.
-    """
-    found = polish(problem, search(problem, starts, history, path.level), history)
-    if found.status is not Status.CONVERGED:
-        return fit, path  # around what has not converged nothing is told
-    outcomes = (fit, path), settle(problem, found, history)
-    return max(outcomes, key=lambda outcome: persistence(*outcome))
 
 
 def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
