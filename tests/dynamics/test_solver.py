@@ -233,8 +233,9 @@ def test_same_seed_same_result():
     assert (first.covariance == second.covariance).all()
 
 
+@pytest.mark.parametrize("persists", [True, False])
 @pytest.mark.parametrize("again", [0, 1, 2])
-def test_the_progress_bar_moves_through_all_searches_to_its_end(monkeypatch, again):
+def test_the_progress_bar_moves_through_all_searches_to_its_end(monkeypatch, again, persists):
     bars, weighed = [], iter(range(again))
 
     class Bar(solver.tqdm):
@@ -247,9 +248,11 @@ def test_the_progress_bar_moves_through_all_searches_to_its_end(monkeypatch, aga
 
     monkeypatch.setattr(solver, "tqdm", Bar)
     monkeypatch.setattr(solver, "with_precision", another)
+    monkeypatch.setattr(solver, "persists", lambda fit, path: persists)
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
-    assert bars[0] == (2 + again, 2 + again)
+    searches = 2 + again + (not persists)
+    assert bars[0] == (searches, searches)
 
 
 def test_history_tells_the_fit(lorenz):
