@@ -59,6 +59,11 @@ def test_where_the_origin_is_known_no_other_is_sought():
     assert known.exact
 
 
+def test_another_origin_is_no_choice():
+    with pytest.raises(ValueError, match="origin: must be one of learn, data, got 'nowhere'"):
+        LorenzContest(4, 0.1, origin="nowhere")
+
+
 @pytest.mark.parametrize("error", [*ERRORS, *MOTIONS])
 def test_flows_are_seen_from_one_origin_whatever_the_error(error):
     contest = FlowContest("Lorenz", error, samples=300)

@@ -263,7 +263,7 @@ def _range(low: float, high: float) -> str:
 
 
 def _contested(problem: Problem, state: State, path: Path, remedy: str) -> Iterator[str]:
-    """Is another plateau nearly as wide, where errors last also one of larger errors?"""
+    """Is another plateau more than half as wide, where errors last also one of larger errors?"""
     lasting, law = problem.shared or path.level > path.lowest, problem.law(state)
     for own, plateaus in zip(path.of(state.active), path.plateaus, strict=True):
         near = [plateau for plateau in plateaus if plateau.low <= path.level]

@@ -54,7 +54,10 @@ LONGEST_CLIMB = 4
 def search(
     problem: Problem, rng: np.random.Generator, history: History, tolerated: float = TOLERATED
 ) -> Fit:
-    """The terms that make the motion: the cheapest law at the least error that is tolerated."""
+    """The terms that make the motion: the cheapest law at the least error that is tolerated.
+
+    Relative to the spread of the data; where the noise is larger, that is tolerated.
+    """
     return _tolerating(problem, _tolerable(problem, tolerated), rng, history)
 
 

@@ -33,7 +33,8 @@ MOST_PLATEAUS = 4
 def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
     """The law that has the widest plateau of each equation on the path around it, and that path.
 
-    Where paths lead round in a circle, the law at which the last of them ended.
+    Where paths lead round in a circle, the law to which the last of them led; that path is then
+    around the law before.
     """
     for _ in range(MOST_PATHS):
         start = fit
@@ -44,7 +45,7 @@ def settle(problem: Problem, fit: Fit, history: History) -> tuple[Fit, Path]:
 
 
 def persists(fit: Fit, path: Path) -> bool:
-    """Whether a law has converged, and has the widest plateau of each equation on its path."""
+    """Whether a law has converged, and has the widest plateau of each equation on a path."""
     widest = [plateau for plateau, *_ in path.ranked()]
     return fit.status is Status.CONVERGED and not _changed(fit, widest)
 

@@ -36,13 +36,7 @@ from .posing import pose
 from .precision import foreseen, with_precision
 from .problem import Problem, fit_curves
 from .process_noise import rebalanced, with_process_noise
-from .search import (
-    CONSISTENT,
-    FINAL_WEIGHT,
-    climb,
-    consistent,
-    search,
-)
+from .search import CONSISTENT, FINAL_WEIGHT, climb, consistent, search
 from .selection import inverse
 from .settling import EXACT, persists, settle
 from .shape import is_on_circle

@@ -191,6 +191,9 @@ class LorenzContest:
     methods: tuple[str, ...] = ("ours",)
     origin: str = "learn"
 
+    def __post_init__(self) -> None:
+        check_choice("origin", self.origin, ("learn", "data"))
+
     @property
     def condition(self) -> str:
         return f"noise {100 * self.noise:g} %"
