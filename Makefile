@@ -1,4 +1,4 @@
-# Thin: the work is `python -m vidsindy_lite run` and `pytest`. Every target sets up what it needs.
+# Thin: the work is `python -m vidsindy_lite run`, pytest and Sphinx. Every target sets up what it needs.
 
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -13,9 +13,10 @@ PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python
 .PHONY: help figures test test-fast bench lint demo site lab clean
 
 help:
-	@echo "make figures          run all notebooks, regenerate figures/ and the notebooks' outputs"
+	@echo "make figures          run all notebooks, refresh what differs in figures/ and notebooks/"
+	@echo "make figures ONLY=03  only this one, by its number"
 	@echo "make figures QUICK=1  the same code in its small profile, into build/quick/"
-	@echo "make figures FORCE=1  also those that this clone has executed and nothing has changed"
+	@echo "make figures FORCE=1  also those that this clone has executed with the same code"
 	@echo "make test             all tests, the notebooks in the quick profile among them"
 	@echo "make test-fast        the quick ones of the tests, in a few minutes"
 	@echo "make bench            speed and memory, as ratios"
@@ -35,7 +36,7 @@ $(READY): requirements.txt pyproject.toml
 	@touch $@
 
 figures: $(READY)
-	$(BIN)/python -m vidsindy_lite run --profile $(if $(QUICK),quick,full) $(if $(FORCE),--force)
+	$(BIN)/python -m vidsindy_lite run $(ONLY) --profile $(if $(QUICK),quick,full) $(if $(FORCE),--force)
 
 test: $(READY)
 	$(BIN)/python -m pytest $(SPREAD)
@@ -55,7 +56,8 @@ demo: $(READY)
 	$(BIN)/python -m vidsindy_lite demo
 
 site: $(READY)
-	$(BIN)/python -m vidsindy_lite site --output build/site
+	$(BIN)/sphinx-build --quiet --builder html --conf-dir docs . build/site
+	@echo "open build/site/README.html"
 
 lab: $(READY)
 	$(BIN)/jupyter lab --ServerApp.root_dir=. --LabApp.default_url=/lab/tree/notebooks

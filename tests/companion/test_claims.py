@@ -3,7 +3,7 @@
 import pytest
 
 from vidsindy_lite.companion.claims import claims_of
-from vidsindy_lite.stamp import PACKAGE
+from vidsindy_lite.repository import PACKAGE
 
 ROOT = PACKAGE.parent
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))

@@ -1,14 +1,38 @@
-"""Two folders of figures are compared by their numbers."""
+"""Two folders of figures, and two runs of a notebook, are compared; what differs is refreshed."""
 
+import io
 import json
 
+import nbformat
+import numpy as np
 import pytest
+from PIL import Image
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.companion.compare import differences, side_by_side
+from vidsindy_lite.companion.compare import (
+    VISIBLE,
+    differences,
+    looks_the_same,
+    refresh,
+    same_notebook,
+    write_differences,
+)
 
-RECORD = {"id": "table_1", "stamp": "a", "rows": [{"name": "x", "l2": 1.0, "seconds": 2.0}]}
-FIGURE = {"id": "fig_1", "stamp": "a", "numbers": {"error": [1e-9, 5.0, None], "n": 3}}
+COMMON = {"notebook": "01_first", "caption": "A."}
+RECORD = COMMON | {"id": "table_1", "kind": "table"}
+RECORD["rows"] = [{"name": "x", "l2": 1.0, "seconds": 2.0}]
+FIGURE = COMMON | {"id": "fig_1", "kind": "figure"}
+FIGURE["numbers"] = {"error": [1e-9, 5.0, None], "n": 3}
+
+
+def png(pixels):
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "PNG")
+    return file.getvalue()
+
+
+LINE = np.full((64, 96, 3), 255, np.uint8)
+LINE[30:33] = (0, 114, 178)
 
 
 @pytest.fixture
@@ -17,8 +41,7 @@ def folders(tmp_path):
     for side in ("committed", "regenerated"):
         write(tmp_path / side, RECORD)
         write(tmp_path / side, FIGURE)
-        (tmp_path / side / "fig_1.png").write_bytes(b"image")
-        (tmp_path / side / "run_times.json").write_text("{}")
+        (tmp_path / side / "fig_1.png").write_bytes(png(LINE))
     return tmp_path / "committed", tmp_path / "regenerated"
 
 
@@ -27,36 +50,63 @@ def write(folder, record):
     (folder / f"{record['id']}.json").write_text(json.dumps(record))
 
 
-@pytest.mark.parametrize(
-    "record",
-    [
-        RECORD,
-        RECORD | {"stamp": "b"},
-        RECORD | {"rows": [{"name": "x", "l2": 1.0005, "seconds": 9.0}]},
-        FIGURE | {"numbers": {"error": [2e-9, 5.0, None], "n": 3}},  # rounding beside 5
-    ],
-)
+def rows(**changes):
+    return RECORD | {"rows": [RECORD["rows"][0] | changes]}
+
+
+SAME = [
+    RECORD,
+    rows(l2=1.0005, seconds=9.0),
+    FIGURE | {"numbers": {"error": [2e-9, 5.0, None], "n": 3}},  # rounding beside 5
+]
+OTHER = [
+    (rows(l2=1.01), "row 0 (x), column l2: 1.0 committed, 1.01 regenerated"),
+    (rows(name="y"), "row 0 (x), column name: 'x' committed"),
+    (RECORD | {"rows": []}, "1 rows committed, 0 regenerated"),
+    (FIGURE | {"numbers": {"error": [1e-9, 5.0, 0.0], "n": 3}}, "error[2]: None committed"),
+    (FIGURE | {"numbers": {"error": [1e-9, 5.1, None], "n": 3}}, "error[1]: 5.0 committed"),
+    (FIGURE | {"numbers": {"error": [1e-9, 5.0, None]}}, "committed"),
+]
+
+
+@pytest.mark.parametrize("record", SAME)
 def test_what_does_not_count(folders, record):
     write(folders[1], record)
     assert differences(*folders) == {}
+    before = files(folders[0])
+    assert refresh(*folders, "01_first") == []
+    assert files(folders[0]) == before
 
 
-@pytest.mark.parametrize(
-    ("record", "place"),
-    [
-        (RECORD | {"rows": [{"name": "x", "l2": 1.01, "seconds": 2.0}]}, "[0] l2: 1.0 committed"),
-        (RECORD | {"rows": [{"name": "y", "l2": 1.0, "seconds": 2.0}]}, "[0] name: 'x' committed"),
-        (RECORD | {"rows": []}, "committed"),
-        (FIGURE | {"numbers": {"error": [1e-9, 5.0, 0.0], "n": 3}}, "error[2]: None committed"),
-        (FIGURE | {"numbers": {"error": [1e-9, 5.1, None], "n": 3}}, "error[1]: 5.0 committed"),
-        (FIGURE | {"numbers": {"error": [1e-9, 5.0, None]}}, "committed"),
-    ],
-)
+@pytest.mark.parametrize(("record", "place"), OTHER)
 def test_what_counts(folders, record, place):
     write(folders[1], record)
     found = differences(*folders)
     assert list(found) == [record["id"]]
     assert place in found[record["id"]]
+    assert refresh(*folders, "01_first") == [record["id"]]
+    assert files(folders[0]) == files(folders[1])
+
+
+def test_a_record_may_state_a_tolerance(folders):
+    for key, changed, stated in (
+        ("l2", rows(l2=1.1), {"l2": 0.2}),
+        ("error", FIGURE | {"numbers": {"error": [1e-9, 5.1, None], "n": 3}}, {"error": 0.05}),
+    ):
+        original = RECORD if key == "l2" else FIGURE
+        write(folders[1], changed | {"tolerance": stated})
+        write(folders[0], original | {"tolerance": stated})
+        assert differences(*folders) == {}
+        write(folders[0], original | {"tolerance": {"n": 1}} if key == "error" else original)
+        assert list(differences(*folders)) == [original["id"]]
+        write(folders[0], changed)
+
+
+def test_of_one_notebook_only(folders):
+    write(folders[1], rows(l2=2.0) | {"notebook": "02_second"})
+    write(folders[0], RECORD | {"notebook": "02_second"})
+    assert differences(*folders, notebook="01_first") == {}
+    assert list(differences(*folders, notebook="02_second")) == ["table_1"]
 
 
 def test_what_is_on_one_side_only(folders):
@@ -65,68 +115,130 @@ def test_what_is_on_one_side_only(folders):
     assert differences(*folders) == {"fig_1": "only regenerated", "table_1": "only committed"}
 
 
-def test_differences_are_laid_out_side_by_side(folders, tmp_path):
-    write(folders[1], FIGURE | {"numbers": {"error": [0.0, 6.0, None], "n": 3}})
-    assert list(side_by_side(*folders, tmp_path / "out")) == ["fig_1"]
-    page = (tmp_path / "out" / "index.html").read_text()
-    for side in ("committed", "regenerated"):
-        assert f"{side}/fig_1.png" in page
-        assert (tmp_path / "out" / side / "fig_1.png").exists()
-    assert not (tmp_path / "out" / "committed" / "table_1.json").exists()
+# ------------------------------------------------------------------------------------------ refresh
 
 
-def test_the_first_difference_is_told_in_the_order_of_the_file(folders):
-    keys = [f"number_{k}" for k in range(20)]
-    write(folders[0], FIGURE | {"numbers": dict.fromkeys(keys, 1.0)})
-    write(folders[1], FIGURE | {"numbers": dict.fromkeys(keys, 2.0)})
-    assert differences(*folders) == {"fig_1": "number_0: 1.0 committed, 2.0 regenerated"}
+def files(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_an_earlier_comparison_is_replaced(folders, tmp_path):
-    output = tmp_path / "out"
-    write(folders[1], FIGURE | {"numbers": {}})
-    write(folders[1], RECORD | {"rows": [{"name": "<b>"}]})
-    side_by_side(*folders, output)
-    assert "<b>" not in (output / "index.html").read_text()
-    write(folders[1], FIGURE)
-    side_by_side(*folders, output)
-    names = {str(path.relative_to(output)) for path in output.rglob("*.*")}
-    assert names == {"index.html", "committed/table_1.json", "regenerated/table_1.json"}
+def shifted(pixels, share):
+    """A picture moved down by a part of a pixel."""
+    moved = (1 - share) * pixels + share * np.roll(pixels, 1, axis=0)
+    return np.rint(moved).astype(np.uint8)
 
 
 @pytest.mark.parametrize(
-    "mine",
-    ["notes.txt", "committed/notes.txt", "committed/fig_1.txt", "regenerated", "index.html"],
+    ("pixels", "same"),
+    [
+        (shifted(LINE, 0.1), True),
+        (np.minimum(LINE.astype(int) + 3, 255).astype(np.uint8), True),
+        (np.roll(LINE, 4, axis=0), False),
+        (np.where(LINE == 114, 180, LINE).astype(np.uint8), False),
+        (LINE[:-1], False),
+    ],
 )
-@pytest.mark.parametrize("earlier", [True, False])
-def test_other_peoples_files_are_not_touched(folders, tmp_path, mine, earlier):
-    output = tmp_path / "out"
-    if earlier and mine != "regenerated":
-        write(folders[1], FIGURE | {"numbers": {}})
-        side_by_side(*folders, output)
-    (output / mine).parent.mkdir(parents=True, exist_ok=True)
-    (output / mine).write_text("mine")
-    message = f"output: must be a new folder or hold an earlier comparison, .* with .*{mine}"
-    with pytest.raises(ValueError, match=message):
-        side_by_side(*folders, output)
-    assert (output / mine).read_text() == "mine"
+def test_a_picture_is_refreshed_where_one_sees_it(folders, pixels, same):
+    (folders[1] / "fig_1.png").write_bytes(png(pixels))
+    assert refresh(*folders, "01_first") == ([] if same else ["fig_1"])
+    expected = LINE if same else pixels
+    assert (folders[0] / "fig_1.png").read_bytes() == png(expected)
 
 
-def test_what_is_compared_is_not_replaced(folders, tmp_path):
-    output = tmp_path / "out"
-    write(folders[1], FIGURE | {"numbers": {}})
-    side_by_side(*folders, output)
-    with pytest.raises(ValueError, match="output: must not hold or lie in what is compared"):
-        side_by_side(output / "committed", output / "regenerated", output)
-    assert (output / "committed" / "fig_1.json").exists()
-    for inside in (folders[0] / "out", folders[1], folders[1] / "a" / "b"):
-        before = sorted(tmp_path.rglob("*"))
-        with pytest.raises(ValueError, match="output: must not hold or lie in what is compared"):
-            side_by_side(*folders, inside)
-        assert sorted(tmp_path.rglob("*")) == before
-    (tmp_path / "file").touch()
-    with pytest.raises(ValueError, match="output: must be a folder, got the file"):
-        side_by_side(*folders, tmp_path / "file")
+def test_a_small_thing_that_is_gone_is_seen():
+    with_target = LINE.copy()
+    with_target[8:12, 8:12] = 255 - 2 * VISIBLE
+    assert not looks_the_same(png(LINE), png(with_target))
+
+
+def test_a_picture_of_wall_times_stays_if_the_other_numbers_do(folders):
+    for folder, seconds in zip(folders, (1.0, 2.0), strict=True):
+        write(folder, FIGURE | {"numbers": {"n": 3, "seconds": [seconds]}})
+    (folders[1] / "fig_1.png").write_bytes(png(np.roll(LINE, 9, axis=0)))
+    assert refresh(*folders, "01_first") == []
+    write(folders[1], FIGURE | {"numbers": {"n": 4, "seconds": [2.0]}})
+    assert refresh(*folders, "01_first") == ["fig_1"]
+
+
+@pytest.mark.parametrize("change", [{"caption": "B."}, {"tolerance": {"n": 0.1}}])
+def test_other_words_are_refreshed(folders, change):
+    write(folders[1], FIGURE | change)
+    assert refresh(*folders, "01_first") == ["fig_1"]
+    assert files(folders[0]) == files(folders[1])
+
+
+def test_what_a_notebook_makes_no_longer_goes_and_others_things_stay(folders):
+    write(folders[0], RECORD | {"id": "other", "notebook": "02_second"})
+    (folders[1] / "fig_1.json").unlink()
+    assert refresh(*folders, "01_first") == ["fig_1"]
+    assert set(files(folders[0])) == {"table_1.json", "other.json"}
+
+
+def test_two_notebooks_cannot_make_one_id(folders):
+    write(folders[1], rows(l2=2.0))
+    write(folders[0], FIGURE | {"notebook": "02_second"})
+    before = files(folders[0])
+    with pytest.raises(ValueError, match="fig_1: belongs to notebook 02_second"):
+        refresh(*folders, "01_first")
+    assert files(folders[0]) == before
+
+
+# ---------------------------------------------------------------------------------------- notebooks
+
+
+def notebook(source="print(x)", said="x = 1.0\n", shown="<b>", count=1):
+    outputs = [
+        nbformat.v4.new_output("stream", text=said),
+        nbformat.v4.new_output("display_data", data={"text/plain": shown}),
+    ]
+    cell = nbformat.v4.new_code_cell(source, outputs=outputs[:count] + outputs[1:])
+    return nbformat.v4.new_notebook(cells=[cell])
+
+
+@pytest.mark.parametrize(
+    ("other", "same"),
+    [
+        ({}, True),
+        ({"said": "x = 1.0005\n"}, True),
+        ({"said": "x = 1.01\n"}, False),
+        ({"said": "y = 1.0\n"}, False),
+        ({"shown": "<i>"}, False),
+        ({"source": "print( x)"}, False),
+        ({"count": 0}, False),
+    ],
+)
+def test_notebooks_are_compared_by_what_they_say(other, same):
+    assert same_notebook(notebook(), notebook(**other)) == same
+
+
+def test_what_a_cell_saves_is_compared_where_it_is_saved():
+    saves = [notebook("save_table('a', rows)", shown=f"took {n} s") for n in (1, 2)]
+    assert same_notebook(*saves)
+
+
+# ------------------------------------------------------------------------------------- side by side
+
+
+def test_differences_are_shown_side_by_side_and_replaced_by_the_next(folders, tmp_path):
+    output = tmp_path / "page.html"
+    write(folders[1], FIGURE | {"numbers": {"error": [0.0, 6.0, None], "n": 3}})
+    write(folders[1], rows(name="<b>"))
+    assert list(write_differences(*folders, output)) == ["fig_1", "table_1"]
+    page = output.read_text()
+    assert page.count("data:image/png;base64,") == 2
+    assert "<b>" not in page
+    write(folders[1], FIGURE)
+    write_differences(*folders, output)
+    assert "data:image" not in output.read_text()
+
+
+@pytest.mark.parametrize("content", ["mine", None])
+def test_other_peoples_files_are_not_touched(folders, tmp_path, content):
+    output = tmp_path / "page.html"
+    output.mkdir() if content is None else output.write_text(content)
+    with pytest.raises(ValueError, match="output: must be a new file or an earlier comparison"):
+        write_differences(*folders, output)
+    assert output.is_dir() if content is None else output.read_text() == content
 
 
 @pytest.mark.parametrize("content", ["{", "[1]", "3", "null", "{}", '"rows"', b"\xff\xfe"])
@@ -134,30 +246,22 @@ def test_what_is_compared_is_not_replaced(folders, tmp_path):
 def test_a_strange_file_is_named(folders, tmp_path, capsys, content, wrong):
     path = folders[wrong] / "strange.json"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    assert main(["compare", *map(str, folders), "--output", str(tmp_path / "out")]) == 2
+    assert main(["compare", *map(str, folders), "--output", str(tmp_path / "out.html")]) == 2
     name = ("committed", "regenerated")[wrong]
     message = f"error: {name}: must hold figures and tables (*.json), got '{path}', which is none"
     assert message in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "out.html").exists()
 
 
-def test_the_command_fails_on_a_difference(folders, tmp_path, capsys):
-    command = ["compare", *map(str, folders), "--output", str(tmp_path / "out")]
-    assert main(command) == 0
+def test_the_command_fails_on_a_difference_and_on_nothing(folders, tmp_path, capsys):
+    page = str(tmp_path / "out.html")
+    assert main(["compare", *map(str, folders), "--output", page]) == 0
     write(folders[1], RECORD | {"rows": []})
-    assert main(command) == 1
+    assert main(["compare", *map(str, folders), "--output", page]) == 1
     assert "table_1: " in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("wrong", [0, 1])
-def test_nothing_to_compare_is_an_error(folders, tmp_path, capsys, wrong):
-    name = ("committed", "regenerated")[wrong]
-    asked = list(map(str, folders))
-    asked[wrong] = str(tmp_path / "nowhere")
-    assert main(["compare", *asked, "--output", str(tmp_path / "out")]) == 2
-    assert f"error: {name}: must be a folder, got '{asked[wrong]}'" in capsys.readouterr().err
-    (tmp_path / "nowhere").mkdir()
-    (tmp_path / "nowhere" / "run_times.json").write_text("{}")
-    assert main(["compare", *asked, "--output", str(tmp_path / "out")]) == 2
-    assert f"error: {name}: must hold figures or tables" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    nowhere = tmp_path / "nowhere"
+    assert main(["compare", str(nowhere), str(folders[1]), "--output", page]) == 2
+    assert f"error: committed: must be a folder, got '{nowhere}'" in capsys.readouterr().err
+    nowhere.mkdir()
+    assert main(["compare", str(folders[0]), str(nowhere), "--output", page]) == 2
+    assert "error: regenerated: must hold figures and tables" in capsys.readouterr().err

@@ -6,10 +6,10 @@ import shutil
 
 import numpy as np
 import pytest
+from vidsindy_lite.companion.readme import HEADLINES, PARTS, fill, reading_minutes, written_pages
 
 from vidsindy_lite.cameras import Rig
-from vidsindy_lite.companion.readme import HEADLINES, PARTS, fill, reading_minutes, written_pages
-from vidsindy_lite.stamp import PACKAGE
+from vidsindy_lite.repository import PACKAGE
 
 ROOT = PACKAGE.parent
 PAGES = {path.stem: path.read_text("utf-8") for path in written_pages(ROOT)}

@@ -9,11 +9,11 @@ import time
 import matplotlib.pyplot as plt
 import pytest
 from browser import CHROMIUM, Browser
-
-from vidsindy_lite.companion.artifacts import save_slider
 from vidsindy_lite.companion.manifest import clear, sign
 from vidsindy_lite.companion.site import build_site
-from vidsindy_lite.stamp import PACKAGE, write_file
+
+from vidsindy_lite.companion.artifacts import save_slider
+from vidsindy_lite.repository import PACKAGE, write_file
 
 ROOT = PACKAGE.parent
 LAPTOP, PHONE = 1280, 390  # CSS pixels

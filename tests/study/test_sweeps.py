@@ -3,7 +3,6 @@
 import json
 import math
 import os
-import pickle
 import re
 import shutil
 import signal
@@ -16,8 +15,9 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.stamp import PACKAGE
-from vidsindy_lite.study.sweeps import remember, sweep
+from vidsindy_lite.repository import PACKAGE
+from vidsindy_lite.study.sweeps import _built, remember, sweep
+from vidsindy_lite.values import decoded
 from vidsindy_lite.vision import Scene, video_info
 
 pytestmark = pytest.mark.slow  # starts processes
@@ -48,6 +48,7 @@ def square(task):
     time.sleep(task.pause)
     if task.number < 0:
         raise ArithmeticError("below zero")
+    # a comment
     return power(task.number), np.random.default_rng(task.number).normal(size=3).tolist()
 
 
@@ -82,15 +83,15 @@ class Clone:
         self.package = root / "vidsindy_lite"
         self.package.mkdir()
         (root / "notebooks").mkdir()
-        (root / "requirements.txt").write_text("numpy==2.4.6\n")
         (root / "sweep.py").write_text(SWEEP)
         (self.package / "study").mkdir()
         for front_door in (self.package, self.package / "study"):
             (front_door / "__init__.py").touch()
         (self.package / "toy.py").write_text(TOY)
         (self.package / "powers.py").write_text("def square(number):\n    return number**2\n")
-        (self.package / "unrelated.py").write_text("LINE_WIDTH = 1\n")
-        for module in ("stamp.py", "study/sweeps.py"):
+        (self.package / "companion").mkdir()
+        (self.package / "companion" / "pages.py").write_text("LINE_WIDTH = 1\n")
+        for module in ("repository.py", "values.py", "study/sweeps.py"):
             (self.package / module).write_bytes((PACKAGE / module).read_bytes())
 
     def start(self, tasks, function="square", **environment):
@@ -126,8 +127,8 @@ class Clone:
 
     def stored(self):
         """Files of results, by the number of the task."""
-        files = list((self.root / "build" / "cache").glob("*/toy.square/*.pkl"))
-        return {math.isqrt(pickle.loads(file.read_bytes())[0]): file for file in files}
+        files = list((self.root / "build" / "cache").glob("*/toy.square/*.json"))
+        return {math.isqrt(content(file)[0]): file for file in files}
 
 
 @pytest.fixture
@@ -139,7 +140,12 @@ def clone(tmp_path, monkeypatch):
     return Clone(root)
 
 
-TASKS = [[number, 0.0] for number in range(1, 7)]
+def content(file):
+    """The result that a file holds, as plain values."""
+    return json.loads(file.read_text().splitlines()[1])["result"]
+
+
+TASKS = [[number, 0.0] for number in range(1, 8)]
 
 
 @pytest.fixture(scope="module")
@@ -226,10 +232,8 @@ def test_a_process_has_one_thread(clone):
     [
         ("vidsindy_lite/toy.py", "power(task.number)", "1 * power(task.number)", True),
         ("vidsindy_lite/powers.py", "number**2", "number * number", True),
-        ("vidsindy_lite/unrelated.py", "1", "2", False),
-        ("vidsindy_lite/study/sweeps.py", "if jobs < 1", "if jobs <= 0", False),
-        ("requirements.txt", "2.4.6", "2.4.7", True),
-        ("vidsindy_lite/toy.py", "A result with", "Numbers with", False),
+        ("vidsindy_lite/companion/pages.py", "1", "2", False),
+        ("vidsindy_lite/toy.py", "# a comment", "# another", False),
     ],
 )
 def test_other_code_finds_no_results(swept, file, old, new, again):
@@ -243,10 +247,11 @@ def test_other_code_finds_no_results(swept, file, old, new, again):
 
 DAMAGES = [
     lambda content: b"",
-    lambda content: content[:-1],
+    lambda content: content[:-2],
     lambda content: content[: len(content) // 2],
     lambda content: bytes([content[0] ^ 1]) + content[1:],
-    lambda content: content[:40] + bytes([content[40] ^ 1]) + content[41:],
+    lambda content: content[:80] + bytes([content[80] ^ 1]) + content[81:],
+    lambda content: b"\x80\x04K\x00.",  # a pickle
 ]
 
 
@@ -257,8 +262,29 @@ def test_damaged_files_are_computed_again(swept):
     for number, damage in enumerate(DAMAGES, start=2):  # of the first task nothing is damaged
         stored[number].write_bytes(damage(whole[number]))
     assert clone.sweep(TASKS) == results
-    assert clone.called() == [2, 3, 4, 5, 6]
+    assert clone.called() == [2, 3, 4, 5, 6, 7]
     assert {number: file.read_bytes() for number, file in stored.items()} == whole
+
+
+def test_an_entry_of_something_else_is_told_and_computed_again(swept):
+    clone, results = swept
+    stored = clone.stored()
+    stored[1].write_bytes(stored[2].read_bytes())  # whole, but of another task
+    stored[3].unlink()
+    stored[3].mkdir()
+    process = clone.start(TASKS)
+    output, errors = process.communicate(timeout=120)
+    assert json.loads(output) == results
+    assert clone.called() == [1, 3]
+    assert errors.count("UserWarning: computed again, as ") == 1
+    assert errors.count("UserWarning: a result is not stored: ") == 1
+
+
+def test_a_stored_file_is_never_executed(tmp_path):
+    """Nothing but dataclasses of this package is made of a file, and none by other code."""
+    for place in ("os:system", "vidsindy_lite.study.sweeps:sweep", "vidsindy_lite.pipeline:np"):
+        with pytest.raises(ValueError, match="not of the package|no such dataclass"):
+            decoded({"type": place, "command": "true"}, _built)
 
 
 def test_error_names_the_task_and_what_was_finished_stays(clone):
@@ -271,7 +297,7 @@ def test_error_names_the_task_and_what_was_finished_stays(clone):
 
 def test_named_folder(clone, tmp_path):
     clone.sweep([[1, 0.0]], VIDSINDY_CACHE=str(tmp_path / "named"))
-    assert len(list((tmp_path / "named").glob("*/toy.square/*.pkl"))) == 1
+    assert len(list((tmp_path / "named").glob("*/toy.square/*.json"))) == 1
     assert not (clone.root / "build").exists()
 
 

@@ -1,7 +1,6 @@
-"""What turns notebooks into a book: each command of it is a module.
+"""What turns notebooks into a book, and a discovery into a report.
 
-`run` executes the notebooks, whose cells hand their results to `artifacts`; `registry` keeps the
-folder of figures, `readme` the tables of README and docs/, `claims` what
-is said and by which check. `compare`, `report` and `site` write pages.
-Words and marks stand in templates (`pages`), beside the module that fills them in.
+`run` executes the notebooks, whose cells hand their results to `artifacts`; `compare` says where
+two runs differ, `claims` what is said and by which check. `report`, `play` and `pick` write pages
+for those who film. Words and marks stand in templates (`pages`), beside the module that fills them.
 """

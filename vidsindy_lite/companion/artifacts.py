@@ -1,54 +1,51 @@
-"""What the notebooks produce: figures, tables, and the registry that keeps the folder honest.
+"""What the notebooks produce: figures and tables in a folder, each with its numbers beside it.
 
 A notebook hands each result over under an id, the paper's number where there is one::
 
     save_figure("fig_3", fig, caption="...", numbers={"noise": levels, "l2": errors})
     save_table("table_1", rows, caption="...")          # rows: a list of dicts
 
-and the folder then holds, beside the image (PNG, SVG) or the table (CSV, Markdown), one JSON file
-``<id>.json``: the registry's record (caption, notebook, stamp of the code that made it) together
-with the plotted numbers or the rows. What the folder adds up to is the business of `registry`.
+and the folder then holds the picture and one JSON file ``<id>.json``, the record: caption,
+notebook, and the plotted numbers or the rows of the table. No dates, no versions, six significant
+digits. What is called ``seconds`` in a record is a wall time: it differs from run to run, and
+counts nowhere.
 
-All files are deterministic: no dates, no library versions, six significant digits. Wall times are
-the one thing that differs between two runs, so they are recorded by the first run of the same code
-and kept by later ones: a table's column ``seconds``, and the run time of each notebook.
-
-The folder is the one that the environment variable VIDSINDY_FIGURES names; the runner sets it,
-VIDSINDY_NOTEBOOK and VIDSINDY_STAMP. Without it, a cell that somebody runs by hand writes to
+The folder is the one that the environment variable VIDSINDY_FIGURES names; the runner sets it, and
+VIDSINDY_NOTEBOOK. Without it, a cell that somebody runs by hand writes to
 build/interactive/figures: only the runner writes the committed ones.
 """
 
 import base64
 import io
+import json
 import os
 import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from IPython.display import HTML
+from IPython.display import HTML, Markdown
 from matplotlib.figure import Figure
 from PIL import Image
 
-from ..stamp import LIBRARIES, repository_root, write_file
+from ..repository import library_versions, repository_root, write_file
+from ..values import as_json
 from .pages import page
-from .records import RUN_TIMES, as_json, json_bytes, read_json, read_records
 
 INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
-LARGEST_SVG = 120_000  # bytes
 PICTURE = 83  # milliseconds that one of an animation stays
 SLIDER_DPI = 100  # dots per inch of its frames
-SECONDS = "seconds"  # the column of a table that holds wall times
+LARGEST_FILE, LARGEST_FOLDER, MOST_FILES = 600_000, 6_000_000, 250  # bytes, bytes
 
 
-# ---------------------------------------------------------------------------------------- where
+def versions() -> str:
+    """Python and the libraries that results depend on, as they are here, a line each."""
+    return "\n".join([f"Python {platform.python_version()}", *library_versions()])
 
 
 def figures_folder() -> Path:
@@ -65,99 +62,18 @@ def _interactive_folder(root: Path) -> Path:
     return folder
 
 
-def versions() -> str:
-    """Python and the libraries that results depend on, as they are here, a line each."""
-    lines = [f"{name} {metadata.version(name)}" for name in LIBRARIES]
-    return "\n".join([f"Python {platform.python_version()}", *lines])
-
-
-# ------------------------------------------------------------------------------------- what goes in
-
-
-@dataclass(frozen=True)
-class Table:
-    """A registered table, shown by a notebook as HTML and by a terminal as text.
-
-    Parameters
-    ----------
-    table_id : str
-    caption : str
-    rows : tuple of dict
-        One dict per row, all with the same keys in the same order; the values are text, numbers,
-        booleans or None (also in place of NaN).
-    notebook : str
-        Which wrote it.
-    """
-
-    table_id: str
-    caption: str
-    rows: tuple[dict, ...]
-    notebook: str
-
-    def __post_init__(self) -> None:
-        if not self.rows:
-            raise ValueError(f"rows: table {self.table_id!r} needs at least one row, got none")
-        for number, row in enumerate(self.rows):
-            if tuple(row) != self.columns:
-                raise ValueError(
-                    f"rows: every row of table {self.table_id!r} must have the columns "
-                    f"{list(self.columns)}, got {list(row)} in row {number}"
-                )
-            for column, value in row.items():
-                if isinstance(value, list | dict):
-                    raise ValueError(
-                        f"rows: a cell of table {self.table_id!r} must be text, a number, a "
-                        f"boolean or None, got {value!r} in row {number}, column {column!r}"
-                    )
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return tuple(self.rows[0])
-
-    def csv(self) -> str:
-        """The table as comma-separated values; None is an empty cell."""
-        return pd.DataFrame(self.rows, dtype=object).to_csv(index=False, lineterminator="\n")
-
-    def markdown(self) -> str:
-        """The table in Markdown, four significant digits."""
-        body = [[cell.replace("|", "\\|") for cell in line] for line in self._cells()]
-        rule = ["---" if self._is_text(column) else "---:" for column in self.columns]
-        lines = [body[0], rule, *body[1:]]
-        return "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-    def _cells(self) -> list[list[str]]:
-        rows = [[_shown(value) for value in row.values()] for row in self.rows]
-        return [[str(column) for column in self.columns], *rows]
-
-    def _is_text(self, column: str) -> bool:
-        return any(isinstance(row[column], str) for row in self.rows)
-
-    def __str__(self) -> str:
-        cells = self._cells()
-        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        align = ["<" if self._is_text(column) else ">" for column in self.columns]
-        lines = [
-            "  ".join(f"{c:{a}{w}}" for c, a, w in zip(line, align, widths, strict=True)).rstrip()
-            for line in cells
-        ]
-        return "\n".join([lines[0], "-" * (sum(widths) + 2 * len(widths) - 2), *lines[1:]])
-
-    def _repr_markdown_(self) -> str:
-        return f"{self.markdown()}\n{self.caption}\n"
-
-    def _repr_html_(self) -> str:
-        align = ["left" if self._is_text(column) else "right" for column in self.columns]
-        return page("table.html", caption=self.caption, align=align, lines=self._cells())
+# ------------------------------------------------------------------------------------------ figures
 
 
 def save_figure(
-    figure_id: str, figure: Figure, *, caption: str, numbers: Mapping[str, object]
+    figure_id: str,
+    figure: Figure,
+    *,
+    caption: str,
+    numbers: Mapping[str, object],
+    tolerance: Mapping[str, float] | None = None,
 ) -> None:
-    """Write a figure as PNG and SVG with the plotted numbers beside it, and register it.
-
-    There is no SVG of a figure that holds a picture of pixels, or so many points that the drawing
-    is larger than the picture.
+    """Write a figure as PNG with the plotted numbers beside it.
 
     Parameters
     ----------
@@ -169,38 +85,19 @@ def save_figure(
         The sentence on what to see.
     numbers : mapping of str to array_like
         What is plotted, by name: numbers, text, arrays and nestings of them. NaN becomes null.
+    tolerance : mapping of str to float, optional
+        By how much some of the numbers may differ between two runs, relatively, by name; all others
+        by a thousandth (see `compare.differences`).
 
     Raises
     ------
     ValueError
-        On a malformed id, an empty caption, or an id that another notebook of this run owns.
+        On a malformed id, an empty caption, or a tolerance of what is not there.
     TypeError
         If something in `numbers` is none of the above.
     """
-    record = _new_record("figure", figure_id, caption)
-    record["numbers"] = as_json(dict(numbers), "numbers", DIGITS)
-    # Without these three, a PNG names the library and an SVG the date, with random ids.
-    drawing = _saved(figure, "svg", figure_id, {"Date": None, "Creator": None})
-    files = {f"{figure_id}.png": with_palette(_saved(figure, "png", figure_id, {"Software": None}))}
-    if b"<image" not in drawing and len(drawing) <= LARGEST_SVG:
-        files[f"{figure_id}.svg"] = drawing
-    _write(record, files)
-
-
-def _saved(figure: Figure, form: str, salt: str, metadata: Mapping[str, None]) -> bytes:
-    image = io.BytesIO()
-    with plt.rc_context({"svg.hashsalt": salt}):
-        figure.savefig(image, format=form, metadata=metadata)
-    return image.getvalue()
-
-
-def with_palette(png: bytes) -> bytes:
-    """A PNG with 256 colours, a third of the size; as it was if that is not smaller."""
-    image, small = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
-    # Colours that lie far apart first: white stays white, and small symbols keep their own.
-    reduced = image.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE)
-    reduced.save(small, "PNG", optimize=True)
-    return min(png, small.getvalue(), key=len)
+    record = _record(figure_id, "figure", caption, "numbers", numbers, tolerance)
+    _write(record, ".png", _png(figure))
 
 
 def save_animation(
@@ -210,7 +107,7 @@ def save_animation(
     caption: str,
     numbers: Mapping[str, object],
 ) -> None:
-    """Write pictures as an animated GIF, which every code host plays, and register it.
+    """Write pictures as an animated GIF, which every code host plays.
 
     Parameters
     ----------
@@ -226,25 +123,21 @@ def save_animation(
     ValueError, TypeError
         As `save_figure` does.
     """
-    record = _new_record("animation", animation_id, caption)
-    record["numbers"] = as_json(dict(numbers), "numbers", DIGITS)
-    # All as one strip get one palette. It starts from the colours that lie farthest apart: so a
-    # small target keeps its own, which MEDIANCUT gives to the background.
-    height, width = pictures[0].shape[:2]
-    strip = Image.fromarray(np.concatenate(pictures))
-    strip = strip.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1)
-    tops = range(0, strip.height, height)
-    first, *rest = (strip.crop((0, top, width, top + height)) for top in tops)
-    durations = [PICTURE] * len(rest) + [3000]
-    file = io.BytesIO()
+    record = _record(animation_id, "animation", caption, "numbers", numbers, None)
+    palette = _palette(np.concatenate(pictures))
+    first, *rest = (
+        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+        for picture in pictures
+    )
+    durations, file = [PICTURE] * len(rest) + [3000], io.BytesIO()
     first.save(file, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
-    _write(record, {f"{animation_id}.gif": file.getvalue()})
+    _write(record, ".gif", file.getvalue())
 
 
 def save_slider(
     slider_id: str, figures: Mapping[str, Figure], *, caption: str, numbers: Mapping[str, object]
 ) -> HTML:
-    """Register the first of some figures, close all, and show them behind a slider.
+    """Save the first of some figures, close all, and show them behind a slider.
 
     The frames are drawn before, one below the other in a single picture, and the slider moves it:
     so it works in JupyterLab as on a page without a kernel or a network.
@@ -271,10 +164,11 @@ def save_slider(
     if not figures:
         raise ValueError(f"figures: slider {slider_id!r} needs at least one figure, got none")
     save_figure(slider_id, next(iter(figures.values())), caption=caption, numbers=numbers)
-    frames = []
+    with plt.rc_context({"savefig.dpi": SLIDER_DPI}):
+        frames = [
+            Image.open(io.BytesIO(_png(figure))).convert("RGB") for figure in figures.values()
+        ]
     for figure in figures.values():
-        with plt.rc_context({"savefig.dpi": SLIDER_DPI}):
-            frames.append(Image.open(io.BytesIO(_saved(figure, "png", slider_id, {}))))
         plt.close(figure)
     (width, height), strip = frames[0].size, io.BytesIO()
     Image.fromarray(np.concatenate([np.asarray(frame) for frame in frames])).save(strip, "PNG")
@@ -283,40 +177,82 @@ def save_slider(
     return HTML(page("slider.html", width=width, height=height, **shown))
 
 
-def save_table(table_id: str, rows: Iterable[Mapping[str, object]], *, caption: str) -> Table:
-    """Write a table as CSV and Markdown, and register it.
+def with_palette(png: bytes) -> bytes:
+    """A PNG with 256 colours, a third of the size; as it was if that is not smaller."""
+    image, small = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
+    reduced = image.quantize(palette=_palette(np.asarray(image)), dither=Image.Dither.NONE)
+    reduced.save(small, "PNG", optimize=True)
+    return min(png, small.getvalue(), key=len)
+
+
+def _palette(pixels: np.ndarray) -> Image.Image:
+    """256 colours, chosen among those of a picture however rare they are.
+
+    Of colours that differ by less than eight grey levels the most frequent is a candidate: white
+    stays white, a small target keeps its colour, and noise has few enough to choose from quickly.
+    """
+    codes = pixels.reshape(-1, 3) @ np.array([1 << 16, 1 << 8, 1])
+    codes, counts = np.unique(codes, return_counts=True)
+    codes = codes[np.argsort(-counts, kind="stable")]
+    _, firsts = np.unique(codes & 0xF8F8F8, return_index=True)
+    colours = np.stack([codes >> 16, codes >> 8, codes], axis=-1)[firsts].astype(np.uint8)
+    return Image.fromarray(colours[None]).quantize(256, Image.Quantize.MAXCOVERAGE)
+
+
+def _png(figure: Figure) -> bytes:
+    image = io.BytesIO()
+    figure.savefig(image, format="png", metadata={"Software": None})  # else it names the library
+    return with_palette(image.getvalue())
+
+
+# ------------------------------------------------------------------------------------------- tables
+
+
+def save_table(
+    table_id: str,
+    rows: Iterable[Mapping[str, object]],
+    *,
+    caption: str,
+    tolerance: Mapping[str, float] | None = None,
+) -> Markdown:
+    """Write the record of a table, and show it.
 
     Parameters
     ----------
     table_id : str
         The paper's number ("table_1", "table_S2") or a name of ours: letters, digits, _ and -.
     rows : iterable of mappings
-        One per row, all with the same keys. A column named "seconds" holds wall times: two digits,
-        and a second run of the same code keeps the recorded ones.
+        One per row, all with the same keys. A column named "seconds" holds wall times, to two
+        digits.
     caption : str
         The sentence on what to see.
+    tolerance : mapping of str to float, optional
+        As of `save_figure`, by column.
 
     Returns
     -------
-    Table
-        As it was written; the last expression of a cell shows it.
+    IPython.display.Markdown
+        The table with its caption, for the last expression of a cell.
 
     Raises
     ------
     ValueError
-        On a malformed id, an empty caption, no rows, rows with different keys, a cell that is not
-        a scalar, or an id that another notebook of this run owns.
+        On a malformed id, an empty caption, no rows, rows with different keys, or a tolerance of a
+        column that is not there.
     """
-    record = _new_record("table", table_id, caption)
-    plain = [{str(k): as_json(v, "rows", DIGITS) for k, v in row.items()} for row in rows]
-    record["rows"] = _with_steady_seconds(record, plain)
-    table = as_table(record)
-    markdown = table._repr_markdown_().encode()
-    _write(record, {f"{table_id}.csv": table.csv().encode(), f"{table_id}.md": markdown})
-    return table
+    copies = [dict(row) for row in rows]
+    if not copies or any(list(row) != list(copies[0]) for row in copies):
+        columns = " and ".join(dict.fromkeys(str(list(row)) for row in copies)) or "no row"
+        raise ValueError(f"rows: table {table_id!r} needs rows of the same columns, got {columns}")
+    for row in copies:
+        if isinstance(row.get("seconds"), int | float):
+            row["seconds"] = float(f"{row['seconds']:.2g}")
+    record = _record(table_id, "table", caption, "rows", copies, tolerance)
+    _write(record)
+    return Markdown(table_text(record))
 
 
-def load_table(table_id: str, folder: Path) -> Table:
+def load_table(table_id: str, folder: Path) -> pd.DataFrame:
     """Read a table of a folder back, its values as they were written.
 
     Raises
@@ -324,79 +260,133 @@ def load_table(table_id: str, folder: Path) -> Table:
     FileNotFoundError
         If the folder holds no table of that id; the message lists those it holds.
     """
-    record = read_json(folder / f"{table_id}.json")
-    if record.get("kind") != "table":
-        tables = [r["id"] for r in read_records(folder).values() if r["kind"] == "table"]
+    tables = {n: record for n, record in read_records(folder).items() if "rows" in record}
+    if table_id not in tables:
         raise FileNotFoundError(
             f"table_id: expected one of the tables in {folder} ({', '.join(tables) or 'none'}), "
             f"got {table_id!r}"
         )
-    return as_table(record)
+    return pd.DataFrame(tables[table_id]["rows"], dtype=object)
 
 
-# ------------------------------------------------------------------------------------------ details
+def table_text(record: dict) -> str:
+    """A table in Markdown with its caption, four significant digits, numbers to the right."""
+
+    def shown(value: object) -> str:
+        if value is None or isinstance(value, bool):
+            return {None: "", True: "yes", False: "no"}[value]
+        return f"{value:.4g}" if isinstance(value, float) else str(value).replace("|", "\\|")
+
+    frame = pd.DataFrame(record["rows"], dtype=object)
+    is_text = frame.map(lambda value: isinstance(value, str)).any()
+    align = ["left" if text else "right" for text in is_text]
+    table = frame.map(shown).to_markdown(index=False, colalign=align, disable_numparse=True)
+    return f"{table}\n\n{record['caption']}\n"
 
 
-def _new_record(kind: str, artifact_id: str, caption: str) -> dict:
-    """The part of a record that figures and tables share, checked."""
-    taken = {Path(INDEX).stem, Path(RUN_TIMES).stem}
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", artifact_id) or artifact_id in taken:
+# ------------------------------------------------------------------------------------------ records
+
+
+def _record(
+    artifact_id: str,
+    kind: str,
+    caption: str,
+    holds: str,
+    content: Mapping | list,
+    tolerance: Mapping[str, float] | None,
+) -> dict:
+    """A record, checked."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", artifact_id) or artifact_id == Path(INDEX).stem:
         raise ValueError(
-            f"{kind}_id: expected letters, digits, _ and -, other than "
-            f"{' and '.join(sorted(taken))}, got {artifact_id!r}"
+            f"{kind}_id: expected letters, digits, _ and -, other than {Path(INDEX).stem}, "
+            f"got {artifact_id!r}"
         )
     caption = " ".join(caption.split())
     if not caption:
         raise ValueError(f"caption: {kind} {artifact_id!r} needs a sentence, got an empty one")
-    notebook = os.environ.get("VIDSINDY_NOTEBOOK")
-    owner = read_json(figures_folder() / f"{artifact_id}.json").get("notebook")
-    if notebook and owner not in (None, "interactive", notebook):
+    known = {name for row in (content if isinstance(content, list) else [content]) for name in row}
+    if strange := set(tolerance or ()) - known:
         raise ValueError(
-            f"{kind}_id: {artifact_id!r} belongs to notebook {owner}, got it from {notebook} too"
+            f"tolerance: must name what is in {kind} {artifact_id!r} ({', '.join(sorted(known))}), "
+            f"got {', '.join(sorted(strange))}"
         )
     return {
         "id": artifact_id,
         "kind": kind,
-        "notebook": notebook or "interactive",
-        "stamp": os.environ.get("VIDSINDY_STAMP"),
+        "notebook": os.environ.get("VIDSINDY_NOTEBOOK", "interactive"),
         "caption": caption,
-        "files": [],
+        **({"tolerance": dict(tolerance)} if tolerance else {}),
+        holds: as_json(content, holds, DIGITS),
     }
 
 
-def as_table(record: dict) -> Table:
-    return Table(record["id"], record["caption"], tuple(record["rows"]), record["notebook"])
+def _write(record: dict, suffix: str = "", picture: bytes = b"") -> None:
+    """Write a picture, then its record, a line per entry and per row."""
 
+    def entry(value: object) -> str:
+        if isinstance(value, dict) and value:
+            items = (f"  {json.dumps(k)}: {json.dumps(v)}" for k, v in value.items())
+            return "{\n" + ",\n".join(items) + "\n }"
+        if isinstance(value, list):
+            return "[\n" + ",\n".join(f"  {json.dumps(item)}" for item in value) + "\n ]"
+        return json.dumps(value)
 
-def _with_steady_seconds(record: dict, rows: list[dict]) -> list[dict]:
-    """Round the wall times; take the recorded ones where the same code wrote the same rows."""
-    before = read_json(figures_folder() / f"{record['id']}.json")
-    is_same_code = record["stamp"] is not None and record["stamp"] == before.get("stamp")
-    earlier = before.get("rows", []) if is_same_code else []
-    for row in rows:
-        if isinstance(row.get(SECONDS), int | float):
-            row[SECONDS] = float(f"{row[SECONDS]:.2g}")
-    for row, old in zip(rows, earlier, strict=False):
-        if SECONDS in row and row | {SECONDS: None} == old | {SECONDS: None}:
-            row[SECONDS] = old[SECONDS]
-    return rows
-
-
-def _shown(value: object) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _write(record: dict, files: Mapping[str, bytes]) -> None:
-    """Write the files of a figure or table, then its record; remove what an earlier one had."""
     folder = figures_folder()
-    earlier = read_json(folder / f"{record['id']}.json").get("files", [])
-    record["files"] = list(files)
-    for name, content in files.items():
-        write_file(folder / name, content)
-    write_file(folder / f"{record['id']}.json", json_bytes(record))
-    for name in set(earlier) - files.keys():
-        (folder / name).unlink(missing_ok=True)
+    if picture:
+        write_file(folder / f"{record['id']}{suffix}", picture)
+    lines = (f" {json.dumps(key)}: {entry(value)}" for key, value in record.items())
+    write_file(folder / f"{record['id']}.json", ("{\n" + ",\n".join(lines) + "\n}\n").encode())
+
+
+def read_records(folder: Path) -> dict[str, dict]:
+    """All records by id, in the order of a reader: S2 before S10. A damaged one is none."""
+    found = {}
+    for path in folder.glob("*.json"):
+        try:
+            record = json.loads(path.read_text("utf-8"))
+        except ValueError:
+            continue
+        if isinstance(record, dict) and record.keys() >= {"id", "kind", "notebook", "caption"}:
+            found[path.stem] = record
+
+    def order(artifact_id: str) -> list:
+        return [int(p) if p.isdigit() else p for p in re.split(r"(\d+)", artifact_id)]
+
+    return {artifact_id: found[artifact_id] for artifact_id in sorted(found, key=order)}
+
+
+def files_of(record: dict) -> list[str]:
+    """Names of the files that a figure or table consists of."""
+    suffixes = {"figure": [".png"], "animation": [".gif"], "table": []}[record["kind"]]
+    return [f"{record['id']}{suffix}" for suffix in (".json", *suffixes)]
+
+
+def write_index(folder: Path) -> None:
+    """Write the folder's index page (README.md, which code hosts show) from the records."""
+    records = read_records(folder)
+    made: dict[str, list[dict]] = {}
+    for record in sorted(records.values(), key=lambda record: record["notebook"]):
+        made.setdefault(record["notebook"], []).append(record)
+    tables = {name: table_text(record) for name, record in records.items() if "rows" in record}
+    write_file(folder / INDEX, page("index.md", made=made, tables=tables).encode())
+
+
+def folder_problems(folder: Path) -> list[str]:
+    """What is wrong with a folder of figures; an empty list means nothing.
+
+    Returns
+    -------
+    list of str
+        One line per file of a record that is missing, file that no record names, and file that is
+        too large; and one each if there are too many files or bytes in all.
+    """
+    expected = {INDEX, *(name for r in read_records(folder).values() for name in files_of(r))}
+    sizes = {p.name: p.stat().st_size for p in folder.glob("*") if not p.name.startswith(".")}
+    limits = [(f"{name}: ", size, "bytes", LARGEST_FILE) for name, size in sorted(sizes.items())]
+    limits += [("all files: ", sum(sizes.values()), "bytes", LARGEST_FOLDER)]
+    limits += [("all files: ", len(sizes), "files", MOST_FILES)]
+    return [
+        *(f"{name}: missing" for name in sorted(expected - sizes.keys())),
+        *(f"{name}: no record names it" for name in sorted(sizes.keys() - expected)),
+        *(f"{who}{much} {what}, at most {most}" for who, much, what, most in limits if much > most),
+    ]

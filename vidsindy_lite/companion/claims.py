@@ -6,6 +6,7 @@ figure or table with its numbers; a path is a page of docs/, or a test as pytest
 """
 
 import ast
+import json
 import re
 from dataclasses import dataclass
 from functools import cache
@@ -13,6 +14,8 @@ from pathlib import Path
 
 import jupytext
 from nbformat import NotebookNode
+
+from ..repository import write_file
 
 BY = re.compile(r"\s*<!-- by: (.*?) -->", re.DOTALL)
 # What a notebook claims: the items and the answers to the paper under these headings.
@@ -26,6 +29,45 @@ class Claim:
 
     text: str
     checks: tuple[str, ...]
+
+
+def write_pages(root: Path) -> None:
+    """Write what README and docs/ say after the notebooks: the tour's law, and all claims.
+
+    They stand between a line ``<!-- name -->`` and the next ``<!-- end -->``.
+
+    Parameters
+    ----------
+    root : path
+        The repository, with figures/ as its notebooks have made it.
+    """
+    for name, text in pages(root).items():
+        write_file(root / name, text.encode())
+
+
+def pages(root: Path) -> dict[str, str]:
+    """The pages that `write_pages` writes, by name, as they have to be."""
+    law = json.loads((root / "figures" / "tour.json").read_text("utf-8"))["numbers"]["equations"]
+    sections = []
+    for page in [root / "README.md", *sorted((root / "notebooks").glob("*.py"))]:
+        title = (
+            "README" if page.suffix == ".md" else f"[{page.stem}](../notebooks/{page.stem}.ipynb)"
+        )
+        claims = [[f"* {c.text}", *(f"  * {check}" for check in c.checks)] for c in claims_of(page)]
+        sections.append("\n".join([f"\n## {title}\n", *sum(claims, [])]))
+    parts = {
+        "README.md": ("equations", "\n".join(["```", *law, "```"])),
+        "docs/claims.md": ("claims", "\n".join([*sections, ""])),
+    }
+    return {
+        name: re.sub(
+            rf"(?<=^<!-- {mark} -->\n).*?(?=^<!-- end -->$)",
+            part.replace("\\", r"\\") + "\n",
+            (root / name).read_text("utf-8"),
+            flags=re.DOTALL | re.MULTILINE,
+        )
+        for name, (mark, part) in parts.items()
+    }
 
 
 def claims_of(page: Path) -> list[Claim]:

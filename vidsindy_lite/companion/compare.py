@@ -1,70 +1,89 @@
-"""Two folders of figures, number by number: what a run on another machine or day has changed."""
+"""Two folders of figures, or two runs of a notebook: number by number, and as one looks at them.
 
+What a run has made replaces what is committed only where it differs: a number by more than its
+tolerance, or a picture so that one sees it.
+"""
+
+import base64
+import io
 import json
 import math
 import os
-import shutil
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+from nbformat import NotebookNode
+from PIL import Image, ImageSequence
+
 from ..checks import check_path
-from .artifacts import SECONDS
-from .manifest import clear, sign
+from ..repository import write_file
+from .artifacts import files_of, read_records
 from .pages import page
-from .records import RUN_TIMES
 
-SIDES = ("committed", "regenerated")
+TOLERANCE = 1e-3  # of a number, relative, where its record states no other
+ROUNDING = 1e-9  # of the largest of its list: what is zero but for rounding has no digits
+SQUARE = 4  # pixels: a picture is looked at in squares of this side
+VISIBLE = 24  # grey levels by which the mean of a square differs so that one sees it
+TIMES = "seconds"  # what is called so differs from run to run, and counts nowhere
 
-# Of a number; and of the largest of its list, as what is zero but for rounding has no digits.
-TOLERANCE = 1e-3
-ROUNDING = 1e-9
+_PAGE_MARK = '<meta name="generator" content="vidsindy_lite compare">'
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
+_SAVES = re.compile(r"^save_|= save_", re.MULTILINE)
 
 
 def differences(
-    committed: str | os.PathLike, regenerated: str | os.PathLike, tolerance: float = TOLERANCE
+    committed: str | os.PathLike, regenerated: str | os.PathLike, notebook: str | None = None
 ) -> dict[str, str]:
     """Which figures and tables hold other numbers, and where each first differs.
 
-    Wall times, captions and stamps do not count.
+    Numbers may differ by the tolerance that the committed record states for their column or name,
+    or else by `TOLERANCE`. Wall times and captions do not count.
 
     Parameters
     ----------
     committed, regenerated : path
         Folders as notebooks write them.
-    tolerance : float
-        Relative difference of two numbers that passes.
+    notebook : str, optional
+        Only what it has made.
 
     Returns
     -------
     dict of str to str
-        By id, in words.
+        By id, in words: the row, the column, and both values.
 
     Raises
     ------
     ValueError
         If one of them is no folder, holds no figure or table, or a JSON file that is none.
     """
-    ours, theirs = _numbers("committed", committed), _numbers("regenerated", regenerated)
+    ours, theirs = _records("committed", committed), _records("regenerated", regenerated)
+    if notebook is not None:
+        ours, theirs = (
+            {name: record for name, record in records.items() if record["notebook"] == notebook}
+            for records in (ours, theirs)
+        )
     found = {}
     for name in sorted(ours | theirs):
         if name not in ours or name not in theirs:
             found[name] = "only " + ("committed" if name in ours else "regenerated")
-        elif place := next(_unlike(ours[name], theirs[name], "", 0.0, tolerance), None):
+        elif place := _first_difference(ours[name], theirs[name]):
             found[name] = place
     return found
 
 
-def side_by_side(
+def write_differences(
     committed: str | os.PathLike, regenerated: str | os.PathLike, output: str | os.PathLike
 ) -> dict[str, str]:
-    """Copy what `differences` finds, and a page that shows both images and the places.
+    """Write a page that shows what `differences` finds, both pictures side by side.
 
     Parameters
     ----------
     committed, regenerated : path
         As of `differences`.
     output : path
-        Where; an earlier comparison is replaced.
+        Of the page; an earlier one is replaced.
 
     Returns
     -------
@@ -74,62 +93,171 @@ def side_by_side(
     Raises
     ------
     ValueError
-        As of `differences`, or if the output holds anything but an earlier comparison.
+        As of `differences`, or if another file is at `output`.
     """
     output = check_path("output", output)
-    for folder in (committed, regenerated):
-        ours, theirs = output.resolve(), Path(folder).resolve()
-        if ours.is_relative_to(theirs) or theirs.is_relative_to(ours):
-            raise ValueError(f"output: must not hold or lie in what is compared, got '{output}'")
+    if output.exists() and not (
+        output.is_file() and _PAGE_MARK in output.read_text("utf-8", "replace")
+    ):
+        raise ValueError(f"output: must be a new file or an earlier comparison, got '{output}'")
     found = differences(committed, regenerated)
-    clear(output, "comparison")
-    pictures: dict[str, list[str]] = {name: [] for name in found}
-    for side, folder in zip(SIDES, (committed, regenerated), strict=True):
-        (output / side).mkdir(parents=True, exist_ok=True)
-        for name in found:
-            for file in Path(folder).glob(f"{name}.*"):
-                shutil.copy(file, output / side)
-                pictures[name] += [side] if file.suffix == ".png" else []
-    index = page("compare.html", found=found, pictures=pictures)
-    (output / "index.html").write_text(index, "utf-8")
-    sign(output)
+    pictures = {
+        name: [
+            base64.b64encode(picture.read_bytes()).decode()
+            for side in (committed, regenerated)
+            if (picture := Path(side) / f"{name}.png").exists()
+        ]
+        for name in found
+    }
+    write_file(output, page("compare.html", found=found, pictures=pictures).encode())
     return found
 
 
-def _numbers(name: str, folder: str | os.PathLike) -> dict[str, object]:
-    """What each figure plots and each table holds, by id."""
+def refresh(committed: Path, regenerated: Path, notebook: str) -> list[str]:
+    """Put what a notebook has made where it differs from what is committed.
+
+    Parameters
+    ----------
+    committed : Path
+        The folder to be written to.
+    regenerated : Path
+        What the notebook has made, and nothing else.
+    notebook : str
+        Whose earlier figures and tables go, if it makes them no longer.
+
+    Returns
+    -------
+    list of str
+        Ids of what was written or removed.
+
+    Raises
+    ------
+    ValueError
+        If another notebook has made a figure or table of the same id; then nothing is written.
+    """
+    old, new = read_records(committed), read_records(regenerated)
+    for name in new.keys() & old.keys():
+        if old[name]["notebook"] != notebook:
+            raise ValueError(f"{name}: belongs to notebook {old[name]['notebook']}")
+    changed = [
+        name
+        for name in new
+        if name not in old or not _same(old[name], new[name], committed, regenerated)
+    ]
+    for name in changed:
+        for file in reversed(files_of(new[name])):  # the record last
+            write_file(committed / file, (regenerated / file).read_bytes())
+    gone = [n for n in old if old[n]["notebook"] == notebook and n not in new]
+    for name in gone:
+        for file in files_of(old[name]):
+            (committed / file).unlink(missing_ok=True)
+    return changed + gone
+
+
+def same_notebook(committed: NotebookNode, regenerated: NotebookNode) -> bool:
+    """Whether two executed notebooks have the same cells and say the same.
+
+    What a cell saves as a figure or table, and so shows, is compared there.
+    """
+    cells = [
+        [(c.cell_type, c.source, c.metadata) for c in notebook.cells]
+        for notebook in (committed, regenerated)
+    ]
+    said = [_said(committed), _said(regenerated)]
+    words = [_NUMBER.sub("#", text) for text in said]
+    return (
+        cells[0] == cells[1]
+        and words[0] == words[1]
+        and all(
+            a == b or math.isclose(float(a), float(b), rel_tol=TOLERANCE)
+            for a, b in zip(*map(_NUMBER.findall, said), strict=True)
+        )
+    )
+
+
+def _said(notebook: NotebookNode) -> str:
+    """What the cells of a notebook print, and what those show that save nothing, as text."""
+    texts = []
+    for cell in notebook.cells:
+        for output in cell.get("outputs", []):
+            shown = {} if _SAVES.search(cell.source) else output.get("data", {})
+            texts += [output.output_type, output.get("text", ""), shown.get("text/plain", "")]
+    return "\n".join(texts)
+
+
+def looks_the_same(one: bytes, other: bytes) -> bool:
+    """Whether one could tell two pictures apart; each frame of an animation counts."""
+    frames = [
+        [np.asarray(f.convert("RGB").reduce(SQUARE), float) for f in ImageSequence.Iterator(image)]
+        for image in (Image.open(io.BytesIO(one)), Image.open(io.BytesIO(other)))
+    ]
+    return [f.shape for f in frames[0]] == [f.shape for f in frames[1]] and all(
+        np.abs(a - b).max() <= VISIBLE for a, b in zip(*frames, strict=True)
+    )
+
+
+# ------------------------------------------------------------------------------------------ details
+
+
+def _records(name: str, folder: str | os.PathLike) -> dict[str, dict]:
+    """The records of a folder, which holds nothing else as JSON."""
     folder = check_path(name, folder)
     if not folder.is_dir():
         raise ValueError(f"{name}: must be a folder, got '{folder}'")
-    paths = [path for path in folder.glob("*.json") if path.name != RUN_TIMES]
-    if not paths:
-        raise ValueError(f"{name}: must hold figures or tables (*.json), got none in '{folder}'")
-    return {path.stem: _content(name, path) for path in paths}
+    records = read_records(folder)
+    strange = [path for path in sorted(folder.glob("*.json")) if path.stem not in records]
+    if strange or not records:
+        got = f"'{strange[0]}', which is none" if strange else f"none in '{folder}'"
+        raise ValueError(f"{name}: must hold figures and tables (*.json), got {got}")
+    return records
 
 
-def _content(name: str, path: Path) -> object:
-    try:
-        record = json.loads(path.read_text("utf-8"))
-        return record["rows"] if "rows" in record else record["numbers"]
-    except (ValueError, TypeError, KeyError):
-        raise ValueError(
-            f"{name}: must hold figures and tables (*.json), got '{path}', which is none"
-        ) from None
+def _first_difference(one: dict, other: dict) -> str | None:
+    """Where the numbers of two records first differ, in words."""
+    tolerance = one.get("tolerance", {})
+    if "rows" not in one or "rows" not in other:
+        return next(_unlike(one.get("numbers"), other.get("numbers"), "", tolerance), None)
+    if len(one["rows"]) != len(other["rows"]):
+        return f"{len(one['rows'])} rows committed, {len(other['rows'])} regenerated"
+    for number, rows in enumerate(zip(one["rows"], other["rows"], strict=True)):
+        for place in _unlike(*rows, "", tolerance):
+            words = ", ".join(v for v in rows[0].values() if isinstance(v, str))
+            return f"row {number} ({words}), column {place}"
+    return None
 
 
-def _unlike(one: object, other: object, place: str, size: float, tolerance: float) -> Iterator[str]:
+def _unlike(
+    one: object, other: object, place: str, tolerance: dict | float, size: float = 0.0
+) -> Iterator[str]:
     """Where two contents differ; `size` is that of the largest number beside this one."""
     if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
         for key in one:
-            if key != SECONDS:
-                yield from _unlike(one[key], other[key], f"{place} {key}", 0.0, tolerance)
+            if key != TIMES:
+                near = tolerance.get(key, TOLERANCE) if isinstance(tolerance, dict) else tolerance
+                yield from _unlike(one[key], other[key], f"{place} {key}", near)
     elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
         largest = max((abs(v) for v in one if isinstance(v, int | float)), default=0.0)
         for index, pair in enumerate(zip(one, other, strict=True)):
-            yield from _unlike(*pair, f"{place}[{index}]", largest, tolerance)
+            yield from _unlike(*pair, f"{place}[{index}]", tolerance, largest)
     elif isinstance(one, float | int) and isinstance(other, float | int):
-        nothing = max(tolerance * size, ROUNDING)
-        if not math.isclose(one, other, rel_tol=tolerance, abs_tol=nothing):
+        near = TOLERANCE if isinstance(tolerance, dict) else tolerance
+        if not math.isclose(one, other, rel_tol=near, abs_tol=max(near * size, ROUNDING)):
             yield f"{place.strip()}: {one} committed, {other} regenerated"
     elif one != other:
         yield f"{place.strip()}: {one!r:.60} committed, {other!r:.60} regenerated"
+
+
+def _same(old: dict, new: dict, committed: Path, regenerated: Path) -> bool:
+    """Whether a record says the same, and its picture looks the same.
+
+    A picture of wall times never does: it stays as it was, if the other numbers are.
+    """
+    said = ("kind", "caption", "tolerance")
+    if [old.get(k) for k in said] != [new.get(k) for k in said] or _first_difference(old, new):
+        return False
+    files = [[folder / name for name in files_of(old)[1:]] for folder in (committed, regenerated)]
+    timed = f'"{TIMES}"' in json.dumps(old)
+    return all(
+        a.exists() and (timed or looks_the_same(a.read_bytes(), b.read_bytes()))
+        for a, b in zip(*files, strict=True)
+    )

@@ -1,97 +1,83 @@
-"""Run the notebooks: each notebooks/NN_name.py through papermill, three at a time, outputs cleaned.
+"""Run the notebooks: each notebooks/NN_name.py through papermill, three at a time.
 
-The .py half of a pair is the source. The .ipynb half is made here: executed, stripped of all that
-differs between two runs, and stamped with a hash of the code that it depends on. The full profile
-writes ``notebooks/*.ipynb`` and figures/ of the repository, and the tables of README and
-docs/; the quick profile writes the layout of the former two under build/quick/.
-
-A notebook is not executed again if its stamp and its source are the same, its prose included, and
-its outputs are in place byte for byte (see `ledger`).
+The .py half of a pair is the source. A run leaves what it makes in build/runs/ of its output, and
+is not repeated there while the code cells, the package and the libraries are the same. From there
+`compare.refresh` puts into figures/, and this module into notebooks/*.ipynb, what differs from
+what is there already.
 """
 
+import asyncio
+import base64
+import hashlib
+import json
 import os
+import shutil
 import sys
 import time
-from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import jupytext
 import nbformat
+import papermill
 import psutil
+from nbformat import NotebookNode
+from papermill.exceptions import strip_color
 from tqdm import tqdm
 
-from ..stamp import repository_root, source_stamp, write_file
-from . import artifacts, registry
-from .clean import clean
-from .execute import NotebookError, check_parameters, execute
-from .ledger import enter, seconds_if_current
-from .readme import write_readme
+from ..repository import PACKAGE, code_hash, repository_root, write_file
+from .artifacts import folder_problems, read_records, with_palette, write_index
+from .claims import write_pages
+from .compare import refresh, same_notebook
 
 PROFILES = ("full", "quick")
 AT_ONCE = 3  # notebooks: where one waits for the last task of a sweep, another goes on
-SYSTEMS_TABLE = "table_systems"  # printed after a run of its notebook, or if that is up to date
+CELL_TIMEOUT = 3600  # seconds; papermill's own default is to wait for ever
+EXECUTED, LOG = "executed.ipynb", "log.txt"  # in the folder of a run
+
+# Papermill, which ends its kernel before itself, also where this process is closed or killed.
+# Ctrl-C is for this process, which then ends it.
+PAPERMILL = """\
+import ctypes, signal, sys
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+for number in (signal.SIGTERM, signal.SIGHUP):
+    signal.signal(number, lambda *_: sys.exit(1))
+if sys.platform == "linux":
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+from papermill.cli import papermill
+papermill()"""
+OPTIONS = ("--kernel", "python3", "--no-progress-bar", "--log-level", "ERROR")
+
+
+class NotebookError(RuntimeError):
+    """A notebook did not run to its end; the message shows the cell and the traceback."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How the run of one notebook ended: `error` is None if every cell completed.
+    """How the run of one notebook ended.
 
-    A notebook that was `up_to_date` was not executed; `seconds` is how long it took when it was.
+    `error` is None if every cell completed; `seconds` is None if nothing had to be executed;
+    `changed` names the figures, tables and executed notebook that were not as before.
     """
 
     notebook: str
-    seconds: float
+    seconds: float | None
     error: str | None = None
-    up_to_date: bool = False
-
-    @property
-    def verdict(self) -> str:
-        """One or two words."""
-        return "up to date" if self.up_to_date else "ok" if self.error is None else "FAILED"
-
-
-@dataclass(frozen=True)
-class Report:
-    """What a run came to: the outcome of each notebook, and what is wrong with the figures.
-
-    `memory` is the peak of the largest process of the run in GB, where the system counts it.
-    """
-
-    outcomes: tuple[Outcome, ...]
-    problems: tuple[str, ...]
-    systems: artifacts.Table | None = None
-    memory: float | None = None
-
-    @property
-    def ok(self) -> bool:
-        """True if every notebook ran to its end and the folder of figures adds up."""
-        return not self.problems and all(outcome.error is None for outcome in self.outcomes)
+    changed: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        width = max((len(outcome.notebook) for outcome in self.outcomes), default=0)
-        lines = [] if self.systems is None else [self.systems.caption, "", str(self.systems), ""]
-        for outcome in self.outcomes:
-            seconds, verdict = outcome.seconds, outcome.verdict
-            lines.append(f"{outcome.notebook:<{width}}  {seconds:7.1f} s  {verdict}")
-        lines += [f"figures: {problem}" for problem in self.problems]
-        executed = [outcome for outcome in self.outcomes if not outcome.up_to_date]
-        failed = sum(outcome.error is not None for outcome in executed)
-        if executed and self.memory is not None:
-            lines.append(f"largest process: {self.memory:.2f} GB at its peak")
-        lines.append(
-            f"{len(executed)} run in {sum(outcome.seconds for outcome in executed):.1f} s, "
-            f"{len(self.outcomes) - len(executed)} up to date, {failed} failed"
-        )
-        return "\n".join(lines)
+        took = "up to date" if self.seconds is None else f"{self.seconds:.1f} s"
+        changed = f", changed: {', '.join(self.changed)}" if self.changed else ""
+        failed = f"FAILED\n\n{self.error}\n" if self.error else ""
+        return f"{self.notebook}: {failed or took}{changed}"
 
 
 def find_notebooks(root: str | os.PathLike) -> tuple[Path, ...]:
-    """The source halves (``notebooks/*.py``) of a repository's notebooks, in order."""
-    return tuple(sorted((Path(root) / "notebooks").glob("*.py")))
+    """The source halves of a repository's notebooks, in order."""
+    return tuple(sorted(Path(root, "notebooks").glob("[0-9][0-9]_*.py")))
 
 
 def select_notebooks(names: Iterable[str], root: str | os.PathLike) -> tuple[Path, ...]:
@@ -102,18 +88,17 @@ def select_notebooks(names: Iterable[str], root: str | os.PathLike) -> tuple[Pat
     ValueError
         If a name fits no notebook; the message lists those there are.
     """
-    known = {path.stem: path for path in find_notebooks(root)}
-    chosen = set()
+    known, chosen = find_notebooks(root), set()
     for name in names:
         stem = Path(name).name.removesuffix(".py").removesuffix(".ipynb")
-        fitting = [n for n in known if n == stem or n.startswith(f"{stem}_")] if stem else []
+        fitting = {p for p in known if stem and f"{p.stem}_".startswith(f"{stem}_")}
         if not fitting:
+            there = ", ".join(path.stem for path in known) or "(there are none)"
             raise ValueError(
-                f"notebook: expected one of {', '.join(known) or '(there are none)'}, "
-                f"its number or its path, got {str(name)!r}"
+                f"notebook: expected one of {there}, its number or its path, got {str(name)!r}"
             )
-        chosen.update(fitting)
-    return tuple(path for name, path in known.items() if name in chosen or not chosen)
+        chosen |= fitting
+    return tuple(path for path in known if path in chosen or not chosen)
 
 
 def run(
@@ -124,8 +109,8 @@ def run(
     force: bool = False,
     dask: str | None = None,
     root: str | os.PathLike | None = None,
-) -> Report:
-    """Execute notebooks, three at a time, and write what they make; goes on after a failure.
+) -> list[Outcome]:
+    """Execute notebooks, three at a time, and write what differs; goes on after a failure.
 
     Parameters
     ----------
@@ -135,10 +120,10 @@ def run(
         Handed to each notebook as its parameter `profile`.
     output : path, optional
         Folder that receives notebooks/ (executed) and figures/. By default the repository itself
-        in the full profile and build/quick in the quick one. A notebook that fails leaves its
-        executed half as it was.
+        in the full profile and build/quick in the quick one. A notebook that fails changes nothing
+        there; what it made until then lies in build/runs/ of the output.
     force : bool
-        Execute also what is up to date: executed here by the same code, outputs in place.
+        Execute also what has been executed here with the same code.
     dask : str, optional
         Address of a Dask scheduler: what a notebook sweeps runs on its workers (see `sweep`).
     root : path, optional
@@ -146,7 +131,8 @@ def run(
 
     Returns
     -------
-    Report
+    list of Outcome
+        Of the notebooks in order; and one of the name "figures", if their folder does not add up.
 
     Raises
     ------
@@ -157,166 +143,244 @@ def run(
         If there is no repository around the working directory.
     """
     root = repository_root() if root is None else Path(root).resolve()
-    output = _output(profile, output, root)
-    figures, chosen = output / "figures", select_notebooks(notebooks, root)
+    if profile not in PROFILES:
+        raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
+    output = Path(output or (root if profile == "full" else root / "build" / "quick")).resolve()
+    if profile == "quick" and output == root:
+        raise ValueError(
+            f"output: the quick profile needs a folder of its own, got {str(output)!r}"
+        )
+    chosen, figures = select_notebooks(notebooks, root), output / "figures"
     for path in chosen:
         check_parameters(path, ["profile"])
-    stamps: dict[str, str | None] = dict.fromkeys(path.stem for path in find_notebooks(root))
-    registry.prune(figures, stamps)  # what a notebook left that has gone
-    outcomes = {}
-    for task, outcome in _outcomes(chosen, profile, output, force, dask):
-        outcomes[task.path] = outcome
-        if outcome.error is None:
-            stamps[task.path.stem] = task.stamp
-            registry.prune(figures, stamps)  # what an earlier version of it left
-            registry.record_run_time(figures, task.path.stem, task.stamp, outcome.seconds)
-            enter(output, task.path, task.stamp, outcome.seconds)
-    problems = _written_pages(figures, stamps, root)
-    done = tuple(outcomes[path] for path in chosen)
-    return Report(done, tuple(problems), _systems_table(figures, done), _largest_process())
+    outcomes = asyncio.run(_outcomes(chosen, profile, output, force, dask))
+    known = {path.stem for path in find_notebooks(root)}
+    for gone in {record["notebook"] for record in read_records(figures).values()} - known:
+        refresh(figures, figures / "none", gone)
+    write_index(figures)
+    if output == root and (root / "docs").is_dir():
+        write_pages(root)
+    if problems := folder_problems(figures):
+        outcomes.append(Outcome("figures", None, "\n".join(problems)))
+        print(outcomes[-1])
+    return outcomes
 
 
-def notebook_stamp(path: str | os.PathLike, profile: str) -> str:
-    """Hash of what a notebook's outputs depend on: profile, code cells, and what these reach.
+def execute(
+    path: str | os.PathLike,
+    parameters: Mapping[str, object],
+    folder: str | os.PathLike,
+    *,
+    environment: Mapping[str, str] | None = None,
+    timeout: float = CELL_TIMEOUT,
+) -> NotebookNode:
+    """Run a notebook's source half through papermill, in its own folder.
 
-    Prose does not count, nor what the code does not use: see `vidsindy_lite.stamp`.
+    Parameters
+    ----------
+    path : path
+        The .py half.
+    parameters : mapping
+        Values for names of the parameters cell.
+    folder : path
+        Receives the executed notebook and what was written to stderr.
+    environment : mapping of str to str, optional
+        Environment variables for the kernel, beside those of this process.
+    timeout : float
+        Seconds that one cell may take.
+
+    Returns
+    -------
+    NotebookNode
+        As papermill leaves it; see `tidy`.
+
+    Raises
+    ------
+    ValueError
+        On an unknown parameter.
+    NotebookError
+        If the kernel does not start, or if a cell raises, takes too long, ends the kernel, or
+        stops the run early: after ``sys.exit(0)`` papermill reports success, but cells were left
+        out.
     """
-    path = Path(path)
-    code = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
-    return source_stamp("\n".join([f"{profile!r}", *code]), path.parent.parent)
+    path, folder = Path(path), Path(folder)
+    check_parameters(path, parameters)
+    return asyncio.run(_execute(path, parameters, folder, environment or {}, timeout))
+
+
+def check_parameters(path: Path, parameters: Iterable[str]) -> None:
+    """Check that a notebook's parameters cell has these parameters (papermill only warns)."""
+    known = papermill.inspect_notebook(jupytext.read(path))
+    for name in parameters:
+        if name not in known:
+            raise ValueError(
+                f"parameter: notebook {path.stem} has {', '.join(known) or 'no parameters'} "
+                f"(one `name: type = value  # help` a line in the cell tagged parameters), "
+                f"got {name!r}"
+            )
+
+
+def tidy(executed: NotebookNode, path: str | os.PathLike) -> NotebookNode:
+    """The .ipynb half of a pair: cells and metadata of the .py, outputs of the run.
+
+    Left out is what the source does not have and what differs between two runs: the injected cell,
+    papermill's and the kernel's metadata, what went to stderr, random cell ids. Images get a
+    palette, which keeps a notebook small.
+    """
+    notebook = jupytext.read(path)
+    notebook.metadata.jupytext.pop("text_representation", None)  # is about the .py half
+    ran = [c for c in executed.cells if "injected-parameters" not in c.metadata.get("tags", [])]
+    codes = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    for index, cell in enumerate(notebook.cells):
+        cell.id = f"cell-{index:02d}"
+    twins = (cell for cell in ran if cell.cell_type == "code")
+    for count, (cell, twin) in enumerate(zip(codes, twins, strict=True), start=1):
+        cell.execution_count = count
+        cell.outputs = [output for output in twin.outputs if output.get("name") != "stderr"]
+        for output in cell.outputs:
+            if "execution_count" in output:
+                output.execution_count = count
+            if png := output.get("data", {}).get("image/png"):
+                small = with_palette(base64.b64decode(png))
+                output.data["image/png"] = base64.b64encode(small).decode() + "\n"
+    return notebook
 
 
 # ------------------------------------------------------------------------------------------ details
 
 
-@dataclass(frozen=True)
-class _Task:
-    """One notebook to execute, and how."""
+async def _outcomes(
+    paths: Sequence[Path], profile: str, output: Path, force: bool, dask: str | None
+) -> list[Outcome]:
+    """How the notebooks end, the longest begun first, so that none runs on alone for long."""
+    turns, environment = asyncio.Semaphore(AT_ONCE), {"VIDSINDY_DASK": dask} if dask else {}
+    by_size = sorted(paths, key=lambda path: -path.stat().st_size)
+    works = [_outcome(path, profile, output, force, environment, turns) for path in by_size]
+    with tqdm(total=len(works), desc="notebooks", leave=False, disable=None) as bar:
 
-    path: Path
-    label: str
-    stamp: str
-    profile: str
-    output: Path
-    environment: dict[str, str]
+        async def tick() -> None:
+            while True:
+                await asyncio.sleep(1)
+                bar.refresh()
 
-
-def _output(profile: str, output: str | os.PathLike | None, root: Path) -> Path:
-    """The folder that a run writes to, checked."""
-    if profile not in PROFILES:
-        raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
-    if output is None:
-        output = root if profile == "full" else root / "build" / "quick"
-    output = Path(output).resolve()
-    if profile == "quick" and output == root:
-        raise ValueError(
-            f"output: the quick profile needs a folder of its own, got {str(output)!r}"
-        )
-    return output
+        clock, outcomes = asyncio.create_task(tick()), []
+        for work in asyncio.as_completed(works):
+            outcomes.append(await work)
+            with tqdm.external_write_mode():
+                print(outcomes[-1], flush=True)
+            bar.update()
+        clock.cancel()
+    return sorted(outcomes, key=lambda outcome: outcome.notebook)
 
 
-def _written_pages(figures: Path, stamps: Mapping[str, str | None], root: Path) -> list[str]:
-    """Write the index of the figures, with the repository's own the README; what is wrong."""
-    registry.write_index(figures)
-    problems = registry.check_folder(figures, stamps)
-    if figures == root / "figures" and (root / "README.md").exists():
-        try:
-            write_readme(root)
-        except (ValueError, FileNotFoundError) as missing:
-            problems.append(f"README and docs: {missing}")
-    return problems
-
-
-def _outcomes(
-    chosen: Sequence[Path], profile: str, output: Path, force: bool, dask: str | None
-) -> Iterator[tuple[_Task, Outcome]]:
-    """How each notebook ends: at once what is up to date, then what is executed, as it ends."""
-    figures, due = output / "figures", []
-    for number, path in enumerate(chosen, start=1):
-        stamp = notebook_stamp(path, profile)
-        environment = {
-            "VIDSINDY_FIGURES": str(figures),
-            "VIDSINDY_NOTEBOOK": path.stem,
-            "VIDSINDY_STAMP": stamp,
-            **({"VIDSINDY_DASK": dask} if dask else {}),
-        }
-        label = f"[{number}/{len(chosen)}] {path.stem}"
-        task = _Task(path, label, stamp, profile, output, environment)
-        seconds = None if force else seconds_if_current(output, path, stamp)
-        if seconds is None:
-            due.append(task)
-        else:
-            print(f"{label}: up to date ({seconds:.1f} s when it ran)", flush=True)
-            yield task, Outcome(path.stem, seconds, up_to_date=True)
-    # The longest first, so that none runs on alone for long.
-    usual = registry.load_run_times(figures)
-    yield from _executed(sorted(due, key=lambda task: -usual.get(task.path.stem, 0.0)))
-
-
-def _executed(tasks: Sequence[_Task]) -> Iterator[tuple[_Task, Outcome]]:
-    """The notebooks as they end, begun in this order; each has a kernel, a process of its own."""
-    waiting, running = deque(tasks), dict[Future[Outcome], _Task]()
-    others = psutil.Process().children(recursive=True)
-    # The bar stands still while a notebook runs, but for the clock and what is running.
-    with (
-        ThreadPoolExecutor(AT_ONCE) as pool,
-        tqdm(total=len(tasks), desc="notebooks", leave=False, disable=None) as bar,
-    ):
-        try:
-            while waiting or running:
-                while waiting and len(running) < AT_ONCE:
-                    task = waiting.popleft()
-                    _say(task.label)
-                    running[pool.submit(_outcome, task)] = task
-                bar.set_postfix_str(", ".join(task.path.stem for task in running.values()))
-                for future in wait(running, timeout=1, return_when=FIRST_COMPLETED).done:
-                    task, outcome = running.pop(future), future.result()
-                    failed = f"FAILED\n\n{outcome.error}\n" if outcome.error else ""
-                    _say(f"{task.label}: {failed or f'{outcome.seconds:.1f} s'}")
-                    bar.update()
-                    yield task, outcome
-        finally:
-            while wait(running, timeout=0.1).not_done:  # left early: the kernels end now
-                for process in psutil.Process().children(recursive=True):
-                    with suppress(psutil.NoSuchProcess):
-                        if process not in others:
-                            process.kill()
-
-
-def _outcome(task: _Task) -> Outcome:
-    """Execute a notebook, write its executed half, and tell how it ended."""
-    error, started = None, time.perf_counter()
+async def _outcome(
+    path: Path,
+    profile: str,
+    output: Path,
+    force: bool,
+    environment: dict[str, str],
+    turns: asyncio.Semaphore,
+) -> Outcome:
+    """Execute a notebook, unless this very code has been, and put what it made where it differs."""
+    code = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
+    key = hashlib.sha256("\0".join([code_hash(), *code]).encode()).hexdigest()[:16]
+    kept = output / "build" / "runs" / f"{path.stem}-{profile}" / key
+    running, began, error = kept.with_name(f"running-{os.getpid()}"), None, None
+    changed: list[str] = []
     try:
-        executed = execute(task.path, {"profile": task.profile}, environment=task.environment)
-        half = nbformat.writes(clean(executed, task.path, task.profile, task.stamp)) + "\n"
-        write_file(task.output / "notebooks" / f"{task.path.stem}.ipynb", half.encode())
-    except NotebookError as failure:
+        async with turns:
+            if force or not kept.exists():
+                began = time.perf_counter()
+                _clear(kept.parent)
+                places = {"VIDSINDY_FIGURES": f"{running}/figures", "VIDSINDY_NOTEBOOK": path.stem}
+                await _execute(path, {"profile": profile}, running, environment | places)
+                shutil.rmtree(kept, ignore_errors=True)
+                running.rename(kept)
+        changed = _refresh(path, kept, output)
+    except (NotebookError, ValueError, OSError) as failure:  # such as a full disk: others go on
         error = str(failure)
-    except Exception as failure:  # such as a full disk: the other notebooks go on
-        error = f"{task.path.stem}: {type(failure).__name__}: {failure}"
-    return Outcome(task.path.stem, time.perf_counter() - started, error)
+        with suppress(OSError):  # to be looked at
+            running.rename(kept.with_name("failed"))
+    seconds = None if began is None else time.perf_counter() - began
+    return Outcome(path.stem, seconds, error, tuple(changed))
 
 
-def _say(line: str) -> None:
-    with tqdm.external_write_mode():
-        print(line, flush=True)
+def _clear(folder: Path) -> None:
+    """Remove the earlier runs of a notebook, but those that another process is at."""
+    for run in folder.glob("*"):
+        _, _, process = run.name.partition("running-")
+        if not process or not psutil.pid_exists(int(process)) or int(process) == os.getpid():
+            shutil.rmtree(run, ignore_errors=True)
 
 
-def _largest_process() -> float | None:
-    """Peak memory in GB of the largest process that this one has started, kernels' own included."""
-    if sys.platform == "win32":
-        return None
-    import resource
+def _refresh(path: Path, kept: Path, output: Path) -> list[str]:
+    """Refresh figures, tables and the executed half of a notebook from its run."""
+    changed = refresh(output / "figures", kept / "figures", path.stem)
+    half = output / "notebooks" / f"{path.stem}.ipynb"
+    notebook = tidy(nbformat.read(kept / EXECUTED, 4), path)
+    if changed or not half.exists() or not same_notebook(nbformat.read(half, 4), notebook):
+        write_file(half, (nbformat.writes(notebook) + "\n").encode())
+        changed.append(half.name)
+    return changed
 
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit / 1e9
 
-
-def _systems_table(figures: Path, outcomes: Sequence[Outcome]) -> artifacts.Table | None:
-    """The table of the systems, if its notebook ran or is up to date."""
+async def _execute(
+    path: Path,
+    parameters: Mapping[str, object],
+    folder: Path,
+    environment: Mapping[str, str],
+    timeout: float = CELL_TIMEOUT,
+) -> NotebookNode:
+    """Have papermill execute a notebook into a folder; its kernel imports this very package."""
+    folder.mkdir(parents=True, exist_ok=True)
+    nbformat.write(jupytext.read(path), folder / EXECUTED)
+    paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH")]
+    variables = {
+        # Sums do not depend on the number of cores, and joblib's workers do not fight over them.
+        "OMP_NUM_THREADS": "1",
+        "OPENCV_FOR_THREADS_NUM": "1",
+        **os.environ,
+        **environment,
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "PYTHONHASHSEED": "0",  # the order of a set is then the same in every run
+    }
+    command: list[str | Path] = [
+        sys.executable, "-c", PAPERMILL, folder / EXECUTED, folder / EXECUTED, *OPTIONS,
+        "--cwd", path.parent, "--execution-timeout", str(round(timeout)),
+        "-y", json.dumps(dict(parameters)),
+    ]  # fmt: skip
+    with open(folder / LOG, "w") as log:
+        process = await asyncio.create_subprocess_exec(
+            *command, env=variables, stdout=log, stderr=log
+        )
     try:
-        table = artifacts.load_table(SYSTEMS_TABLE, figures)
-    except FileNotFoundError:
-        return None
-    succeeded = {outcome.notebook for outcome in outcomes if outcome.error is None}
-    return table if table.notebook in succeeded else None
+        status = await process.wait()
+    finally:
+        with suppress(ProcessLookupError):  # it has ended
+            process.terminate()
+            await process.wait()
+    return _whole(path, folder, status)
+
+
+def _whole(path: Path, folder: Path, status: int) -> NotebookNode:
+    """What papermill has executed, which ended with a status; an error if it is not all."""
+    executed = nbformat.read(folder / EXECUTED, as_version=4)
+    codes = [cell for cell in executed.cells if cell.cell_type == "code" and cell.source.strip()]
+    ended = [
+        cell for cell in codes
+        if cell.execution_count is None or cell.metadata.papermill.status != "completed"
+    ]  # fmt: skip
+    if status == 0 and not ended:
+        return executed
+    log = (folder / LOG).read_text("utf-8", "replace").strip().splitlines() or ["no word of it"]
+    for cell in codes:
+        for output in cell.outputs:
+            if output.output_type == "error":
+                source = "\n".join(f"    {line}" for line in cell.source.splitlines())
+                what = [
+                    strip_color("\n".join(output.traceback)),
+                    *(x for x in log if "timed out" in x),
+                ]
+                where = f"{path.stem}, cell In [{cell.execution_count}]:\n\n{source}"
+                raise NotebookError("\n\n".join([where, *what]))
+    raise NotebookError(f"{path.stem} did not run to its end: {log[-1]}")

@@ -6,14 +6,15 @@ import json
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
+from operator import attrgetter
 from typing import Any, cast
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from ..arrays import Bools, Floats
 from ..checks import check_output, check_path
+from ..values import decoded, encoded
 from .candidates import Library, harmonic
 from .discovery import Discovery
 from .history import Step
@@ -38,8 +39,8 @@ def write(found: Discovery, path: str | os.PathLike) -> None:
     file = check_output("path", path)
     content = {
         "format": FORMAT,
-        "functions": _encoded(_values(found)),
-        "discovery": _encoded(found),
+        "functions": encoded(_values(found), str),
+        "discovery": encoded(found, attrgetter("__name__"), (Function,)),
     }
     text = json.dumps(content, indent=1)
     file.write_text(text + "\n", encoding="utf-8")
@@ -64,8 +65,8 @@ def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
         raise FileNotFoundError(f"{message}, which does not exist")
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-        found = _decoded(content["discovery"]) if content["format"] == FORMAT else None
-        values = _decoded(content.get("functions"))
+        found = decoded(content["discovery"], _built) if content["format"] == FORMAT else None
+        values = decoded(content.get("functions"), _built)
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(message) from error
     if not isinstance(found, Discovery):
@@ -145,28 +146,6 @@ def _check_alike(found: Discovery, written: Floats) -> None:
         )
 
 
-def _encoded(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return {"type": "array", "dtype": value.dtype.kind, "values": value.tolist()}
-    if isinstance(value, BSpline):
-        return {"type": "spline", "t": _encoded(value.t), "c": _encoded(value.c), "k": value.k}
-    if isinstance(value, Function):
-        return value.name
-    if is_dataclass(value):
-        parts = {field.name: _encoded(getattr(value, field.name)) for field in fields(value)}
-        return {"type": type(value).__name__, **parts}
-    if isinstance(value, tuple | list):
-        return [_encoded(item) for item in value]
-    return value
-
-
-def _decoded(value: Any) -> Any:
-    if isinstance(value, list):
-        return tuple(_decoded(item) for item in value)
-    if not isinstance(value, dict):
-        return value
-    kind = value["type"]
-    if kind == "array":
-        return np.array(value["values"], dtype={"f": float, "i": int, "b": bool}[value["dtype"]])
-    parts = {name: _decoded(part) for name, part in value.items() if name != "type"}
-    return BSpline(parts["t"], parts["c"], parts["k"]) if kind == "spline" else TYPES[kind](**parts)
+def _built(kind: str, parts: dict[str, Any]) -> Any:
+    """What a file holds under the name of a type."""
+    return TYPES[kind](**parts)

@@ -5,24 +5,28 @@ done with it is a function of this package::
 
     results = sweep(run_trial, grid(["Lorenz"], {"noise": (0, 0.1, 0.2)}, range(5)))
 
-Each result goes to a file as soon as it is there, build/cache/<stamp>/<function>/<task>.pkl in the
+Each result goes to a file as soon as it is there, build/cache/<hash>/<function>/<task>.json in the
 repository, or in place of build/cache the folder that the environment variable VIDSINDY_CACHE
-names. The stamp is that of the code which the function reaches, and of the libraries' pins: other
-code finds no results. A package installed outside a clone of its repository stores nothing.
+names. The hash is that of the code which computes results, and of the libraries' versions: other
+code finds no results. A file holds plain values: it is read, never executed. A package installed
+outside a clone of its repository stores nothing.
 
 The tasks run in processes of this machine, or on a Dask cluster of any size. Two sweeps of this
 machine that share tasks may run at the same time: who comes second waits for the first one's
 result.
 
 Why not joblib.Memory: it watches the source of the one function that it wraps, not of what that
-calls; it does not make two processes share a task, nor take a result that a cluster computed. With
-the stamp, the lock and the storing added, it would save no more than the pickling.
+calls; it does not make two processes share a task, nor take a result that a cluster computed; and
+it stores pickles, which whoever can write into the folder makes run.
 """
 
 import hashlib
+import importlib
+import json
 import os
-import pickle
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -30,13 +34,12 @@ from uuid import uuid4
 
 from tqdm import tqdm
 
-from ..stamp import PACKAGE, code_stamp, repository_root, write_file
+from ..repository import PACKAGE, RESULTLESS, code_hash, repository_root, write_file
+from ..values import decoded, encoded
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 Function = Callable[[Task], Result]
-
-_DIGEST = hashlib.sha256().digest_size
 
 
 class TaskError(RuntimeError):
@@ -56,7 +59,8 @@ def sweep(
     Parameters
     ----------
     function : callable
-        A top-level function of this package, of one task. Its result must be picklable.
+        A top-level function of this package, of one task. Its result has to be made of numbers,
+        text, None, arrays, dataclasses of this package, and tuples, lists and dicts of them.
     tasks : iterable
         Frozen dataclasses of numbers, text and tuples of them: a result is stored under the repr.
     jobs : int
@@ -87,7 +91,7 @@ def sweep(
     _check(function, tasks, jobs)
     address = dask or os.environ.get("VIDSINDY_DASK")
     files = _files(function, tasks)
-    results = _stored(files)
+    results = _stored(files, tasks)
     todo = {number: task for number, task in enumerate(tasks) if number not in results}
     if address:
         work = _on_cluster(function, todo, address, files)
@@ -144,10 +148,10 @@ def _remember(function: Function[Task, Result], task: Task, file: Path | None) -
 
     file.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{file}.lock"):
-        results = _stored({0: file})
+        results = _stored({0: file}, [task])
         if not results:
             results[0] = function(task)
-            _store(file, results[0])
+            _store(file, task, results[0])
     return results[0]
 
 
@@ -197,8 +201,8 @@ def _on_cluster(
         ) from None
     with Client(address) as client:
         client.wait_for_workers(1, timeout=60)
-        ours, theirs = code_stamp(function), client.run(code_stamp, function)
-        differing = [worker for worker, stamp in theirs.items() if stamp != ours]
+        ours, theirs = code_hash(RESULTLESS), client.run(code_hash, RESULTLESS)
+        differing = [worker for worker, other in theirs.items() if other != ours]
         if differing:
             raise RuntimeError(
                 f"dask: all workers must have this very code of {PACKAGE.name}, "
@@ -209,7 +213,7 @@ def _on_cluster(
         futures = client.map(partial(_call, function), todo, todo.values(), key=keys)
         for _, (number, result) in as_completed(futures, with_results=True):
             if number in files:
-                _store(files[number], result)
+                _store(files[number], todo[number], result)
             yield number, result
 
 
@@ -225,22 +229,57 @@ def _files(function: Callable, tasks: list) -> dict[int, Path]:
     named = os.environ.get("VIDSINDY_CACHE")
     cache = Path(named) if named else root / "build" / "cache"
     module = function.__module__.removeprefix(f"{PACKAGE.name}.")
-    folder = cache / code_stamp(function, root) / f"{module}.{function.__name__}"
+    folder = cache / code_hash(RESULTLESS) / f"{module}.{function.__name__}"
     names = [hashlib.sha256(repr(task).encode()).hexdigest()[:32] for task in tasks]
-    return {number: folder / f"{name}.pkl" for number, name in enumerate(names)}
+    return {number: folder / f"{name}.json" for number, name in enumerate(names)}
 
 
-def _store(file: Path, result: object) -> None:
-    content = pickle.dumps(result)
-    write_file(file, content + hashlib.sha256(content).digest())
+def _store(file: Path, task: object, result: object) -> None:
+    content = json.dumps({"task": repr(task), "result": encoded(result, _place)})
+    try:
+        write_file(file, f"{_digest(content)}\n{content}\n".encode())
+    except OSError as error:  # such as a full disk, or a folder in its place
+        warnings.warn(f"a result is not stored: {error}", stacklevel=2)
 
 
-def _stored(files: Mapping[int, Path]) -> dict[int, Any]:
-    """The results that are stored as they were written: the digest at the end says so."""
+def _stored(files: Mapping[int, Path], tasks: list) -> dict[int, Any]:
+    """The results that are stored as they were written; any other file is told, and goes."""
     results = {}
     for number, file in files.items():
-        content = file.read_bytes() if file.exists() else b""
-        result, digest = content[:-_DIGEST], content[-_DIGEST:]
-        if hashlib.sha256(result).digest() == digest:
-            results[number] = pickle.loads(result)
+        if not file.is_file():
+            continue
+        try:
+            digest, content = file.read_text("utf-8").splitlines()
+            entry = json.loads(content) if digest == _digest(content) else {}
+            if entry["task"] != repr(tasks[number]):
+                raise ValueError("of another task")
+            results[number] = decoded(entry["result"], _built)
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, ImportError) as error:
+            problem = f"{type(error).__name__}: {error}"
+            warnings.warn(f"computed again, as {file} holds no result ({problem})", stacklevel=2)
+            file.unlink(missing_ok=True)
     return results
+
+
+def _digest(content: str) -> str:
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def _place(kind: type) -> str:
+    """Where a dataclass of the package is defined."""
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def _built(place: str, parts: dict[str, Any]) -> Any:
+    """A dataclass of the package with these very fields, as its constructor might round them."""
+    module, _, name = place.partition(":")
+    if module.partition(".")[0] != PACKAGE.name:
+        raise ValueError(f"not of the package: {place}")
+    kind = getattr(importlib.import_module(module), name)
+    names = {field.name for field in fields(kind)} if is_dataclass(kind) else {None}
+    if parts.keys() != names:
+        raise ValueError(f"no such dataclass: {place} of {', '.join(parts)}")
+    value = kind(**{field.name: parts[field.name] for field in fields(kind) if field.init})
+    for name, part in parts.items():
+        object.__setattr__(value, name, part)
+    return value

@@ -20,7 +20,7 @@ from tqdm import trange
 
 from ..arrays import Floats, Floats32, Image
 from ..checks import check_integer, check_path
-from ..stamp import write_file
+from ..repository import write_file
 from .detector import WEIGHTS
 from .network import STRIDE, Network, anchors, as_input
 from .rendering import LabelledFrame, draw_frames
