@@ -138,7 +138,7 @@ for start in np.linspace(0, len(gappy), 7).astype(int)[1:-1]:  # five gaps of 4 
     gappy[start : start + len(gappy) // 25] = np.nan
 for name, x in ((f"noise of {share:.0%}", noisy), ("20 % hidden", gappy)):
     law = discover(one.t, x, systematic=one.systematic, order=1)
-    print(f"{name}: {score(law, one.truth)}\n{law.equations()}\n")
+    print(f"{name}:\n{law.equations()}\n")
     assert score(law, one.truth).exact
 
 # %% [markdown]

@@ -60,7 +60,7 @@ def test_figure_and_numbers_are_written_the_same_twice(folder, figure):
         assert record.pop("numbers") == {"x": [0, 1, 2], "y": [0.333333, None, None], "n": 3}
         assert record == {
             "id": "fig_2", "kind": "figure", "notebook": "01_first",
-            "caption": "A square in words.", "tolerance": {"y": 0.1},
+            "caption": "A square in words.", "tolerance": {"y": 0.1}, "words": ["square"],
         }  # fmt: skip
     assert plt.fignum_exists(figure.number)
     assert b"Matplotlib" not in contents(folder)["fig_2.png"]

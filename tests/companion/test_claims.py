@@ -2,7 +2,7 @@
 
 import pytest
 
-from vidsindy_lite.companion.claims import claims_of
+from vidsindy_lite.companion.claims import claims_of, pages
 from vidsindy_lite.repository import PACKAGE
 
 ROOT = PACKAGE.parent
@@ -93,3 +93,20 @@ def test_a_claim_without_a_check_is_seen(page, old, new):
     page.write_text(CELLS.replace(old, new, 1))
     with pytest.raises(ValueError, match=r"01_one.py: no (check|assertion)"):
         claims_of(page)
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/claims.md"])
+def test_pages_after_the_notebooks_are_those_of_now(name):
+    assert pages(ROOT)[name] == (ROOT / name).read_text("utf-8")
+
+
+def test_another_law_is_seen(page):
+    root = page.parent.parent
+    (root / "figures" / "tour.json").write_text('{"numbers": {"equations": ["dx/dt = y"]}}')
+    (root / "README.md").write_text("<!-- equations -->\nold\n<!-- end -->\n")
+    (root / "docs" / "claims.md").write_text("<!-- claims -->\n<!-- end -->\n")
+    (root / "notebooks" / "02_two.py").unlink()
+    page.write_text(CELLS.replace("; 02: two > 1", ""))
+    said = pages(root)
+    assert said["README.md"] == "<!-- equations -->\n```\ndx/dt = y\n```\n<!-- end -->\n"
+    assert "* One and one are two" in said["docs/claims.md"]

@@ -15,6 +15,7 @@ from vidsindy_lite.companion.compare import (
     looks_the_same,
     refresh,
     same_notebook,
+    same_text,
     write_differences,
 )
 
@@ -132,9 +133,10 @@ def shifted(pixels, share):
     ("pixels", "same"),
     [
         (shifted(LINE, 0.1), True),
+        (np.roll(LINE, 2, axis=0), True),
         (np.minimum(LINE.astype(int) + 3, 255).astype(np.uint8), True),
-        (np.roll(LINE, 4, axis=0), False),
-        (np.where(LINE == 114, 180, LINE).astype(np.uint8), False),
+        (np.roll(LINE, 9, axis=0), False),
+        (np.where(LINE == (0, 114, 178), (213, 94, 0), LINE).astype(np.uint8), False),
         (LINE[:-1], False),
     ],
 )
@@ -160,7 +162,7 @@ def test_a_picture_of_wall_times_stays_if_the_other_numbers_do(folders):
     assert refresh(*folders, "01_first") == ["fig_1"]
 
 
-@pytest.mark.parametrize("change", [{"caption": "B."}, {"tolerance": {"n": 0.1}}])
+@pytest.mark.parametrize("change", [{"caption": "B."}, {"tolerance": 0.1}, {"words": ["time"]}])
 def test_other_words_are_refreshed(folders, change):
     write(folders[1], FIGURE | change)
     assert refresh(*folders, "01_first") == ["fig_1"]
@@ -200,7 +202,8 @@ def notebook(source="print(x)", said="x = 1.0\n", shown="<b>", count=1):
     [
         ({}, True),
         ({"said": "x = 1.0005\n"}, True),
-        ({"said": "x = 1.01\n"}, False),
+        ({"said": "x = 1.1\n"}, True),  # one in the last digit
+        ({"said": "x = 1.2\n"}, False),
         ({"said": "y = 1.0\n"}, False),
         ({"shown": "<i>"}, False),
         ({"source": "print( x)"}, False),
@@ -209,6 +212,22 @@ def notebook(source="print(x)", said="x = 1.0\n", shown="<b>", count=1):
 )
 def test_notebooks_are_compared_by_what_they_say(other, same):
     assert same_notebook(notebook(), notebook(**other)) == same
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("x = 2.50 ± 0.10", "x = 2.50 ± 0.11", True),
+        ("x = 2.50 ± 0.10", "x = 2.50 ± 0.15", False),
+        ("x = 2.50 +- 1.0e-3", "x = 2.51 +- 1.2e-3", True),
+        ("34 of 35", "35 of 35", False),
+        ("1e-15", "3e-15", False),
+        ("5000.1", "5002.1", True),
+        ("dx/dt = 2.0 x", "dx/dt = 2.0 y", False),
+    ],
+)
+def test_texts_are_compared_by_words_and_numbers(one, other, same):
+    assert same_text(one, other) == same_text(other, one) == same
 
 
 def test_what_a_cell_saves_is_compared_where_it_is_saved():

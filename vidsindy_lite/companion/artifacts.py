@@ -30,6 +30,7 @@ import numpy as np
 import pandas as pd
 from IPython.display import HTML, Markdown
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from ..repository import library_versions, repository_root, write_file
@@ -71,7 +72,7 @@ def save_figure(
     *,
     caption: str,
     numbers: Mapping[str, object],
-    tolerance: Mapping[str, float] | None = None,
+    tolerance: float | Mapping[str, float] | None = None,
 ) -> None:
     """Write a figure as PNG with the plotted numbers beside it.
 
@@ -85,9 +86,9 @@ def save_figure(
         The sentence on what to see.
     numbers : mapping of str to array_like
         What is plotted, by name: numbers, text, arrays and nestings of them. NaN becomes null.
-    tolerance : mapping of str to float, optional
-        By how much some of the numbers may differ between two runs, relatively, by name; all others
-        by a thousandth (see `compare.differences`).
+    tolerance : float or mapping of str to float, optional
+        By how much the numbers may differ between two runs, relatively, or some of them, by name;
+        by default a thousandth (see `compare.differences`).
 
     Raises
     ------
@@ -97,6 +98,7 @@ def save_figure(
         If something in `numbers` is none of the above.
     """
     record = _record(figure_id, "figure", caption, "numbers", numbers, tolerance)
+    record["words"] = _words(figure)
     _write(record, ".png", _png(figure))
 
 
@@ -205,6 +207,12 @@ def _png(figure: Figure) -> bytes:
     return with_palette(image.getvalue())
 
 
+def _words(figure: Figure) -> list[str]:
+    """What is written in a figure, but for numbers: titles, labels, legends."""
+    texts = dict.fromkeys(text.get_text() for text in figure.findobj(Text) if text.get_visible())
+    return [text for text in texts if re.search(r"[^\W\d_]", re.sub(r"\\\w+", "", text))]
+
+
 # ------------------------------------------------------------------------------------------- tables
 
 
@@ -213,7 +221,7 @@ def save_table(
     rows: Iterable[Mapping[str, object]],
     *,
     caption: str,
-    tolerance: Mapping[str, float] | None = None,
+    tolerance: float | Mapping[str, float] | None = None,
 ) -> Markdown:
     """Write the record of a table, and show it.
 
@@ -226,7 +234,7 @@ def save_table(
         digits.
     caption : str
         The sentence on what to see.
-    tolerance : mapping of str to float, optional
+    tolerance : float or mapping of str to float, optional
         As of `save_figure`, by column.
 
     Returns
@@ -293,7 +301,7 @@ def _record(
     caption: str,
     holds: str,
     content: Mapping | list,
-    tolerance: Mapping[str, float] | None,
+    tolerance: float | Mapping[str, float] | None,
 ) -> dict:
     """A record, checked."""
     if not re.fullmatch(r"[A-Za-z0-9_-]+", artifact_id) or artifact_id == Path(INDEX).stem:
@@ -305,7 +313,7 @@ def _record(
     if not caption:
         raise ValueError(f"caption: {kind} {artifact_id!r} needs a sentence, got an empty one")
     known = {name for row in (content if isinstance(content, list) else [content]) for name in row}
-    if strange := set(tolerance or ()) - known:
+    if strange := set(tolerance if isinstance(tolerance, Mapping) else ()) - known:
         raise ValueError(
             f"tolerance: must name what is in {kind} {artifact_id!r} ({', '.join(sorted(known))}), "
             f"got {', '.join(sorted(strange))}"
@@ -315,7 +323,7 @@ def _record(
         "kind": kind,
         "notebook": os.environ.get("VIDSINDY_NOTEBOOK", "interactive"),
         "caption": caption,
-        **({"tolerance": dict(tolerance)} if tolerance else {}),
+        **({"tolerance": as_json(tolerance, "tolerance")} if tolerance else {}),
         holds: as_json(content, holds, DIGITS),
     }
 

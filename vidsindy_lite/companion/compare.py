@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from nbformat import NotebookNode
 from PIL import Image, ImageSequence
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from ..checks import check_path
 from ..repository import write_file
@@ -24,12 +25,15 @@ from .pages import page
 
 TOLERANCE = 1e-3  # of a number, relative, where its record states no other
 ROUNDING = 1e-9  # of the largest of its list: what is zero but for rounding has no digits
-SQUARE = 4  # pixels: a picture is looked at in squares of this side
+ERROR_BAR = 0.2  # of what stands after a +-
+SQUARE = 2  # pixels: a picture is looked at in squares of this side,
+NEAR = 5  # and what was anywhere in so many by so many of them, may be in their middle
 VISIBLE = 24  # grey levels by which the mean of a square differs so that one sees it
+FEW = 0.002  # share of such squares of which one takes no notice
 TIMES = "seconds"  # what is called so differs from run to run, and counts nowhere
 
 _PAGE_MARK = '<meta name="generator" content="vidsindy_lite compare">'
-_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
+_NUMBER = re.compile(r"((?:±|\+-) ?)?([-+]?\d+(?:\.(\d+))?(?:e([-+]?\d+))?)", re.IGNORECASE)
 _SAVES = re.compile(r"^save_|= save_", re.MULTILINE)
 
 
@@ -38,8 +42,9 @@ def differences(
 ) -> dict[str, str]:
     """Which figures and tables hold other numbers, and where each first differs.
 
-    Numbers may differ by the tolerance that the committed record states for their column or name,
-    or else by `TOLERANCE`. Wall times and captions do not count.
+    Numbers may differ by the tolerance that the committed record states, for all or for their
+    column or name, or else by `TOLERANCE`; texts as in `same_text`. Wall times and captions do not
+    count.
 
     Parameters
     ----------
@@ -163,16 +168,7 @@ def same_notebook(committed: NotebookNode, regenerated: NotebookNode) -> bool:
         [(c.cell_type, c.source, c.metadata) for c in notebook.cells]
         for notebook in (committed, regenerated)
     ]
-    said = [_said(committed), _said(regenerated)]
-    words = [_NUMBER.sub("#", text) for text in said]
-    return (
-        cells[0] == cells[1]
-        and words[0] == words[1]
-        and all(
-            a == b or math.isclose(float(a), float(b), rel_tol=TOLERANCE)
-            for a, b in zip(*map(_NUMBER.findall, said), strict=True)
-        )
-    )
+    return cells[0] == cells[1] and same_text(_said(committed), _said(regenerated))
 
 
 def _said(notebook: NotebookNode) -> str:
@@ -185,15 +181,50 @@ def _said(notebook: NotebookNode) -> str:
     return "\n".join(texts)
 
 
+def same_text(one: str, other: str) -> bool:
+    """Whether two texts have the same words, integers, and nearly the same other numbers.
+
+    These may differ by `TOLERANCE`, by one in the last digit, and after a +- by `ERROR_BAR`.
+    """
+    if _NUMBER.sub("#", one) != _NUMBER.sub("#", other):
+        return False
+    for (error, a, *digits), (_, b, *others) in zip(
+        _NUMBER.findall(one), _NUMBER.findall(other), strict=True
+    ):
+        near = ERROR_BAR if error else TOLERANCE
+        last = max(_last_digit(*digits), _last_digit(*others))
+        if a != b and not math.isclose(float(a), float(b), rel_tol=near, abs_tol=1.01 * last):
+            return False
+    return True
+
+
+def _last_digit(decimals: str, exponent: str) -> float:
+    """What one in the last digit of a number is worth; nothing in an integer."""
+    return 10.0 ** (int(exponent or 0) - len(decimals)) if decimals or exponent else 0.0
+
+
 def looks_the_same(one: bytes, other: bytes) -> bool:
-    """Whether one could tell two pictures apart; each frame of an animation counts."""
+    """Whether one would take two pictures for one; each frame of an animation counts.
+
+    What has moved by a few pixels is the same, as between two processors.
+    """
+    images = [Image.open(io.BytesIO(picture)) for picture in (one, other)]
+    if images[0].size != images[1].size:
+        return False
     frames = [
         [np.asarray(f.convert("RGB").reduce(SQUARE), float) for f in ImageSequence.Iterator(image)]
-        for image in (Image.open(io.BytesIO(one)), Image.open(io.BytesIO(other)))
+        for image in images
     ]
-    return [f.shape for f in frames[0]] == [f.shape for f in frames[1]] and all(
-        np.abs(a - b).max() <= VISIBLE for a, b in zip(*frames, strict=True)
+    return len(frames[0]) == len(frames[1]) and all(
+        max(_strange(a, b), _strange(b, a)) <= FEW for a, b in zip(*frames, strict=True)
     )
+
+
+def _strange(one: np.ndarray, other: np.ndarray) -> float:
+    """Share of the squares of a picture whose colour is nowhere near them in another."""
+    size = (NEAR, NEAR, 1)
+    low, high = minimum_filter(other, size), maximum_filter(other, size)
+    return float(((one < low - VISIBLE) | (one > high + VISIBLE)).any(axis=-1).mean())
 
 
 # ------------------------------------------------------------------------------------------ details
@@ -214,7 +245,7 @@ def _records(name: str, folder: str | os.PathLike) -> dict[str, dict]:
 
 def _first_difference(one: dict, other: dict) -> str | None:
     """Where the numbers of two records first differ, in words."""
-    tolerance = one.get("tolerance", {})
+    tolerance = one.get("tolerance", TOLERANCE)
     if "rows" not in one or "rows" not in other:
         return next(_unlike(one.get("numbers"), other.get("numbers"), "", tolerance), None)
     if len(one["rows"]) != len(other["rows"]):
@@ -243,6 +274,8 @@ def _unlike(
         near = TOLERANCE if isinstance(tolerance, dict) else tolerance
         if not math.isclose(one, other, rel_tol=near, abs_tol=max(near * size, ROUNDING)):
             yield f"{place.strip()}: {one} committed, {other} regenerated"
+    elif isinstance(one, str) and isinstance(other, str) and same_text(one, other):
+        return
     elif one != other:
         yield f"{place.strip()}: {one!r:.60} committed, {other!r:.60} regenerated"
 
@@ -252,7 +285,7 @@ def _same(old: dict, new: dict, committed: Path, regenerated: Path) -> bool:
 
     A picture of wall times never does: it stays as it was, if the other numbers are.
     """
-    said = ("kind", "caption", "tolerance")
+    said = ("kind", "caption", "tolerance", "words")
     if [old.get(k) for k in said] != [new.get(k) for k in said] or _first_difference(old, new):
         return False
     files = [[folder / name for name in files_of(old)[1:]] for folder in (committed, regenerated)]

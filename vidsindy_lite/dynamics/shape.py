@@ -325,7 +325,7 @@ def cancelling(law: PolynomialSystem, x: Floats) -> Iterator[str]:
         times = float(np.sqrt((parts**2).mean() / max((sums[:, j] ** 2).mean(), LEAST)))
         if times > CANCELLED:
             yield (
-                f"the terms of d{name}/dt cancel (their sizes add up to {times:.3g} times their "
+                f"the terms of d{name}/dt cancel (their sizes add up to {times:.1g} times their "
                 "sum): something is constant on these data; look for it, or add runs from other "
                 "starts"
             )
