@@ -492,7 +492,7 @@ def result_row(noise, name, result, seconds, alpha, beta):
 rows = [result_row(noise, *run) for noise, results in runs.items() for run in results]
 assert all(row["false"] + row["missing"] == 0 for row in rows if row["optimiser"] == "ours")
 caption = "Lorenz in the reference frame (12 terms), the same data for both optimisers."
-save_table("solver_optimisers", rows, caption=caption)
+save_table("solver_optimisers", rows, caption=caption, tolerance={"l2 (%)": 0.2})
 
 # %% [markdown]
 # How they get there, at the higher noise. Both losses are brought to the same units: data loss over the
@@ -516,7 +516,8 @@ def our_step(s):
 # %%
 chosen = np.unique(np.geomspace(1, len(theirs.history), 16).astype(int)) - 1
 rows = [their_step(theirs.history[i]) for i in chosen] + [our_step(s) for s in ours.history]
-save_table("solver_history", rows, caption="Losses and terms on the way, by optimiser.")
+loose = dict.fromkeys(["data loss", "physics loss"], 0.2)
+save_table("solver_history", rows, caption="Losses and terms on the way, by optimiser.", tolerance=loose)
 histories = {
     name: {key: [row[key] for row in rows if row["optimiser"] == name] for key in rows[0]}
     for name in ("paper's", "ours")

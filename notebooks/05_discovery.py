@@ -211,12 +211,12 @@ groups = trialled.groupby("source", sort=False)
 parts = {sources[source]: beside_paper("Table 1", group, two) for source, group in groups}
 table_1 = pd.concat(parts, names=["pixels"]).reset_index(level=0)
 caption = f"Ours and PySINDy on the same tracks, medians of {len(trials)} trials; detector and whole: in whole pixels; 0.001 is 0.001 or less."
-save_table("table_1", table_1.to_dict("records"), caption=caption)
+save_table("table_1", table_1.to_dict("records"), caption=caption, tolerance={"l2 (e-2)": 0.2})
 
 # %%
 table_S3 = beside_paper("Table S3", results, ("ours", "E-SINDy", "WeakSINDy", "Model-A"))
 caption = "Ours, E-SINDy, WeakSINDy and Model-A, from sub-pixel tracks, medians of the trials; 0.001 is 0.001 or less."
-save_table("table_S3", table_S3.to_dict("records"), caption=caption)
+save_table("table_S3", table_S3.to_dict("records"), caption=caption, tolerance={"l2 (e-2)": 0.2})
 
 # %%
 ours = results[results.method == "ours"]
@@ -253,7 +253,8 @@ for name, mine in ours.groupby("system", sort=False):
         "seconds": shots[0].seconds + mine.seconds.iloc[0],
     })  # fmt: skip
 caption = f"Seven systems from videos, medians of {len(trials)} trials, path errors in scene units; l2 0.001 is 0.001 or less."
-save_table("table_systems", rows, caption=caption)
+loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)", "pixel error (px)", "path error"], 0.2)
+save_table("table_systems", rows, caption=caption, tolerance=loose)
 
 # %%
 assert max(max(film.pixel_error) for film in films) < 0.1
@@ -315,6 +316,8 @@ rows = [
     for row, term in enumerate(law.terms)
     if law.coefficients[row, equation]
 ]  # fmt: skip
+
+# %%
 caption = "Every discovered term in the reference frame, with its standard error, and the truth."
 save_table("table_S2", rows, caption=caption, tolerance={"standard error": 0.1})
 print(len(rows), "terms, stored as table_S2")
@@ -362,8 +365,11 @@ rows = [
 ]  # fmt: skip
 assert all(row["forecast good for (periods)"] > 4 for row in rows)
 assert all(row["from three other starts, least (at most 10)"] > (2 if full else 1) for row in rows)
+
+# %%
 caption = f"Forecast from the first frame and from other points, at most {horizon} periods; the videos last {frames / 100:g}."
-save_table("discovery_forecast", rows, caption=caption)
+loose = dict.fromkeys(["forecast good for (periods)", "from three other starts, least (at most 10)"], 0.2)
+save_table("discovery_forecast", rows, caption=caption, tolerance=loose)
 
 # %%
 shown = {name: (truth[:6000], found[:6000]) for name, (truth, found) in forecasts.items()}
@@ -392,7 +398,8 @@ rows = [
     for row in whole[whole.trial == seed].itertuples()
 ]  # fmt: skip
 caption = "From tracks rounded to whole pixels, one trial."
-save_table("discovery_whole_pixels", rows, caption=caption)
+loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)"], 0.2)
+save_table("discovery_whole_pixels", rows, caption=caption, tolerance=loose)
 
 # %%
 for name, group, share in (("detector", detected, 0.8), ("whole pixels", whole, 0.9)):

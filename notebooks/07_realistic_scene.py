@@ -162,7 +162,8 @@ for n, trial in zip(trials, runs, strict=True):
             "rms error (px)": np.sqrt(np.nanmean(error**2)),
             "largest error (px)": np.nanmax(error),
         })  # fmt: skip
-save_table("scene_tracks", rows, caption="Tracks of the realistic scene, by trial and camera.")
+loose = dict.fromkeys(["rms error (px)", "largest error (px)"], 0.2)
+save_table("scene_tracks", rows, caption="Tracks of the realistic scene, by trial and camera.", tolerance=loose)
 
 # %%
 assert sum(row["hidden (%)"] > 0 for row in rows) > len(rows) / 2
@@ -259,10 +260,13 @@ rows = [
     }
     for n, trial in zip(trials, runs, strict=True)
 ]  # fmt: skip
+
+# %%
 save_table(
     "scene_equations",
     rows,
     caption="Laws discovered from the realistic scene, by trial; 0.001 (e-2) is 0.001 or less.",
+    tolerance={"l2 (e-2)": 0.2, "worst coefficient (%)": 0.2},
 )
 
 # %%

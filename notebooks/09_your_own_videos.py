@@ -215,7 +215,7 @@ for name, results in outcomes.items():
         "suspect": verdicts.count("suspect"),
     })  # fmt: skip
 assert all(row["l2, median"] < 1e-3 for row in rows)
-save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rate.")
+save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rate.", tolerance={"l2, median": 0.2})
 
 # %% [markdown]
 # The coefficients are still good to a thousandth, as the solver allows for trails
@@ -277,7 +277,7 @@ rows = [
 ]  # fmt: skip
 assert np.allclose(lags, (0, late, 0), atol=0.01)
 assert all(abs(row["scale"] / row["scale, true"] - 1) < 1e-3 for row in rows)
-save_table("own_cameras", rows, caption="Lags and cameras as learned; the first was given.")
+save_table("own_cameras", rows, caption="Lags and cameras as learned; the first was given.", tolerance={"residual (px)": 0.2})
 
 # %% [markdown]
 # ### The residuals
@@ -427,7 +427,8 @@ for known, good, bad in zip(rows[::3], rows[1::3], rows[2::3], strict=True):
     assert bad["wrong and ok"] == good["wrong and ok"] == 0
 assert np.mean(right) >= 0.5
 caption = "The same tracks by how the rig is known: without its error, a measured number spoils the path."
-save_table("own_by_hand", rows, caption=caption)
+loose = dict.fromkeys(["path, error / spread (%)", "unit of length, off (%)", "law, l2"], 0.2)
+save_table("own_by_hand", rows, caption=caption, tolerance=loose)
 
 # %% [markdown]
 # With the errors in the file, a rig measured by hand gives the same path as the exact one, and the same coefficients, but for the
@@ -554,7 +555,7 @@ for name, (law, x0, step, asked) in pair.items():
 
 # %%
 caption = "Two targets in three films: one law for both, and who drives whom."
-save_table("own_two_targets", rows, caption=caption)
+save_table("own_two_targets", rows, caption=caption, tolerance={"l2": 0.2})
 assert all(row["exact"] and row["l2"] < 1e-3 for row in rows)
 assert "2 drives 1" in seen["springs"].driven
 assert not full or seen["Lorenz"].driven == "1 moves independently; 1 drives 2 by x1 in dx4/dt"

@@ -184,23 +184,23 @@ def _said(notebook: NotebookNode) -> str:
 def same_text(one: str, other: str) -> bool:
     """Whether two texts have the same words, integers, and nearly the same other numbers.
 
-    These may differ by `TOLERANCE`, by one in the last digit, and after a +- by `ERROR_BAR`.
+    These may differ by `TOLERANCE`, by one in the last digit of the longer one, and after a +- by
+    `ERROR_BAR`.
     """
     if _NUMBER.sub("#", one) != _NUMBER.sub("#", other):
         return False
-    for (error, a, *digits), (_, b, *others) in zip(
-        _NUMBER.findall(one), _NUMBER.findall(other), strict=True
-    ):
-        near = ERROR_BAR if error else TOLERANCE
-        last = max(_last_digit(*digits), _last_digit(*others))
-        if a != b and not math.isclose(float(a), float(b), rel_tol=near, abs_tol=1.01 * last):
-            return False
-    return True
+    pairs = zip(_NUMBER.findall(one), _NUMBER.findall(other), strict=True)
+    return all(_near(bool(error), a, b) for (error, *a), (_, *b) in pairs)
 
 
-def _last_digit(decimals: str, exponent: str) -> float:
-    """What one in the last digit of a number is worth; nothing in an integer."""
-    return 10.0 ** (int(exponent or 0) - len(decimals)) if decimals or exponent else 0.0
+def _near(is_error: bool, one: list[str], other: list[str]) -> bool:
+    """Whether two numbers are nearly the same, each as text, its decimals and its exponent."""
+    (a, *digits), (b, *others) = one, other
+    if a == b or not any(digits) or not any(others):  # integers
+        return a == b
+    last = min(10.0 ** (int(e or 0) - len(decimals)) for decimals, e in (digits, others))
+    near = ERROR_BAR if is_error else TOLERANCE
+    return math.isclose(float(a), float(b), rel_tol=near, abs_tol=1.01 * last)
 
 
 def looks_the_same(one: bytes, other: bytes) -> bool:
