@@ -293,7 +293,8 @@ def test_a_figure_that_cannot_be_drawn_is_seen_without_paper(form):
 def pair(tiny):
     """A pair that passes every gate; its executed half was made without running it."""
     path = tiny.write("01_first", "x = 1", "x + 1")
-    nbformat.write(tidy(jupytext.read(path), path), path.with_suffix(".ipynb"))
+    source = jupytext.read(path)
+    nbformat.write(tidy(source, source), path.with_suffix(".ipynb"))
     return path
 
 

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import cache
 
 import nbformat
 import psutil
@@ -128,7 +129,7 @@ def test_only_other_code_is_executed(good):
 
 
 def test_another_package_is_other_code(good, monkeypatch):
-    monkeypatch.setattr(runner, "code_hash", lambda: "another")
+    monkeypatch.setattr(runner, "code_hash", cache(lambda: "another"))
     (outcome,) = run(root=good.root)
     assert outcome.seconds is not None
     assert outcome.changed == ()

@@ -8,6 +8,7 @@ what is there already.
 
 import asyncio
 import base64
+import copy
 import hashlib
 import json
 import os
@@ -205,7 +206,8 @@ def execute(
     """
     path, folder = Path(path), Path(folder)
     check_parameters(path, parameters)
-    return asyncio.run(_execute(path, parameters, folder, environment or {}, timeout))
+    source = jupytext.read(path)
+    return asyncio.run(_execute(source, path, parameters, folder, environment or {}, timeout))
 
 
 def check_parameters(path: Path, parameters: Iterable[str]) -> None:
@@ -220,14 +222,14 @@ def check_parameters(path: Path, parameters: Iterable[str]) -> None:
             )
 
 
-def tidy(executed: NotebookNode, path: str | os.PathLike) -> NotebookNode:
-    """The .ipynb half of a pair: cells and metadata of the .py, outputs of the run.
+def tidy(executed: NotebookNode, source: NotebookNode) -> NotebookNode:
+    """The .ipynb half of a pair: cells and metadata of the .py (source), outputs of the run.
 
     Left out is what the source does not have and what differs between two runs: the injected cell,
     papermill's and the kernel's metadata, what went to stderr, random cell ids. Images get a
     palette, which keeps a notebook small.
     """
-    notebook = jupytext.read(path)
+    notebook = copy.deepcopy(source)
     notebook.metadata.jupytext.pop("text_representation", None)  # is about the .py half
     ran = [c for c in executed.cells if "injected-parameters" not in c.metadata.get("tags", [])]
     codes = [cell for cell in notebook.cells if cell.cell_type == "code"]
@@ -282,26 +284,30 @@ async def _outcome(
     turns: asyncio.Semaphore,
 ) -> Outcome:
     """Execute a notebook, unless this very code has been, and put what it made where it differs."""
-    code = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
-    key = hashlib.sha256("\0".join([code_hash(), *code]).encode()).hexdigest()[:16]
-    kept = output / "build" / "runs" / f"{path.stem}-{profile}" / key
-    running, began, error = kept.with_name(f"running-{os.getpid()}"), None, None
+    seconds, error = None, None
     changed: list[str] = []
-    try:
-        async with turns:
+    async with turns:
+        code_hash.cache_clear()  # somebody may have edited it meanwhile
+        source = jupytext.read(path)
+        code = [cell.source for cell in source.cells if cell.cell_type == "code"]
+        key = hashlib.sha256("\0".join([code_hash(), *code]).encode()).hexdigest()[:16]
+        kept = output / "build" / "runs" / f"{path.stem}-{profile}" / key
+        running = kept.with_name(f"running-{os.getpid()}")
+        try:
             if force or not kept.exists():
                 began = time.perf_counter()
                 _clear(kept.parent)
                 places = {"VIDSINDY_FIGURES": f"{running}/figures", "VIDSINDY_NOTEBOOK": path.stem}
-                await _execute(path, {"profile": profile}, running, environment | places)
+                asked = {"profile": profile}
+                await _execute(source, path, asked, running, environment | places)
                 shutil.rmtree(kept, ignore_errors=True)
                 running.rename(kept)
-        changed = _refresh(path, kept, output)
-    except (NotebookError, ValueError, OSError) as failure:  # such as a full disk: others go on
-        error = str(failure)
-        with suppress(OSError):  # to be looked at
-            running.rename(kept.with_name("failed"))
-    seconds = None if began is None else time.perf_counter() - began
+                seconds = time.perf_counter() - began
+            changed = _refresh(source, path, kept, output)
+        except (NotebookError, ValueError, OSError) as failure:  # such as a full disk: others go on
+            error = str(failure)
+            with suppress(OSError):  # to be looked at
+                running.rename(kept.with_name("failed"))
     return Outcome(path.stem, seconds, error, tuple(changed))
 
 
@@ -313,11 +319,11 @@ def _clear(folder: Path) -> None:
             shutil.rmtree(run, ignore_errors=True)
 
 
-def _refresh(path: Path, kept: Path, output: Path) -> list[str]:
+def _refresh(source: NotebookNode, path: Path, kept: Path, output: Path) -> list[str]:
     """Refresh figures, tables and the executed half of a notebook from its run."""
     changed = refresh(output / "figures", kept / "figures", path.stem)
     half = output / "notebooks" / f"{path.stem}.ipynb"
-    notebook = tidy(nbformat.read(kept / EXECUTED, 4), path)
+    notebook = tidy(nbformat.read(kept / EXECUTED, 4), source)
     if changed or not half.exists() or not same_notebook(nbformat.read(half, 4), notebook):
         write_file(half, (nbformat.writes(notebook) + "\n").encode())
         changed.append(half.name)
@@ -325,6 +331,7 @@ def _refresh(path: Path, kept: Path, output: Path) -> list[str]:
 
 
 async def _execute(
+    source: NotebookNode,
     path: Path,
     parameters: Mapping[str, object],
     folder: Path,
@@ -333,7 +340,7 @@ async def _execute(
 ) -> NotebookNode:
     """Have papermill execute a notebook into a folder; its kernel imports this very package."""
     folder.mkdir(parents=True, exist_ok=True)
-    nbformat.write(jupytext.read(path), folder / EXECUTED)
+    nbformat.write(source, folder / EXECUTED)
     paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH")]
     variables = {
         # Sums do not depend on the number of cores, and joblib's workers do not fight over them.
