@@ -37,6 +37,7 @@ $(READY): requirements.txt pyproject.toml
 
 figures: $(READY)
 	$(BIN)/python -m vidsindy_lite run $(ONLY) --profile $(if $(QUICK),quick,full) $(if $(FORCE),--force)
+	$(if $(QUICK),,@$(BIN)/python tests/claims.py)
 
 test: $(READY)
 	$(BIN)/python -m pytest $(SPREAD)

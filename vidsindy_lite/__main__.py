@@ -224,9 +224,7 @@ def _run(options: argparse.Namespace) -> int:
     """
     from .companion.run import run
 
-    outcomes = run(
-        options.notebooks, options.profile, options.output, force=options.force, dask=options.dask
-    )
+    outcomes = run(options.notebooks, options.profile, force=options.force)
     failed = [outcome.notebook for outcome in outcomes if outcome.error]
     changed = sum(len(outcome.changed) for outcome in outcomes)
     print(f"\n{changed} outputs changed; failed: {', '.join(failed) or 'none'}")
@@ -381,17 +379,10 @@ COMMANDS = {
     "run": _Command(_run, "execute the notebooks, regenerate figures and tables", {
         "notebooks": words("NOTEBOOK", "number, name or path (default: all)", nargs="*"),
         "--profile": choice("full", ("full", "quick"), "size (default: full)"),
-        "--output": words(
-            "DIR", "folder for notebooks/ and figures/ (default: the repository, or build/quick)"
-        ),
         "--force": {
             "action": "store_true",
             "help": "execute also what has been executed here with the same code",
         },
-        "--dask": words(
-            "ADDRESS",
-            "scheduler of a Dask cluster, e.g. tcp://10.0.0.1:8786, that the sweeps run on"
-        ),
     }),
     "demo": _Command(_demo, "from three videos to the first equation, in a minute", {
         "--system": choice("Lorenz", tuple(SYSTEMS), "default: Lorenz"),

@@ -110,8 +110,10 @@ def test_of_one_notebook_only(folders):
     assert list(differences(*folders, notebook="02_second")) == ["table_1"]
 
 
-def test_what_is_on_one_side_only(folders):
-    (folders[0] / "fig_1.json").unlink()
+@pytest.mark.parametrize("content", [None, "{", "[1]", "null", "{}"])
+def test_what_is_on_one_side_only(folders, content):
+    record = folders[0] / "fig_1.json"
+    record.unlink() if content is None else record.write_text(content)  # a damaged one is none
     (folders[1] / "table_1.json").unlink()
     assert differences(*folders) == {"fig_1": "only regenerated", "table_1": "only committed"}
 
@@ -263,18 +265,6 @@ def test_other_peoples_files_are_not_touched(folders, tmp_path, content):
     assert output.is_dir() if content is None else output.read_text() == content
 
 
-@pytest.mark.parametrize("content", ["{", "[1]", "3", "null", "{}", '"rows"', b"\xff\xfe"])
-@pytest.mark.parametrize("wrong", [0, 1])
-def test_a_strange_file_is_named(folders, tmp_path, capsys, content, wrong):
-    path = folders[wrong] / "strange.json"
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    assert main(["compare", *map(str, folders), "--output", str(tmp_path / "out.html")]) == 2
-    name = ("committed", "regenerated")[wrong]
-    message = f"error: {name}: must hold figures and tables (*.json), got '{path}', which is none"
-    assert message in capsys.readouterr().err
-    assert not (tmp_path / "out.html").exists()
-
-
 def test_the_command_fails_on_a_difference_and_on_nothing(folders, tmp_path, capsys):
     page = str(tmp_path / "out.html")
     assert main(["compare", *map(str, folders), "--output", page]) == 0
@@ -286,4 +276,4 @@ def test_the_command_fails_on_a_difference_and_on_nothing(folders, tmp_path, cap
     assert f"error: committed: must be a folder, got '{nowhere}'" in capsys.readouterr().err
     nowhere.mkdir()
     assert main(["compare", str(folders[0]), str(nowhere), "--output", page]) == 2
-    assert "error: regenerated: must hold figures and tables" in capsys.readouterr().err
+    assert "error: regenerated: must hold figures or tables" in capsys.readouterr().err

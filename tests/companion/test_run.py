@@ -329,8 +329,6 @@ def test_unknown_notebook(tiny, name):
 def test_what_makes_no_sense_is_refused(tiny, tmp_path, monkeypatch, capsys):
     with pytest.raises(ValueError, match="profile: expected one of full, quick, got 'small'"):
         run(profile="small", root=tiny.root)
-    with pytest.raises(ValueError, match="output: the quick profile"):
-        run(profile="quick", output=tiny.root, root=tiny.root)
     monkeypatch.chdir(tmp_path.parent)
     assert main(["run"]) == 2
     assert "repository: expected to be inside a clone" in capsys.readouterr().err

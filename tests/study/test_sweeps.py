@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from vidsindy_lite.__main__ import main
 from vidsindy_lite.repository import PACKAGE
 from vidsindy_lite.study.sweeps import _built, remember, sweep
 from vidsindy_lite.values import decoded
@@ -365,13 +364,6 @@ def test_cluster_with_other_code_is_refused(clone, cluster):
     error = other.fail([[1, 0.0]], VIDSINDY_DASK=cluster)
     assert "all workers must have this very code of vidsindy_lite, got other code on tcp" in error
     assert other.called() == []
-
-
-def test_run_hands_the_cluster_to_the_notebooks(tiny, monkeypatch, capsys):
-    monkeypatch.chdir(tiny.root)
-    tiny.write("01_first", "import os\nassert os.environ['VIDSINDY_DASK'] == 'tcp://10.0.0.1:8786'")
-    assert main(["run", "--dask", "tcp://10.0.0.1:8786"]) == 0
-    assert "VIDSINDY_DASK" not in os.environ
 
 
 # ---------------------------------------------------------------------------------------- bad input

@@ -260,23 +260,6 @@ def save_table(
     return Markdown(table_text(record))
 
 
-def load_table(table_id: str, folder: Path) -> pd.DataFrame:
-    """Read a table of a folder back, its values as they were written.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the folder holds no table of that id; the message lists those it holds.
-    """
-    tables = {n: record for n, record in read_records(folder).items() if "rows" in record}
-    if table_id not in tables:
-        raise FileNotFoundError(
-            f"table_id: expected one of the tables in {folder} ({', '.join(tables) or 'none'}), "
-            f"got {table_id!r}"
-        )
-    return pd.DataFrame(tables[table_id]["rows"], dtype=object)
-
-
 def table_text(record: dict) -> str:
     """A table in Markdown with its caption, four significant digits, numbers to the right."""
 

@@ -30,7 +30,6 @@ from tqdm import tqdm
 
 from ..repository import PACKAGE, code_hash, repository_root, write_file
 from .artifacts import folder_problems, read_records, with_palette, write_index
-from .claims import write_pages
 from .compare import refresh, same_notebook
 
 PROFILES = ("full", "quick")
@@ -105,13 +104,15 @@ def select_notebooks(names: Iterable[str], root: str | os.PathLike) -> tuple[Pat
 def run(
     notebooks: Iterable[str] = (),
     profile: str = "full",
-    output: str | os.PathLike | None = None,
     *,
     force: bool = False,
-    dask: str | None = None,
     root: str | os.PathLike | None = None,
 ) -> list[Outcome]:
     """Execute notebooks, three at a time, and write what differs; goes on after a failure.
+
+    The full profile writes notebooks/*.ipynb and figures/ of the repository, the quick one the same
+    into build/quick/. A notebook that fails changes nothing there; what it made until then lies in
+    build/runs/.
 
     Parameters
     ----------
@@ -119,14 +120,8 @@ def run(
         As of `select_notebooks`.
     profile : {"full", "quick"}
         Handed to each notebook as its parameter `profile`.
-    output : path, optional
-        Folder that receives notebooks/ (executed) and figures/. By default the repository itself
-        in the full profile and build/quick in the quick one. A notebook that fails changes nothing
-        there; what it made until then lies in build/runs/ of the output.
     force : bool
         Execute also what has been executed here with the same code.
-    dask : str, optional
-        Address of a Dask scheduler: what a notebook sweeps runs on its workers (see `sweep`).
     root : path, optional
         The repository; by default the one around the working directory.
 
@@ -138,29 +133,23 @@ def run(
     Raises
     ------
     ValueError
-        Before anything runs: on an unknown profile or notebook, a notebook without the parameter
-        `profile`, or if the quick profile were to overwrite the repository's outputs.
+        Before anything runs: on an unknown profile or notebook, or a notebook without the parameter
+        `profile`.
     FileNotFoundError
         If there is no repository around the working directory.
     """
     root = repository_root() if root is None else Path(root).resolve()
     if profile not in PROFILES:
         raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
-    output = Path(output or (root if profile == "full" else root / "build" / "quick")).resolve()
-    if profile == "quick" and output == root:
-        raise ValueError(
-            f"output: the quick profile needs a folder of its own, got {str(output)!r}"
-        )
+    output = root if profile == "full" else root / "build" / "quick"
     chosen, figures = select_notebooks(notebooks, root), output / "figures"
     for path in chosen:
         check_parameters(path, ["profile"])
-    outcomes = asyncio.run(_outcomes(chosen, profile, output, force, dask))
+    outcomes = asyncio.run(_outcomes(chosen, profile, output, force))
     known = {path.stem for path in find_notebooks(root)}
     for gone in {record["notebook"] for record in read_records(figures).values()} - known:
         refresh(figures, figures / "none", gone)
     write_index(figures)
-    if output == root and (root / "docs").is_dir():
-        write_pages(root)
     if problems := folder_problems(figures):
         outcomes.append(Outcome("figures", None, "\n".join(problems)))
         print(outcomes[-1])
@@ -252,12 +241,12 @@ def tidy(executed: NotebookNode, source: NotebookNode) -> NotebookNode:
 
 
 async def _outcomes(
-    paths: Sequence[Path], profile: str, output: Path, force: bool, dask: str | None
+    paths: Sequence[Path], profile: str, output: Path, force: bool
 ) -> list[Outcome]:
     """How the notebooks end, the longest begun first, so that none runs on alone for long."""
-    turns, environment = asyncio.Semaphore(AT_ONCE), {"VIDSINDY_DASK": dask} if dask else {}
+    turns = asyncio.Semaphore(AT_ONCE)
     by_size = sorted(paths, key=lambda path: -path.stat().st_size)
-    works = [_outcome(path, profile, output, force, environment, turns) for path in by_size]
+    works = [_outcome(path, profile, output, force, turns) for path in by_size]
     with tqdm(total=len(works), desc="notebooks", leave=False, disable=None) as bar:
 
         async def tick() -> None:
@@ -280,7 +269,6 @@ async def _outcome(
     profile: str,
     output: Path,
     force: bool,
-    environment: dict[str, str],
     turns: asyncio.Semaphore,
 ) -> Outcome:
     """Execute a notebook, unless this very code has been, and put what it made where it differs."""
@@ -299,7 +287,7 @@ async def _outcome(
                 _clear(kept.parent)
                 places = {"VIDSINDY_FIGURES": f"{running}/figures", "VIDSINDY_NOTEBOOK": path.stem}
                 asked = {"profile": profile}
-                await _execute(source, path, asked, running, environment | places)
+                await _execute(source, path, asked, running, places)
                 shutil.rmtree(kept, ignore_errors=True)
                 running.rename(kept)
                 seconds = time.perf_counter() - began

@@ -1,8 +1,8 @@
 """Every claim names a check that is there, and one that names none is seen."""
 
 import pytest
+from claims import claims_of, pages
 
-from vidsindy_lite.companion.claims import claims_of, pages
 from vidsindy_lite.repository import PACKAGE
 
 ROOT = PACKAGE.parent

@@ -15,7 +15,7 @@ from pathlib import Path
 import jupytext
 from nbformat import NotebookNode
 
-from ..repository import write_file
+from vidsindy_lite.repository import PACKAGE, write_file
 
 BY = re.compile(r"\s*<!-- by: (.*?) -->", re.DOTALL)
 # What a notebook claims: the items and the answers to the paper under these headings.
@@ -31,22 +31,11 @@ class Claim:
     checks: tuple[str, ...]
 
 
-def write_pages(root: Path) -> None:
-    """Write what README and docs/ say after the notebooks: the tour's law, and all claims.
+def pages(root: Path) -> dict[str, str]:
+    """What README and docs/ say after the notebooks: the tour's law, and all claims; by name.
 
     They stand between a line ``<!-- name -->`` and the next ``<!-- end -->``.
-
-    Parameters
-    ----------
-    root : path
-        The repository, with figures/ as its notebooks have made it.
     """
-    for name, text in pages(root).items():
-        write_file(root / name, text.encode())
-
-
-def pages(root: Path) -> dict[str, str]:
-    """The pages that `write_pages` writes, by name, as they have to be."""
     law = json.loads((root / "figures" / "tour.json").read_text("utf-8"))["numbers"]["equations"]
     sections = []
     for page in [root / "README.md", *sorted((root / "notebooks").glob("*.py"))]:
@@ -147,3 +136,8 @@ def _cells(notebook: str, kind: str) -> list[str]:
 def _read(notebook: str) -> NotebookNode:
     """A notebook from its source half."""
     return jupytext.reads(notebook, "py:percent")
+
+
+if __name__ == "__main__":
+    for name, text in pages(PACKAGE.parent).items():
+        write_file(PACKAGE.parent / name, text.encode())
