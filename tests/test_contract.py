@@ -43,7 +43,7 @@ def test_the_contract_is_kept():
         ("cameras/geometry.py", "def late():\n    from ..study import SYSTEMS"),
         ("vision/video.py", "import vidsindy_lite.pipeline"),
         ("study/systems.py", "from ..companion import artifacts"),
-        ("checks.py", "from .stamp import PACKAGE"),
+        ("checks.py", "from .repository import PACKAGE"),
     ],
 )
 def test_the_gate_sees_an_import_against_it(copy, module, line):

@@ -227,7 +227,7 @@ def test_figures_are_what_the_notebooks_save():
     assert {notebook for notebook, _ in saved} == {path.stem for path in NOTEBOOKS}
     sources = {path.stem: path.read_text("utf-8") for path in NOTEBOOKS}
     assert [one for one in saved if not is_saved(one[1], sources[one[0]])] == []
-    keys = {"id", "kind", "notebook", "caption", "tolerance", "rows", "numbers"}
+    keys = {"id", "kind", "notebook", "caption", "tolerance", "rows", "numbers", "words"}
     assert {key for record in records for key in record} <= keys
 
 
@@ -380,7 +380,7 @@ def test_anatomy_gate_accepts_a_generator_and_fifteen_lines(pair):
     "line",
     [
         "from vidsindy_lite.cameras import Rig",
-        "import vidsindy_lite.stamp",
+        "import vidsindy_lite.repository",
         "def late():\n    from vidsindy_lite.study.metrics import score",
     ],
 )

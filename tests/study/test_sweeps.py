@@ -1,5 +1,6 @@
 """Sweeps in small clones of the repository: killed, edited, damaged, on a cluster."""
 
+import errno
 import json
 import math
 import os
@@ -425,6 +426,22 @@ def test_one_task_is_remembered_by_whoever_asks_next(cache):
     assert sweep(double, [Holder(3), Holder(4)], jobs=1) == [6, 8]
     assert remember(double, Holder(4)) == 8
     assert calls == [Holder(3), Holder(4)]
+
+
+def test_a_full_disk_costs_the_storing_not_the_result(cache, monkeypatch):
+    def full(path, content):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("vidsindy_lite.study.sweeps.write_file", full)
+    with pytest.warns(UserWarning, match="a result is not stored: .*No space left"):
+        assert remember(squared, Holder(3)) == 9
+
+
+def squared(task):
+    return task.values**2
+
+
+squared.__module__ = "vidsindy_lite.toy"
 
 
 def test_the_study_is_imported_without_what_only_parts_of_it_need():
