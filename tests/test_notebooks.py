@@ -13,7 +13,14 @@ import pytest
 from disturbed.undisplayed import FigureCanvas
 from matplotlib.figure import Figure
 
-from vidsindy_lite.companion.artifacts import folder_problems, read_records
+from vidsindy_lite.companion.artifacts import (
+    INDEX,
+    files_of,
+    read_records,
+    save_figure,
+    save_table,
+    write_index,
+)
 from vidsindy_lite.companion.compare import differences
 from vidsindy_lite.companion.run import NotebookError, execute, find_notebooks, tidy
 from vidsindy_lite.repository import PACKAGE
@@ -22,6 +29,7 @@ ROOT = PACKAGE.parent
 NOTEBOOKS = find_notebooks(ROOT)
 REFERENCES = ROOT / "tests" / "quick"  # tables of a quick run
 LARGEST = 600_000  # bytes of an executed notebook; a code host shows no more
+LARGEST_FILE, LARGEST_FOLDER, MOST_FILES = 600_000, 6_000_000, 250  # of figures/; bytes, bytes
 LONGEST = 15  # lines of a code cell
 
 # What a notebook says at its opening and its close, in this order.
@@ -184,6 +192,20 @@ def number_problems(path, figures, references=REFERENCES):
     records = read_records(figures) | read_records(references)
     found = differences(references, figures, path.stem)
     return [f"{name}: {place}" for name, place in found.items() if "rows" in records[name]]
+
+
+def folder_problems(folder):
+    """Files of a record that are missing, files of none, and what is too large or too many."""
+    expected = {INDEX, *(name for r in read_records(folder).values() for name in files_of(r))}
+    sizes = {p.name: p.stat().st_size for p in folder.glob("*") if not p.name.startswith(".")}
+    limits = [(f"{name}: ", size, "bytes", LARGEST_FILE) for name, size in sorted(sizes.items())]
+    limits += [("all files: ", sum(sizes.values()), "bytes", LARGEST_FOLDER)]
+    limits += [("all files: ", len(sizes), "files", MOST_FILES)]
+    return [
+        *(f"{name}: missing" for name in sorted(expected - sizes.keys())),
+        *(f"{name}: no record names it" for name in sorted(sizes.keys() - expected)),
+        *(f"{who}{much} {what}, at most {most}" for who, much, what, most in limits if much > most),
+    ]
 
 
 def orphan_problems(notebooks):
@@ -531,3 +553,42 @@ artifacts.save_table("found", [{"system": "Lorenz", "value": value}], caption="A
     problems = run_problems(path, tmp_path / "run", tmp_path / "references")
     assert len(problems) == names
     assert problems[0].startswith("found: row 0 (Lorenz), column value: 1.0 committed, 1.01")
+
+
+@pytest.fixture
+def complete(tmp_path, monkeypatch):
+    """A folder of figures with a picture, a table and its index."""
+    monkeypatch.setenv("VIDSINDY_FIGURES", str(tmp_path / "figures"))
+    figure = Figure()
+    FigureCanvas(figure)
+    save_figure("fig_2", figure, caption="Empty.", numbers={})
+    save_table("table_1", [{"x": 1}], caption="One.")
+    write_index(tmp_path / "figures")
+    return tmp_path / "figures"
+
+
+@pytest.mark.parametrize("content", [None, "", "{", "[1]", '{"id": 3}'])
+def test_folder_gate_names_what_is_missing_and_what_is_stray(complete, content):
+    assert folder_problems(complete) == []
+    (complete / "fig_2.png").unlink()
+    (complete / "README.md").unlink()
+    record = complete / "table_1.json"
+    record.unlink() if content is None else record.write_text(content)  # a damaged record is none
+    (complete / "old.svg").write_bytes(b"")
+    stray = ["old.svg: no record names it"]
+    stray += [] if content is None else ["table_1.json: no record names it"]
+    assert folder_problems(complete) == ["README.md: missing", "fig_2.png: missing", *stray]
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "problem"),
+    [
+        ("LARGEST_FILE", 999, "fig_2.png: 1000 bytes, at most 999"),
+        ("LARGEST_FOLDER", 999, "all files: .* bytes, at most 999"),
+        ("MOST_FILES", 3, "all files: 4 files, at most 3"),
+    ],
+)
+def test_folder_gate_names_what_would_swell_the_history(complete, monkeypatch, name, most, problem):
+    (complete / "fig_2.png").write_bytes(b" " * 1000)
+    monkeypatch.setitem(globals(), name, most)
+    assert re.fullmatch(problem, "\n".join(folder_problems(complete)))

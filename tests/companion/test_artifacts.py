@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vidsindy_lite.companion import artifacts
 from vidsindy_lite.companion.artifacts import (
-    folder_problems,
     read_records,
     save_animation,
     save_figure,
@@ -77,7 +75,6 @@ def test_animation_is_the_same_bytes_twice(folder):
     assert contents(folder) == first
     write_index(folder)
     assert "![tour](tour.gif)\n\nStripes." in (folder / "README.md").read_text()
-    assert folder_problems(folder) == []
 
 
 def test_a_small_thing_keeps_its_colour_and_white_stays_white_in_noise(folder):
@@ -197,31 +194,3 @@ def test_index_shows_everything_in_order_and_is_the_same_bytes_twice(complete):
     before = contents(complete)
     write_index(complete)
     assert contents(complete) == before
-    assert folder_problems(complete) == []
-
-
-@pytest.mark.parametrize("content", [None, "", "{", "[1]", '{"id": 3}'])
-def test_what_is_missing_and_what_is_stray_is_told(complete, content):
-    (complete / "fig_2.png").unlink()
-    (complete / "README.md").unlink()
-    record = complete / "table_S2.json"
-    record.unlink() if content is None else record.write_text(content)  # a damaged record is none
-    (complete / "old.svg").write_bytes(b"")
-    stray = ["old.svg: no record names it"] + ["table_S2.json: no record names it"] * bool(
-        content is not None
-    )
-    assert folder_problems(complete) == ["README.md: missing", "fig_2.png: missing", *stray]
-
-
-def test_what_would_swell_the_history_is_told(complete, monkeypatch):
-    total = sum(len(content) for content in contents(complete).values())
-    monkeypatch.setattr(artifacts, "LARGEST_FOLDER", total - 1)
-    monkeypatch.setattr(artifacts, "MOST_FILES", 4)
-    monkeypatch.setattr(artifacts, "LARGEST_FILE", total - 2)
-    (complete / "fig_2.png").write_bytes(b" " * total)
-    whole = sum(len(content) for content in contents(complete).values())
-    assert folder_problems(complete) == [
-        f"fig_2.png: {total} bytes, at most {total - 2}",
-        f"all files: {whole} bytes, at most {total - 1}",
-        "all files: 5 files, at most 4",
-    ]

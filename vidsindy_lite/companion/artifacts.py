@@ -41,7 +41,6 @@ INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
 PICTURE = 83  # milliseconds that one of an animation stays
 SLIDER_DPI = 100  # dots per inch of its frames
-LARGEST_FILE, LARGEST_FOLDER, MOST_FILES = 600_000, 6_000_000, 250  # bytes, bytes
 
 
 def versions() -> str:
@@ -360,24 +359,3 @@ def write_index(folder: Path) -> None:
         made.setdefault(record["notebook"], []).append(record)
     tables = {name: table_text(record) for name, record in records.items() if "rows" in record}
     write_file(folder / INDEX, page("index.md", made=made, tables=tables).encode())
-
-
-def folder_problems(folder: Path) -> list[str]:
-    """What is wrong with a folder of figures; an empty list means nothing.
-
-    Returns
-    -------
-    list of str
-        One line per file of a record that is missing, file that no record names, and file that is
-        too large; and one each if there are too many files or bytes in all.
-    """
-    expected = {INDEX, *(name for r in read_records(folder).values() for name in files_of(r))}
-    sizes = {p.name: p.stat().st_size for p in folder.glob("*") if not p.name.startswith(".")}
-    limits = [(f"{name}: ", size, "bytes", LARGEST_FILE) for name, size in sorted(sizes.items())]
-    limits += [("all files: ", sum(sizes.values()), "bytes", LARGEST_FOLDER)]
-    limits += [("all files: ", len(sizes), "files", MOST_FILES)]
-    return [
-        *(f"{name}: missing" for name in sorted(expected - sizes.keys())),
-        *(f"{name}: no record names it" for name in sorted(sizes.keys() - expected)),
-        *(f"{who}{much} {what}, at most {most}" for who, much, what, most in limits if much > most),
-    ]

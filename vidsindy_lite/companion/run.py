@@ -29,7 +29,7 @@ from papermill.exceptions import strip_color
 from tqdm import tqdm
 
 from ..repository import PACKAGE, code_hash, repository_root, write_file
-from .artifacts import folder_problems, read_records, with_palette, write_index
+from .artifacts import read_records, with_palette, write_index
 from .compare import refresh, same_notebook
 
 PROFILES = ("full", "quick")
@@ -128,13 +128,12 @@ def run(
     Returns
     -------
     list of Outcome
-        Of the notebooks in order; and one of the name "figures", if their folder does not add up.
+        Of the notebooks, in order.
 
     Raises
     ------
     ValueError
-        Before anything runs: on an unknown profile or notebook, or a notebook without the parameter
-        `profile`.
+        On an unknown profile or notebook, before anything runs.
     FileNotFoundError
         If there is no repository around the working directory.
     """
@@ -143,16 +142,11 @@ def run(
         raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
     output = root if profile == "full" else root / "build" / "quick"
     chosen, figures = select_notebooks(notebooks, root), output / "figures"
-    for path in chosen:
-        check_parameters(path, ["profile"])
     outcomes = asyncio.run(_outcomes(chosen, profile, output, force))
     known = {path.stem for path in find_notebooks(root)}
     for gone in {record["notebook"] for record in read_records(figures).values()} - known:
         refresh(figures, figures / "none", gone)
     write_index(figures)
-    if problems := folder_problems(figures):
-        outcomes.append(Outcome("figures", None, "\n".join(problems)))
-        print(outcomes[-1])
     return outcomes
 
 
@@ -194,21 +188,14 @@ def execute(
         out.
     """
     path, folder = Path(path), Path(folder)
-    check_parameters(path, parameters)
     source = jupytext.read(path)
+    known = papermill.inspect_notebook(source)
+    if strange := parameters.keys() - known:
+        raise ValueError(
+            f"parameters: notebook {path.stem} has {', '.join(known) or 'none'} (one `name: type = "
+            f"value  # help` a line in the cell tagged parameters), got {', '.join(strange)}"
+        )
     return asyncio.run(_execute(source, path, parameters, folder, environment or {}, timeout))
-
-
-def check_parameters(path: Path, parameters: Iterable[str]) -> None:
-    """Check that a notebook's parameters cell has these parameters (papermill only warns)."""
-    known = papermill.inspect_notebook(jupytext.read(path))
-    for name in parameters:
-        if name not in known:
-            raise ValueError(
-                f"parameter: notebook {path.stem} has {', '.join(known) or 'no parameters'} "
-                f"(one `name: type = value  # help` a line in the cell tagged parameters), "
-                f"got {name!r}"
-            )
 
 
 def tidy(executed: NotebookNode, source: NotebookNode) -> NotebookNode:
@@ -244,23 +231,18 @@ async def _outcomes(
     paths: Sequence[Path], profile: str, output: Path, force: bool
 ) -> list[Outcome]:
     """How the notebooks end, the longest begun first, so that none runs on alone for long."""
-    turns = asyncio.Semaphore(AT_ONCE)
+    turns, outcomes = asyncio.Semaphore(AT_ONCE), []
     by_size = sorted(paths, key=lambda path: -path.stat().st_size)
-    works = [_outcome(path, profile, output, force, turns) for path in by_size]
+    works = {asyncio.create_task(_outcome(path, profile, output, force, turns)) for path in by_size}
     with tqdm(total=len(works), desc="notebooks", leave=False, disable=None) as bar:
-
-        async def tick() -> None:
-            while True:
-                await asyncio.sleep(1)
-                bar.refresh()
-
-        clock, outcomes = asyncio.create_task(tick()), []
-        for work in asyncio.as_completed(works):
-            outcomes.append(await work)
-            with tqdm.external_write_mode():
-                print(outcomes[-1], flush=True)
-            bar.update()
-        clock.cancel()
+        while works:
+            done, works = await asyncio.wait(works, timeout=1)
+            for outcome in (work.result() for work in done):
+                outcomes.append(outcome)
+                with tqdm.external_write_mode():
+                    print(outcome, flush=True)
+            bar.update(len(done))
+            bar.refresh()
     return sorted(outcomes, key=lambda outcome: outcome.notebook)
 
 
