@@ -101,17 +101,16 @@ def write_differences(
         As of `differences`, or if another file is at `output`.
     """
     output = check_path("output", output)
-    if output.exists() and not (
-        output.is_file() and _PAGE_MARK in output.read_text("utf-8", "replace")
-    ):
+    earlier = output.read_text("utf-8", "replace") if output.is_file() else ""
+    if output.exists() and _PAGE_MARK not in earlier:
         raise ValueError(f"output: must be a new file or an earlier comparison, got '{output}'")
     found = differences(committed, regenerated)
     pictures = {
-        name: [
-            base64.b64encode(picture.read_bytes()).decode()
-            for side in (committed, regenerated)
-            if (picture := Path(side) / f"{name}.png").exists()
-        ]
+        name: {
+            side: base64.b64encode(picture.read_bytes()).decode()
+            for side, folder in (("committed", committed), ("regenerated", regenerated))
+            if (picture := Path(folder) / f"{name}.png").exists()
+        }
         for name in found
     }
     write_file(output, page("compare.html", found=found, pictures=pictures).encode())
@@ -175,6 +174,8 @@ def _said(notebook: NotebookNode) -> str:
     """What the cells of a notebook print, and what those show that save nothing, as text."""
     texts = []
     for cell in notebook.cells:
+        if "versions()" in cell.source:  # with which it was run is no result
+            continue
         for output in cell.get("outputs", []):
             shown = {} if _SAVES.search(cell.source) else output.get("data", {})
             texts += [output.output_type, output.get("text", ""), shown.get("text/plain", "")]
@@ -250,7 +251,7 @@ def _first_difference(one: dict, other: dict) -> str | None:
     for number, rows in enumerate(zip(one["rows"], other["rows"], strict=True)):
         for place in _unlike(*rows, "", tolerance):
             words = ", ".join(v for v in rows[0].values() if isinstance(v, str))
-            return f"row {number} ({words}), column {place}"
+            return f"row {number} ({words:.60}), column {place}"
     return None
 
 
