@@ -11,7 +11,7 @@ from vidsindy_lite.repository import PACKAGE
 ROOT = PACKAGE.parent
 
 
-def test_binder_takes_the_python_of_the_weekly_run():
+def test_binder_takes_the_python_of_the_nightly_run():
     runtime = (ROOT / "binder" / "runtime.txt").read_text().strip()
     workflow = (ROOT / ".github" / "workflows" / "figures.yml").read_text()
     assert runtime.replace("python-", 'python-version: "') + '"' in workflow

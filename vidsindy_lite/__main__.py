@@ -219,7 +219,7 @@ def _run(options: argparse.Namespace) -> int:
       python -m vidsindy_lite run 03                     one notebook, by its number ...
       python -m vidsindy_lite run 03_camera_learning 04  ... or its name, or several
 
-    exit status: 0 if every notebook ran to its end and the figures are complete, 1 if not,
+    exit status: 0 if every notebook ran to its end, 1 if not,
     2 if the command makes no sense.
     """
     from .companion.run import run

@@ -1,5 +1,6 @@
 """Two folders of figures, and two runs of a notebook, are compared; what differs is refreshed."""
 
+import base64
 import io
 import json
 
@@ -13,7 +14,8 @@ from vidsindy_lite.companion.compare import (
     VISIBLE,
     differences,
     looks_the_same,
-    refresh,
+    outdated,
+    replace,
     same_notebook,
     same_text,
     write_differences,
@@ -58,7 +60,7 @@ def rows(**changes):
 SAME = [
     RECORD,
     rows(l2=1.0005, seconds=9.0),
-    FIGURE | {"numbers": {"error": [2e-9, 5.0, None], "n": 3}},  # rounding beside 5
+    FIGURE | {"numbers": {"error": [1e-4, 5.0, None], "n": 3}},  # nearly zero beside 5
 ]
 OTHER = [
     (rows(l2=1.01), "row 0 (x), column l2: 1.0 committed, 1.01 regenerated"),
@@ -67,6 +69,8 @@ OTHER = [
     (FIGURE | {"numbers": {"error": [1e-9, 5.0, 0.0], "n": 3}}, "error[2]: None committed"),
     (FIGURE | {"numbers": {"error": [1e-9, 5.1, None], "n": 3}}, "error[1]: 5.0 committed"),
     (FIGURE | {"numbers": {"error": [1e-9, 5.0, None]}}, "committed"),
+    (FIGURE | {"numbers": {"error": [1e-3, 5.0, None], "n": 3}}, "error[0]: 1e-09 committed"),
+    (FIGURE | {"numbers": {"error": [1e-9, 5.0, None], "n": 4}}, "n: 3 committed, 4"),
 ]
 
 
@@ -105,7 +109,7 @@ def test_of_one_notebook_only(folders):
     assert list(differences(*folders, notebook="02_second")) == ["table_1"]
 
 
-@pytest.mark.parametrize("content", [None, "{", "[1]", "null", "{}"])
+@pytest.mark.parametrize("content", [None, "{", "[1]", "null", "{}", "[" * 100_000])
 def test_what_is_on_one_side_only(folders, content):
     record = folders[0] / "fig_1.json"
     record.unlink() if content is None else record.write_text(content)  # a damaged one is none
@@ -114,6 +118,13 @@ def test_what_is_on_one_side_only(folders, content):
 
 
 # ------------------------------------------------------------------------------------------ refresh
+
+
+def refresh(committed, regenerated, notebook):
+    """Put what is outdated in place, and say what it was."""
+    names = outdated(committed, regenerated, notebook)
+    replace(committed, regenerated, names)
+    return names
 
 
 def files(folder):
@@ -173,6 +184,19 @@ def test_what_a_notebook_makes_no_longer_goes_and_others_things_stay(folders):
     assert set(files(folders[0])) == {"table_1.json", "other.json"}
 
 
+def test_a_damaged_picture_and_a_copy_are_no_obstacles(folders):
+    (folders[0] / "fig_1.png").write_bytes(b"version https://git-lfs")
+    (folders[0] / "fig_1 copy.json").write_text(json.dumps(FIGURE))
+    assert refresh(*folders, "01_first") == ["fig_1"]
+    assert (folders[0] / "fig_1.png").read_bytes() == png(LINE)
+
+
+def test_a_figure_that_becomes_a_table_leaves_no_picture(folders):
+    write(folders[1], RECORD | {"id": "fig_1"})
+    assert refresh(*folders, "01_first") == ["fig_1"]
+    assert set(files(folders[0])) == {"fig_1.json", "table_1.json"}
+
+
 def test_two_notebooks_cannot_make_one_id(folders):
     write(folders[1], rows(l2=2.0))
     write(folders[0], FIGURE | {"notebook": "02_second"})
@@ -214,15 +238,19 @@ def test_notebooks_are_compared_by_what_they_say(other, same):
 @pytest.mark.parametrize(
     ("one", "other", "same"),
     [
-        ("x = 2.50 ± 0.10", "x = 2.50 ± 0.11", True),
-        ("x = 2.50 ± 0.10", "x = 2.50 ± 0.15", False),
-        ("x = 2.50 +- 1.0e-3", "x = 2.51 +- 1.2e-3", True),
+        ("2.500 ± 0.100", "2.550 ± 0.110", True),
+        ("2.500 ± 0.100", "2.500 ± 0.150", False),
+        ("9.9999981 ± 0.0000083", "9.9912345 ± 0.0000083", False),
+        ("2.50 +- 1.0e-1", "2.55 +- 1.1e-1", True),
+        ("2.50 ± 0.10", "2.50 0.10", False),
         ("34 of 35", "35 of 35", False),
         ("1e-15", "3e-15", False),
         ("- 10 x", "- 10.1 x", False),
-        ("0.8 z", "0.808 z", False),
-        ("0.8 z", "0.799 z", True),
+        ("- 10 x", "- 9.999 x", True),
+        ("0.8 z", "0.9 z", False),
+        ("0.99 y", "1.00 y", False),
         ("5000.1", "5002.1", True),
+        ("x   9.9996", "x 10.0000", True),
         ("dx/dt = 2.0 x", "dx/dt = 2.0 y", False),
     ],
 )
@@ -233,8 +261,22 @@ def test_texts_are_compared_by_words_and_numbers(one, other, same):
 def test_what_a_cell_saves_is_compared_where_it_is_saved():
     saves = [notebook("save_table('a', rows)", shown=f"took {n} s") for n in (1, 2)]
     assert same_notebook(*saves)
+    assert not same_notebook(saves[0], notebook("save_table('a', rows)", said="x = 2.0\n"))
+    others = [notebook("save_video('a', rows)", shown=f"took {n} s") for n in (1, 2)]
+    assert not same_notebook(*others)
     printed = [notebook("print(versions())", said=f"Python 3.11.{n}\n") for n in (7, 9)]
     assert same_notebook(*printed)
+
+
+@pytest.mark.parametrize("kind", ["image/png", "text/latex", "text/html"])
+def test_what_a_cell_shows_and_does_not_save_is_compared(kind):
+    coded = [base64.b64encode(png(p)).decode() for p in (LINE, np.roll(LINE, 9, axis=0))]
+    shown = coded if kind == "image/png" else ["$x = 1.0$", "$y = 1.0$"]
+    books = [notebook(), notebook()]
+    for book, one in zip(books, shown, strict=True):
+        book.cells[0].outputs[1].data[kind] = one
+    assert same_notebook(books[0], books[0])
+    assert not same_notebook(*books)
 
 
 # ------------------------------------------------------------------------------------- side by side

@@ -17,7 +17,6 @@ from helpers import TinyRepository
 
 from vidsindy_lite import repository
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.companion import artifacts
 from vidsindy_lite.companion import run as runner
 from vidsindy_lite.companion.run import NotebookError, execute, run, select_notebooks
 
@@ -169,7 +168,7 @@ def test_a_notebook_that_fails_leaves_what_was_there_and_others_go_on(good, monk
     assert after.keys() - before.keys() == {
         "notebooks/02_dead.py", "notebooks/03_good.py", "notebooks/03_good.ipynb"
     }  # fmt: skip
-    failed = good.root / "build" / "runs" / "01_first-full" / "failed"
+    failed = good.root / "build" / "runs" / "01_first-full" / "running"
     assert {"fig_1.json", "table_1.json"} < {path.name for path in (failed / "figures").iterdir()}
 
 
@@ -203,21 +202,43 @@ def test_unknown_parameter_is_found_before_anything_runs(tiny, tmp_path):
     assert not list(tiny.root.rglob("*.ipynb"))
 
 
-def test_a_full_disk_leaves_what_was_there(good, monkeypatch):
+@pytest.mark.parametrize("module", ["compare", "run"])
+def test_a_full_disk_leaves_nothing_half(good, monkeypatch, module):
     record = good.root / "figures" / "table_1.json"
     record.write_text(record.read_text().replace("1.0", "1.01"))
-    artifacts.write_index(record.parent)
-    before = outputs(good)
 
     def full(path, content):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("vidsindy_lite.companion.compare.write_file", full)
+    monkeypatch.setattr(f"vidsindy_lite.companion.{module}.write_file", full)
     (outcome,) = run(root=good.root)
     assert "No space left on device" in outcome.error
-    assert outputs(good) == before
     monkeypatch.undo()
     assert run(root=good.root)[0].changed == ("table_1", "01_first.ipynb")
+    assert run(root=good.root)[0].changed == ()
+
+
+def test_an_edit_meanwhile_is_not_taken_for_a_run_of_this_code(good, monkeypatch):
+    hashes = iter(["before", "after", "before", "before"])
+    monkeypatch.setattr(runner, "_key", lambda source: next(hashes))
+    assert executed(run(root=good.root)) == ["01_first"]
+    assert executed(run(root=good.root)) == ["01_first"]
+
+
+def test_a_module_that_cannot_be_read_fails_its_notebook_only(good, monkeypatch):
+    def broken(source):
+        raise SyntaxError("half typed")
+
+    monkeypatch.setattr(runner, "_key", broken)
+    (outcome,) = run(root=good.root)
+    assert "half typed" in outcome.error
+
+
+def test_a_notebook_that_is_renamed_takes_its_figures_along(good):
+    (good.notebooks / "01_first.py").rename(good.notebooks / "02_first.py")
+    (good.notebooks / "01_first.ipynb").unlink()
+    (outcome,) = run(root=good.root)
+    assert outcome.changed == ("fig_1", "table_1", "02_first.ipynb")
 
 
 # ---------------------------------------------------------------------------- ended, two at once
@@ -260,7 +281,7 @@ def test_a_run_that_is_ended_leaves_no_process_and_goes_on_later(good, interrupt
     assert outputs(good) == before
     good.write("02_long", "x = 1")
     assert executed(run(root=good.root)) == ["02_long"]
-    assert not list((good.root / "build" / "runs" / "02_long-full").glob("running-*"))
+    assert not (good.root / "build" / "runs" / "02_long-full" / "running").exists()
 
 
 def test_two_runs_at_once_leave_one_whole_result(good):
@@ -269,8 +290,8 @@ def test_two_runs_at_once_leave_one_whole_result(good):
     together = [start(good) for _ in range(2)]
     assert [process.wait(120) for process in together] == [0, 0]
     assert outputs(good) == before
-    (kept,) = (good.root / "build" / "runs" / "01_first-full").iterdir()
-    assert not kept.name.startswith("running")
+    (kept,) = (good.root / "build" / "runs" / "01_first-full").glob("*/")
+    assert kept.name != "running"
 
 
 PAPERMILL = """\

@@ -1,6 +1,7 @@
 """Sweeps in small clones of the repository: killed, edited, damaged, on a cluster."""
 
 import errno
+import hashlib
 import json
 import math
 import os
@@ -16,8 +17,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.repository import PACKAGE
-from vidsindy_lite.study.sweeps import _built, remember, sweep
-from vidsindy_lite.values import decoded
+from vidsindy_lite.study.sweeps import remember, sweep
 from vidsindy_lite.vision import Scene, video_info
 
 pytestmark = pytest.mark.slow  # starts processes
@@ -280,11 +280,33 @@ def test_an_entry_of_something_else_is_told_and_computed_again(swept):
     assert errors.count("UserWarning: a result is not stored: ") == 1
 
 
-def test_a_stored_file_is_never_executed(tmp_path):
-    """Nothing but dataclasses of this package is made of a file, and none by other code."""
-    for place in ("os:system", "vidsindy_lite.study.sweeps:sweep", "vidsindy_lite.pipeline:np"):
-        with pytest.raises(ValueError, match="not of the package|no such dataclass"):
-            decoded({"type": place, "command": "true"}, _built)
+DEEP = 100_000
+PLANTED = [
+    '{"type": "os:system", "command": "touch planted"}',
+    '{"type": "vidsindy_lite.study.sweeps:sweep", "function": 1}',
+    '{"type": "vidsindy_lite.pipeline:np"}',
+    '{"type": "array", "dtype": "i", "values": [1' + "0" * 40 + "]}",
+    "[" * DEEP + "]" * DEEP,
+    "[" * 900 + "]" * 900,
+    "null",
+]
+
+
+@pytest.mark.parametrize("result", PLANTED, ids=range(len(PLANTED)))
+def test_a_planted_file_is_read_and_never_executed(cache, monkeypatch, result):
+    """Its digest is right, but it is no result: a value of other kinds is a value."""
+    monkeypatch.chdir(cache)
+    assert remember(squared, Holder(3)) == 9
+    (file,) = cache.rglob("*.json")
+    content = '{"task": ' + json.dumps(repr(Holder(3))) + ', "result": ' + result + "}"
+    file.write_text(f"{hashlib.sha256(content.encode()).hexdigest()}\n{content}\n")
+    if result == "null":
+        assert remember(squared, Holder(3)) is None
+    else:
+        with pytest.warns(UserWarning, match="computed again, as .* does not hold its result"):
+            assert remember(squared, Holder(3)) == 9
+        assert remember(squared, Holder(3)) == 9
+    assert not (cache / "planted").exists()
 
 
 def test_error_names_the_task_and_what_was_finished_stays(clone):

@@ -22,6 +22,7 @@ import os
 import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -41,6 +42,7 @@ INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
 PICTURE = 83  # milliseconds that one of an animation stays
 SLIDER_DPI = 100  # dots per inch of its frames
+PICTURES = {"figure": [".png"], "animation": [".gif"], "table": []}  # files of a kind
 
 
 def versions() -> str:
@@ -305,7 +307,7 @@ def _record(
         "kind": kind,
         "notebook": os.environ.get("VIDSINDY_NOTEBOOK", "interactive"),
         "caption": caption,
-        **({"tolerance": as_json(tolerance, "tolerance")} if tolerance else {}),
+        **({"tolerance": as_json(tolerance, "tolerance")} if tolerance is not None else {}),
         holds: as_json(content, holds, DIGITS),
     }
 
@@ -332,12 +334,10 @@ def read_records(folder: Path) -> dict[str, dict]:
     """All records by id, in the order of a reader: S2 before S10. A damaged one is none."""
     found = {}
     for path in folder.glob("*.json"):
-        try:
+        with suppress(ValueError, RecursionError):
             record = json.loads(path.read_text("utf-8"))
-        except ValueError:
-            continue
-        if isinstance(record, dict) and record.keys() >= {"id", "kind", "notebook", "caption"}:
-            found[path.stem] = record
+            if _is_record(record, path.stem):
+                found[path.stem] = record
 
     def order(artifact_id: str) -> list:
         return [int(p) if p.isdigit() else p for p in re.split(r"(\d+)", artifact_id)]
@@ -345,10 +345,19 @@ def read_records(folder: Path) -> dict[str, dict]:
     return {artifact_id: found[artifact_id] for artifact_id in sorted(found, key=order)}
 
 
+def _is_record(record: object, name: str) -> bool:
+    """Whether this is what `save_figure` and `save_table` write under a name."""
+    if not isinstance(record, dict) or record.get("id") != name:
+        return False
+    rows, numbers = record.get("rows"), record.get("numbers")
+    has_rows = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
+    said = isinstance(record.get("notebook"), str) and isinstance(record.get("caption"), str)
+    return said and record.get("kind") in PICTURES and (has_rows or isinstance(numbers, dict))
+
+
 def files_of(record: dict) -> list[str]:
     """Names of the files that a figure or table consists of."""
-    suffixes = {"figure": [".png"], "animation": [".gif"], "table": []}[record["kind"]]
-    return [f"{record['id']}{suffix}" for suffix in (".json", *suffixes)]
+    return [f"{record['id']}{suffix}" for suffix in (".json", *PICTURES[record["kind"]])]
 
 
 def write_index(folder: Path) -> None:

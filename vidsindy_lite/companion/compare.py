@@ -10,7 +10,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +24,9 @@ from .artifacts import files_of, read_records
 from .pages import page
 
 TOLERANCE = 1e-3  # of a number, relative, where its record states no other
-ROUNDING = 1e-9  # of the largest of its list: what is zero but for rounding has no digits
-ERROR_BAR = 0.2  # of what stands after a +-
+OF_LIST = 1e-4  # of the largest of a list: what is nearly zero beside it has fewer digits
+NOTHING = 1e-12  # and a number that small has none
+ERROR_BAR = 0.2  # of what stands after a +-; what stands before it may differ by as much as that is
 SQUARE = 2  # pixels: a picture is looked at in squares of this side,
 NEAR = 5  # and what was anywhere in so many by so many of them, may be in their middle
 VISIBLE = 24  # grey levels by which the mean of a square differs so that one sees it
@@ -33,8 +34,9 @@ FEW = 0.002  # share of such squares of which one takes no notice
 TIMES = "seconds"  # what is called so differs from run to run, and counts nowhere
 
 _PAGE_MARK = '<meta name="generator" content="vidsindy_lite compare">'
-_NUMBER = re.compile(r"((?:±|\+-) ?)?([-+]?\d+(?:\.(\d+))?(?:e([-+]?\d+))?)", re.IGNORECASE)
-_SAVES = re.compile(r"^save_|= save_", re.MULTILINE)
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
+_ERROR = re.compile(r"(?:±|\+-) ?$")
+_SAVES = re.compile(r"\bsave_(?:figure|slider|animation|table)\(")
 
 
 def differences(
@@ -117,98 +119,131 @@ def write_differences(
     return found
 
 
-def refresh(committed: Path, regenerated: Path, notebook: str) -> list[str]:
-    """Put what a notebook has made where it differs from what is committed.
+def outdated(committed: Path, regenerated: Path, notebook: str) -> list[str]:
+    """Ids of a notebook's figures and tables that are not as it has made them now.
 
     Parameters
     ----------
     committed : Path
-        The folder to be written to.
+        The folder with those of all notebooks.
     regenerated : Path
         What the notebook has made, and nothing else.
     notebook : str
-        Whose earlier figures and tables go, if it makes them no longer.
-
-    Returns
-    -------
-    list of str
-        Ids of what was written or removed.
+        What it makes no longer counts, too.
 
     Raises
     ------
     ValueError
-        If another notebook has made a figure or table of the same id; then nothing is written.
+        If another notebook has made a figure or table of the same id.
     """
     old, new = read_records(committed), read_records(regenerated)
     for name in new.keys() & old.keys():
         if old[name]["notebook"] != notebook:
             raise ValueError(f"{name}: belongs to notebook {old[name]['notebook']}")
-    changed = [
+    gone = [name for name in old if old[name]["notebook"] == notebook and name not in new]
+    return gone + [
         name
         for name in new
         if name not in old or not _same(old[name], new[name], committed, regenerated)
     ]
-    for name in changed:
-        for file in reversed(files_of(new[name])):  # the record last
+
+
+def replace(committed: Path, regenerated: Path, names: Iterable[str]) -> None:
+    """Put figures and tables in place of those of the same ids, or remove what is made no more."""
+    old, new = read_records(committed), read_records(regenerated)
+    for name in names:
+        files = files_of(new[name]) if name in new else []
+        for file in reversed(files):  # the record last
             write_file(committed / file, (regenerated / file).read_bytes())
-    gone = [n for n in old if old[n]["notebook"] == notebook and n not in new]
-    for name in gone:
-        for file in files_of(old[name]):
+        for file in set(files_of(old[name]) if name in old else []) - set(files):
             (committed / file).unlink(missing_ok=True)
-    return changed + gone
 
 
 def same_notebook(committed: NotebookNode, regenerated: NotebookNode) -> bool:
-    """Whether two executed notebooks have the same cells and say the same.
+    """Whether two executed notebooks have the same cells, and say and show the same.
 
-    What a cell saves as a figure or table, and so shows, is compared there.
+    What a cell saves as a figure or table, and so shows, is compared there. Printed numbers may
+    differ by one in their last digit.
     """
-    cells = [
-        [(c.cell_type, c.source, c.metadata) for c in notebook.cells]
-        for notebook in (committed, regenerated)
-    ]
-    return cells[0] == cells[1] and same_text(_said(committed), _said(regenerated))
-
-
-def _said(notebook: NotebookNode) -> str:
-    """What the cells of a notebook print, and what those show that save nothing, as text."""
-    texts = []
-    for cell in notebook.cells:
-        if "versions()" in cell.source:  # with which it was run is no result
+    if len(committed.cells) != len(regenerated.cells):
+        return False
+    for one, other in zip(committed.cells, regenerated.cells, strict=True):
+        cells = [(cell.cell_type, cell.source, cell.metadata) for cell in (one, other)]
+        if cells[0] != cells[1]:
+            return False
+        if "versions()" in one.source:  # with which it was run is no result
             continue
-        for output in cell.get("outputs", []):
-            shown = {} if _SAVES.search(cell.source) else output.get("data", {})
-            texts += [output.output_type, output.get("text", ""), shown.get("text/plain", "")]
-    return "\n".join(texts)
+        (texts, pictures), (others, theirs) = _shown(one), _shown(other)
+        if not same_text("\n".join(texts), "\n".join(others), printed=True):
+            return False
+        if len(pictures) != len(theirs) or not all(map(looks_the_same, pictures, theirs)):
+            return False
+    return True
 
 
-def same_text(one: str, other: str) -> bool:
-    """Whether two texts have the same words, integers, and nearly the same other numbers.
+def _shown(cell: NotebookNode) -> tuple[list[str], list[bytes]]:
+    """What a cell prints, and the texts and pictures that it shows and does not save."""
+    texts, pictures = [], []
+    for output in cell.get("outputs", []):
+        data = {} if _SAVES.search(cell.source) else output.get("data", {})
+        texts += [output.output_type, output.get("text", "")]
+        texts += [data[kind] for kind in sorted(data) if kind.startswith("text/")]
+        pictures += [base64.b64decode(data["image/png"])] if "image/png" in data else []
+    return texts, pictures
 
-    These may differ by `TOLERANCE`, by one in the last digit of the longer one, and after a +- by
-    `ERROR_BAR`.
+
+def same_text(one: str, other: str, printed: bool = False) -> bool:
+    """Whether two texts have the same words and integers, and nearly the same other numbers.
+
+    Numbers may differ by `TOLERANCE`; before a +- by as much as stands after it, and after it by
+    `ERROR_BAR`. Blanks do not count.
+
+    Parameters
+    ----------
+    one, other : str
+    printed : bool
+        Numbers may also differ by one in the last digit of the longer one.
     """
+    one, other = " ".join(one.split()), " ".join(other.split())
+    ours, theirs = list(_NUMBER.finditer(one)), list(_NUMBER.finditer(other))
     if _NUMBER.sub("#", one) != _NUMBER.sub("#", other):
         return False
-    pairs = zip(_NUMBER.findall(one), _NUMBER.findall(other), strict=True)
-    return all(_near(bool(error), a, b) for (error, *a), (_, *b) in pairs)
-
-
-def _near(is_error: bool, one: list[str], other: list[str]) -> bool:
-    """Whether two numbers are nearly the same, each as text, its decimals and its exponent."""
-    (a, *digits), (b, *others) = one, other
-    if a == b or not any(digits) or not any(others):  # integers
-        return a == b
-    last = min(10.0 ** (int(e or 0) - len(decimals)) for decimals, e in (digits, others))
-    near = ERROR_BAR if is_error else TOLERANCE
-    return math.isclose(float(a), float(b), rel_tol=near, abs_tol=1.01 * last)
+    for k, (a, b) in enumerate(zip(ours, theirs, strict=True)):
+        first, second = a[0], b[0]
+        if first == second:
+            continue
+        digits = [re.fullmatch(r"[-+]?\d+(?:\.(\d+))?(?:e(.+))?", n, re.I) for n in (first, second)]
+        places = [(d[1] or "", int(d[2] or 0)) if d else ("", 0) for d in digits]
+        if places == [("", 0)] * 2:  # integers
+            return False
+        near, room = TOLERANCE, 0.0
+        if _ERROR.search(one[: a.start()]):
+            near = ERROR_BAR
+        elif k + 1 < len(ours) and re.fullmatch(
+            r" ?(?:±|\+-) ?", one[a.end() : ours[k + 1].start()]
+        ):
+            near, room = 0.0, abs(float(ours[k + 1][0]))
+        if printed:
+            last = min(e - len(decimals) for decimals, e in places if decimals or e)
+            room = max(room, 1.01 * float(f"1e{last}"))
+        if not math.isclose(float(first), float(second), rel_tol=near, abs_tol=room):
+            return False
+    return True
 
 
 def looks_the_same(one: bytes, other: bytes) -> bool:
     """Whether one would take two pictures for one; each frame of an animation counts.
 
-    What has moved by a few pixels is the same, as between two processors.
+    What has moved by a few pixels is the same, as between two processors; what cannot be read is
+    not.
     """
+    try:
+        return _look_the_same(one, other)
+    except (OSError, ValueError):
+        return False
+
+
+def _look_the_same(one: bytes, other: bytes) -> bool:
     images = [Image.open(io.BytesIO(picture)) for picture in (one, other)]
     if images[0].size != images[1].size:
         return False
@@ -268,9 +303,9 @@ def _unlike(
         largest = max((abs(v) for v in one if isinstance(v, int | float)), default=0.0)
         for index, pair in enumerate(zip(one, other, strict=True)):
             yield from _unlike(*pair, f"{place}[{index}]", tolerance, largest)
-    elif isinstance(one, float | int) and isinstance(other, float | int):
+    elif isinstance(one, float) and isinstance(other, float):
         near = TOLERANCE if isinstance(tolerance, dict) else tolerance
-        if not math.isclose(one, other, rel_tol=near, abs_tol=max(near * size, ROUNDING)):
+        if not math.isclose(one, other, rel_tol=near, abs_tol=max(OF_LIST * size, NOTHING)):
             yield f"{place.strip()}: {one} committed, {other} regenerated"
     elif isinstance(one, str) and isinstance(other, str) and same_text(one, other):
         return
@@ -287,7 +322,7 @@ def _same(old: dict, new: dict, committed: Path, regenerated: Path) -> bool:
     if said[0] != said[1] or _first_difference(old, new):
         return False
     files = [[folder / name for name in files_of(old)[1:]] for folder in (committed, regenerated)]
-    timed = f'"{TIMES}"' in json.dumps(old)
+    timed = f'"{TIMES}": ' in json.dumps([old.get("rows"), old.get("numbers")])
     return all(
         a.exists() and (timed or looks_the_same(a.read_bytes(), b.read_bytes()))
         for a, b in zip(*files, strict=True)

@@ -23,14 +23,14 @@ from pathlib import Path
 import jupytext
 import nbformat
 import papermill
-import psutil
+from filelock import FileLock, Timeout
 from nbformat import NotebookNode
 from papermill.exceptions import strip_color
 from tqdm import tqdm
 
 from ..repository import PACKAGE, code_hash, repository_root, write_file
 from .artifacts import read_records, with_palette, write_index
-from .compare import refresh, same_notebook
+from .compare import outdated, replace, same_notebook
 
 PROFILES = ("full", "quick")
 AT_ONCE = 3  # notebooks: where one waits for the last task of a sweep, another goes on
@@ -142,10 +142,10 @@ def run(
         raise ValueError(f"profile: expected one of {', '.join(PROFILES)}, got {profile!r}")
     output = root if profile == "full" else root / "build" / "quick"
     chosen, figures = select_notebooks(notebooks, root), output / "figures"
-    outcomes = asyncio.run(_outcomes(chosen, profile, output, force))
     known = {path.stem for path in find_notebooks(root)}
-    for gone in {record["notebook"] for record in read_records(figures).values()} - known:
-        refresh(figures, figures / "none", gone)
+    gone = [n for n, record in read_records(figures).items() if record["notebook"] not in known]
+    replace(figures, figures / "none", gone)
+    outcomes = asyncio.run(_outcomes(chosen, profile, output, force))
     write_index(figures)
     return outcomes
 
@@ -256,48 +256,59 @@ async def _outcome(
     """Execute a notebook, unless this very code has been, and put what it made where it differs."""
     seconds, error = None, None
     changed: list[str] = []
+    folder = output / "build" / "runs" / f"{path.stem}-{profile}"
+    folder.mkdir(parents=True, exist_ok=True)
+    running, lock = folder / "running", FileLock(folder / "lock")
     async with turns:
-        code_hash.cache_clear()  # somebody may have edited it meanwhile
-        source = jupytext.read(path)
-        code = [cell.source for cell in source.cells if cell.cell_type == "code"]
-        key = hashlib.sha256("\0".join([code_hash(), *code]).encode()).hexdigest()[:16]
-        kept = output / "build" / "runs" / f"{path.stem}-{profile}" / key
-        running = kept.with_name(f"running-{os.getpid()}")
         try:
+            await _acquired(lock)
+            source = jupytext.read(path)
+            kept = folder / _key(source)
             if force or not kept.exists():
                 began = time.perf_counter()
-                _clear(kept.parent)
+                for earlier in folder.glob("*/"):
+                    shutil.rmtree(earlier)
                 places = {"VIDSINDY_FIGURES": f"{running}/figures", "VIDSINDY_NOTEBOOK": path.stem}
-                asked = {"profile": profile}
-                await _execute(source, path, asked, running, places)
-                shutil.rmtree(kept, ignore_errors=True)
-                running.rename(kept)
+                await _execute(source, path, {"profile": profile}, running, places)
+                # What was edited meanwhile is of no code that anybody will have again.
+                kept = running.rename(kept if kept.name == _key(source) else folder / "edited")
                 seconds = time.perf_counter() - began
             changed = _refresh(source, path, kept, output)
-        except (NotebookError, ValueError, OSError) as failure:  # such as a full disk: others go on
+        except (NotebookError, ValueError, OSError, SyntaxError) as failure:  # the others go on
             error = str(failure)
-            with suppress(OSError):  # to be looked at
-                running.rename(kept.with_name("failed"))
+        finally:
+            lock.release()
     return Outcome(path.stem, seconds, error, tuple(changed))
 
 
-def _clear(folder: Path) -> None:
-    """Remove the earlier runs of a notebook, but those that another process is at."""
-    for run in folder.glob("*"):
-        _, _, process = run.name.partition("running-")
-        if not process or not psutil.pid_exists(int(process)) or int(process) == os.getpid():
-            shutil.rmtree(run, ignore_errors=True)
+async def _acquired(lock: FileLock) -> None:
+    """Wait until no other run is at a notebook."""
+    while True:
+        try:
+            lock.acquire(timeout=0)
+            return
+        except Timeout:
+            await asyncio.sleep(1)
+
+
+def _key(source: NotebookNode) -> str:
+    """What the outputs of a notebook depend on, prose not."""
+    code_hash.cache_clear()  # somebody may have edited it meanwhile
+    code = [cell.source for cell in source.cells if cell.cell_type == "code"]
+    return hashlib.sha256("\0".join([code_hash(), *code]).encode()).hexdigest()[:16]
 
 
 def _refresh(source: NotebookNode, path: Path, kept: Path, output: Path) -> list[str]:
-    """Refresh figures, tables and the executed half of a notebook from its run."""
-    changed = refresh(output / "figures", kept / "figures", path.stem)
-    half = output / "notebooks" / f"{path.stem}.ipynb"
+    """Put the executed half, then figures and tables of a run where they differ."""
     notebook = tidy(nbformat.read(kept / EXECUTED, 4), source)
-    if changed or not half.exists() or not same_notebook(nbformat.read(half, 4), notebook):
+    changed = outdated(output / "figures", kept / "figures", path.stem)
+    half, same = output / "notebooks" / f"{path.stem}.ipynb", False
+    with suppress(OSError, ValueError):  # there is none, or it cannot be read
+        same = same_notebook(nbformat.read(half, 4), notebook)
+    if changed or not same:
         write_file(half, (nbformat.writes(notebook) + "\n").encode())
-        changed.append(half.name)
-    return changed
+    replace(output / "figures", kept / "figures", changed)
+    return changed if same and not changed else [*changed, half.name]
 
 
 async def _execute(

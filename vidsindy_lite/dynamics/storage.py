@@ -67,7 +67,7 @@ def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
         content = json.loads(file.read_text(encoding="utf-8"))
         found = decoded(content["discovery"], _built) if content["format"] == FORMAT else None
         values = decoded(content.get("functions"), _built)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
         raise ValueError(message) from error
     if not isinstance(found, Discovery):
         raise ValueError(message)

@@ -41,6 +41,12 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 Function = Callable[[Task], Result]
 
+NO_RESULT = (
+    OSError, ValueError, LookupError, TypeError, AttributeError, ImportError, ArithmeticError,
+    RecursionError,
+)  # fmt: skip
+"""What reading a file of a result raises that is damaged, or none."""
+
 
 class TaskError(RuntimeError):
     """A task of a sweep raised; the message names the task."""
@@ -150,6 +156,8 @@ def _remember(function: Function[Task, Result], task: Task, file: Path | None) -
     with FileLock(f"{file}.lock"):
         results = _stored({0: file}, [task])
         if not results:
+            if file.is_file():
+                warnings.warn(f"computed again, as {file} does not hold its result", stacklevel=2)
             results[0] = function(task)
             _store(file, task, results[0])
     return results[0]
@@ -243,21 +251,16 @@ def _store(file: Path, task: object, result: object) -> None:
 
 
 def _stored(files: Mapping[int, Path], tasks: list) -> dict[int, Any]:
-    """The results that are stored as they were written; any other file is told, and goes."""
+    """The results that are stored as they were written, by number of the task."""
     results = {}
     for number, file in files.items():
-        if not file.is_file():
-            continue
         try:
             digest, content = file.read_text("utf-8").splitlines()
             entry = json.loads(content) if digest == _digest(content) else {}
-            if entry["task"] != repr(tasks[number]):
-                raise ValueError("of another task")
-            results[number] = decoded(entry["result"], _built)
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, ImportError) as error:
-            problem = f"{type(error).__name__}: {error}"
-            warnings.warn(f"computed again, as {file} holds no result ({problem})", stacklevel=2)
-            file.unlink(missing_ok=True)
+            if entry["task"] == repr(tasks[number]):
+                results[number] = decoded(entry["result"], _built)
+        except NO_RESULT:
+            continue
     return results
 
 
