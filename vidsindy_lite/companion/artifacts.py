@@ -41,6 +41,7 @@ from .pages import page
 INDEX = "README.md"
 DIGITS = 6  # of the numbers in the records
 PICTURE = 83  # milliseconds that one of an animation stays
+SAMPLED = 20_000  # pixels of a picture that have a say in its palette
 SLIDER_DPI = 100  # dots per inch of its frames
 PICTURES = {"figure": [".png"], "animation": [".gif"], "table": []}  # files of a kind
 
@@ -189,17 +190,19 @@ def with_palette(png: bytes) -> bytes:
 
 
 def _palette(pixels: np.ndarray) -> Image.Image:
-    """256 colours, chosen among those of a picture however rare they are.
+    """256 colours for a picture: as far apart as its own, then moved to where its pixels are.
 
-    Of colours that differ by less than eight grey levels the most frequent is a candidate: white
-    stays white, a small target keeps its colour, and noise has few enough to choose from quickly.
+    Of colours that differ by less than eight grey levels the most frequent is a candidate, however
+    rare: a small target keeps its colour, and noise has few enough to choose from quickly.
     """
-    codes = pixels.reshape(-1, 3) @ np.array([1 << 16, 1 << 8, 1])
-    codes, counts = np.unique(codes, return_counts=True)
+    flat = pixels.reshape(-1, 3)
+    codes, counts = np.unique(flat @ np.array([1 << 16, 1 << 8, 1]), return_counts=True)
     codes = codes[np.argsort(-counts, kind="stable")]
     _, firsts = np.unique(codes & 0xF8F8F8, return_index=True)
     colours = np.stack([codes >> 16, codes >> 8, codes], axis=-1)[firsts].astype(np.uint8)
-    return Image.fromarray(colours[None]).quantize(256, Image.Quantize.MAXCOVERAGE)
+    some = flat[:: max(1, len(flat) // SAMPLED)]
+    strip = Image.fromarray(np.concatenate([colours, some])[None])
+    return strip.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=1)
 
 
 def _png(figure: Figure) -> bytes:
