@@ -35,8 +35,8 @@ artifacts.save_table("table_1", [row], caption="The systems.")"""
 NOISE = """\
 import sys
 
-print("to stdout")
-print("to stderr", file=sys.stderr)
+print("to stdout", flush=True)
+print("to stderr", file=sys.stderr, flush=True)
 print("again")
 {3, 1, 2} | {"b", "a"}"""
 

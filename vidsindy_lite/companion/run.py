@@ -214,7 +214,12 @@ def tidy(executed: NotebookNode, source: NotebookNode) -> NotebookNode:
     twins = (cell for cell in ran if cell.cell_type == "code")
     for count, (cell, twin) in enumerate(zip(codes, twins, strict=True), start=1):
         cell.execution_count = count
-        cell.outputs = [output for output in twin.outputs if output.get("name") != "stderr"]
+        cell.outputs = []
+        for output in twin.outputs:
+            if output.get("name") == "stdout" and cell.outputs[-1:] and "text" in cell.outputs[-1]:
+                cell.outputs[-1].text += output.text  # how it is split depends on the moment
+            elif output.get("name") != "stderr":
+                cell.outputs.append(output)
         for output in cell.outputs:
             if "execution_count" in output:
                 output.execution_count = count
