@@ -2,7 +2,7 @@
 
 The .py half of a pair is the source. A run leaves what it makes in build/runs/ of its output, and
 is not repeated there while the code cells, the package and the libraries are the same. From there
-`compare.refresh` puts into figures/, and this module into notebooks/*.ipynb, what differs from
+`compare.refresh` puts into figures/, and this module into ``notebooks/``, what differs from
 what is there already.
 """
 
@@ -110,7 +110,7 @@ def run(
 ) -> list[Outcome]:
     """Execute notebooks, three at a time, and write what differs; goes on after a failure.
 
-    The full profile writes notebooks/*.ipynb and figures/ of the repository, the quick one the same
+    The full profile writes notebooks/ and figures/ of the repository, the quick one the same
     into build/quick/. A notebook that fails changes nothing there; what it made until then lies in
     build/runs/.
 
