@@ -9,9 +9,8 @@ from helpers import posed
 from vidsindy_lite.dynamics.conclusion import _pruned, conclude
 from vidsindy_lite.dynamics.history import History
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.persistence import LARGEST, follow
+from vidsindy_lite.dynamics.path import FINAL_WEIGHT, LARGEST, follow
 from vidsindy_lite.dynamics.problem import fit_curves
-from vidsindy_lite.dynamics.search import FINAL_WEIGHT
 from vidsindy_lite.dynamics.state import State
 
 

@@ -13,7 +13,7 @@ from vidsindy_lite.dynamics.collocation import CLEANEST, Collocation, Status
 from vidsindy_lite.dynamics.diagnostics import diagnose, outliers
 from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.integrate import runge_kutta_4
-from vidsindy_lite.dynamics.persistence import Plateau, follow
+from vidsindy_lite.dynamics.path import Plateau, follow
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 from vidsindy_lite.dynamics.posing import pose
 from vidsindy_lite.dynamics.splines import DEGREE, Segment

@@ -90,7 +90,7 @@ def solved(terms, degree, start, span=20.0, noise=0.01):
     x = law.simulate(t, start)
     x += noise * x.std() * np.random.default_rng(0).normal(size=x.shape)
     measured = [(t, x)], [np.zeros((*x.shape, 0))], None
-    task = _Task(measured, law.names, Library.polynomial(degree), "learn", 0, False)
+    task = _Task(measured, law.names, Library.polynomial(degree), "learn", 0, False, np.inf)
     return _solved(task, task.form(1))
 
 

@@ -30,8 +30,8 @@ from .form import Form
 from .integrate import runge_kutta_4
 from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
 from .order import check_order
-from .origin import ShiftedLaw
-from .persistence import Plateau
+from .frames import ShiftedLaw
+from .path import Plateau
 from .polynomials import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
 from .rounds import Round, on_circle, on_sphere

@@ -22,7 +22,7 @@ from .collocation import Collocation, Fit, Linearisation
 from .library import monomial_exponents
 from .polynomials import PolynomialSystem
 from .problem import SURE, Problem, term_penalties
-from .selection import inverse
+from .selection import newcomers
 from .state import State
 
 HIGHER = 2
@@ -40,8 +40,6 @@ or a lens, are spread over several (up to two thirds were seen)."""
 FEW = 4
 """Errors that are left, to a term, at which all terms together are few: chance leaves more than
 that share."""
-DEPENDENT = 1e-9
-"""Share of a term that those of the law leave, below which they have it already."""
 
 
 @dataclass(frozen=True)
@@ -213,20 +211,6 @@ def _higher(exponents: Ints, d: int, budget: float) -> Ints:
             unused = ((0, 0), (0, exponents.shape[1] - d))
             return np.concatenate([exponents, np.pad(kept, unused)])
     return exponents
-
-
-def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, Floats]:
-    """What each further column would be, (k,), if it alone joined the first ``own``, fitted anew.
-
-    Its estimate and its variance: 0 and infinity where it is a combination of the first.
-    """
-    response = inverse(information[:own, :own]) @ information[:own, own:]
-    left = gradient[own:] - gradient[:own] @ response
-    whole = np.diag(information)[own:]
-    apart = whole - (information[:own, own:] * response).sum(axis=0)
-    new = apart > DEPENDENT * whole
-    room = np.where(new, apart, 1.0)
-    return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)
 
 
 def place(law: PolynomialSystem, entry: int) -> str:

@@ -15,10 +15,9 @@ import numpy as np
 from .collocation import Fit
 from .errors import residual_noise
 from .history import History
-from .persistence import TOLERATED
+from .path import CONSISTENT, FIRST_WEIGHTS, TOLERATED, unpruned
 from .precision import foreseen
 from .problem import COARSE, Problem, fit_curves
-from .search import CONSISTENT, FIRST_WEIGHTS, unpruned
 
 FLAT = 0.9
 """Errors, relative to the spread of the data, of a curve that has given the motion up."""
@@ -49,7 +48,7 @@ def _by_terms(problem: Problem) -> Problem | None:
     degrees = problem.exponents.sum(axis=1)
     for degree in range(problem.form.degree, 0, -1):
         rows = ~problem.form.implicit & (degrees <= degree)
-        fit, weight = unpruned(problem, collocation, control, rows, "all terms", History())
+        fit, weight = unpruned(problem, collocation, control, rows, History())
         left = residual_noise(fit)
         over = CONSISTENT * left < problem.noise
         if weight == FIRST_WEIGHTS[-1] and over.any():

@@ -32,7 +32,9 @@ NEARLY = 1e-2
 converged all the same: a tenth of a standard error, squared."""
 FAITHFUL = 1e-2
 """A step whose fall missed what it promised by so little was the last: of a miss ``m`` of a promise
-``p``, third order in the step, the next step would promise some ``9 m^2 / p``."""
+``p``, third order in the step, the next step would promise some ``9 m^2 / p``. Where the law holds
+so firmly that a step leaves nothing of its residual but what is second order, that is the miss, and
+the next step would promise all of it: so the miss has to be below the tolerance, too."""
 AT_ONCE = 10_000
 """Rows that are multiplied at once where their product would be as large as what it is added to."""
 STRONGEST_DAMPING = 1e2
@@ -436,7 +438,8 @@ class Collocation:
                 continue
             miss = abs(value - trial_value - promise)
             state, value = trial, trial_value
-            faithful = miss * miss < FAITHFUL * tolerance * promise  # a power may overflow
+            limit = FAITHFUL * tolerance * promise
+            faithful = miss < 10 * tolerance and miss * miss < limit  # a power may overflow
             if fraction == 1.0 and damping == 0.0 and faithful:
                 return Fit(state, self, Status.CONVERGED)
             damping = damping / 10 if damping > 1e-8 else 0.0

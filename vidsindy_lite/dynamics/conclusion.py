@@ -15,7 +15,7 @@ from .discovery import Discovery
 from .errors import residual_noise
 from .history import History
 from .library import divides, shift_generators, shift_matrix
-from .persistence import Path
+from .path import Path
 from .problem import Problem
 from .selection import inverse
 from .splines import DEGREE
@@ -75,7 +75,7 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
             seen, (problem.noise if problem.kicked else residual_noise(fit)) * units.scale, np.nan
         ),
         model_error=_kicks(problem, fit),
-        warnings=diagnose(problem, fit, model, path, law, margins),
+        warnings=(*diagnose(problem, fit, model, path, law, margins), *history.warnings),
         path=path.plateaus,
         history=tuple(history.steps),
         absent=intervals(problem, fit.state, model, tolerated),

@@ -15,7 +15,7 @@ from .beyond import Wider, beyond_the_library, place, spoken, widened
 from .collocation import CLEANEST, Fit, Linearisation, Status
 from .elsewhere import NEAR_TIE, elsewhere, pinned, untold_origins
 from .errors import passing, residual_noise
-from .persistence import Path
+from .path import RESOLVED, Path
 from .polynomials import PolynomialSystem
 from .problem import COARSE, Problem
 from .selection import closest_rival
@@ -31,8 +31,6 @@ REPEATED = 10.0
 """Turns that tell kicks from a wrong law, which misses the same whenever the motion comes by."""
 LONGEST_STEP = 1.0
 """Longest typical time step, in time scales of the motion (about 6 to a turn)."""
-RESOLVED = 1e-2
-"""Residual, relative to the spread of the data, below which a misfit does not matter."""
 OUTLIER = 30.0
 """Distance of a sample from those around it, over how far nine samples in ten are from the median,
 and over the typical distance of those around it, that no motion explains. Noise of 50 % makes 6."""

@@ -15,7 +15,7 @@ from ..checks import check_array
 from .absent import unseen
 from .candidates import Library
 from .history import Step
-from .persistence import Plateau
+from .path import Plateau
 from .physics import Physics, physics_of
 from .polynomials import PolynomialSystem, power_of_ten
 

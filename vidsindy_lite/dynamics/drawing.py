@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..arrays import Bools
-from .persistence import Plateau
+from .path import Plateau
 
 if TYPE_CHECKING:  # matplotlib takes a second to import, and few discoveries are drawn
     from matplotlib.figure import Figure

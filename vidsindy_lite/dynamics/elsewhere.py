@@ -11,13 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Floats
-from .beyond import newcomers
 from .collocation import Linearisation
+from .frames import away, freed
 from .library import shift_generators, shift_matrix
 from .polynomials import PolynomialSystem
 from .problem import Problem
-from .search import away
 from .selection import closest_rival, minimiser, subset_search
 from .state import State
 
@@ -89,57 +87,10 @@ def pinned(
     tolerated : float
         Errors that have to be tolerated, over those that the law leaves.
     """
-    for axis, gain, room, moved in _freed(problem, state, model, tolerated):
+    for axis, gain, room, moved in freed(problem, state, model, tolerated):
         new = (np.abs(moved) > VANISHED * np.abs(moved).max(initial=0.0)) & ~law.support
         if state.moving.any() and new.any() and room - gain < CLAIMED:
             yield AWAY, problem.form.names[axis], room - gain
-
-
-def off_home(problem: Problem, state: State, model: Linearisation, tolerated: float) -> State:
-    """The state with the axis off home by which its law gains most, if that is worth it.
-
-    Its terms were chosen at larger errors, at which it may have been too near home to tell. What it
-    gains has to be worth the price of an axis, and more than its place would be a coincidence.
-
-    Parameters
-    ----------
-    problem, state, model
-        See `elsewhere`.
-    tolerated : float
-        Errors that have to be tolerated, over those that the law leaves.
-    """
-    freed = _freed(problem, state, model, tolerated)
-    gains = [(gain - max(room, problem.axis_penalty), axis) for axis, gain, room, _ in freed]
-    gain, axis = max(gains, default=(0.0, 0))
-    if not gain > 0:
-        return state
-    return replace(state, moving=state.moving | (np.arange(problem.d) == axis))
-
-
-def _freed(
-    problem: Problem, state: State, model: Linearisation, tolerated: float
-) -> Iterator[tuple[int, float, float, Floats]]:
-    """Axes at home, what the law would gain if each alone left, and what a place is worth.
-
-    That is twice the logarithm of how much wider the box of the data is than the origin is
-    uncertain. And what the move does to the law in the frame of the data, (l, d). Without those
-    whose move the terms of the law make up for.
-    """
-    low, high = problem.box
-    own = np.flatnonzero(state.free()[model.columns])
-    generators = shift_generators(problem.exponents)
-    forth = shift_matrix(problem.exponents, state.offset - problem.home)
-    for axis in np.flatnonzero(problem.form.movable & ~state.moving).tolist():
-        rate = -generators[axis] @ state.coefficients
-        rows = np.eye(len(model.columns))[own]
-        rows = np.vstack([rows, np.append(rate.T.ravel(), np.zeros(problem.d))[model.columns]])
-        (place,), (variance,) = newcomers(
-            rows @ model.information @ rows.T, rows @ model.gradient, len(own)
-        )
-        if np.isfinite(variance):
-            variance *= tolerated**2
-            room = np.log((high - low)[axis] ** 2 / (2 * np.pi * variance))
-            yield axis, float(place**2 / variance), float(room), forth @ rate
 
 
 def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:

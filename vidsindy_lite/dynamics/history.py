@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
+import numpy as np
+from tqdm import tqdm
+
 from ..arrays import Floats
 from .collocation import Fit
 from .problem import Problem
@@ -43,10 +46,40 @@ class Step:
 
 @dataclass(frozen=True)
 class History:
-    """The steps of a discovery so far, in the order of time."""
+    """The steps of a discovery so far, in the order of time, and how much of it is left.
+
+    Parameters
+    ----------
+    steps : list of Step
+    began : float
+        On the clock of `time.perf_counter`.
+    end : float
+        When no further round begins, on that clock.
+    bar : tqdm, optional
+        Moves with every round.
+    """
 
     steps: list[Step] = field(default_factory=list)
     began: float = field(default_factory=time.perf_counter)
+    end: float = np.inf
+    bar: tqdm | None = None
+
+    @property
+    def over(self) -> bool:
+        """Whether there is no time left."""
+        return time.perf_counter() > self.end
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be told if the time was not enough."""
+        told = "the time limit ended the search: this is the best law so far; raise time_limit"
+        return (told,) if self.over else ()
+
+    def another(self) -> bool:
+        """Count a round, and say whether there is time for another."""
+        if self.bar is not None:
+            self.bar.update()
+        return not self.over
 
     def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
         """Add what a fit at a relative physics weight has reached."""

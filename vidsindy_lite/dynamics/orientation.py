@@ -21,8 +21,8 @@ from ..arrays import Bools, Floats, Ints
 from .collocation import Fit, Linearisation
 from .history import History
 from .library import monomial_gradients, monomials
+from .path import FIRST_WEIGHTS, leaves_something_over, tightened, unpruned
 from .problem import Problem, fit_curves
-from .search import FIRST_WEIGHTS, leaves_something_over, tightened, unpruned
 from .selection import inverse
 from .state import State
 
@@ -150,8 +150,7 @@ def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Float
     degrees = problem.exponents.sum(axis=1)
     found: list[Floats] = []
     for degree in range(1, problem.form.degree + 1):
-        stage = f"unpruned, degree {degree}"
-        fit, weight = unpruned(problem, collocation, control, degrees <= degree, stage, history)
+        fit, weight = unpruned(problem, collocation, control, degrees <= degree, history)
         if weight < FIRST_WEIGHTS[-1]:  # too many terms for these data
             continue
         for turn in sparse_orientations(TurnedLaw.of(problem, fit), found, rng):

@@ -26,6 +26,8 @@ PLATEAU = 1e-6
 """Changes of the function below this are taken for rounding."""
 NOTHING = 1e-250
 """Least information; its inverse, even over the ridge, is still a number."""
+DEPENDENT = 1e-9
+"""Share of a term that those of the law leave, below which they have it already."""
 RIDGE = 1e-12
 """Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance."""
 
@@ -448,3 +450,17 @@ def inverse(information: Floats) -> Floats:
     """The covariance that belongs to an information matrix, shape (m, m)."""
     matrix, scale = equilibrated(information)
     return np.linalg.inv(matrix) * scale[:, None] * scale
+
+
+def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, Floats]:
+    """What each further column would be, (k,), if it alone joined the first ``own``, fitted anew.
+
+    Its estimate and its variance: 0 and infinity where it is a combination of the first.
+    """
+    response = inverse(information[:own, :own]) @ information[:own, own:]
+    left = gradient[own:] - gradient[:own] @ response
+    whole = np.diag(information)[own:]
+    apart = whole - (information[:own, own:] * response).sum(axis=0)
+    new = apart > DEPENDENT * whole
+    room = np.where(new, apart, 1.0)
+    return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)

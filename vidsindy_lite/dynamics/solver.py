@@ -3,16 +3,14 @@
 The objective is the paper's (Eqs. 8-9): data loss of a cubic B-spline, physics loss at collocation
 points, a price per term. What differs is how it is minimised: banded Gauss-Newton steps with the
 curve eliminated (`collocation`), a search over supports in the small algebra that remains
-(`selection`), the offset as the origin in which the law is sparsest (`origin`), and a physics
-weight that is raised until the law holds exactly. Nothing is set by hand per system.
-
-The stages, in order: `pose` (`posing`), twice where samples are few (`coarse`), `search` at a
-tolerated error, `polish` at the errors that are left, `settle` on the law that persists
-(`settling`); where none persists, also from a search that tolerates all that has to be.
+(`selection`), the offset as the origin in which the law is sparsest (`frames`), a physics weight
+that is raised until the law holds exactly, and an error that is tolerated (`path`). Nothing is set
+by hand per system.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -21,24 +19,20 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from ..arrays import Floats
-from ..checks import check_integer
+from ..checks import check_integer, check_positive
 from .candidates import Library, check_library
 from .coarse import evidence, views
-from .collocation import Fit, Status
+from .collocation import Fit
 from .conclusion import conclude
 from .discovery import Discovery
-from .elsewhere import off_home
 from .form import Form
 from .history import History
 from .order import accelerated, better, check_order
-from .persistence import Path
+from .path import ROUNDS, TOLERATED, Path, first_law, near, persistent
 from .posing import pose
-from .precision import foreseen, with_precision
-from .problem import Problem, fit_curves
+from .precision import foreseen
+from .problem import Problem
 from .process_noise import rebalanced, with_process_noise
-from .search import CONSISTENT, FINAL_WEIGHT, climb, consistent, search
-from .selection import inverse
-from .settling import EXACT, persists, settle
 from .shape import is_on_circle
 from .swing import LIBRARY, NAME, Swing, swinging
 from .trajectories import (
@@ -50,15 +44,10 @@ from .trajectories import (
 )
 from .turning import Measured, Solved, check_orientation, in_axes, in_sparsest_axes
 
-SPLINE_ERROR = 3e-7
-"""Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
 DROWNED = 0.5
 """Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
-MOST_HALVINGS, MOST_CREEPING = 4, 2
-"""Most halvings of the knot spans, and those until a law must converge: a sharp turn that the first
-knots cannot follow takes two."""
-MOST_WEIGHINGS = 2
-"""Most laws of which the precision of the measurements is learned."""
+MOST_LAWS = 3
+"""Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
 
 
 def discover(
@@ -73,6 +62,7 @@ def discover(
     sigma: float | Floats | Sequence[float | Floats] | None = None,
     origin: str = "learn",
     orientation: str = "data",
+    time_limit: float | None = None,
 ) -> Discovery:
     """Discover the law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -88,7 +78,7 @@ def discover(
         Highest degree of the candidate terms: short for ``library=Library.polynomial(degree)``; 3
         by default.
     seed : int
-        For the random probes of the noise estimate and the starts of the offset search.
+        For the random probes of the noise estimate.
     progress : bool
         Show a progress bar.
     systematic : array_like, shape (k, n, d), optional
@@ -116,6 +106,9 @@ def discover(
         nobody knows how two or three coordinates of a place lie. Then all of the result is in the
         axes that `Discovery.orientation` holds: a state of it is ``x @ orientation.T``. Rows in
         which a coordinate was not seen do not count.
+    time_limit : float, optional
+        Seconds after which no further round begins: then the best law so far comes back, and a
+        warning says so. One fit may last longer.
 
     Returns
     -------
@@ -143,7 +136,12 @@ def discover(
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
     measured = trajectories, shared, check_sigma(sigma, times, trajectories)
-    task = _Task(measured, names, library, origin, seed, progress)
+    end = (
+        np.inf
+        if time_limit is None
+        else time.perf_counter() + check_positive("time_limit", time_limit)
+    )
+    task = _Task(measured, names, library, origin, seed, progress, end)
     # Matrices this small gain nothing by threads, which wait for each other on a busy machine.
     with threadpool_limits(limits=1, user_api="blas"):
         found = _of_order(task, order)
@@ -160,6 +158,7 @@ class _Task:
     origin: str
     seed: int
     progress: bool
+    end: float
     turned: bool = False
     """Whether the axes are a guess: a wrong one looks like an origin that is a little off."""
 
@@ -227,88 +226,48 @@ def _swing(task: _Task, problem: Problem) -> Swing | None:
 
 
 def _solved(task: _Task, form: Form) -> Solved:
-    """The law of a form, the problem that it solves, and the last fit."""
+    """The law of a form, the problem that it solves, and the last fit.
+
+    As in the paper: prepare, path, refit, infer, diagnose; the last two are `conclude`.
+    """
     trajectories, shared, sigma = task.measured
-    starts, probes = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(task.seed).spawn(2)
-    )
-    history = History()
-    with tqdm(total=0, disable=not task.progress, desc="discover", leave=False) as bar:
-        outcomes = [
-            _law(problem, starts, probes, history, bar)
-            for problem in views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
-        ]
-    problem, fit, path = min(outcomes, key=lambda outcome: evidence(*outcome[:2]))
-    if not task.turned:
-        fit = _off_home(problem, fit, path)
+    probes = np.random.default_rng(task.seed)
+    problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
+    rounds = MOST_LAWS * (1 + ROUNDS) * len(problems)
+    with tqdm(total=rounds, disable=not task.progress, desc="discover", leave=False) as bar:
+        history = History(end=task.end, bar=bar)
+        laws = [_law(problem, probes, history, not task.turned) for problem in problems]
+        bar.update(rounds - bar.n)
+    problem, fit, path = min(laws, key=lambda law: evidence(*law[:2]))
     return conclude(problem, fit, path, history), problem, fit
 
 
 def _law(
-    problem: Problem,
-    starts: np.random.Generator,
-    probes: np.random.Generator,
-    history: History,
-    bar: tqdm,
+    problem: Problem, probes: np.random.Generator, history: History, free: bool
 ) -> tuple[Problem, Fit, Path]:
-    """The law of a problem: the problem as that tells it, the last fit, and the path of laws."""
-    bar.total += 2
-    fit = search(problem, starts, history)
-    # No search at larger errors would find an exact law of a motion that is kicked.
-    asked = not consistent(problem, fit)
+    """The law that persists: the problem as that tells it, the last fit, and the path of laws.
+
+    Where a first law does not fit, the motion may be kicked; where no path leads to a law, errors
+    that last may have made terms of the first, and one that tolerates them is the start.
+    """
+    fit = first_law(problem, history)
+    asked = not near(problem, fit, TOLERATED)
     if asked:
-        problem, fit = _kicked(problem, fit, starts, probes, history)
-    if not problem.kicked:
-        fit = polish(problem, climb(problem, fit, starts, history), history)
-        bar.update()
-    for _ in range(0 if problem.kicked else MOST_WEIGHINGS):
-        weighed = with_precision(problem, fit)
-        if weighed is problem:
-            break
-        problem = weighed
-        bar.total += 1
-        fit = climb(problem, search(problem, starts, history), starts, history)
-        fit = polish(problem, fit, history)
-        bar.update()
-    if not asked and (problem.errors(fit) > CONSISTENT * problem.noise).any():
-        problem = with_process_noise(problem, fit, probes)
-        fit = search(problem, starts, history) if problem.kicked else fit
-    if problem.kicked:
-        bar.total += 1
-        problem = rebalanced(problem, fit, probes)
-        fit = polish(problem, fit, history)
-        bar.update()
-    fit, path = settle(problem, fit, history)
-    bar.update()
-    if not (problem.kicked or persists(fit, path)):
-        # Errors that last may have made terms from which no path leads to the law that persists.
-        bar.total += 1
-        found = polish(problem, search(problem, starts, history, path.level), history)
-        if found.status is Status.CONVERGED:  # around what has not, nothing is told
-            other = settle(problem, found, history)
-            fit, path = other if persists(*other) else (fit, path)
-        bar.update()
+        problem, fit = _kicked(problem, fit, probes, history)
+    fit, path, persists = persistent(problem, fit, history, free)
+    if not asked and not near(problem, fit, 0.0):
+        kicked, law = _kicked(problem, fit, probes, history)
+        if kicked.kicked:
+            return kicked, *persistent(kicked, law, history, free)[:2]
+    if not (persists or problem.kicked or history.over):
+        law = first_law(problem, history, path.level)
+        other, around, found = persistent(problem, law, history, free)
+        fit, path = (other, around) if found else (fit, path)
     return problem, fit, path
 
 
-def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
-    """The fit with those axes off home that the errors which are left tell from there."""
-    if not (problem.form.movable & ~fit.state.moving).any():
-        return fit
-    model = path.model if path.fit is fit else problem.model(fit)
-    state = off_home(problem.cautious, fit.state, model, path.tolerated)
-    if state is fit.state:
-        return fit
-    moved = fit.collocation.solve(state, EXACT)
-    return _off_home(problem, moved, path) if moved.status is Status.CONVERGED else fit
-
-
 def _kicked(
-    problem: Problem,
-    fit: Fit,
-    starts: np.random.Generator,
-    probes: np.random.Generator,
-    history: History,
+    problem: Problem, fit: Fit, probes: np.random.Generator, history: History
 ) -> tuple[Problem, Fit]:
     """The problem with the kicks that its data show, and the law under them; else both as given.
 
@@ -317,31 +276,7 @@ def _kicked(
     kicked = with_process_noise(problem, fit, probes)
     if kicked is problem:
         return problem, fit
-    law = search(kicked, starts, history)
-    exact = with_process_noise(problem, law, probes) is problem
-    return (problem, fit) if exact else (kicked, law)
-
-
-def polish(problem: Problem, fit: Fit, history: History) -> Fit:
-    """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
-    fit = first = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
-    columns, creeps = np.flatnonzero(fit.state.free()), first.status is Status.MAX_STEPS
-    for halving in range(MOST_HALVINGS):
-        if creeps and halving == MOST_CREEPING:
-            fit = first
-            break
-        before = fit.state.flat()[columns]
-        segments = [segment.refined() for segment in fit.collocation.segments]
-        finer = problem.collocation(segments, problem.errors(fit))
-        splines = fit.collocation.grid.splines(fit.state.control_points)
-        state = replace(fit.state, control_points=fit_curves(finer, splines))
-        fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
-        creeps = creeps and fit.status is Status.MAX_STEPS
-        information = fit.collocation.linearise(fit.state, columns).information
-        spread = np.sqrt(np.diag(inverse(information)))
-        # Half the spacing, a sixteenth of the error: so much is left of what it just was.
-        error = np.abs(fit.state.flat()[columns] - before) / 15
-        if (error < np.maximum(0.1 * spread, SPLINE_ERROR)).all():
-            break
-    history.add("polish", problem, fit, FINAL_WEIGHT)
-    return fit
+    law = first_law(kicked, history)
+    if with_process_noise(problem, law, probes) is problem:
+        return problem, fit
+    return rebalanced(kicked, law, probes), law

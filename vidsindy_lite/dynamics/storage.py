@@ -19,7 +19,7 @@ from .candidates import Library, harmonic
 from .discovery import Discovery
 from .history import Step
 from .library import Function, extended
-from .persistence import Plateau
+from .path import Plateau
 from .polynomials import PolynomialSystem
 from .rounds import Round
 from .swing import Swing
