@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.library import closure, monomial_exponents
+from vidsindy_lite.dynamics.model import Form
 
 PENDULUM = Library.polynomial(1) + Library.fourier(1)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics.coarse import views
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics.model import Form
+from vidsindy_lite.dynamics.path import views
+from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.study import FLOWS
 
 CIRCLING = {"x": {"vx": 1.0}, "vx": {"x": -1.0, "vx": 0.5, "x^2 vx": -0.5}}

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from helpers import posed
 
-from vidsindy_lite.dynamics.conclusion import _pruned, conclude
-from vidsindy_lite.dynamics.history import History
+from vidsindy_lite.dynamics.inference import _pruned, conclude
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.path import FINAL_WEIGHT, LARGEST, follow
+from vidsindy_lite.dynamics.model import State
+from vidsindy_lite.dynamics.path import FINAL_WEIGHT, LARGEST, History, follow
 from vidsindy_lite.dynamics.problem import fit_curves
-from vidsindy_lite.dynamics.state import State
 
 
 def pruned(coefficients, covariance, penalties):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.dynamics import discover
-from vidsindy_lite.dynamics.conclusion import _coincidence
-from vidsindy_lite.dynamics.elsewhere import untold_origins
+from vidsindy_lite.dynamics.diagnostics import untold_origins
+from vidsindy_lite.dynamics.inference import _coincidence
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.study import corruption, score
 from vidsindy_lite.study.systems import FLOWS

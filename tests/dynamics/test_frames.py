@@ -5,7 +5,7 @@ import pytest
 
 from vidsindy_lite.dynamics.frames import ShiftedLaw
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.study import SYSTEMS
 
 

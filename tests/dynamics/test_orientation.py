@@ -6,12 +6,19 @@ from scipy.spatial.transform import Rotation
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import solver, turning
-from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.orientation import TurnedLaw, _turns, apart, nearest, turned, with_turns
-from vidsindy_lite.dynamics.selection import inverse
-from vidsindy_lite.dynamics.solver import _solved, _Task
-from vidsindy_lite.dynamics.turning import in_axes
+from vidsindy_lite.dynamics.l0 import inverse
+from vidsindy_lite.dynamics.library import Library, monomial_exponents
+from vidsindy_lite.dynamics.solver import (
+    TurnedLaw,
+    _solved,
+    _Task,
+    _turns,
+    apart,
+    in_axes,
+    nearest,
+    turned,
+    with_turns,
+)
 from vidsindy_lite.study import SYSTEMS
 
 

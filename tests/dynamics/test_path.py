@@ -8,17 +8,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import path as paths
-from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.history import History
-from vidsindy_lite.dynamics.path import LARGEST, Path, Plateau
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.posing import pose
-from vidsindy_lite.dynamics.problem import fit_curves
+from vidsindy_lite.dynamics.data import check_trajectory
+from vidsindy_lite.dynamics.library import Library
+from vidsindy_lite.dynamics.model import Form, PolynomialSystem, State
+from vidsindy_lite.dynamics.path import LARGEST, History, Path, Plateau
+from vidsindy_lite.dynamics.problem import fit_curves, pose
 from vidsindy_lite.dynamics.solver import discover
-from vidsindy_lite.dynamics.state import State
-from vidsindy_lite.dynamics.trajectories import check_trajectory
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,

@@ -6,10 +6,10 @@ import pytest
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.dynamics import PolynomialSystem
-from vidsindy_lite.dynamics import precision as weighing
-from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics import noise as weighing
+from vidsindy_lite.dynamics.library import Library
+from vidsindy_lite.dynamics.model import Form
+from vidsindy_lite.dynamics.problem import pose
 
 LAW = PolynomialSystem.from_terms(
     {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3

@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 from helpers import posed
 
-from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Fit, Status
-from vidsindy_lite.dynamics.errors import residual_noise
-from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.frames import as_shifted, cheapest_at, closed, nearer_home
-from vidsindy_lite.dynamics.posing import pose
-from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, term_penalties
-from vidsindy_lite.dynamics.state import State
+from vidsindy_lite.dynamics.library import Library
+from vidsindy_lite.dynamics.model import Form, State
+from vidsindy_lite.dynamics.noise import residual_noise
+from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, pose, term_penalties
 from vidsindy_lite.study import SYSTEMS
 
 

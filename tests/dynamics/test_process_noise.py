@@ -8,13 +8,13 @@ from helpers import dependent, posed
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import PolynomialSystem
+from vidsindy_lite.dynamics.bspline import Segment
 from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
-from vidsindy_lite.dynamics.conclusion import _kicks
+from vidsindy_lite.dynamics.inference import _kicks
 from vidsindy_lite.dynamics.library import monomial_exponents
+from vidsindy_lite.dynamics.model import State
+from vidsindy_lite.dynamics.noise import OCTAVE, _bands, evidence
 from vidsindy_lite.dynamics.path import FIRST_WEIGHTS
-from vidsindy_lite.dynamics.process_noise import OCTAVE, _bands, evidence
-from vidsindy_lite.dynamics.splines import Segment
-from vidsindy_lite.dynamics.state import State
 
 LAW = PolynomialSystem.from_terms(
     {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3

@@ -7,18 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
-from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Status
-from vidsindy_lite.dynamics.form import Form
 from vidsindy_lite.dynamics.frames import away
-from vidsindy_lite.dynamics.history import History
-from vidsindy_lite.dynamics.library import shift_matrix
-from vidsindy_lite.dynamics.order import accelerated, better, unexplained
-from vidsindy_lite.dynamics.path import FINAL_WEIGHT, framed, select
-from vidsindy_lite.dynamics.posing import pose
-from vidsindy_lite.dynamics.problem import fit_curves
+from vidsindy_lite.dynamics.library import Library, shift_matrix
+from vidsindy_lite.dynamics.model import Form
+from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, framed, select
+from vidsindy_lite.dynamics.problem import fit_curves, pose
 from vidsindy_lite.dynamics.smoothing import smooth
-from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.dynamics.solver import accelerated, better, discover, unexplained
 from vidsindy_lite.study import SYSTEMS
 
 

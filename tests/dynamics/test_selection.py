@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from vidsindy_lite.dynamics import selection
-from vidsindy_lite.dynamics.selection import (
+from vidsindy_lite.dynamics import l0 as selection
+from vidsindy_lite.dynamics.l0 import (
     _descend,
     _moved_by_newcomers,
     _Quadratic,

@@ -8,17 +8,12 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics import path as paths
-from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.history import History
-from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.path import FINAL_WEIGHT, polish
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.posing import pose
-from vidsindy_lite.dynamics.problem import fit_curves, term_penalties
+from vidsindy_lite.dynamics.bspline import Segment
+from vidsindy_lite.dynamics.library import Library, monomial_exponents
+from vidsindy_lite.dynamics.model import Form, PolynomialSystem, State
+from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, polish
+from vidsindy_lite.dynamics.problem import fit_curves, pose, term_penalties
 from vidsindy_lite.dynamics.solver import discover
-from vidsindy_lite.dynamics.splines import Segment
-from vidsindy_lite.dynamics.state import State
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,

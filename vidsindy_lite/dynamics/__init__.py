@@ -22,26 +22,25 @@ turning: the same in the axes in which the law is sparsest (orientation), where 
 beside the way: cramer_rao, the least errors that any estimate could have
 """
 
-from .candidates import Library, check_library
+from .library import Library, check_library
 from .collocation import Collocation, Status
-from .cramer_rao import cramer_rao
-from .discovery import Discovery
-from .form import Form
-from .integrate import runge_kutta_4
+from .inference import cramer_rao
+from .result import Discovery
+from .model import Form
+from .model import runge_kutta_4
 from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
-from .order import check_order
+from .solver import check_order
 from .frames import ShiftedLaw
-from .path import Plateau
-from .polynomials import PolynomialSystem
+from .result import Plateau, Swing
+from .model import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
-from .rounds import Round, on_circle, on_sphere
-from .selection import closest_rival, subset_search
-from .sindy import SplineSINDy
+from .mechanics import Round, on_circle, on_sphere
+from .l0 import closest_rival, subset_search
+from .solver import SplineSINDy
 from .smoothing import smooth
 from .solver import discover
-from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis
-from .state import State
-from .swing import Swing
-from .trajectories import Trajectory, check_trajectory, cut, typical_step
-from .turning import check_orientation
-from .units import Units
+from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis
+from .model import State
+from .data import Trajectory, check_trajectory, cut, typical_step
+from .solver import check_orientation
+from .data import Units

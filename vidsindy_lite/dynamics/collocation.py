@@ -19,11 +19,10 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cholesky_banded
 
 from ..arrays import Floats, Ints
-from .banded import normal_band, solve_factored
+from .bspline import WIDTH, Grid, Segment, normal_band, solve_factored
+from .l0 import RIDGE, equilibrated
 from .library import Function, along_state, law_variables, monomials, shift_generators
-from .selection import RIDGE, equilibrated
-from .splines import WIDTH, Grid, Segment
-from .state import State
+from .model import State
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""

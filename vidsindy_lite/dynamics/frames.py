@@ -17,10 +17,10 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .collocation import Fit, Linearisation
+from .l0 import newcomers, subset_search
 from .library import closure_mask, divides, shift_generators, shift_matrix
+from .model import State
 from .problem import Problem
-from .selection import newcomers, subset_search
-from .state import State
 
 ROUNDING = 1e-9
 """Moves of an origin, in units of the spread of the data, that are none."""

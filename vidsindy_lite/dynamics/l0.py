@@ -28,6 +28,8 @@ NOTHING = 1e-250
 """Least information; its inverse, even over the ridge, is still a number."""
 DEPENDENT = 1e-9
 """Share of a term that those of the law leave, below which they have it already."""
+LEAST = 1e-300
+"""Keeps a quotient or a logarithm finite where there is nothing."""
 RIDGE = 1e-12
 """Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance."""
 
