@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers import posed
 
-from vidsindy_lite.dynamics.inference import _pruned, conclude
+from vidsindy_lite.dynamics.inference import _pruned, infer
 from vidsindy_lite.dynamics.library import monomial_exponents
 from vidsindy_lite.dynamics.model import State
 from vidsindy_lite.dynamics.path import FINAL_WEIGHT, LARGEST, History, follow
@@ -47,7 +47,7 @@ def test_what_no_shift_has_changed_stays_however_large_the_errors_that_are_toler
     tolerant = tuple(
         tuple(replace(plateau, low=LARGEST) for plateau in plateaus) for plateaus in path.plateaus
     )
-    found = conclude(problem, fit, replace(path, plateaus=tolerant), History())
+    found, _ = infer(problem, fit, path.model, replace(path, plateaus=tolerant), History())
     assert (found.system.support == found.native.support).all()
 
 

@@ -5,13 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics import solver, turning
+from vidsindy_lite.dynamics import orientation, solver
 from vidsindy_lite.dynamics.l0 import inverse
 from vidsindy_lite.dynamics.library import Library, monomial_exponents
-from vidsindy_lite.dynamics.solver import (
+from vidsindy_lite.dynamics.orientation import (
     TurnedLaw,
-    _solved,
-    _Task,
     _turns,
     apart,
     in_axes,
@@ -19,6 +17,7 @@ from vidsindy_lite.dynamics.solver import (
     turned,
     with_turns,
 )
+from vidsindy_lite.dynamics.solver import _solved, _Task
 from vidsindy_lite.study import SYSTEMS
 
 
@@ -162,11 +161,13 @@ def test_axes_are_refined_only_for_a_law_that_is_then_sought(monkeypatch):
         used = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given: calls.append(name) or used(*given))
 
-    starts = turning.rough_orientations
+    starts = orientation.rough_orientations
     monkeypatch.setattr(
-        turning, "rough_orientations", lambda *given: calls.append("start") or starts(*given)[:1]
+        orientation,
+        "rough_orientations",
+        lambda *given: calls.append("start") or starts(*given)[:1],
     )
-    counted(turning, "refined")
+    counted(orientation, "refined")
     counted(solver, "_solved")
     law, t = vl.PolynomialSystem.from_terms(DUFFING), np.linspace(0, 20, 300)
     x = law.simulate(t, [1.5, 0.4]) @ turned(np.array([0.5]), 2)

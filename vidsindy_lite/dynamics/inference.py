@@ -15,7 +15,6 @@ from ..arrays import Bools, Floats, Ints
 from .bspline import DEGREE
 from .collocation import Fit, Linearisation
 from .data import Units
-from .diagnostics import diagnose
 from .l0 import LEAST, inverse, newcomers
 from .library import divides, shift_generators, shift_matrix
 from .model import PolynomialSystem, State
@@ -196,8 +195,13 @@ HOLDS = 3
 """Steps to the likeliest law of which a term is zero."""
 
 
-def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discovery:
-    """Turn the last fit into a `Discovery` in the units of the data.
+def infer(
+    problem: Problem, fit: Fit, model: Linearisation, path: Path, history: History
+) -> tuple[Discovery, Floats]:
+    """Turn the last fit into a `Discovery` in the units of the data, without warnings as yet.
+
+    By how much the criterion rises comes along, (l d,), if a term of the law in the data's frame is
+    taken out or put back, equation by equation.
 
     Parameters
     ----------
@@ -206,6 +210,8 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
         be told from zero.
     fit : Fit
         At a physics weight at which the law holds exactly.
+    model : Linearisation
+        Around it, of all candidates and moving axes.
     path : Path
         On which the law was chosen.
     history : History
@@ -213,7 +219,6 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     """
     units, state, collocation = problem.units, fit.state, fit.collocation
     form, exponents, (l, d) = problem.form, problem.exponents, state.coefficients.shape
-    model = path.model if path.fit is fit else problem.model(fit)
     covariance = _covariance(units, fit, model)
     coefficients = state.coefficients * units.factors(exponents)
     offset = np.where(state.moving, units.point(state.offset), 0.0)
@@ -231,7 +236,7 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
     margins[weighed] = np.inf
     law = form.law(moved + form.known)
     seen = collocation.counts > 0
-    return Discovery(
+    found = Discovery(
         system=law,
         native=form.law(coefficients + form.known),
         offset=offset,
@@ -242,7 +247,7 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
             seen, (problem.noise if problem.kicked else residual_noise(fit)) * units.scale, np.nan
         ),
         model_error=_kicks(problem, fit),
-        warnings=(*diagnose(problem, fit, model, path, law, margins), *history.warnings),
+        warnings=(),
         path=path.plateaus,
         history=tuple(history.steps),
         absent=intervals(problem, fit.state, model, tolerated),
@@ -251,6 +256,7 @@ def conclude(problem: Problem, fit: Fit, path: Path, history: History) -> Discov
             for s in collocation.grid.splines(state.control_points)
         ),
     )
+    return found, margins
 
 
 def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisation) -> Discovery:

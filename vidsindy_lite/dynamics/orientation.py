@@ -1,0 +1,393 @@
+"""The axes in which a polynomial law is sparsest, for paths of which nobody knows how they lie.
+
+A rotation of the axes, like a shift of their origin, maps polynomials of one degree onto each
+other, exactly. So all terms are fitted once, and the estimate, with its covariance, is looked at
+in other axes, where the number of terms that differ from zero is minimised; see `origin`, which
+does the same for shifts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
+from math import comb
+
+import numpy as np
+from scipy.linalg import block_diag, eigh
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from ..arrays import Bools, Floats, Ints
+from ..checks import check_choice
+from .collocation import Fit, Linearisation
+from .data import (
+    Trajectory,
+)
+from .inference import with_errors
+from .l0 import inverse
+from .library import (
+    Library,
+    monomial_gradients,
+    monomials,
+    variable_names,
+)
+from .model import Form, State
+from .path import (
+    FIRST_WEIGHTS,
+    History,
+    leaves_something_over,
+    tightened,
+    unpruned,
+)
+from .problem import Problem, fit_curves
+from .result import Discovery
+
+STARTS = 20
+"""Random orientations from which the sparsest is sought."""
+KEPT = 3
+"""Most orientations that are worth a discovery."""
+COARSE, FINE = 0.1, 0.01
+"""Sizes of a standard coefficient at which it counts: while seeking, and at the end."""
+LEFT_OVER = 0.05
+"""Standard coefficients below this may be what axes that are not quite right leave."""
+ALIKE = np.deg2rad(2.0)
+"""Orientations that differ by less are one."""
+MODES = 40
+"""Most directions of uncertainty that are looked at: the largest."""
+SLIGHTEST = 1e-10
+"""Least variance over the largest, in units of their own, that is no rounding."""
+POINTS = 3
+"""Points at which two polynomials are compared, over the number of their terms."""
+CHOSEN = 1e-8
+"""Share of what a turn changes that a law's terms cannot make up for: if less, it is a choice."""
+
+
+@dataclass(frozen=True, eq=False)
+class TurnedLaw:
+    """An estimate of all terms of a law of m coordinates, to be looked at in other axes.
+
+    Parameters
+    ----------
+    exponents : ndarray of int, shape (l, m) or (l, 2 m)
+        All monomials up to a degree, of places, or of places and velocities.
+    estimates : ndarray, shape (1 + k, l, m)
+        Coefficients in axes of one unit, and the directions in which they are uncertain, each one
+        standard error long.
+    origin : ndarray, shape (m,)
+        Where the fit had its origin, in these axes, around the middle of the data.
+    """
+
+    exponents: Ints
+    estimates: Floats
+    origin: Floats
+
+    @classmethod
+    def of(cls, problem: Problem, fit: Fit) -> TurnedLaw:
+        """The quadratic model around a fit, in all terms; the unit is the spread of the data."""
+        state, m = fit.state, problem.measured[0][1].shape[1]
+        rows = _rows(fit)
+        columns = np.flatnonzero((problem.form.candidates & rows[:, None]).T)
+        model = fit.collocation.linearise(state, columns)
+        flat = state.flat()[columns] + model.newton()[0]
+        values, axes = np.linalg.eigh(inverse(model.information))
+        directions = (axes * np.sqrt(np.maximum(values, 0.0))).T
+        stacked = np.vstack([flat, directions]).reshape(-1, m, rows.sum())
+        scale, unit = problem.units.scale, _unit(problem)
+        origin = (state.offset * scale / unit)[:m]
+        law = cls(problem.exponents[rows], np.moveaxis(stacked, 1, 2), origin)
+        law = law._mapped(np.diag(unit / scale), -state.offset, np.diag((scale / unit)[-m:]))
+        flat = law.estimates[1:].reshape(len(directions), -1)
+        _, sizes, largest = np.linalg.svd(flat, full_matrices=False)
+        modes = (sizes[:, None] * largest).reshape(-1, *law.estimates.shape[1:])
+        return replace(law, estimates=np.concatenate([law.estimates[:1], modes]))
+
+    def _mapped(self, inward: Floats, origin: Floats, outward: Floats) -> TurnedLaw:
+        """The law of ``outward f(inward y + origin)``, compared at points enough."""
+        count, d = self.exponents.shape
+        y = np.random.default_rng(0).uniform(-1, 1, (POINTS * count, d))
+        values = monomials(y @ inward.T + origin, self.exponents) @ self.estimates @ outward.T
+        fitted = np.linalg.pinv(monomials(y, self.exponents)) @ values
+        return replace(self, estimates=fitted)
+
+    def _places(self, origin: Floats) -> Floats:
+        """An origin in space as one of the state: velocities have none."""
+        return np.append(origin, np.zeros(self.exponents.shape[1] - len(origin)))
+
+    def seen(self, turn: Floats, origin: Floats) -> tuple[Floats, Floats]:
+        """Coefficients and their variances, (l, m), in axes that are the rows of ``turn``, (m, m).
+
+        Around an origin, (m,), in the axes of the estimate.
+        """
+        m = len(turn)
+        copies = self.exponents.shape[1] // m
+        law = self._mapped(block_diag(*[turn.T] * copies), self._places(origin), turn)
+        return law.estimates[0], (law.estimates[1:] ** 2).sum(axis=0)
+
+    def descended(self, turn: Floats, origin: Floats, size: float) -> tuple[float, Floats, Floats]:
+        """The nearest orientation and origin with fewest terms, and their smoothed number.
+
+        A coefficient counts ``log(1 + z^2)``, with ``z`` over its standard error and a size.
+        """
+        m = len(turn)
+
+        def scores(step: Floats) -> Floats:
+            estimate, variance = self.seen(turned(step[:-m], m) @ turn, origin + step[-m:])
+            return (estimate / np.sqrt(variance + size**2)).ravel()
+
+        free = m * (m - 1) // 2 + m
+        best = least_squares(scores, np.zeros(free), loss="cauchy", max_nfev=60)
+        return float(best.cost), turned(best.x[:-m], m) @ turn, origin + best.x[-m:]
+
+    def freed(self, support: Bools) -> Floats:
+        """The small turn, (m, m), after which only these terms, (l, m), are left, if they are all.
+
+        The others are made as small as their covariance asks for, while the origin gives way.
+        """
+        m, home = len(self.origin), self.origin
+        law = self._mapped(np.eye(self.exponents.shape[1]), self._places(home), np.eye(m))
+        others = ~support
+        directions = law.estimates[1:][:, others]
+        sizes = np.maximum(np.linalg.norm(directions, axis=0), np.finfo(float).tiny)
+        values, axes = np.linalg.eigh((directions / sizes).T @ (directions / sizes))
+        whiten = axes / np.sqrt(np.maximum(values, SLIGHTEST * values[-1]))
+
+        def scores(step: Floats) -> Floats:
+            estimate, _ = self.seen(turned(step[:-m], m), home + step[-m:])
+            return (estimate[others] / sizes) @ whiten
+
+        best = least_squares(scores, np.zeros(m * (m - 1) // 2 + m), x_scale="jac", max_nfev=60)
+        return turned(best.x[:-m], m)
+
+
+def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Floats]:
+    """Orientations in which fits of all terms up to a degree look sparse, for degrees as needed."""
+    collocation = problem.collocation(problem.segments())
+    control, history = fit_curves(collocation, problem.curves), History()
+    degrees = problem.exponents.sum(axis=1)
+    found: list[Floats] = []
+    for degree in range(1, problem.form.degree + 1):
+        fit, weight = unpruned(problem, collocation, control, degrees <= degree, history)
+        if weight < FIRST_WEIGHTS[-1]:  # too many terms for these data
+            continue
+        for turn in sparse_orientations(TurnedLaw.of(problem, fit), found, rng):
+            if all(apart(turn, other) > ALIKE for other in found):
+                found.append(turn)
+        if not leaves_something_over(problem, fit):
+            break
+    return found
+
+
+def refined(problem: Problem, fit: Fit) -> Floats:
+    """The small turn, (m, m), after which the small terms of a law are not needed any more.
+
+    Axes that are off by a fraction of a degree leave small terms, which clean data tell. The law is
+    fitted without them, and the axes are those in which all that it lacks is nothing.
+    """
+    state, units = fit.state, problem.units
+    unit = replace(units, scale=_unit(problem))
+    sizes = state.coefficients * units.factors(problem.exponents) / unit.factors(problem.exponents)
+    state, collocation = state.of_terms(state.active & (np.abs(sizes) > LEFT_OVER)), fit.collocation
+    if not state.active.any():
+        return np.eye(problem.measured[0][1].shape[1])
+    fit = tightened(problem, collocation, state)
+    law = TurnedLaw.of(problem, fit)
+    return law.freed(fit.state.active[_rows(fit)][:, -len(law.origin) :])
+
+
+def with_turns(problem: Problem, fit: Fit) -> Linearisation:
+    """The quadratic model around a fit, with small turns of its axes eliminated.
+
+    Axes in which terms are absent were learned from these: so what a law with the same terms in
+    axes near by explains as well is not known. A turn that the law's own terms can make up for is
+    no unknown but a choice of axes, which stay.
+    """
+    model = problem.model(fit)
+    turns = _turns(problem, fit.state)[model.columns]
+    own = np.flatnonzero(fit.state.free()[model.columns])
+    told = model.information @ turns
+    gain = inverse(model.information[np.ix_(own, own)]) @ told[own]
+    whole = turns.T @ told
+    least = CHOSEN * np.trace(whole) * np.eye(len(whole))  # turns that change nothing have a share
+    shares, directions = eigh(whole - told[own].T @ gain, whole + least)
+    turns = turns @ directions[:, shares > CHOSEN]
+    told = model.information @ turns
+    share = told @ np.linalg.pinv(turns.T @ told, hermitian=True)
+    return replace(
+        model,
+        information=model.information - share @ told.T,
+        gradient=model.gradient - share @ (turns.T @ model.gradient),
+    )
+
+
+def _turns(problem: Problem, state: State) -> Floats:
+    """What small turns about the origin of the data change in a law, along `State.flat`, (k, r).
+
+    With the generator K of a turn it is ``K f(x) - f'(x) K x``.
+    """
+    m, scale, exponents = problem.measured[0][1].shape[1], problem.units.scale, problem.exponents
+    y = np.random.default_rng(0).uniform(-1, 1, (POINTS * len(exponents), problem.d))
+    values, law = monomials(y, exponents), state.coefficients + problem.known
+    slopes = np.einsum("nlk,lj->njk", monomial_gradients(y, exponents), law)
+    changes = []
+    for i, j in combinations(range(m), 2):
+        generator = np.zeros((m, m))
+        generator[[i, j], [j, i]] = 1.0, -1.0
+        turn = np.kron(np.eye(problem.d // m), generator) * scale / scale[:, None]
+        moved = np.einsum("njk,nk->nj", slopes, (y + state.offset - problem.home) @ turn.T)
+        change = np.linalg.pinv(values) @ (values @ law @ turn.T - moved)
+        changes.append(np.append(change.T, np.zeros(problem.d)))
+    return np.column_stack(changes)
+
+
+def _rows(fit: Fit) -> Bools:
+    """Terms, (l,), up to the highest degree of a law: these are mixed by turns and shifts."""
+    degrees = fit.collocation.exponents.sum(axis=1)
+    return np.asarray(degrees <= degrees[fit.state.active.any(axis=1)].max())
+
+
+def _unit(problem: Problem) -> Floats:
+    """One unit of length for all coordinates, and one for all velocities, (d,)."""
+    m, scale = problem.measured[0][1].shape[1], problem.units.scale
+    return np.repeat(np.sqrt(np.mean(scale.reshape(-1, m) ** 2, axis=1)), m)
+
+
+def turned(angles: Floats, m: int) -> Floats:
+    """A rotation of m axes, (m, m), by an angle, or by a vector of three."""
+    vector = angles if m == 3 else np.append([0, 0], angles)
+    return Rotation.from_rotvec(vector).as_matrix()[:m, :m]
+
+
+def sparse_orientations(
+    law: TurnedLaw, known: Sequence[Floats], rng: np.random.Generator
+) -> list[Floats]:
+    """Orientations, (m, m), in which a law has fewest terms, distinct, best first.
+
+    Sought from those that are known, from the data's own, and from random ones.
+    """
+    law, m = replace(law, estimates=law.estimates[: 1 + MODES]), law.estimates.shape[2]
+    home = np.zeros(m)
+    starts = [*known, np.eye(m), *(random_turn(m, rng) for _ in range(STARTS))]
+    coarse = sorted((law.descended(turn, home, COARSE) for turn in starts), key=lambda f: f[0])
+    found: list[Floats] = []
+    fine = [law.descended(turn, origin, FINE) for _, turn, origin in coarse[: 2 * KEPT]]
+    for _, turn, _ in sorted(fine, key=lambda f: f[0]):
+        near = nearest(turn)
+        if all(apart(near, other) > ALIKE for other in found):
+            found.append(near)
+    return found[:KEPT]
+
+
+def random_turn(m: int, rng: np.random.Generator) -> Floats:
+    """A rotation of two or three axes, (m, m), any as likely."""
+    if m == 3:
+        return Rotation.random(random_state=rng).as_matrix()
+    return Rotation.from_euler("z", rng.uniform(0, 2 * np.pi)).as_matrix()[:2, :2]
+
+
+def apart(turn: Floats, other: Floats) -> float:
+    """Largest angle between the axes of two orientations, by whatever name and sign."""
+    return float(np.arccos(np.clip(np.abs(turn @ other.T).max(axis=1), 0, 1)).max())
+
+
+def nearest(turn: Floats) -> Floats:
+    """The same axes in the order and with the signs that are nearest to the data's own."""
+    m = len(turn)
+    rows = (
+        np.array(signs)[:, None] * turn[list(order)]
+        for order in permutations(range(m))
+        for signs in product([1.0, -1.0], repeat=m)
+    )
+    return max((axes for axes in rows if np.linalg.det(axes) > 0), key=np.trace)
+
+
+MOST_TURNS = 3
+"""Most times that a discovery tells the axes better, in which the next is made."""
+
+Solved = tuple[Discovery, Problem, Fit]
+Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
+"""Trajectories, their systematic errors, and their standard errors if they are known."""
+
+
+def check_orientation(orientation: str, library: Library, d: int, origin: str) -> None:
+    """Refuse what is no orientation, or to learn one of data or candidates that have none."""
+    check_choice("orientation", orientation, ("data", "learn"))
+    if orientation == "data":
+        return
+    if d not in (2, 3):
+        raise ValueError(f"orientation: can be learned of two or three coordinates, got {d}")
+    form = Form.of(variable_names(d), library)
+    whole = len(form.exponents) == comb(d + form.degree, d) and form.candidates.all()
+    if not whole or form.functions or library.given or library.timed(form.names):
+        raise ValueError(
+            "orientation: can be learned only among all polynomials up to a degree, got "
+            f"library={library}"
+        )
+    if origin != "learn":
+        raise ValueError(f"orientation: can be learned only with origin='learn', got {origin!r}")
+
+
+def in_sparsest_axes(
+    own: Discovery,
+    pose: Callable[[Floats], Problem],
+    solve: Callable[[Floats], Solved],
+    rng: np.random.Generator,
+) -> Discovery:
+    """The law in the axes in which it has fewest terms: its own if no others have fewer.
+
+    Parameters
+    ----------
+    own : Discovery
+        In the axes of the data.
+    pose, solve : callable
+        The problem, and its solution, in axes that are the rows of (m, m).
+    rng : numpy.random.Generator
+        For the starts of the search.
+    """
+    starts = rough_orientations(pose(np.eye(own.system.states // own.system.order)), rng)
+    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=own)
+    if _terms(best) < _terms(own):
+        return replace(best, note=own.note)
+    said = "orientation: the data's own axes, as the law has no fewer terms in any others"
+    return replace(own, note="; ".join(filter(None, (own.note, said))))
+
+
+def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Discovery:
+    """The law in the best axes near some; of laws alike, the one in the axes that were refined."""
+    found, problem, fit = solve(turn)
+    best = replace(found, orientation=turn), problem, fit
+    for _ in range(MOST_TURNS):
+        turn, before = refined(problem, fit) @ turn, _rank(found)
+        found, problem, fit = solve(turn)
+        if _rank(found) <= _rank(best[0]):
+            best = replace(found, orientation=turn), problem, fit
+        if _rank(found) >= before:
+            break
+    found, problem, fit = best
+    return with_errors(found, problem, fit, with_turns(problem, fit))
+
+
+def _rank(found: Discovery) -> tuple[bool, int]:
+    """What is to be smallest: no warnings, then few terms."""
+    return bool(found.warnings), _terms(found)
+
+
+def _terms(found: Discovery) -> int:
+    """Terms of a law, and axes along which its origin is moved."""
+    return int(found.native.support.sum() + (found.offset != 0).sum())
+
+
+def in_axes(measured: Measured, turn: Floats) -> Measured:
+    """What was measured, in axes that are the rows of ``turn``, (m, m).
+
+    A place of which a coordinate was not seen is none. The errors of two coordinates of known ones
+    are taken to be independent in all axes.
+    """
+    trajectories, shared, sigma = measured
+    whole = [np.isfinite(x).all(axis=1) for _, x in trajectories]
+    paths = [(t[rows], x[rows] @ turn.T) for (t, x), rows in zip(trajectories, whole, strict=True)]
+    modes = [np.einsum("ij,njk->nik", turn, s[rows]) for s, rows in zip(shared, whole, strict=True)]
+    if sigma is None:
+        return paths, modes, None
+    pairs = zip(sigma, whole, strict=True)
+    return paths, modes, [np.sqrt(errors[rows] ** 2 @ (turn**2).T) for errors, rows in pairs]
