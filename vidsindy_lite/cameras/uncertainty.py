@@ -53,8 +53,8 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     ndarray, shape (k, n, 3)
         Scene units; what k independent causes, each off by one standard error, add to the path.
         Zero where nothing can be reconstructed. If something of the rig was measured with an error,
-        without what moves or stretches the whole path: no law's terms depend on the origin and the
-        unit of length, which are as uncertain as the measurements leave them.
+        without what stretches the whole path: no law's terms depend on the unit of length. On the
+        origin they do, in the frame of the data: what moves the path counts.
     """
     errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = (lags.errors > 0) & np.isfinite(lags.errors)
@@ -72,14 +72,13 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
 
 
 def _of_shape(modes: Floats, x: Floats) -> Floats:
-    """Modes, (k, n, 3), without moves and stretches of the whole path x, (n, 3), largest first.
+    """Modes, (k, n, 3), without stretches of the whole path x, (n, 3), largest first.
 
     What is smaller than `_SMALLEST` of the largest is left out.
     """
     seen = np.asarray(np.isfinite(x).all(axis=1))
     centred = np.where(seen[:, None], x - x[seen].mean(axis=0), 0.0)
-    moves = [seen[:, None] * axis for axis in np.eye(3)]
-    frame, _ = np.linalg.qr(np.reshape([*moves, centred], (4, -1)).T)
+    frame = (centred / np.linalg.norm(centred)).reshape(-1, 1)
     flat = modes.reshape(len(modes), -1)
     _, sizes, ways = np.linalg.svd(flat - flat @ frame @ frame.T, full_matrices=False)
     kept = sizes > _SMALLEST * sizes[:1]

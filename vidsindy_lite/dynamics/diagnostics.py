@@ -21,7 +21,15 @@ from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Collocation, Fit, Linearisation, Status
 from .data import Trajectory, typical_step
 from .frames import away, freed
-from .l0 import LEAST, closest_rival, minimiser, newcomers, subset_search
+from .l0 import (
+    LEAST,
+    closest_rival,
+    far_neighbours,
+    minimiser,
+    newcomers,
+    prior_prices,
+    subset_search,
+)
 from .library import monomial_exponents, monomials, shift_generators, shift_matrix, velocity_names
 from .mechanics import Round, on_circle, on_sphere
 from .model import PolynomialSystem, State, place, spoken
@@ -778,6 +786,8 @@ WILD = 2.0
 APART = 0.2
 """Root mean square distance of the law's two frames along the curve, relative to the speed: more
 than terms that cannot be told from zero make."""
+UNLIKELY = 0.02
+"""Odds of laws with other coefficients from which on the errors of a law are none to rely on."""
 MEANING = {
     Status.MAX_STEPS: "its coefficients may be off by more than their errors",
     Status.STALLED: "terms may be indistinguishable on these data",
@@ -965,6 +975,7 @@ def _selection(
         # The offset stays where it is: with it free, the same law in another frame would count.
         yield from _left_over(model.of(problem.form.searched), fit.state)
         yield from _near_tie(wider, remedy)
+        yield from _far_neighbours(problem, fit.state, model.of(problem.form.searched), remedy)
         origins += elsewhere(problem.cautious, fit.state, model, law)
     yield from untold_origins(origins, remedy)
 
@@ -1050,6 +1061,29 @@ def _near_tie(wider: Wider, remedy: str) -> Iterator[str]:
         f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
         f"do not settle it: use {remedy}"
     )
+
+
+def _far_neighbours(
+    problem: Problem, state: State, model: Linearisation, remedy: str
+) -> Iterator[str]:
+    """Has another law that may as well be true coefficients far from those of this one?"""
+    columns, law = model.columns, problem.law(state)
+    support, present = state.free()[columns], state.flat()[columns]
+    if not support.any():
+        return
+    prices = np.tile(prior_prices(problem.exponents), problem.d)[columns]
+    odds, dropped, added, entry, value = far_neighbours(
+        model.information, model.gradient, present, prices, support
+    )
+    if odds > UNLIKELY:
+        out, into = (" and ".join(place(law, columns[k]) for k in at) for at in (dropped, added))
+        change = f"{into} instead of {out}" if out and into else f"with {into}" if into else ""
+        times = value / present[entry]
+        yield (
+            f"another law may as well be true ({100 * odds:.0f} %), {change or f'without {out}'}: "
+            f"{place(law, columns[entry])} is {times:.2g} times as large there, far beyond its "
+            f"standard error; use {remedy}"
+        )
 
 
 def _standstill(law: PolynomialSystem, remedy: str) -> Iterator[str]:

@@ -28,6 +28,8 @@ NOTHING = 1e-250
 """Least information; its inverse, even over the ridge, is still a number."""
 DEPENDENT = 1e-9
 """Share of a term that those of the law leave, below which they have it already."""
+FAR = 4.0
+"""Standard errors of a coefficient beyond which another law has another coefficient."""
 LEAST = 1e-300
 """Keeps a quotient or a logarithm finite where there is nothing."""
 RIDGE = 1e-12
@@ -466,3 +468,82 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
     new = apart > DEPENDENT * whole
     room = np.where(new, apart, 1.0)
     return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)
+
+
+# --------------------------------------------------------------------------------------------------
+# How likely a law is next to which a law's coefficients are elsewhere than their errors say.
+#
+# The standard errors of a law hold if its terms are the right ones. A law with one term more, one
+# less or one in place of another may fit a little worse, or better by less than the price of a
+# term, and have other coefficients: where a motion tells the sum of two dampings alone, the law
+# that gives all of it to one of them has an error that is ten times too small. So the laws next to
+# a law are weighed by their evidence (Laplace's approximation; Madigan and Raftery 1994), and those
+# count that are far away in units of the errors that are told.
+
+
+def prior_prices(exponents: Ints) -> Floats:
+    """Twice the log odds that an equation lacks a term of each kind, shape (l,).
+
+    An equation has one linear term by expectation, half a quadratic one and so on, and a constant
+    as likely as not; a coefficient is as large as 1 in standard units.
+    """
+    degrees = exponents.sum(axis=1)
+    chance = 2.0 ** (1 - degrees) / np.bincount(degrees)[degrees]
+    return 2 * np.log(1 / np.minimum(chance, 0.5) - 1)
+
+
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of columns that are combinations
+def far_neighbours(
+    information: Floats, gradient: Floats, present: Floats, price: Floats, support: Bools
+) -> tuple[float, Ints, Ints, int, float]:
+    """The odds of the neighbours of a support that have other entries, and the likeliest of them.
+
+    Parameters
+    ----------
+    information, gradient, present : ndarray
+        See `subset_search`; in units in which an entry is as large as 1.
+    price : ndarray, shape (m,)
+        Twice the log odds that an entry is zero.
+    support : ndarray of bool, shape (m,)
+        Of which a neighbour has one entry more, one less or one in place of another.
+
+    Returns
+    -------
+    odds : float
+        Probability of all that have an entry more than `FAR` errors away, if the law is the support
+        or one of its neighbours.
+    dropped, added : ndarray of int
+        The entries that the likeliest of them drops and adds.
+    entry : int
+        Which of the support it has farthest away, ...
+    value : float
+        ... and what that is there.
+    """
+    matrix, scale = equilibrated(information)
+    own, others = np.flatnonzero(support), np.flatnonzero(~support)
+    shared = matrix[np.ix_(others, own)]
+    inverse = np.linalg.inv(matrix[np.ix_(own, own)])
+    pull, spread = matrix @ (present / scale) + gradient * scale, np.diag(inverse)
+    fitted, response = inverse @ pull[own], shared @ inverse
+    # First axis: the entry that leaves, last of all none; second: the one that joins, likewise.
+    leaves, none = np.eye(len(own) + 1, len(own), dtype=bool)[:, None], np.zeros((1, len(own)))
+    out, gone = np.vstack([inverse / spread[:, None], none]), np.append(fitted, 0.0)[:, None]
+    lost = fitted**2 / spread + np.log(spread * scale[own] ** 2) - price[own]
+    along = np.vstack([(response / spread).T, np.zeros((1, len(others)))])
+    freed = along * np.append(spread, 0.0)[:, None]
+    left = pull[others] - response @ pull[own] + along * gone
+    room = 1 - (response * shared).sum(axis=1) + along * freed
+    new = room > COLLINEAR
+    step = np.where(new, left / room, 0.0)
+    joined = np.where(new, np.log(room / scale[others] ** 2) + price[others] - left * step, np.inf)
+    cost = np.append(lost, 0.0)[:, None] + np.hstack([joined, np.zeros((len(own) + 1, 1))])
+    gives = np.concatenate([response - freed[:, :, None] * out[:, None], 0.0 * leaves], axis=1)
+    values = (fitted - out * gone)[:, None] - gives * np.hstack([step, 0.0 * gone])[:, :, None]
+    values = np.where(leaves, 0.0, values)
+    away = np.abs(values - fitted) / np.sqrt(spread)
+    weight = np.exp((cost.min() - cost) / 2)
+    weight = np.where((away > FAR).any(axis=2), weight / weight.sum(), 0.0)
+    drop, add = np.unravel_index(weight.argmax(), weight.shape)
+    entry = int(away[drop, add].argmax())
+    value = float(values[drop, add, entry] * scale[own[entry]])
+    return float(weight.sum()), own[drop : drop + 1], others[add : add + 1], int(own[entry]), value
