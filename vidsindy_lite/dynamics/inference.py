@@ -375,7 +375,7 @@ def _pruned(
     powers = _powers(exponents, coefficients, offset)
     moved = _carried(exponents, coefficients, offset, covariance)
     original, margins, dead = np.diag(moved).copy(), np.full(size, np.inf), flat == 0
-    while True:
+    for _ in range(size + 1):
         variance = np.diag(moved)
         # After conditioning, a dependent entry has neither value nor variance left.
         known = variance <= 1e-12 * original

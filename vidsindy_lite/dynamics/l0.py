@@ -24,6 +24,8 @@ BATCH = 1_000_000
 """Most numbers of an array over newcomers, those outside and those inside."""
 PLATEAU = 1e-6
 """Changes of the function below this are taken for rounding."""
+MOST_CHANGES = 4
+"""Most changes of a support on its way down, for each entry that there is."""
 NOTHING = 1e-250
 """Least information; its inverse, even over the ridge, is still a number."""
 DEPENDENT = 1e-9
@@ -251,7 +253,10 @@ def _search(model: _Quadratic, start: Bools) -> _Fit:
     """The lowest value from a support and from nothing, and through newcomers from there."""
     starts = (start, np.isneginf(model.penalty))
     best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
-    while (deeper := _through_newcomer(model, best)) is not None:
+    for _ in range(MOST_CHANGES * len(start)):
+        deeper = _through_newcomer(model, best)
+        if deeper is None:
+            break
         best = deeper
     return best
 
@@ -262,7 +267,7 @@ def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
     Or until as many changes like the best as there are entries would still not reach the goal.
     """
     best = model.fit(start)
-    while True:
+    for _ in range(MOST_CHANGES * len(start)):
         changes = _single_changes(model, model.tableau(best))
         change, dropped, added = min(changes, key=lambda item: item[0])
         if not change < -PLATEAU or best.value + len(best.inside) * change > goal:
@@ -272,6 +277,7 @@ def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
         if not fit.value < best.value - PLATEAU:
             return best
         best = fit
+    return best
 
 
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:

@@ -40,210 +40,6 @@ from .noise import effective_noise, errors_left, foreseen, residual_noise, time_
 from .problem import COARSE, Problem, fit_curves
 from .result import Plateau, Step
 
-# --------------------------------------------------------------------------------------------------
-# How a discovery went: the steps of its fits, in the order of time.
-
-
-@dataclass(frozen=True)
-class History:
-    """The steps of a discovery so far, in the order of time, and how much of it is left.
-
-    Parameters
-    ----------
-    steps : list of Step
-    began : float
-        On the clock of `time.perf_counter`.
-    end : float
-        When no further round begins, on that clock.
-    bar : tqdm, optional
-        Moves with every round.
-    """
-
-    steps: list[Step] = field(default_factory=list)
-    began: float = field(default_factory=time.perf_counter)
-    end: float = np.inf
-    bar: tqdm | None = None
-
-    @property
-    def over(self) -> bool:
-        """Whether there is no time left."""
-        return time.perf_counter() > self.end
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is to be told if the time was not enough."""
-        told = "the time limit ended the search: this is the best law so far; raise time_limit"
-        return (told,) if self.over else ()
-
-    def another(self) -> bool:
-        """Count a round, and say whether there is time for another."""
-        if self.bar is not None:
-            self.bar.update()
-        return not self.over
-
-    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
-        """Add what a fit at a relative physics weight has reached."""
-        state, collocation = fit.state, fit.collocation
-        data = collocation.data_loss(collocation.curve(state.control_points))
-        self.steps.append(
-            Step(
-                stage=stage,
-                seconds=time.perf_counter() - self.began,
-                physics_weight=weight,
-                data_loss=data / collocation.counts.sum(),
-                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
-                terms=int(state.active.sum()),
-                offset=problem.units.point(state.offset),
-            )
-        )
-
-
-# --------------------------------------------------------------------------------------------------
-# Curves across gaps in the data, by integrating a law from both sides.
-#
-# A smoothing spline crosses a gap on whatever branch is smooth, not on the one that the motion
-# took. A law found from the stretches between the gaps tells which.
-
-Gap = tuple[int, float]
-"""A gap is named by its trajectory and the time of the last sample before it."""
-
-
-def gaps(segments: Sequence[Segment]) -> list[Gap]:
-    """The gaps between segments of the same trajectory, shortest first."""
-    lengths = {
-        (left.trajectory, left.t[-1]): right.t[0] - left.t[-1]
-        for left, right in zip(segments[:-1], segments[1:], strict=True)
-        if left.trajectory == right.trajectory
-    }
-    return sorted(lengths, key=lengths.__getitem__)
-
-
-@dataclass(frozen=True)
-class Joined:
-    """A curve made of splines, with the gaps between them crossed by a law.
-
-    Parameters
-    ----------
-    splines : sequence of scipy.interpolate.BSpline
-        Pieces in the order of time, with values of shape (d,).
-    law : PolynomialSystem
-        Integrated forward from the left end and backward from the right end of each gap; the two
-        are blended linearly.
-    """
-
-    splines: Sequence[BSpline]
-    law: PolynomialSystem
-
-    def __call__(self, t: Floats) -> Floats:
-        """Evaluate at increasing times, shape (n, d)."""
-        values = np.empty((len(t), self.law.d))
-        ends = [(spline.t[0], spline.t[-1]) for spline in self.splines]
-        for (low, high), spline in zip(ends, self.splines, strict=True):
-            inside = (t >= low) & (t <= high)
-            values[inside] = spline(t[inside])
-        crossed = [(low, high) for (_, low), (high, _) in zip(ends[:-1], ends[1:], strict=True)]
-        inside = [(t > low) & (t < high) for low, high in crossed]
-        steps = 1 + max(rows.sum() for rows in inside)
-        forward, backward = self._crossings(np.array(crossed), steps)
-        for (low, high), rows, left, right in zip(crossed, inside, forward, backward, strict=True):
-            share = (t[rows] - low) / (high - low)
-            values[rows] = (1 - share[:, None]) * left(share) + share[:, None] * right(1 - share)
-        return values
-
-    def _crossings(
-        self, crossed: Floats, steps: int
-    ) -> tuple[list[CubicHermiteSpline], list[CubicHermiteSpline]]:
-        """Each gap from its left and from its right end, as functions of the share covered."""
-        x0 = np.array(
-            [spline(low) for spline, (low, _) in zip(self.splines[:-1], crossed, strict=True)]
-            + [spline(high) for spline, (_, high) in zip(self.splines[1:], crossed, strict=True)]
-        )
-        length = np.diff(crossed)
-        pace = np.concatenate([length, -length])
-        share = np.linspace(0, 1, steps + 1)
-
-        def rate(x: Floats) -> Floats:
-            return pace * self.law(x)
-
-        with np.errstate(over="ignore", invalid="ignore"):
-            paths = runge_kutta_4(rate, share, x0, substeps=1)
-            slopes = np.array([rate(x) for x in paths])
-        # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
-        lost = ~(np.isfinite(paths) & np.isfinite(slopes)).all(axis=(0, 2))
-        paths[:, lost], slopes[:, lost] = x0[lost], 0.0
-        curves = [CubicHermiteSpline(share, paths[:, i], slopes[:, i]) for i in range(len(x0))]
-        return curves[: len(crossed)], curves[len(crossed) :]
-
-
-def join(
-    segments: Sequence[Segment],
-    splines: Sequence[BSpline],
-    bridged: Sequence[Gap],
-    trajectories: Sequence[Trajectory],
-    law: PolynomialSystem,
-    spacing: float,
-) -> tuple[list[Segment], list[BSpline | Joined]]:
-    """Join segments across the named gaps.
-
-    Parameters
-    ----------
-    segments, splines
-        The present pieces and their fitted curves.
-    bridged : sequence of Gap
-        Which gaps to cross.
-    trajectories : sequence of Trajectory
-        All data, including samples that were too few to make a segment of their own.
-    law : PolynomialSystem
-        The law, in the frame of the trajectories.
-    spacing : float
-        Length of a knot span.
-
-    Returns
-    -------
-    segments : list of Segment
-    curves : list of callable
-        A first curve for each of them.
-    """
-    groups: list[list[int]] = []
-    for i, segment in enumerate(segments):
-        left = segments[i - 1]
-        if i and left.trajectory == segment.trajectory and (left.trajectory, left.t[-1]) in bridged:
-            groups[-1].append(i)
-        else:
-            groups.append([i])
-    joined, curves = [], []
-    for group in groups:
-        first, last = segments[group[0]], segments[group[-1]]
-        if len(group) == 1:
-            joined.append(first)
-            curves.append(splines[group[0]])
-            continue
-        t, x = trajectories[first.trajectory]
-        inside = (t >= first.t[0]) & (t <= last.t[-1])
-        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory))
-        curves.append(Joined([splines[i] for i in group], law))
-    return joined, curves
-
-
-# --------------------------------------------------------------------------------------------------
-# The path of laws over the tolerated error, and the law that stays the same over most of it.
-#
-# One objective, in standard units, with ``s`` the error that is tolerated over that of the data::
-#
-# J_s = s^-2 (sum w r^2 / sigma^2 + sum |x' - Theta(x - Delta) Lambda|^2 / q) + price (|Lambda|_0 +
-# |Delta|_0)
-#
-# A smooth error of a thousandth (of an integrator, of a lens) is a small change of the law: terms
-# that no noise model refuses, each worth its price. Raise the error that is tolerated, and the law
-# changes at every step until only the terms remain that the motion needs; then it stays the same
-# over a wide range. So each equation has a *path* of laws over ``s``, and the widest plateau, in
-# decades, is the law (stability selection). To tolerate an error is to divide the quadratic model
-# of a fit by ``s^2``: around a fit the whole path is small algebra.
-#
-# So there is one loop. A first law at a large ``s``; the path around it down to the errors of the
-# data; of each equation the widest plateau; that law fitted where it begins; and again, until the
-# path around a law leads to that law.
-
 TOLERATED = 0.03
 """Error that a first law tolerates, relative to the spread of the data: finer terms come after
 those that make the motion."""
@@ -798,3 +594,188 @@ def evidence(problem: Problem, fit: Fit) -> float:
         np.hypot(problem.noise, problem.process_noise) if problem.kicked else residual_noise(fit)
     )
     return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.price(fit.state)
+
+
+# --------------------------------------------------------------------------------------------------
+# Curves across gaps in the data, by integrating a law from both sides.
+#
+# A smoothing spline crosses a gap on whatever branch is smooth, not on the one that the motion
+# took. A law found from the stretches between the gaps tells which.
+
+Gap = tuple[int, float]
+"""A gap is named by its trajectory and the time of the last sample before it."""
+
+
+def gaps(segments: Sequence[Segment]) -> list[Gap]:
+    """The gaps between segments of the same trajectory, shortest first."""
+    lengths = {
+        (left.trajectory, left.t[-1]): right.t[0] - left.t[-1]
+        for left, right in zip(segments[:-1], segments[1:], strict=True)
+        if left.trajectory == right.trajectory
+    }
+    return sorted(lengths, key=lengths.__getitem__)
+
+
+@dataclass(frozen=True)
+class Joined:
+    """A curve made of splines, with the gaps between them crossed by a law.
+
+    Parameters
+    ----------
+    splines : sequence of scipy.interpolate.BSpline
+        Pieces in the order of time, with values of shape (d,).
+    law : PolynomialSystem
+        Integrated forward from the left end and backward from the right end of each gap; the two
+        are blended linearly.
+    """
+
+    splines: Sequence[BSpline]
+    law: PolynomialSystem
+
+    def __call__(self, t: Floats) -> Floats:
+        """Evaluate at increasing times, shape (n, d)."""
+        values = np.empty((len(t), self.law.d))
+        ends = [(spline.t[0], spline.t[-1]) for spline in self.splines]
+        for (low, high), spline in zip(ends, self.splines, strict=True):
+            inside = (t >= low) & (t <= high)
+            values[inside] = spline(t[inside])
+        crossed = [(low, high) for (_, low), (high, _) in zip(ends[:-1], ends[1:], strict=True)]
+        inside = [(t > low) & (t < high) for low, high in crossed]
+        steps = 1 + max(rows.sum() for rows in inside)
+        forward, backward = self._crossings(np.array(crossed), steps)
+        for (low, high), rows, left, right in zip(crossed, inside, forward, backward, strict=True):
+            share = (t[rows] - low) / (high - low)
+            values[rows] = (1 - share[:, None]) * left(share) + share[:, None] * right(1 - share)
+        return values
+
+    def _crossings(
+        self, crossed: Floats, steps: int
+    ) -> tuple[list[CubicHermiteSpline], list[CubicHermiteSpline]]:
+        """Each gap from its left and from its right end, as functions of the share covered."""
+        x0 = np.array(
+            [spline(low) for spline, (low, _) in zip(self.splines[:-1], crossed, strict=True)]
+            + [spline(high) for spline, (_, high) in zip(self.splines[1:], crossed, strict=True)]
+        )
+        length = np.diff(crossed)
+        pace = np.concatenate([length, -length])
+        share = np.linspace(0, 1, steps + 1)
+
+        def rate(x: Floats) -> Floats:
+            return pace * self.law(x)
+
+        with np.errstate(over="ignore", invalid="ignore"):
+            paths = runge_kutta_4(rate, share, x0, substeps=1)
+            slopes = np.array([rate(x) for x in paths])
+        # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
+        lost = ~(np.isfinite(paths) & np.isfinite(slopes)).all(axis=(0, 2))
+        paths[:, lost], slopes[:, lost] = x0[lost], 0.0
+        curves = [CubicHermiteSpline(share, paths[:, i], slopes[:, i]) for i in range(len(x0))]
+        return curves[: len(crossed)], curves[len(crossed) :]
+
+
+def join(
+    segments: Sequence[Segment],
+    splines: Sequence[BSpline],
+    bridged: Sequence[Gap],
+    trajectories: Sequence[Trajectory],
+    law: PolynomialSystem,
+    spacing: float,
+) -> tuple[list[Segment], list[BSpline | Joined]]:
+    """Join segments across the named gaps.
+
+    Parameters
+    ----------
+    segments, splines
+        The present pieces and their fitted curves.
+    bridged : sequence of Gap
+        Which gaps to cross.
+    trajectories : sequence of Trajectory
+        All data, including samples that were too few to make a segment of their own.
+    law : PolynomialSystem
+        The law, in the frame of the trajectories.
+    spacing : float
+        Length of a knot span.
+
+    Returns
+    -------
+    segments : list of Segment
+    curves : list of callable
+        A first curve for each of them.
+    """
+    groups: list[list[int]] = []
+    for i, segment in enumerate(segments):
+        left = segments[i - 1]
+        if i and left.trajectory == segment.trajectory and (left.trajectory, left.t[-1]) in bridged:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    joined, curves = [], []
+    for group in groups:
+        first, last = segments[group[0]], segments[group[-1]]
+        if len(group) == 1:
+            joined.append(first)
+            curves.append(splines[group[0]])
+            continue
+        t, x = trajectories[first.trajectory]
+        inside = (t >= first.t[0]) & (t <= last.t[-1])
+        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory))
+        curves.append(Joined([splines[i] for i in group], law))
+    return joined, curves
+
+
+# --------------------------------------------------------------------------------------------------
+# How a discovery went: the steps of its fits, in the order of time.
+
+
+@dataclass(frozen=True)
+class History:
+    """The steps of a discovery so far, in the order of time, and how much of it is left.
+
+    Parameters
+    ----------
+    steps : list of Step
+    began : float
+        On the clock of `time.perf_counter`.
+    end : float
+        When no further round begins, on that clock.
+    bar : tqdm, optional
+        Moves with every round.
+    """
+
+    steps: list[Step] = field(default_factory=list)
+    began: float = field(default_factory=time.perf_counter)
+    end: float = np.inf
+    bar: tqdm | None = None
+
+    @property
+    def over(self) -> bool:
+        """Whether there is no time left."""
+        return time.perf_counter() > self.end
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be told if the time was not enough."""
+        told = "the time limit ended the search: this is the best law so far; raise time_limit"
+        return (told,) if self.over else ()
+
+    def another(self) -> bool:
+        """Count a round, and say whether there is time for another."""
+        if self.bar is not None:
+            self.bar.update()
+        return not self.over
+
+    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
+        """Add what a fit at a relative physics weight has reached."""
+        state, collocation = fit.state, fit.collocation
+        data = collocation.data_loss(collocation.curve(state.control_points))
+        self.steps.append(
+            Step(
+                stage=stage,
+                seconds=time.perf_counter() - self.began,
+                physics_weight=weight,
+                data_loss=data / collocation.counts.sum(),
+                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
+                terms=int(state.active.sum()),
+                offset=problem.units.point(state.offset),
+            )
+        )
