@@ -57,6 +57,8 @@ ROUNDS = 6
 DEEPEST, DESCENT, RICHEST = 6, 3.0, 2.0
 """Most laws at smaller errors; by what the tolerated error falls from one to the next; and most
 terms of each over those of the one before."""
+MOST_PLATEAUS = 4
+"""Most choices of plateaus that are fitted until a law has no pole on the curve."""
 CONSISTENT = 1.5
 """Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
 RESOLVED = 1e-2
@@ -463,8 +465,18 @@ def at_own_errors(problem: Problem, fit: Fit) -> Fit:
 
 
 def refit(problem: Problem, path: Path, history: History) -> Fit:
-    """The law of the widest plateaus of a path, as a first guess of the next round."""
-    return _refitted(problem, path, path.widest(), history)
+    """The law of the widest plateaus of a path; where such a law has a pole, of the next ones."""
+    ranked = path.ranked()
+    for _ in range(MOST_PLATEAUS):
+        goal = [plateaus[0] for plateaus in ranked]
+        fit = _refitted(problem, path, goal, history)
+        if np.isfinite(fit.collocation.objective(fit.state)):
+            return fit
+        highest = max(goal, key=lambda plateau: plateau.low)
+        ranked[highest.equation].remove(highest)
+        if not ranked[highest.equation]:
+            break
+    return path.fit
 
 
 def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: History) -> Fit:
@@ -478,6 +490,8 @@ def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: Hi
     collocation = fit.collocation.weighted(tolerant.noise**-2, fit.collocation.physics_weights)
     trial = tightened(tolerant, collocation, path.restricted(active))
     trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
+    if not np.isfinite(trial.criterion):
+        return trial
     history.add("another law of the path", tolerant, trial, FINAL_WEIGHT)
     return framed(tolerant, trial, history)
 
