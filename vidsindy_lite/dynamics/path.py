@@ -197,13 +197,15 @@ def typical(noise: Floats) -> float:
 # ------------------------------------------------------------------------------------ a first law
 
 
-def first_law(problem: Problem, history: History, tolerated: float = TOLERATED) -> Fit:
+def first_law(problem: Problem, history: History, tolerated: float | None = None) -> Fit:
     """The cheapest law at a large tolerated error, from terms of low degree, then from all.
 
-    Relative to the spread of the data; where the noise is larger, that is tolerated, and kicks are
-    as they are. Long data are searched in part: all of them then decide on the terms once more.
+    Relative to the spread of the data, `TOLERATED` by default; where the noise is larger, that is
+    tolerated, and kicks are as they are. Long data are searched in part: all of them then decide on
+    the terms once more.
     """
-    noise = problem.noise if problem.kicked else np.maximum(problem.noise, tolerated)
+    least = TOLERATED if tolerated is None else tolerated
+    noise = problem.noise if problem.kicked else np.maximum(problem.noise, least)
     tolerant, stretches = replace(problem, noise=noise), enough(problem)
     part = replace(tolerant, stretches=stretches)
     collocation, found = part.collocation(part.segments()), []
@@ -412,7 +414,7 @@ def persistent(
             fit = replace(fit, state=state)
         if not history.another():
             break
-    fit = polish(problem, fit, history)
+    fit = polish(problem, fit if crossed else bridged(problem, fit), history)
     path = follow(problem, fit)
     return fit, path, fit.status is Status.CONVERGED and has_terms(fit, path.widest())
 
