@@ -131,7 +131,7 @@ def posed(x):
 
 def test_precision_is_foreseen_before_any_law_is_known():
     x, size = uneven("for a while", np.random.default_rng(5))
-    known = weighing.foreseen(posed(x)).precision[0][:, 0]
+    known = weighing.smoother_weights(posed(x)).precision[0][:, 0]
     late = TIMES > 28
     ratio = np.median(known[~late]) / np.median(known[late])
     assert ratio == pytest.approx((0.2 / 0.02) ** 2, rel=0.4)
@@ -153,9 +153,9 @@ def test_the_noise_is_that_of_the_errors_where_they_are_as_usual():
 
 def test_noise_that_looks_even_before_a_law_is_known_stays_even():
     even = posed(PATH + 0.05 * np.random.default_rng(6).standard_normal(PATH.shape))
-    assert weighing.foreseen(even) is even
+    assert weighing.smoother_weights(even) is even
     exact = posed(PATH)
-    assert weighing.foreseen(exact) is exact
+    assert weighing.smoother_weights(exact) is exact
 
 
 @pytest.mark.filterwarnings("error")

@@ -193,71 +193,34 @@ NOISELESS = 1e-4
 """Errors as small as this are those of splines, not of measurements."""
 
 
-def with_precision(problem: Problem, fit: Fit) -> Problem:
-    """The problem with the precision that a fit shows each measurement to have.
+def smoother_weights(problem: Problem) -> Problem:
+    """The problem with the precision that the smoothed curves show each measurement to have.
 
-    The same problem where the noise is even and no sample is wrong, or the errors are given.
-
-    Parameters
-    ----------
-    problem : Problem
-    fit : Fit
-        A law that fits as far as its measurements allow.
-    """
-    collocation, segments = fit.collocation, fit.collocation.segments
-    splines = collocation.grid.splines(fit.state.control_points)
-    residual, _ = collocation.data_residual(fit.state.control_points)
-    path = [
-        np.stack([spline(s.t), spline(s.t, 1)]) for s, spline in zip(segments, splines, strict=True)
-    ]
-    pieces = [(s.trajectory, s.t) for s in segments]
-    return _weighed(problem, pieces, path, residual, collocation.precision)
-
-
-def foreseen(problem: Problem) -> Problem:
-    """The same by the smoothed curves, before any law is known.
-
-    A wrong law explains what it misses by measurements of its own choice; a curve has no law.
-    """
-    stretches, steps = problem.stretches, 1e-3
-    path, residual = [], []
-    for (_, (t, x)), curve in zip(stretches, problem.curves, strict=True):
-        path.append(np.stack([curve(t), (curve(t + steps) - curve(t - steps)) / (2 * steps)]))
-        residual.append(np.nan_to_num(path[-1][0] - x))
-    seen = np.concatenate([np.isfinite(x) for _, (_, x) in stretches]).astype(float)
-    pieces = [(number, t) for number, (t, _) in stretches]
-    return _weighed(problem, pieces, path, np.concatenate(residual), seen)
-
-
-def _weighed(
-    problem: Problem,
-    pieces: list[tuple[int, Floats]],
-    path: list[Floats],
-    residual: Floats,
-    known: Floats,
-) -> Problem:
-    """The problem with the precision that residuals of a path tell, (n, d) in pieces.
-
-    A piece is the number of a trajectory and times, its path states and slopes, (2, n, d); what is
-    ``known`` are the precisions so far.
+    The same problem where the noise is even and no sample is wrong, or the errors are given. A
+    wrong law explains what it misses by measurements of its own choice; a curve has no law.
     """
     if problem.measured_errors:
         return problem
-    residual = residual * np.sqrt(known)
+    steps, path, left_over = 1e-3, [], []
+    for (_, (t, x)), curve in zip(problem.stretches, problem.curves, strict=True):
+        path.append(np.stack([curve(t), (curve(t + steps) - curve(t - steps)) / (2 * steps)]))
+        left_over.append(path[-1][0] - x)
+    residual = np.nan_to_num(np.concatenate(left_over))
+    observed = np.isfinite(np.concatenate([x for _, (_, x) in problem.stretches]))
     signal, speed = np.concatenate(path, axis=1)
     causes = [(signal - problem.home) ** 2, speed**2]  # what the variance of the noise may follow
-    spread = np.sqrt((residual**2).sum(axis=0) / np.maximum((known > 0).sum(axis=0), 1))
+    spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(observed.sum(axis=0), 1))
     factors, noise = np.ones_like(residual), problem.noise.copy()
     for j in np.flatnonzero(spread > NOISELESS):
-        seen = known[:, j] > 0
+        seen = observed[:, j]
         factors[seen, j] = _factors(residual[seen, j], [cause[seen, j] for cause in causes])
         left = (factors[seen, j] * residual[seen, j] ** 2).sum() / (factors[seen, j] > 0).sum()
         noise[j] *= np.sqrt(left) / spread[j]
     if (factors == 1).all():
         return problem
     precision = [values.copy() for values in problem.precision]
-    ends = np.cumsum([len(t) for _, t in pieces])[:-1]
-    for (number, t), factor in zip(pieces, np.split(factors, ends), strict=True):
+    ends = np.cumsum([len(t) for _, (t, _) in problem.stretches])[:-1]
+    for (number, (t, _)), factor in zip(problem.stretches, np.split(factors, ends), strict=True):
         rows = np.searchsorted(problem.trajectories[number][0], t)
         precision[number][rows] *= factor
     return replace(problem, precision=precision, noise=np.maximum(noise, CLEANEST))

@@ -36,7 +36,7 @@ from .frames import Origin, as_shifted, at_home, cheapest_at, closed, off_home, 
 from .l0 import PLATEAU, inverse, minimiser, subset_path, subset_search
 from .library import closure_mask
 from .model import PolynomialSystem, State, runge_kutta_4
-from .noise import effective_noise, errors_left, foreseen, residual_noise, time_inflation
+from .noise import effective_noise, errors_left, residual_noise, smoother_weights, time_inflation
 from .problem import COARSE, Problem, fit_curves
 from .result import Plateau, Step
 
@@ -574,7 +574,7 @@ def views(pose: Callable[..., Problem]) -> list[Problem]:
         Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
         the samples, which serve where smoothed ones leave out a part of the motion.
     """
-    problem = foreseen(pose())
+    problem = smoother_weights(pose())
     # A curve that has given up has no turns.
     enough = problem.samples_a_turn > COARSE and problem.noise.max() < FLAT
     if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():

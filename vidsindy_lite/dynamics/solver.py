@@ -41,7 +41,7 @@ from .library import (
     monomials,
 )
 from .model import Form, PolynomialSystem
-from .noise import foreseen, rebalanced, with_process_noise
+from .noise import rebalanced, smoother_weights, with_process_noise
 from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes
 from .path import (
     ROUNDS,
@@ -188,7 +188,7 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
     def posed(turn: Floats) -> Problem:
         probes = np.random.default_rng(task.seed)
         paths, modes, errors = in_axes(task.measured, turn)
-        return foreseen(pose(paths, modes, form, probes, errors))
+        return smoother_weights(pose(paths, modes, form, probes, errors))
 
     def solved(turn: Floats) -> Solved:
         return _solved(replace(task, measured=in_axes(task.measured, turn), turned=True), form)
