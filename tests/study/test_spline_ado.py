@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from vidsindy_lite.dynamics import (
     PolynomialSystem,
     clamped_knots,
     monomial_exponents,
-    monomial_gradients,
     monomials,
 )
 from vidsindy_lite.study.metrics import score
-from vidsindy_lite.study.paper_ado import (
-    PaperSettings,
-    _curve,
+from vidsindy_lite.study.spline_ado import (
+    SplineADOSettings,
     _Fit,
-    _monomials,
-    discover_paper,
+    spline_ado,
+    spline_ado_batch,
     stridge,
 )
 from vidsindy_lite.study.systems import SYSTEMS
@@ -34,59 +34,107 @@ def spiral(n=150, offset=(3.0, -1.0)):
     return t, SPIRAL.simulate(t, [2.0, 0.0]) + offset
 
 
-def test_monomials_and_their_gradient_are_those_of_numpy():
-    rng = np.random.default_rng(0)
-    x, exponents = rng.standard_normal((20, 3)), monomial_exponents(3, 3)
-    points = torch.tensor(x, requires_grad=True)
-    values = _monomials(points, exponents)
-    np.testing.assert_allclose(values.detach(), monomials(x, exponents))
-    weights = rng.standard_normal(values.shape)
-    (values * torch.tensor(weights)).sum().backward()
-    expected = np.einsum("nl,nli->ni", weights, monomial_gradients(x, exponents))
-    np.testing.assert_allclose(points.grad, expected)
-    assert _monomials(points, exponents[:0]).shape == (20, 0)
+def fitted(records, t, degree=2, **settings):
+    records = np.asarray(records)
+    generators = [np.random.default_rng(one) for one in range(len(records))]
+    chosen = SplineADOSettings(**settings)
+    exponents = monomial_exponents(records.shape[2], degree)
+    return _Fit(t, records, exponents, chosen, generators, torch.device("cpu"))
 
 
 def test_losses_are_those_of_the_paper():
     t, x = spiral()
-    exponents = monomial_exponents(2, 2)
+    hidden = x.copy()
+    hidden[40:50] = np.nan
+    fit = fitted([x, hidden], t, knots_per_sample=80 / 149, collocation_per_knot=4)
     rng = np.random.default_rng(0)
-    settings = PaperSettings(knots_per_sample=80 / 149, collocation_per_knot=4)
-    fit = _Fit(t, x, exponents, settings, rng)
-    coefficients = np.where(rng.random((6, 2)) < 0.5, rng.standard_normal((6, 2)), 0.0)
-    offset = rng.standard_normal(2)
+    coefficients = np.where(rng.random((2, 6, 2)) < 0.5, rng.standard_normal((2, 6, 2)), 0.0)
+    offset = rng.standard_normal((2, 2))
     fit.restart(coefficients)
-    with torch.no_grad():
-        fit.offset += fit.offset.new_tensor(offset)
-    data_loss, physics_loss = (float(loss.detach()) for loss in fit.losses())
+    fit.offset += fit.offset.new_tensor(offset[:, :, None])
+    found = np.array([loss.numpy() for loss in fit.losses()])
 
-    # The same collocation times, from the same seed, and everything else with scipy.
+    # The same collocation times, from the same seeds, and everything else with scipy.
     breakpoints = np.linspace(t[0], t[-1], 81)
-    fractions = np.random.default_rng(0).uniform(size=(80, 4))
-    times = (breakpoints[:-1, None] + fractions * np.diff(breakpoints)[:, None]).ravel()
-    spline = BSpline(clamped_knots(breakpoints), fit.control_points.numpy(force=True), 3)
-    data = (x - x.mean(axis=0)) / x.std(axis=0)
-    residual = spline(t) + offset - data
-    assert data_loss == pytest.approx((residual**2).sum() / len(t))
-    law = PolynomialSystem(("x", "y"), exponents, coefficients)
-    residual = fit.units.time * spline(times, 1) - law(spline(times))
-    assert physics_loss == pytest.approx((residual**2).sum() / len(times))
+    for one, states in enumerate((x, hidden)):
+        seen = ~np.isnan(states[:, 0])
+        fractions = np.random.default_rng(one).uniform(size=(80, 4))
+        times = (breakpoints[:-1, None] + fractions * np.diff(breakpoints)[:, None]).ravel()
+        spline = BSpline(clamped_knots(breakpoints), fit.control_points[one].numpy().T, 3)
+        data = (states - states[seen].mean(axis=0)) / states[seen].std(axis=0)
+        residual = (spline(t) + offset[one] - data)[seen]
+        assert found[0, one] == pytest.approx((residual**2).sum() / seen.sum())
+        law = PolynomialSystem(("x", "y"), fit.exponents, coefficients[one])
+        residual = fit.units[one].time * spline(times, 1) - law(spline(times))
+        assert found[1, one] == pytest.approx((residual**2).sum() / len(times))
+
+
+@given(st.integers(0, 2**31), st.floats(0.1, 0.9))
+@settings(max_examples=20, deadline=None)
+def test_gradients_are_those_of_automatic_differentiation(seed, share):
+    rng = np.random.default_rng(seed)
+    t = np.sort(rng.uniform(0, 1, 40))
+    records = rng.standard_normal((2, 40, 3))
+    records[rng.random((2, 40)) < 0.2] = np.nan
+    fit = fitted(records, t, degree=3, collocation_per_knot=2, physics_weight=0.3)
+    shape = fit.coefficients.shape
+    fit.restart(np.where(rng.random(shape) < share, rng.standard_normal(shape), 0.0))
+    fit.losses()
+    unknowns = [fit.control_points, fit.coefficients, fit.offset]
+    written = [unknown.grad.clone() for unknown in unknowns]
+
+    free = [unknown.clone().requires_grad_() for unknown in unknowns]
+    control, coefficients, offset = free
+    measured = (fit.sampling.to_dense() @ control.transpose(1, 2)).transpose(1, 2)
+    loss = (fit.weights * (measured + offset - fit.data) ** 2).sum()
+    windows = control.unfold(2, 4, 1)
+    both = torch.einsum("bdma,baqm->bdqm", windows, fit.basis)
+    points, slopes = (half.flatten(2) for half in both.chunk(2, dim=2))
+    powers = torch.tensor(fit.exponents)[:, None]
+    terms = (points.transpose(1, 2)[:, None] ** powers).prod(dim=3)
+    residual = slopes - torch.einsum("bli,blk->bik", coefficients * fit.mask, terms)
+    loss = loss + 0.3 * (residual**2).sum() / residual.shape[2]
+    loss.backward()
+    for found, unknown in zip(written, free, strict=True):
+        torch.testing.assert_close(found, unknown.grad, rtol=1e-9, atol=1e-9)
 
 
 def test_collocation_covers_every_knot_span():
     t, x = spiral()
-    settings = PaperSettings(knots_per_sample=40 / 149, collocation_per_knot=5)
-    fit = _Fit(t, x, monomial_exponents(2, 1), settings, np.random.default_rng(0))
-    assert fit.basis.shape == (40, 5, 4)
-    np.testing.assert_allclose(fit.basis.sum(dim=2).cpu(), 1)
-    np.testing.assert_allclose(fit.slopes.sum(dim=2).cpu(), 0, atol=1e-9)
-    ones = fit.control_points.new_ones((43, 2))
-    np.testing.assert_allclose(_curve(fit.basis, ones).cpu(), np.ones((200, 2)))
+    fit = fitted([x], t, degree=1, knots_per_sample=40 / 149, collocation_per_knot=5)
+    assert fit.basis.shape == (1, 4, 10, 40)
+    values, slopes = fit.basis.sum(dim=1).chunk(2, dim=1)
+    np.testing.assert_allclose(values, 1)
+    np.testing.assert_allclose(slopes, 0, atol=1e-9)
+
+
+def test_a_batch_finds_the_laws_of_its_records_alone():
+    t, x = spiral(80)
+    noisy = x + 0.02 * np.random.default_rng(0).standard_normal(x.shape)
+    noisy[30:35] = np.nan
+    records, short = [x, noisy, 2 * noisy], SHORT | {"pretraining": 60, "epochs": 40}
+    together = spline_ado_batch(t, records, 2, [3, 4, 5], **short)
+    for record, seed, law in zip(records, (3, 4, 5), together, strict=True):
+        alone = spline_ado(t, record, 2, seed, **short)
+        np.testing.assert_array_equal(law.native.support, alone.native.support)
+        np.testing.assert_allclose(law.native.coefficients, alone.native.coefficients, rtol=1e-4)
+        np.testing.assert_allclose(law.curve, alone.curve, atol=1e-5)
+        assert len(law.history) == len(alone.history)
+    with pytest.raises(ValueError, match="seeds: must be one a record, 2, got 1"):
+        spline_ado_batch(t, records[:2], 2, [0])
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU here")
+def test_a_gpu_finds_the_same_law():
+    t, x = spiral(80)
+    here, there = (spline_ado(t, x, 2, device=name, **SHORT).native for name in ("cpu", "cuda"))
+    np.testing.assert_array_equal(here.support, there.support)
+    np.testing.assert_allclose(here.coefficients, there.coefficients, rtol=1e-3)
 
 
 def test_a_spiral_is_found_away_from_its_origin():
     t, x = spiral()
-    found = discover_paper(t, x, degree=2, **SHORT)
+    found = spline_ado(t, x, degree=2, **SHORT)
     result = score(found, SPIRAL.shift((3, -1)))
     assert result.exact
     assert result.max_coefficient_error < 1e-2
@@ -100,7 +148,7 @@ def test_a_spiral_is_found_away_from_its_origin():
 def test_lorenz_is_found_from_clean_data():
     truth = SYSTEMS["Lorenz"].shift((10, 10, 0))
     t, x = truth.trajectory(300)
-    result = score(discover_paper(t, x, pretraining=300, epochs=300), truth)
+    result = score(spline_ado(t, x, pretraining=300, epochs=300), truth)
     assert result.exact
     assert result.l2 < 1e-3
 
@@ -108,7 +156,7 @@ def test_lorenz_is_found_from_clean_data():
 def test_a_gap_is_crossed_by_physics():
     t, x = spiral()
     x[60:75] = np.nan
-    result = score(discover_paper(t, x, degree=2, **SHORT), SPIRAL.shift((3, -1)))
+    result = score(spline_ado(t, x, degree=2, **SHORT), SPIRAL.shift((3, -1)))
     assert result.terms_found
     assert result.max_coefficient_error < 0.1
 
@@ -116,7 +164,7 @@ def test_a_gap_is_crossed_by_physics():
 def test_history_goes_on_and_the_loss_falls():
     t, x = spiral()
     x = x + 0.02 * np.random.default_rng(0).standard_normal(x.shape)
-    history = discover_paper(t, x, degree=2, **SHORT).history
+    history = spline_ado(t, x, degree=2, **SHORT).history
     assert set(history[0]) == {"iteration", "seconds", "data_loss", "physics_loss", "terms"}
     assert history[0]["iteration"] == 1
     for name in ("iteration", "seconds"):
@@ -132,7 +180,7 @@ def test_equal_seeds_give_equal_laws_and_no_global_state_is_touched():
     numpy_state, torch_state = np.random.get_state()[1].copy(), torch.get_rng_state()  # noqa: NPY002
     short = SHORT | {"pretraining": 20, "epochs": 20}
     first, again, other = (
-        discover_paper(t, x, degree=2, seed=s, **short).native.coefficients for s in (1, 1, 2)
+        spline_ado(t, x, degree=2, seed=s, **short).native.coefficients for s in (1, 1, 2)
     )
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
@@ -143,8 +191,8 @@ def test_equal_seeds_give_equal_laws_and_no_global_state_is_touched():
 def test_the_law_does_not_depend_on_the_units_of_time_and_space():
     t, x = spiral(80)
     short = SHORT | {"pretraining": 50, "epochs": 50, "prune": 0.0}
-    plain = discover_paper(t, x, degree=2, **short).native
-    scaled = discover_paper(10 * t + 3, 100 * x, degree=2, **short).native
+    plain = spline_ado(t, x, degree=2, **short).native
+    scaled = spline_ado(10 * t + 3, 100 * x, degree=2, **short).native
     factor = 100.0 ** (1 - plain.exponents.sum(axis=1)[:, None]) / 10
     # Gradient descent amplifies the rounding.
     np.testing.assert_allclose(scaled.coefficients, plain.coefficients * factor, rtol=1e-3)
@@ -153,16 +201,16 @@ def test_the_law_does_not_depend_on_the_units_of_time_and_space():
 def test_bad_input():
     t, x = spiral(80)
     with pytest.raises(ValueError, match="t: must increase"):
-        discover_paper(t[::-1], x)
+        spline_ado(t[::-1], x)
     with pytest.raises(ValueError, match="x: must hold at least 6 samples, got 5"):
-        discover_paper(t[:5], x[:5], degree=2)
+        spline_ado(t[:5], x[:5], degree=2)
     with pytest.raises(ValueError, match="x: every coordinate must move"):
-        discover_paper(t, x * [1, 0])
+        spline_ado(t, x * [1, 0])
     with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got -1"):
-        discover_paper(t, x, seed=-1)
+        spline_ado(t, x, seed=-1)
     for name in ("knots_per_sample", "collocation_per_knot", "pretraining", "epochs"):
         with pytest.raises(ValueError, match=f"{name}: must be at least .*, got 0"):
-            discover_paper(t, x, **{name: 0})
+            spline_ado(t, x, **{name: 0})
 
 
 def lorenz_rows():
