@@ -44,6 +44,7 @@ from ..dynamics import (
     monomials,
     variable_names,
 )
+from .corruption import drop_blocks
 
 ROUGHNESS = 1e-4
 """Weight of the second differences in the first curve: enough to carry it across gaps."""
@@ -224,6 +225,33 @@ def spline_ado_batch(
         if not fit.open.any():
             break
     return [fit.result(one, chosen.prune) for one in range(len(records))]
+
+
+def held_out_misfit(
+    t: Floats, x: Floats, seed: int = 0, rate: float = 0.2, **settings: float
+) -> float:
+    """How far the curve of `spline_ado` is from samples that it was not given.
+
+    Parameters
+    ----------
+    t, x, **settings
+        See `spline_ado`.
+    seed : int
+        Also of the blocks that are held out, see `corruption.drop_blocks`.
+    rate : float
+        Fraction of the samples that is held out.
+
+    Returns
+    -------
+    float
+        Root mean square over the spread of each coordinate.
+    """
+    x = np.asarray(x, dtype=float)
+    given = drop_blocks(x, rate, np.random.default_rng(seed))
+    curve = spline_ado(t, given, 3, seed, None, **settings).curve
+    hidden = np.isnan(given).any(axis=1) & ~np.isnan(x).any(axis=1)
+    off = (curve - x)[hidden] / np.nanstd(x, axis=0)
+    return float(np.sqrt((off**2).mean()))
 
 
 class _Fit:

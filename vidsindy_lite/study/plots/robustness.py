@@ -15,8 +15,12 @@ from ...arrays import Floats
 if TYPE_CHECKING:  # pandas and seaborn are imported where they draw
     from pandas import DataFrame
 
-COLOURS = {"ours": "C0", "PySINDy": "C1", "E-SINDy": "C2", "WeakSINDy": "C3", "Model-A": "C4"}
-MARKERS = {"ours": "o", "PySINDy": "s", "E-SINDy": "^", "WeakSINDy": "v", "Model-A": "D"}
+_STYLES = {
+    "Gauss-Newton": ("C0", "o"), "spline-ADO": ("C5", "P"), "PySINDy": ("C1", "s"),
+    "E-SINDy": ("C2", "^"), "WeakSINDy": ("C3", "v"), "Model-A": ("C4", "D"),
+}  # fmt: skip
+COLOURS = {name: colour for name, (colour, _) in _STYLES.items()}
+MARKERS = {name: marker for name, (_, marker) in _STYLES.items()}
 _TITLES = {"noise": "noise", "blocks": "blocks missing", "fibers": "fibers missing"}
 
 VERDICTS = {
