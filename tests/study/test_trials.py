@@ -153,6 +153,20 @@ def test_tracks_are_corrupted_each_by_its_own_draw_before_the_cameras_are_learne
     assert whole == (source == "detector")
 
 
+def test_where_cameras_cannot_be_learned_no_method_has_a_law(this_film, monkeypatch):
+    def refuse(*_, **__):
+        raise ValueError("tracks: the motion must determine the cameras")
+
+    monkeypatch.setattr(experiments, "observe_tracks", refuse)
+    trials = grid(["SprottE"], {"clean": (0,)}, [1], experiments.METHODS, 200)
+    results = run_comparison(Comparison(tuple(trials)))
+    assert {result.verdict for result in results} == {"wrong, refused"}
+    assert {result.score.missing for result in results} == {8}
+    assert results[0].warnings == ("tracks: the motion must determine the cameras",)
+    row = summary(tabulate(results), "system").iloc[0]
+    assert (row["exact"], row["no path"], row["wrong, ok"]) == ("0 of 6", 6, None)
+
+
 def test_doubts_of_the_observation_are_doubts_of_the_trial(this_film, monkeypatch):
     path = experiments.trial_path
     doubtful = lambda trial: path(trial)._replace(warnings=("the views disagree",))  # noqa: E731

@@ -25,6 +25,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -122,7 +123,7 @@ class SplineADOSettings:
     knots_per_sample: float = 1.0
     collocation_per_knot: int = 5
     physics_weight: float = 1.0
-    sparsity_weight: float = 0.02
+    sparsity_weight: float = 0.005
     pretraining: int = 2000
     alternations: int = 5
     epochs: int = 1000
@@ -172,7 +173,7 @@ def spline_ado(
 
 def spline_ado_batch(
     t: Floats, records: Sequence[Floats], degree: int = 3, seeds: Sequence[int] = (),
-    device: str | None = None, **settings: float,
+    device: str | None = None, **settings: Any,
 ) -> list[SplineADOLaw]:  # fmt: skip
     """Discover the laws of several records at the same times, as one computation.
 
@@ -185,7 +186,7 @@ def spline_ado_batch(
     records : sequence of array_like, shape (n, d) each
         States; rows may be missing (NaN) in one record and not in another.
     degree, device, **settings
-        See `spline_ado`.
+        See `spline_ado`; the two weights may be sequences, one a record.
     seeds : sequence of int
         One a record; by default the number of the record.
 
@@ -193,7 +194,7 @@ def spline_ado_batch(
     -------
     list of SplineADOLaw
     """
-    chosen = SplineADOSettings(**settings)  # type: ignore[arg-type]
+    chosen = SplineADOSettings(**settings)
     seeds = list(seeds) or list(range(len(records)))
     if len(seeds) != len(records):
         raise ValueError(f"seeds: must be one a record, {len(records)}, got {len(seeds)}")
@@ -206,6 +207,7 @@ def spline_ado_batch(
         if not (np.ptp(seen, axis=0) > 0).all():
             raise ValueError(f"x: every coordinate must move, got ranges {np.ptp(seen, axis=0)}")
     generators = [np.random.default_rng(check_integer("seed", seed)) for seed in seeds]
+    prices = np.broadcast_to(chosen.sparsity_weight, len(records))
     where = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
     states = np.array([np.asarray(x, dtype=float) for x in records])
     fit = _Fit(check_times(t), states, exponents, chosen, generators, where)
@@ -216,7 +218,7 @@ def spline_ado_batch(
             if fit.open[one]:
                 curve, slope = fit.collocation(one)
                 terms = monomials(curve, exponents)
-                sparse[one] = stridge(terms, slope, rng, chosen.sparsity_weight)
+                sparse[one] = stridge(terms, slope, rng, prices[one])
         changed = ((sparse != 0) != fit.active).any(axis=(1, 2)) & fit.open
         # Where the support is that of before, a last descent from the new coefficients ends it.
         fit.restart(sparse)
@@ -227,31 +229,36 @@ def spline_ado_batch(
     return [fit.result(one, chosen.prune) for one in range(len(records))]
 
 
-def held_out_misfit(
-    t: Floats, x: Floats, seed: int = 0, rate: float = 0.2, **settings: float
-) -> float:
-    """How far the curve of `spline_ado` is from samples that it was not given.
+def held_out_misfits(
+    t: Floats, records: Sequence[Floats], seeds: Sequence[int], rate: float = 0.2, **settings: Any
+) -> list[float]:
+    """How far the curves of `spline_ado` are from samples that they were not given.
 
     Parameters
     ----------
-    t, x, **settings
-        See `spline_ado`.
-    seed : int
-        Also of the blocks that are held out, see `corruption.drop_blocks`.
+    t, records, **settings
+        See `spline_ado_batch`.
+    seeds : sequence of int
+        One a record; also of the blocks that are held out, see `corruption.drop_blocks`.
     rate : float
         Fraction of the samples that is held out.
 
     Returns
     -------
-    float
-        Root mean square over the spread of each coordinate.
+    list of float
+        Root mean square over the spread of each coordinate, one a record.
     """
-    x = np.asarray(x, dtype=float)
-    given = drop_blocks(x, rate, np.random.default_rng(seed))
-    curve = spline_ado(t, given, 3, seed, None, **settings).curve
-    hidden = np.isnan(given).any(axis=1) & ~np.isnan(x).any(axis=1)
-    off = (curve - x)[hidden] / np.nanstd(x, axis=0)
-    return float(np.sqrt((off**2).mean()))
+    states = [np.asarray(x, dtype=float) for x in records]
+    given = [
+        drop_blocks(x, rate, np.random.default_rng(seed))
+        for x, seed in zip(states, seeds, strict=True)
+    ]
+    misfits = []
+    laws = spline_ado_batch(t, given, 3, seeds, None, **settings)
+    for x, seen, law in zip(states, given, laws, strict=True):
+        off = (law.curve - x)[np.isnan(seen[:, 0]) & ~np.isnan(x[:, 0])] / np.nanstd(x, axis=0)
+        misfits.append(float(np.sqrt((off**2).mean())))
+    return misfits
 
 
 class _Fit:
@@ -269,7 +276,8 @@ class _Fit:
         self.began = time.perf_counter()
         self.device = device
         self.exponents = exponents
-        self.physics_weight = settings.physics_weight
+        alpha = np.broadcast_to(settings.physics_weight, len(states))
+        self.physics_weight = self._tensor(alpha[:, None, None])
         self.open = np.ones(len(states), dtype=bool)
         self.history: list[list[dict[str, float]]] = [[] for _ in states]
         self.iteration = 0
@@ -409,7 +417,7 @@ class _Fit:
         part = object.__new__(_Fit)
         part.__dict__.update(self.__dict__)
         at = torch.tensor(which, device=self.device)
-        for name in ("data", "weights", "basis", "control_points", "offset"):
+        for name in ("physics_weight", "data", "weights", "basis", "control_points", "offset"):
             setattr(part, name, getattr(self, name)[at])
         part.restart(self.coefficients.numpy(force=True)[which])
         return part
