@@ -45,7 +45,6 @@ from ..dynamics import (
     monomials,
     variable_names,
 )
-from .corruption import drop_blocks
 
 ROUGHNESS = 1e-4
 """Weight of the second differences in the first curve: enough to carry it across gaps."""
@@ -148,7 +147,7 @@ def spline_ado(
     t : array_like, shape (n,)
         Increasing times.
     x : array_like, shape (n, d)
-        States; a row with a NaN is missing. The spline runs on through a gap, held by physics.
+        States; a row with a NaN is missing. No law is asked for within a gap.
     degree : int
         Highest degree of the candidate terms. Paper: 3.
     seed : int
@@ -239,9 +238,9 @@ def held_out_misfits(
     t, records, **settings
         See `spline_ado_batch`.
     seeds : sequence of int
-        One a record; also of the blocks that are held out, see `corruption.drop_blocks`.
+        One a record; also of the samples that are held out.
     rate : float
-        Fraction of the samples that is held out.
+        Fraction of the samples that is held out, each by itself.
 
     Returns
     -------
@@ -249,10 +248,10 @@ def held_out_misfits(
         Root mean square over the spread of each coordinate, one a record.
     """
     states = [np.asarray(x, dtype=float) for x in records]
-    given = [
-        drop_blocks(x, rate, np.random.default_rng(seed))
-        for x, seed in zip(states, seeds, strict=True)
-    ]
+    given = []
+    for x, seed in zip(states, seeds, strict=True):
+        out = np.random.default_rng(seed).random(len(x)) < rate
+        given.append(np.where(out[:, None], np.nan, x))
     misfits = []
     laws = spline_ado_batch(t, given, 3, seeds, None, **settings)
     for x, seen, law in zip(states, given, laws, strict=True):
@@ -277,7 +276,6 @@ class _Fit:
         self.device = device
         self.exponents = exponents
         alpha = np.broadcast_to(settings.physics_weight, len(states))
-        self.physics_weight = self._tensor(alpha[:, None, None])
         self.open = np.ones(len(states), dtype=bool)
         self.history: list[list[dict[str, float]]] = [[] for _ in states]
         self.iteration = 0
@@ -288,7 +286,12 @@ class _Fit:
         seen = np.asarray(~np.isnan(states).any(axis=2))
         shape = (settings.collocation_per_knot, spans)
         self.units, data, controls, bases = [], [], [], []
-        for x, rows, rng in zip(states, seen, generators, strict=True):
+        # The law is asked for where samples are, or in the next span: elsewhere the first curve is
+        # a guess, and physics would fit the law to it.
+        self.held = np.zeros((len(states), spans), dtype=bool)
+        for x, rows, held, rng in zip(states, seen, self.held, generators, strict=True):
+            held[first[rows]] = True
+            held |= np.append(held[1:], False) | np.append(False, held[:-1])
             centre, scale = x[rows].mean(axis=0), x[rows].std(axis=0)
             standard = np.where(rows[:, None], (x - centre) / scale, 0.0)
             control = _first_curve(first[rows], values[rows], standard[rows], spans + DEGREE)
@@ -300,13 +303,17 @@ class _Fit:
                 for order in (0, 1)
             )
             slope = _curve(torch.tensor(slopes)[None], torch.tensor(control.T)[None])
-            units = Units(centre, scale, time=float(1 / slope.std(dim=(2, 3), correction=0).mean()))
+            spread = slope[..., torch.tensor(held)].std(dim=(2, 3), correction=0)
+            units = Units(centre, scale, time=float(1 / spread.mean()))
             self.units.append(units)
             data.append(standard.T)
             controls.append(control.T)
             bases.append(np.concatenate([basis, slopes * units.time], axis=1))
         self.data = self._tensor(data)
         self.weights = self._tensor((seen / seen.sum(axis=1, keepdims=True))[:, None])
+        every = np.tile(self.held, shape[0])  # collocation time by collocation time
+        self.shares = self._tensor((every / every.sum(axis=1, keepdims=True))[:, None])
+        self.physics_weight = self._tensor(np.array(alpha))[:, None, None]
         # The spline at the samples, as a matrix with four entries a row.
         rows, columns = np.repeat(np.arange(len(t)), DEGREE + 1), first[:, None] + np.arange(4)
         sampling = csr_array((values.ravel(), (rows, columns.ravel())), (len(t), spans + DEGREE))
@@ -346,7 +353,7 @@ class _Fit:
     def collocation(self, one: int) -> tuple[Floats, Floats]:
         """Curve without offset and slope of a record at its collocation times, each (k, d)."""
         both = _curve(self.basis[one : one + 1], self.control_points[one : one + 1])[0]
-        halves = both.numpy(force=True).reshape(len(both), 2, -1)
+        halves = both.numpy(force=True)[..., self.held[one]].reshape(len(both), 2, -1)
         return halves[:, 0].T, halves[:, 1].T
 
     def losses(self) -> tuple[torch.Tensor, torch.Tensor]:
@@ -367,17 +374,17 @@ class _Fit:
         coefficients = (self.coefficients * self.mask)[:, rows]
         law = torch.bmm(coefficients.transpose(1, 2), products)
         residual = slopes.reshape(law.shape) - law
-        per_time = 2 * self.physics_weight / residual.shape[2]
-        physics_loss = (residual**2).sum(dim=(1, 2)) / residual.shape[2]
+        pull = self.shares * residual
+        physics_loss = (pull * residual).sum(dim=(1, 2))
 
-        by_coefficient = -per_time * torch.bmm(products, residual.transpose(1, 2))
+        pull *= 2 * self.physics_weight
         gradient = torch.zeros_like(self.coefficients)
-        gradient[:, rows] = by_coefficient
+        gradient[:, rows] = -torch.bmm(products, pull.transpose(1, 2))
         self.coefficients.grad = gradient * self.mask
         pulled = torch.empty_like(both)
-        by_point = self.terms.jacobian(coefficients, products).mul_(residual[:, None]).sum(dim=2)
-        pulled[:, :, :half] = (-per_time * by_point).view_as(points)
-        pulled[:, :, half:] = (per_time * residual).view_as(slopes)
+        by_point = self.terms.jacobian(coefficients, products).mul_(pull[:, None]).sum(dim=2)
+        pulled[:, :, :half] = by_point.neg_().view_as(points)
+        pulled[:, :, half:] = pull.view_as(slopes)
         gradient = torch.zeros_like(self.control_points)
         spans = self.basis.shape[3]
         for a in range(DEGREE + 1):
@@ -409,7 +416,7 @@ class _Fit:
                 self._report(np.flatnonzero(going), *losses)
         if kept is not self:
             at = torch.tensor(going, device=self.device)
-            for name in ("control_points", "coefficients", "offset"):
+            for name in ("coefficients", *_CURVE):
                 getattr(self, name)[at] = getattr(kept, name)
 
     def _part(self, which: np.ndarray) -> "_Fit":
@@ -417,7 +424,7 @@ class _Fit:
         part = object.__new__(_Fit)
         part.__dict__.update(self.__dict__)
         at = torch.tensor(which, device=self.device)
-        for name in ("physics_weight", "data", "weights", "basis", "control_points", "offset"):
+        for name in ("physics_weight", "data", "weights", "shares", "basis", *_CURVE):
             setattr(part, name, getattr(self, name)[at])
         part.restart(self.coefficients.numpy(force=True)[which])
         return part
@@ -450,6 +457,9 @@ class _Fit:
         kept = np.where(np.abs(shifted.coefficients) < prune, 0.0, shifted.coefficients)
         system = PolynomialSystem(names, shifted.exponents, kept)
         return SplineADOLaw(system, native, centre, path, tuple(self.history[one]))
+
+
+_CURVE = ("control_points", "offset")
 
 
 def _curve(basis: torch.Tensor, control_points: torch.Tensor) -> torch.Tensor:
