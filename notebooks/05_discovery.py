@@ -233,6 +233,8 @@ both_optimisers = ("Gauss-Newton", "spline-ADO")
 ado = table_1[table_1.method == "spline-ADO"].set_index("system")
 plain = table_1[table_1.method == "PySINDy"].set_index("system")["l2 (e-2)"]
 assert right["sub-pixel", "Gauss-Newton"] == 1
+
+# %%
 if full:
     assert right["sub-pixel", "spline-ADO"] == 1
     assert right["detector", "Gauss-Newton"] >= 0.9
@@ -277,6 +279,8 @@ for name, mine in ours.groupby("system", sort=False):
         "background model (px)": significant(np.median([film.pixel_error for film in shots])),
         "seconds": shots[0].seconds + mine.seconds.iloc[0],
     })  # fmt: skip
+
+# %%
 caption = f"Gauss-Newton from the detector's whole pixels, and errors (rms) of both trackers; medians of {len(trials)} trials."
 loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)", "detector (px)", "background model (px)"], 0.2)
 save_table("table_systems", rows, caption=caption, tolerance=loose)
@@ -345,6 +349,7 @@ def by_term(law):
     }
 
 
+# %%
 rows = []
 for name, law in found.items():
     true, newton, ado = map(by_term, (first[name].truth, law.system, by_gradients[name]))
