@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # pandas and seaborn are imported where they draw
 _STYLES = {
     "Gauss-Newton": ("C0", "o"), "spline-ADO": ("C5", "P"), "PySINDy": ("C1", "s"),
     "E-SINDy": ("C2", "^"), "WeakSINDy": ("C3", "v"), "Model-A": ("C4", "D"),
+    "SINDy, oracle": ("0.5", "*"),
 }  # fmt: skip
 COLOURS = {name: colour for name, (colour, _) in _STYLES.items()}
 MARKERS = {name: marker for name, (_, marker) in _STYLES.items()}
