@@ -41,7 +41,7 @@ def plot_standings(panels: Mapping[str, DataFrame]) -> Figure:
         axes.set(xlim=(0, 100), ylim=(-0.6, len(shares) - 0.4), title=title)
     grid[-1, 0].set_xlabel("exact laws (%)")
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles[::-1], labels[::-1], loc="outside upper center", ncols=len(labels))
+    figure.legend(handles[::-1], labels[::-1], loc="outside upper center", ncols=3)
     return figure
 
 
