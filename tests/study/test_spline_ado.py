@@ -126,6 +126,12 @@ def test_a_batch_finds_the_laws_of_its_records_alone():
         assert len(law.history) == len(alone.history)
     with pytest.raises(ValueError, match="seeds: must be one a record, 2, got 1"):
         spline_ado_batch(t, records[:2], 2, [0])
+    with pytest.raises(ValueError, match="records: must be at least one, .* got none"):
+        spline_ado_batch(t, [])
+    with pytest.raises(ValueError, match=r"records: .* got \(80, 2\), \(79, 2\)"):
+        spline_ado_batch(t, [x, x[1:]])
+    with pytest.raises(ValueError, match=r"physics_weight: .* one a record, got \(1, 2, 3\)"):
+        spline_ado_batch(t, records[:2], physics_weight=(1, 2, 3))
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU here")

@@ -10,6 +10,7 @@ import pytest
 
 from vidsindy_lite import discover
 from vidsindy_lite.observation import Observation
+from vidsindy_lite.refusal import Refused
 from vidsindy_lite.study import baselines, score, spline_ado
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.baselines import BASELINES
@@ -154,8 +155,8 @@ def test_tracks_are_corrupted_each_by_its_own_draw_before_the_cameras_are_learne
 
 
 def test_where_cameras_cannot_be_learned_no_method_has_a_law(this_film, monkeypatch):
-    def refuse(*_, **__):
-        raise ValueError("tracks: the motion must determine the cameras")
+    def refuse(tracks, *_, **__):
+        raise Refused("tracks: the motion must determine the cameras", "cameras", tracks)
 
     monkeypatch.setattr(experiments, "observe_tracks", refuse)
     trials = grid(["SprottE"], {"clean": (0,)}, [1], experiments.METHODS, 200)

@@ -7,12 +7,14 @@ collocation times (Eq. 9b), STRidge with an adaptive hard threshold for the coef
 (P, surviving coefficients, offset), an affine elimination of the offset (Eq. 10), and a small
 value below which coefficients are cut at the end.
 
-Three things the paper leaves open and what is done here:
+Four things the paper leaves open and what is done here:
 
 * The curve is ``G P + offset`` in the data loss and ``G P`` in the library. With the offset in
   both, as one reading of the text has it, it changes nothing, for B-splines sum to one.
 * Data are standardised (coordinates and time divided by their scale, undone at the end): one
   learning rate and one physics weight then serve all systems. The offset starts at the mean.
+* The law is asked for where samples are, or in the next knot span: within a gap the first curve is
+  a guess, to which physics would fit the law.
 * Hyperparameters: see `spline_ado`. "PiSL" there is the public code of the same model by the
   same group (F. Sun, Y. Liu, H. Sun, "Physics-informed Spline Learning for Nonlinear Dynamics
   Discovery", IJCAI 2021), in its Lorenz example.
@@ -45,6 +47,8 @@ from ..dynamics import (
     monomials,
     variable_names,
 )
+
+_CURVE = ("control_points", "offset")  # of `_Fit`, what is learned beside the coefficients
 
 ROUGHNESS = 1e-4
 """Weight of the second differences in the first curve: enough to carry it across gaps."""
@@ -192,8 +196,20 @@ def spline_ado_batch(
     Returns
     -------
     list of SplineADOLaw
+
+    Raises
+    ------
+    ValueError
+        As `spline_ado` does, if there is no record, records have different shapes, or there is
+        not one seed and weight a record.
     """
     chosen = SplineADOSettings(**settings)
+    if not len(records) or len({np.shape(x) for x in records}) > 1:
+        shapes = ", ".join(str(np.shape(x)) for x in records) or "none"
+        raise ValueError(f"records: must be at least one, all of one shape, got {shapes}")
+    for name in ("physics_weight", "sparsity_weight"):
+        if np.shape(value := getattr(chosen, name)) not in ((), (len(records),)):
+            raise ValueError(f"{name}: must be one number or one a record, got {value}")
     seeds = list(seeds) or list(range(len(records)))
     if len(seeds) != len(records):
         raise ValueError(f"seeds: must be one a record, {len(records)}, got {len(seeds)}")
@@ -286,8 +302,7 @@ class _Fit:
         seen = np.asarray(~np.isnan(states).any(axis=2))
         shape = (settings.collocation_per_knot, spans)
         self.units, data, controls, bases = [], [], [], []
-        # The law is asked for where samples are, or in the next span: elsewhere the first curve is
-        # a guess, and physics would fit the law to it.
+        # Spans that hold samples, and their neighbours: there the law is asked for.
         self.held = np.zeros((len(states), spans), dtype=bool)
         for x, rows, held, rng in zip(states, seen, self.held, generators, strict=True):
             held[first[rows]] = True
@@ -457,9 +472,6 @@ class _Fit:
         kept = np.where(np.abs(shifted.coefficients) < prune, 0.0, shifted.coefficients)
         system = PolynomialSystem(names, shifted.exponents, kept)
         return SplineADOLaw(system, native, centre, path, tuple(self.history[one]))
-
-
-_CURVE = ("control_points", "offset")
 
 
 def _curve(basis: torch.Tensor, control_points: torch.Tensor) -> torch.Tensor:

@@ -21,6 +21,7 @@ from ..arrays import Floats
 from ..checks import check_choice
 from ..dynamics import Discovery, PolynomialSystem, discover
 from ..observation import observe_tracks
+from ..refusal import Refused
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import FilmTask, film_result
 from .metrics import Score, pulls, score
@@ -36,8 +37,8 @@ CORRUPTIONS: dict[str, Callable[[Floats, float, np.random.Generator], Floats]] =
 CONDITIONS = ("clean", *CORRUPTIONS)
 METHODS = ("Gauss-Newton", "spline-ADO", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
 """`dynamics.discover`, the paper's own optimiser (`spline_ado`), and `baselines.BASELINES`."""
-RANDOM_METHODS = ("spline-ADO", "E-SINDy", "WeakSINDy", "Model-A")
-"""Those that draw random numbers: the number of the trial is their seed."""
+RANDOM_METHODS = ("E-SINDy", "WeakSINDy", "Model-A")
+"""The baselines that draw random numbers: the number of the trial is their seed."""
 SOURCES = ("detector", "sub-pixel", "path", "truth")
 """Where a path comes from, and what a condition is done to: tracks of the learned detector in
 whole pixels (the paper's regime), and tracks of the background model, before cameras are learned
@@ -221,7 +222,11 @@ def run_comparison(comparison: Comparison) -> list[TrialResult]:
     for method in dict.fromkeys(trial.method for trial in comparison.trials):
         mine = [trial for trial in comparison.trials if trial.method == method]
         able = [trial for trial in mine if np.isfinite(data[trial.trial].x).any()]
-        results |= {trial: _refused(trial, data[trial.trial].warnings) for trial in mine}
+        results |= {
+            trial: _refused(trial, data[trial.trial].warnings)
+            for trial in mine
+            if trial not in able
+        }
         draws = [data[trial.trial] for trial in able]
         began = time.process_time()
         laws = _laws(method, draws, [trial.trial for trial in able])
@@ -266,7 +271,7 @@ def trial_path(trial: Trial) -> TrialPath:
     tracks = [np.round(track) if whole else track for track in tracks]
     try:
         seen = observe_tracks(tracks, filmed.rig.uncalibrated(keep=0), filmed.t, lags="synchronous")
-    except ValueError as refusal:
+    except Refused as refusal:
         return TrialPath(filmed.t, np.full(filmed.x.shape, np.nan), None, (str(refusal),))
     return TrialPath(seen.t, seen.x, seen.systematic, seen.warnings)
 
@@ -324,17 +329,13 @@ def find_law(
     degree: int = 3,
     origin: str = "learn",
 ) -> Discovery | PolynomialSystem:
-    """What one of the `METHODS` finds.
+    """What Gauss-Newton or one of the baselines finds in one record.
 
-    Only Gauss-Newton can use what is known of systematic errors. It and spline-ADO look for the
-    law's origin, which the former can be told.
+    Only Gauss-Newton can use what is known of systematic errors, and looks for the law's origin,
+    which it can be told.
     """
     if method == "Gauss-Newton":
         return discover(t, x, degree=degree, systematic=systematic, order=1, origin=origin)
-    if method == "spline-ADO":
-        from .spline_ado import spline_ado
-
-        return spline_ado(t, x, degree, seed).system
     from .baselines import BASELINES  # pysindy takes seconds to import
 
     options = {"seed": seed} if method in RANDOM_METHODS else {}
