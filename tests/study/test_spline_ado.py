@@ -221,6 +221,12 @@ def test_bad_input():
     for name in ("knots_per_sample", "collocation_per_knot", "pretraining", "epochs"):
         with pytest.raises(ValueError, match=f"{name}: must be at least .*, got 0"):
             spline_ado(t, x, **{name: 0})
+    weights = ("physics_weight", "sparsity_weight", "learning_rate", "prune", "alternations")
+    for name, value in [(name, value) for name in weights for value in (-1, np.nan, np.inf)]:
+        with pytest.raises(ValueError, match=f"{name}: must be at least .*, got {value}"):
+            spline_ado(t, x, **{name: value})
+    with pytest.raises(ValueError, match="device: must be one that PyTorch knows, got 'moon'"):
+        spline_ado(t, x, device="moon")
 
 
 def lorenz_rows():

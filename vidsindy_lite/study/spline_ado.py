@@ -134,9 +134,14 @@ class SplineADOSettings:
     prune: float = 0.1
 
     def __post_init__(self) -> None:
-        least = {"knots_per_sample": 0.1, "collocation_per_knot": 1, "pretraining": 1, "epochs": 1}
+        least = {
+            "knots_per_sample": 0.1, "collocation_per_knot": 1, "physics_weight": 0,
+            "sparsity_weight": 0, "pretraining": 1, "alternations": 0, "epochs": 1,
+            "learning_rate": 1e-12, "prune": 0,
+        }  # fmt: skip
         for name, bound in least.items():
-            if not getattr(self, name) >= bound:
+            value = np.asarray(getattr(self, name))
+            if not ((value >= bound) & np.isfinite(value)).all():
                 raise ValueError(f"{name}: must be at least {bound}, got {getattr(self, name)}")
 
 
@@ -223,7 +228,10 @@ def spline_ado_batch(
             raise ValueError(f"x: every coordinate must move, got ranges {np.ptp(seen, axis=0)}")
     generators = [np.random.default_rng(check_integer("seed", seed)) for seed in seeds]
     prices = np.broadcast_to(chosen.sparsity_weight, len(records))
-    where = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
+    try:
+        where = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
+    except RuntimeError as error:
+        raise ValueError(f"device: must be one that PyTorch knows, got {device!r}") from error
     states = np.array([np.asarray(x, dtype=float) for x in records])
     fit = _Fit(check_times(t), states, exponents, chosen, generators, where)
     fit.descend(chosen.pretraining, chosen.learning_rate)
