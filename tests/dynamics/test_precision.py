@@ -141,13 +141,12 @@ def test_the_noise_is_that_of_the_errors_where_they_are_as_usual():
     """By how much weighted errors are smaller than all, so much the noise shrinks."""
     x, _ = uneven("growing", np.random.default_rng(2))
     problem = posed(x)
-    (t, _), units = problem.trajectories[0], problem.units
-    residual, speed = (x - PATH) / units.scale, LAW(PATH) / units.scale * units.time
-    path = [np.stack([(PATH - units.centre) / units.scale, speed])]
-    found = weighing._weighed(problem, [(0, t)], path, residual, np.ones_like(residual))
+    found = weighing.smoother_weights(problem)
     factors = found.precision[0] / problem.precision[0]
     assert np.ptp(factors, axis=0).min() > 0.5
-    smaller = np.mean(factors * residual**2, axis=0) / np.mean(residual**2, axis=0)
+    ((_, (t, data)),) = problem.stretches
+    squares = (problem.curves[0](t) - data) ** 2
+    smaller = np.mean(factors * squares, axis=0) / np.mean(squares, axis=0)
     np.testing.assert_allclose(found.noise, problem.noise * np.sqrt(smaller))
 
 
