@@ -269,14 +269,15 @@ def _observed(
         told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
     x = reconstruct(tracks, learned)
     learning = systematic_errors(raw, rig, learned, told)
-    learning[:, np.isnan(x).any(axis=1)] = np.nan
+    motion = [_smoothed(clock.times, track) for track in tracks]
+    trails = trailing_errors(tracks, learned, motion)
     return Observation(
         tracks=tracks,
         rig=learned,
         lags=told,
         t=clock.times,
         x=x,
-        systematic=_shared_errors(learning, tracks, learned, clock.times),
+        systematic=np.concatenate((learning, trails)),
         warnings=(
             *_rig_warnings(missed, tracks, rig, learned, names, used, best),
             *learned.warnings,
@@ -327,21 +328,6 @@ def _smoothed(t: Floats, values: Floats) -> Floats:
             curve = smooth_curves([(t[stretch], values[stretch])], rng).splines[0]
             clean[stretch] = curve(t[stretch])
     return clean
-
-
-def _shared_errors(learning: Floats, tracks: Sequence[Floats], learned: Rig, t: Floats) -> Floats:
-    """Errors of the path that all frames share, (k, n, 3), as those of the motion alone.
-
-    Those of learning, (l, n, 3), are NaN where there is no path. A mode that holds the noise of
-    each frame would explain that very noise: in a fit, its size would grow beyond all measure, and
-    bend the path with it.
-    """
-    trails = trailing_errors(tracks, learned, [_smoothed(t, track) for track in tracks])
-    if not len(learning):
-        return trails
-    flat = np.moveaxis(learning, 1, 0).reshape(len(t), -1)
-    steady = np.nan_to_num(_smoothed(t, flat)).reshape(len(t), len(learning), 3)
-    return np.concatenate((np.moveaxis(steady, 0, 1), trails))
 
 
 def _track_one(

@@ -456,6 +456,7 @@ def deepest(problem: Problem, path: Path, history: History) -> Path:
 
 def at_own_errors(problem: Problem, fit: Fit) -> Fit:
     """The fit weighted with the errors that it leaves, the law exact."""
+    fit = problem.along(fit)
     collocation = problem.weighted(fit.collocation, FINAL_WEIGHT)
     for _ in range(2):
         weights = errors_left(problem, fit) ** -2
@@ -500,6 +501,7 @@ def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: Hi
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
+    fit = problem.along(fit)
     fit = first = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
     columns, creeps = np.flatnonzero(fit.state.free()), first.status is Status.MAX_STEPS
     for halving in range(MOST_HALVINGS):
@@ -511,7 +513,8 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
         finer = problem.collocation(segments, errors_left(problem, fit))
         splines = fit.collocation.grid.splines(fit.state.control_points)
         state = replace(fit.state, control_points=fit_curves(finer, splines))
-        fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
+        fit = problem.along(Fit(state, problem.weighted(finer, FINAL_WEIGHT), fit.status))
+        fit = fit.collocation.solve(state, EXACT)
         creeps = creeps and fit.status is Status.MAX_STEPS
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))

@@ -56,7 +56,11 @@ class Problem:
     trajectories : list of Trajectory
         The same in standard units.
     systematic : list of ndarray, shape (n, d, k)
-        Errors that all samples share, for each trajectory.
+        Errors that all samples share, for each trajectory, where the motion is at ``smoothed``.
+    smoothed : list of ndarray, shape (n, d)
+        Each trajectory without its noise, as its curves have it.
+    pulls : ndarray, shape (d, d, k)
+        By how much the shared errors grow with the place.
     precision : list of ndarray, shape (n, d)
         Weight of each measurement relative to ``noise ** -2``, for each trajectory; 0 where it was
         not observed.
@@ -83,6 +87,8 @@ class Problem:
     measured: list[Trajectory]
     trajectories: list[Trajectory]
     systematic: list[Floats]
+    smoothed: list[Floats]
+    pulls: Floats
     precision: list[Floats]
     stretches: list[tuple[int, Trajectory]]
     curves: Sequence[Callable[[Floats], Floats]]
@@ -201,6 +207,19 @@ class Problem:
             self.functions,
         )  # fmt: skip
 
+    def along(self, fit: Fit) -> Fit:
+        """A fit whose shared errors are as its curve has them: where that is, and no noise."""
+        if not self.shared:
+            return fit
+        parts = [
+            [self._at(segment, values) for segment in fit.collocation.segments]
+            for values in (self.systematic, self.smoothed)
+        ]
+        modes, smoothed = map(np.concatenate, parts)
+        moved = fit.collocation.curve(fit.state.control_points) - smoothed
+        modes = modes + np.einsum("ni,ijk->njk", np.nan_to_num(moved), self.pulls)
+        return replace(fit, collocation=replace(fit.collocation, systematic=modes))
+
     def _at(self, segment: Segment, values: Sequence[Floats]) -> Floats:
         """What is given for all samples of each trajectory, at those of a segment."""
         t, _ = self.trajectories[segment.trajectory]
@@ -286,7 +305,9 @@ def with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
 
     curves = [with_velocity(spline) for spline in positions]
     seen = np.repeat([True, False], len(rms))
-    return _with_states(problem, curves, rms * units.scale / units.time, seen)
+    found = _with_states(problem, curves, rms * units.scale / units.time, seen)
+    both = np.tile(units.scale_errors, 2)
+    return replace(found, units=replace(found.units, scale_errors=both))
 
 
 def with_time(problem: Problem) -> Problem:
@@ -388,14 +409,17 @@ def _with_states(
 
     centres, scales = np.zeros(len(seen)), np.empty(len(seen))
     centres[seen], scales[seen], scales[~seen] = units.centre, units.scale, scale
+    scale_errors = among(units.scale_errors, 0.0)
     return replace(
         problem,
         trajectories=[(t, among(x, np.nan)) for t, x in problem.trajectories],
         systematic=[among(modes, 0.0) for modes in problem.systematic],
+        smoothed=[among(x, np.nan) for x in problem.smoothed],
+        pulls=np.moveaxis(among(np.moveaxis(among(problem.pulls, 0.0), 1, 0), 0.0), 0, 1),
         precision=[among(precision, 0.0) for precision in problem.precision],
         stretches=[(i, (t, among(x, np.nan))) for i, (t, x) in problem.stretches],
         curves=curves,
-        units=Units(centres, scales, units.time),
+        units=Units(centres, scales, units.time, scale_errors=scale_errors),
         noise=spread_to_unseen(problem.noise, seen),
     )
 
@@ -459,14 +483,30 @@ def pose(
         errors = [np.maximum(part.compress(seen, axis=1) / scale, CLEANEST) for part in sigma]
         noise = np.nanmedian(np.concatenate(errors), axis=0)
         precision = [np.nan_to_num((noise / part) ** 2) for part in errors]
+    smoothed = [np.full(values.shape, np.nan) for _, values in trajectories]
+    for (i, (t, _)), curve in zip(stretches, curves, strict=True):
+        smoothed[i][np.searchsorted(trajectories[i][0], t)] = curve(t * speed)
+    modes = [part.compress(seen, axis=1) / scale[:, None] for part in systematic]
+    pulls, rest = _shared(trajectories, stretches, modes)
+    scale_errors = np.empty((0, len(scale)))
+    if not form.functions:  # else the unit of a coordinate is part of the law
+        # In other units a law has the same terms: no data tell of an error of the scale.
+        scale_errors = np.einsum("jjk->kj", pulls).copy()
+        pulls -= np.eye(len(scale))[:, :, None] * pulls
+        rest = [part - (centre / scale)[:, None] * scale_errors.T for part in rest]
     problem = Problem(
         measured=measured,
         trajectories=[(t * speed, values) for t, values in trajectories],
-        systematic=[modes.compress(seen, axis=1) / scale[:, None] for modes in systematic],
+        systematic=[
+            part + np.einsum("ni,ijk->njk", np.nan_to_num(x), pulls)
+            for part, x in zip(rest, smoothed, strict=True)
+        ],
+        smoothed=smoothed,
+        pulls=pulls,
         precision=precision,
         stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
         curves=curves,
-        units=Units(centre, scale, step / speed),
+        units=Units(centre, scale, step / speed, scale_errors=scale_errors),
         noise=noise,
         form=form,
         penalties=term_penalties(form.exponents, len(seen)),
@@ -485,6 +525,35 @@ def pose(
     if form.exponents.shape[1] > len(form.names):
         problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))
+
+
+def _shared(
+    trajectories: Sequence[Trajectory],
+    stretches: Sequence[tuple[int, Trajectory]],
+    systematic: Sequence[Floats],
+) -> tuple[Floats, list[Floats]]:
+    """By how much shared errors, (n, d, k), grow with the place, (d, d, k), and smooth remainders.
+
+    Errors of a place are those of a noisy place where they are told at the samples. In a fit such
+    errors would explain that very noise, and their sizes grow beyond all measure.
+    """
+    x, modes = np.concatenate([x for _, x in trajectories]), np.concatenate(list(systematic))
+    _, d, k = modes.shape
+    rows = np.isfinite(x).all(axis=1)
+    places, values = np.insert(x[rows], 0, 1.0, axis=1), modes[rows].reshape(-1, d * max(k, 1))
+    if not k or not len(values):
+        return np.zeros((d, d, k)), [np.nan_to_num(part) for part in systematic]
+    pulls = np.asarray(np.linalg.lstsq(places, values)[0][1:], dtype=float).reshape(d, d, k)
+    rest = [
+        part - np.einsum("ni,ijk->njk", x, pulls)
+        for part, (_, x) in zip(systematic, trajectories, strict=True)
+    ]
+    for i, (t, _) in stretches:
+        rows = np.searchsorted(trajectories[i][0], t)
+        left = rest[i][rows].reshape(len(t), -1)
+        curve = smooth([(t, left)], np.random.default_rng(0)).splines[0]
+        rest[i][rows] = curve(t).reshape(-1, d, k)
+    return pulls, [np.nan_to_num(part) for part in rest]
 
 
 def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
