@@ -365,7 +365,8 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
         return fit
     start = start.collocation.solve(start.state)  # its curve is still that of the frame before
     trial = select(problem, start, FINAL_WEIGHT, "another frame", history)
-    return trial if trial.criterion < fit.criterion - PLATEAU else fit
+    cheaper = trial.criterion < fit.criterion - PLATEAU
+    return trial if cheaper and problem.holds_origin(trial.state.offset) else fit
 
 
 # ---------------------------------------------------------------------------- the law that persists
@@ -404,7 +405,10 @@ def persistent(
             fit, coarse = polish(problem, fit, history), False
             path = follow(problem, fit)
         if not has_terms(fit, path.widest()):
-            fit = refit(problem, path, history)
+            other = refit(problem, path, history)
+            if other.status is not Status.CONVERGED and fit.status is Status.CONVERGED:
+                break  # what cannot be fitted is no law
+            fit = other
         elif not crossed:
             fit, crossed = bridged(problem, fit), True
         else:

@@ -170,6 +170,11 @@ class Problem:
         )
         return low, high
 
+    def holds_origin(self, origin: Floats) -> bool:
+        """Whether an origin is in the box of data and home."""
+        low, high = self.box
+        return bool(((low <= origin) & (origin <= high)).all())
+
     @property
     def axis_penalty(self) -> float:
         """Price of an axis along which the law's origin is not at home."""
