@@ -161,12 +161,15 @@ class Problem:
 
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
-        """Corners of the box of data and home, in which a law has its origin, each (d,)."""
+        """Corners of the box in which a law has its origin, each (d,).
+
+        It holds the data and home, and a spread more: a motion need not pass its centre.
+        """
         x = np.concatenate([values for _, (_, values) in self.stretches])
         movable, home = self.form.movable, self.home
         low, high = (
-            np.where(movable, extreme(extreme.reduce(x), home), home)
-            for extreme in (np.fmin, np.fmax)
+            np.where(movable, extreme(extreme.reduce(x), home) + more, home)
+            for extreme, more in ((np.fmin, -1.0), (np.fmax, 1.0))
         )
         return low, high
 
