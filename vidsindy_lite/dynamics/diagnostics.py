@@ -803,7 +803,6 @@ def diagnose(
     model: Linearisation,
     path: Path,
     law: PolynomialSystem,
-    margins: Floats,
 ) -> tuple[str, ...]:
     """Reasons not to trust a law.
 
@@ -819,9 +818,6 @@ def diagnose(
         On which its terms were chosen.
     law : PolynomialSystem
         The law in the frame of the data.
-    margins : ndarray, shape (l d,)
-        By how much the criterion rises if a term of this law is taken out or put back, equation
-        by equation.
     """
     wider = widened(problem, fit)
     return (
@@ -835,7 +831,6 @@ def diagnose(
         *_selection(problem, fit, model, wider, path, law),
         *_sampling(problem),
         *_standstill(law, _remedy(fit)),
-        *_narrow(law, margins),
     )
 
 
@@ -974,8 +969,7 @@ def _selection(
     if not tolerant:  # weaker errors than those tolerated say nothing about the law
         # The offset stays where it is: with it free, the same law in another frame would count.
         yield from _left_over(model.of(problem.form.searched), fit.state)
-        yield from _near_tie(wider, remedy)
-        yield from _far_neighbours(problem, fit.state, model.of(problem.form.searched), remedy)
+        yield from _far_neighbours(wider, remedy)
         origins += elsewhere(problem.cautious, fit.state, model, law)
     yield from untold_origins(origins, remedy)
 
@@ -1038,51 +1032,25 @@ def _left_over(model: Linearisation, state: State) -> Iterator[str]:
         )
 
 
-def _near_tie(wider: Wider, remedy: str) -> Iterator[str]:
-    """Would another law fit almost as well, of the library or of a higher degree?"""
-    model, law = wider.candidates, wider.law
-    cost, dropped, added = closest_rival(
-        model.information,
-        model.gradient,
-        wider.state.flat()[model.columns],
-        wider.prices[model.columns],
-        wider.state.free()[model.columns],
-    )
-    if cost > NEAR_TIE:
-        return
-    out, into = (
-        " and ".join(place(law, k) for k in model.columns[entries]) for entries in (dropped, added)
-    )
-    change = (
-        f"{into} instead of {out}" if out and into else f"with {into}" if into else f"without {out}"
-    )
-    frame = "in its own frame, " if wider.state.moving.any() else ""
-    yield (
-        f"another law fits almost as well: {frame}{change} (criterion {cost:+.1f}); the data "
-        f"do not settle it: use {remedy}"
-    )
-
-
-def _far_neighbours(
-    problem: Problem, state: State, model: Linearisation, remedy: str
-) -> Iterator[str]:
+def _far_neighbours(wider: Wider, remedy: str) -> Iterator[str]:
     """Has another law that may as well be true coefficients far from those of this one?"""
-    columns, law = model.columns, problem.law(state)
+    model, law, state = wider.candidates, wider.law, wider.state
+    columns = model.columns
     support, present = state.free()[columns], state.flat()[columns]
     if not support.any():
         return
-    prices = np.tile(prior_prices(problem.exponents), problem.d)[columns]
+    prices = np.tile(prior_prices(law.exponents), law.d)[columns]
     odds, dropped, added, entry, value = far_neighbours(
         model.information, model.gradient, present, prices, support
     )
     if odds > UNLIKELY:
         out, into = (" and ".join(place(law, columns[k]) for k in at) for at in (dropped, added))
         change = f"{into} instead of {out}" if out and into else f"with {into}" if into else ""
-        times = value / present[entry]
+        change = change or f"without {out}"
         yield (
-            f"another law may as well be true ({100 * odds:.0f} %), {change or f'without {out}'}: "
-            f"{place(law, columns[entry])} is {times:.2g} times as large there, far beyond its "
-            f"standard error; use {remedy}"
+            f"another law may as well be true ({100 * odds:.0f} %), {change}: there "
+            f"{place(law, columns[entry])} changes by {100 * (value / present[entry] - 1):+.2g} %, "
+            f"far beyond its standard error; use {remedy}"
         )
 
 
@@ -1092,16 +1060,6 @@ def _standstill(law: PolynomialSystem, remedy: str) -> Iterator[str]:
     for j in np.flatnonzero(~law.support.any(axis=0)):
         name = law.names[j]
         yield f"no term was found for d{name}/dt although {name} moves: use {remedy}"
-
-
-def _narrow(law: PolynomialSystem, margins: Floats) -> Iterator[str]:
-    close, kept = np.flatnonzero(margins < NEAR_TIE).tolist(), law.support.T.ravel()
-    changes = ", ".join(f"{'without' if kept[k] else 'with'} {place(law, k)}" for k in close)
-    if changes:
-        yield (
-            f"in the frame of the data another law fits almost as well: {changes} (criterion "
-            f"{margins[close].min():+.1f}); the standard errors do not count this in"
-        )
 
 
 def _sampling(problem: Problem) -> Iterator[str]:

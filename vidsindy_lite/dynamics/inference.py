@@ -15,7 +15,7 @@ from ..arrays import Bools, Floats, Ints
 from .bspline import DEGREE
 from .collocation import Fit, Linearisation
 from .data import Units
-from .l0 import LEAST, inverse, newcomers
+from .l0 import inverse, newcomers
 from .library import divides, shift_generators, shift_matrix
 from .model import PolynomialSystem, State
 from .noise import residual_noise
@@ -197,11 +197,8 @@ HOLDS = 3
 
 def infer(
     problem: Problem, fit: Fit, model: Linearisation, path: Path, history: History
-) -> tuple[Discovery, Floats]:
+) -> Discovery:
     """Turn the last fit into a `Discovery` in the units of the data, without warnings as yet.
-
-    By how much the criterion rises comes along, (l d,), if a term of the law in the data's frame is
-    taken out or put back, equation by equation.
 
     Parameters
     ----------
@@ -228,12 +225,7 @@ def infer(
     weighed = _shifted(exponents, coefficients, offset) == coefficients.T.ravel()
     prices = np.where(weighed, KEPT, problem.prices * np.repeat(tolerated, l) ** 2)
     native = exponents, coefficients, offset, covariance
-    moved, moved_covariance, margins = _pruned(*native, prices)
-    margins /= np.repeat(tolerated**2, l)
-    dearer = problem.cautious.prices - problem.prices
-    by_chance = _coincidence(*native, np.repeat(tolerated, l), units.scale) - problem.prices
-    margins += np.where(moved.T.ravel() != 0, -dearer, np.minimum(dearer, by_chance))
-    margins[weighed] = np.inf
+    moved, moved_covariance = _pruned(*native, prices)
     law = form.law(moved + form.known)
     seen = collocation.counts > 0
     found = Discovery(
@@ -256,7 +248,7 @@ def infer(
             for s in collocation.grid.splines(state.control_points)
         ),
     )
-    return found, margins
+    return found
 
 
 def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisation) -> Discovery:
@@ -266,7 +258,7 @@ def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisati
     coefficients = state.coefficients * problem.units.factors(problem.exponents)
     kept = (found.system.support & ~(form.known != 0)).T.ravel()
     native = problem.exponents, coefficients, found.offset, covariance
-    moved, moved_covariance, _ = _pruned(*native, np.where(kept, KEPT, np.inf))
+    moved, moved_covariance = _pruned(*native, np.where(kept, KEPT, np.inf))
     return replace(
         found,
         system=form.law(moved + form.known),
@@ -349,43 +341,22 @@ def _powers(exponents: Ints, coefficients: Floats, offset: Floats) -> Ints:
     return np.maximum(np.concatenate(powers), 1)
 
 
-def _coincidence(
-    exponents: Ints,
-    coefficients: Floats,
-    offset: Floats,
-    covariance: Floats,
-    tolerated: Floats,
-    scale: Floats,
-) -> Floats:
-    """Twice the log odds that a term in the data's frame is no nearer to zero by chance, (l d,).
-
-    A moved origin leaves the sum of some parts, anywhere up to their size, of which its error is a
-    share. The parts are at least those of an origin as far away as the data spread.
-    """
-    variance = np.diag(_carried(exponents, coefficients, offset, covariance)) * tolerated**2
-    reach = np.maximum(np.abs(offset), scale)
-    parts = (np.abs(shift_matrix(exponents, reach)) @ np.abs(coefficients)).T.ravel()
-    odds = parts**2 / (2 * np.pi * np.where(variance > 0, variance, np.inf))
-    return np.where(odds > 0, np.log(np.maximum(odds, LEAST)), np.inf)
-
-
 def _pruned(
     exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats, penalties: Floats
-) -> tuple[Floats, Floats, Floats]:
+) -> tuple[Floats, Floats]:
     """A law in the data's frame without what cannot be told from zero, and its covariance.
 
     Shifting a law by an estimated offset leaves remainders where the exact shift cancels. One by
     one, the least significant is taken out by conditioning the Gaussian estimate of coefficients
     and offset on its being zero. A power of an offset is as far from zero as the offset: in its own
-    standard errors so many times less. Comes back with the margin of each decision, in chi-square
-    units; infinite where none was taken.
+    standard errors so many times less.
     """
     shape, size = coefficients.shape[::-1], coefficients.size
     native = np.concatenate([coefficients.T.ravel(), offset])
     flat = _shifted(exponents, coefficients, offset)
     powers = _powers(exponents, coefficients, offset)
     moved = _carried(exponents, coefficients, offset, covariance)
-    original, margins, dead = np.diag(moved).copy(), np.full(size, np.inf), flat == 0
+    original, dead = np.diag(moved).copy(), flat == 0
     for _ in range(size + 1):
         variance = np.diag(moved)
         # After conditioning, a dependent entry has neither value nor variance left.
@@ -396,12 +367,11 @@ def _pruned(
         score = np.where(known[live], np.inf, (powers * flat)[live] ** 2 / sigma)
         weakness = score / penalties[live]
         if not len(live) or weakness.min() >= 1:
-            margins[live] = score - penalties[live]
             break
         # Of the powers of one offset the lowest: the others vanish with it.
         weakest = np.lexsort([weakness, np.where(weakness < 1, powers[live], size)])[0]
         k = live[weakest]
-        margins[k], dead[k] = penalties[k] - score[weakest], True
+        dead[k] = True
         point = native
         for _ in range(HOLDS):  # the shift is linear around where it is held alone
             value, slope = _entry(exponents, point[:size].reshape(shape).T, point[size:], int(k))
@@ -413,4 +383,4 @@ def _pruned(
         moved = _carried(exponents, *law, covariance)
     flat = np.where(dead, 0.0, flat)
     moved[dead] = moved[:, dead] = 0.0
-    return flat.reshape(shape).T, moved, margins
+    return flat.reshape(shape).T, moved

@@ -254,8 +254,8 @@ def _solved(task: _Task, form: Form) -> Solved:
         bar.update(rounds - bar.n)
     problem, fit, path = min(laws, key=lambda law: evidence(*law[:2]))
     model = path.model if path.fit is fit else problem.model(fit)
-    found, margins = infer(problem, fit, model, path, history)
-    doubts = diagnose(problem, fit, model, path, found.system, margins)
+    found = infer(problem, fit, model, path, history)
+    doubts = diagnose(problem, fit, model, path, found.system)
     return replace(found, warnings=(*doubts, *history.warnings)), problem, fit
 
 
