@@ -31,7 +31,7 @@ The other rooms import from here alone.
 from .alignment import Lags, align, list_lags
 from .calibrate import calibration_errors, check_learnable, learn_cameras
 from .clocks import Clock
-from .calibrations import read_calibration, write_calibration
+from .calibrations import read_calibration
 from .causes import GROSS, explain, smooth
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .identities import identify, side_by_side, stacked

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
-from ..checks import check_integer, check_number, check_path
+from ..checks import check_integer, check_number
+from ..reading import check_file, read_tree
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def load_hints(path: str | os.PathLike) -> tuple[Hint | None, ...]:
     ValueError
         If a target is no hint; names file, camera and key.
     """
-    tables = tomllib.loads(check_path("path", path).read_text(encoding="utf-8"))["camera"]
+    tables = read_tree("path", check_file("path", path), ".toml")["camera"]
     return tuple(_from_table(f"{path}: camera {i}", table) for i, table in enumerate(tables))
 
 
