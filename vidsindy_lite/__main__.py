@@ -67,7 +67,7 @@ def _discover(options: argparse.Namespace) -> int:
     moves. They may start at different times, differ in length and in frame rate; the first one is
     the clock. A video may be a file, a folder of images, or a pattern of their names in quotes.
     Who has tracked the target elsewhere gives --tracks in place of videos: text files as DLTdv,
-    Tracker, DeepLabCut and this command write them.
+    Argus, Tracker, Kinovea, TrackMate, DeepLabCut, SLEAP, detectors and this command write them.
 
     examples:
       python -m vidsindy_lite rig-template --output rig.toml           and fill it in
@@ -91,6 +91,8 @@ def _discover(options: argparse.Namespace) -> int:
 
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
+    if options.individual is not None and not options.tracks:
+        raise ValueError(f"individual: must be given with --tracks, got {options.individual!r}")
     if options.tracks and options.targets != 1:
         raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
@@ -132,7 +134,8 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
     shared |= {"lags": options.lag, "progress": True}
     if options.tracks:
-        return discover_from_tracks(options.tracks, rig, fps=options.fps, **shared)
+        shared |= {"individual": options.individual, "fps": options.fps}
+        return discover_from_tracks(options.tracks, rig, **shared)
     t = None
     if options.fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
@@ -303,6 +306,9 @@ COMMANDS = {
         "--tracks": words(
             "FILE", "text files of tracks, one per camera of the rig or one of all, in place of "
             "videos", nargs="+"
+        ),
+        "--individual": words(
+            "NAME", "which of several targets of these files, by its name there"
         ),
         "--rig": words("FILE", "where the cameras stand", required=True),
         "--out": words("DIR", "folder of the report (default: report)", default="report"),

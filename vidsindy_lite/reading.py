@@ -116,12 +116,12 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
     kind = f"a {suffix[1:].upper()} file"
     text = read_text(name, path, kind)
     try:
-        if suffix == ".toml":
-            return tomllib.loads(text)
         if suffix == ".json" and '"opencv-matrix"' not in text:
             return json.loads(text)
         if _depth(text, suffix) > DEEPEST:
             raise RecursionError
+        if suffix == ".toml":
+            return tomllib.loads(text)
         memory = cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY
         storage = cv2.FileStorage(text, memory)
         try:
@@ -137,18 +137,22 @@ def read_tree(name: str, path: Path, suffix: str) -> Any:
 
 def _depth(text: str, suffix: str) -> int:
     """How deeply a tree is nested at most: never less than it is."""
-    ahead = 0
     if suffix == ".xml":
-        tags = re.findall(
-            r"<(/?)[^\s/<>!?][^<>]*?(/?)>", re.sub(r"<!--.*?-->", "", text, flags=re.S)
-        )
+        first, *rest = text.split("<!--")
+        text = first + "".join(part.partition("-->")[2] for part in rest)
+        tags = re.findall(r"<(/?)[^\s/<>!?][^<>]*?(/?)>", text)
         steps = [0 if closed else -1 if ends else 1 for ends, closed in tags]
+        ahead = [""]
     else:
-        text = re.sub(r'"(?:\\.|[^"\\\n])*"', "", text)  # brackets in strings open nothing
+        text = re.sub(r'"(?:\\.|[^"\\\n])*"|#.*', "", text)  # brackets there open nothing
         steps = [1 if mark in "[{" else -1 for mark in re.findall(r"[][{}]", text)]
-        ahead = max(map(len, re.findall(r"^[ \t?:-]+", text, re.M)), default=0)
+        if suffix == ".toml":  # the dots of a key open levels, too
+            tokens = re.split(r"[\n,=\[\]]", text.replace(" ", "").replace("\t", ""))
+            ahead = ["." * part.count(".") for part in tokens]
+        else:  # as do indents and dashes of YAML
+            ahead = re.findall(r"[ \t?:-]+", text)
     levels = np.cumsum([0, *steps])
-    return int((levels - np.minimum.accumulate(levels)).max()) + ahead
+    return int((levels - np.minimum.accumulate(levels)).max()) + max(map(len, ahead), default=0)
 
 
 def _plain(node: Any) -> Any:
