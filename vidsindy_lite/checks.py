@@ -165,7 +165,6 @@ def check_tracks(tracks: Sequence[ArrayLike], cameras: int | None = None) -> lis
 
 def check_times(t: ArrayLike) -> Floats:
     """Finite, increasing times, at least one, shape (n,)."""
-    single = getattr(t, "dtype", None) in (np.float32, np.float16)
     t = check_array("t", t)
     if t.ndim != 1 or not len(t):
         raise ValueError(f"t: must hold at least one time, with shape (n,), got shape {t.shape}")
@@ -175,6 +174,7 @@ def check_times(t: ArrayLike) -> Floats:
         row = int(np.flatnonzero(np.diff(t) <= 0)[0])
         digits = 17 if t[row] == t[row + 1] else 6
         pair = f"t[{row}] = {t[row]:.{digits}g} before t[{row + 1}] = {t[row + 1]:.{digits}g}"
+        single = digits == 17 and np.array_equal(t, t.astype(np.float32))
         advice = ", equal in single precision: give t in float64, or from zero" if single else ""
         raise ValueError(f"t: must increase, got {pair}{advice}")
     return t

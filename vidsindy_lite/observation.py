@@ -23,6 +23,7 @@ from .cameras import (
     check_learnable,
     disagreement,
     explain,
+    find_mistake,
     identify,
     learn_cameras,
     learn_lags,
@@ -243,8 +244,19 @@ def _observed(
             begun = np.zeros(len(raw)) if lags is None else lags
             rig = posed(align(raw, begun, clock.rates, clock.uneven), rig, lags is not None)
             doubts = (*rig.warnings, *doubts)
+    first: list[str] = []
+    start = lags
+    if rig.is_measured:
+        begun = np.zeros(len(raw)) if lags is None else lags
+        mistake = find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
+        if mistake is not None:  # and is put right, as nothing can be learned with it
+            first, raw = [mistake.text], mistake.tracks
+            clock = replace(clock, rates=mistake.rates, frames=mistake.clocks)
+            lags, start = None, mistake.lags.frames
     with refusing("lags", raw, names):
-        best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress)
+        best = learn_lags(
+            raw, rig, clock.rates, start=start, clocks=clock.uneven, progress=progress
+        )
         if lags is not None:
             _refuse_wrong(lags, best)
     used = best.frames if lags is None else lags
@@ -266,6 +278,7 @@ def _observed(
         x=x,
         systematic=_shared_errors(learning, tracks, learned, clock.times),
         warnings=(
+            *first,
             *_rig_warnings(missed, tracks, rig, learned, names, used, best),
             *learned.warnings,
             *doubts,

@@ -11,6 +11,7 @@ import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,8 @@ from ..checks import check_instance, check_integer, check_number
 from .inputs import Input
 from .library import CLOCK, Function, monomial_exponents, name_latex, velocity_names
 
+MOST_TERMS = 1000
+"""Most monomials of a law, of its denominators, or waves: a search among more would not end."""
 FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
 """What can be written as text."""
 OTHERS = "..."
@@ -271,10 +274,11 @@ class Library:
         Raises
         ------
         ValueError
-            If a function has an argument that is no variable.
+            If a function has an argument that is no variable, or there are too many terms.
         """
         d = len(names)
         states = d - (CLOCK in names[measured:])
+        self._check_size(states, measured)
         functions = [
             harmonic(names, axis, multiple, kind)
             for axis in range(measured)
@@ -301,6 +305,21 @@ class Library:
                 rows[:, :states], rows[:, slope - d] = below, 1
                 exponents = np.concatenate([exponents, rows])
         return exponents, tuple(functions)
+
+    def _check_size(self, states: int, measured: int) -> None:
+        """Refuse more terms than a search can try, before they are listed."""
+        counts = [
+            ("monomials", comb(states + degree, states), f"of degree {degree}")
+            for degree in (self.degree or 0, self.denominators)
+        ]
+        waves = 2 * self.harmonics * measured
+        counts += [("sines and cosines", waves, f"of {self.harmonics} multiples")]
+        for what, count, which in counts:
+            if count > MOST_TERMS:
+                raise ValueError(
+                    f"library: must have at most {MOST_TERMS} {what}, got {count} {which} in "
+                    f"{states} variables"
+                )
 
 
 def check_library(degree: int | None, library: Library | None) -> Library:

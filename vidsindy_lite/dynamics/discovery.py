@@ -39,7 +39,7 @@ class Simulation:
     x : ndarray, shape (n, d)
         NaN from where the path has left all bounds.
     status : str
-        ``"ok"``, or where the path diverges.
+        ``"ok"``, or where the path diverges, or is too stiff to be followed.
     """
 
     t: Floats
@@ -211,10 +211,9 @@ class Discovery:
         ValueError
             If the state has another shape, or an input of the law is not known at a time.
         """
-        x = self.system.simulate(t, x0)
-        lost = np.isnan(x).any(axis=1)
-        t = np.asarray(t, dtype=float)
-        status = f"diverges after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
+        x, end = self.system.followed(t, x0)
+        t, lost = np.asarray(t, dtype=float), np.isnan(x).any(axis=1)
+        status = f"{end} after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
         return Simulation(t, x, status)
 
     def physics(self, down: ArrayLike | None = None) -> Physics:

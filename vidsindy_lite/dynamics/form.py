@@ -8,7 +8,6 @@ is the time, if there are inputs: a last state, with ``t' = 1``.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import comb
 
 import numpy as np
 
@@ -17,8 +16,6 @@ from .candidates import OTHERS, Library
 from .library import CLOCK, Function, closure, velocity_names
 from .polynomials import PolynomialSystem, parse_term
 
-MOST_TERMS = 1000
-"""Most monomials of a law, or of its denominators: a search among more would not end."""
 SIZES, POINTS = (-3, 6), 64
 """Decades of the sizes of points at which a function is asked whether it is none, and how many."""
 
@@ -65,7 +62,6 @@ class Form:
         if order == 2:
             names += velocity_names(coordinates)
         states = len(names)  # those that an equation is sought or known of
-        _check_size(library, states)
         if library.timed(names):
             names += (CLOCK,)
         d = len(names)
@@ -200,16 +196,6 @@ class Form:
         """The candidates' places in the coefficients, equation by equation."""
         own = self.shared == np.arange(len(self.shared))
         return np.flatnonzero(self.candidates.T.ravel() & own)
-
-
-def _check_size(library: Library, states: int) -> None:
-    """Refuse more monomials than a search can try, before they are listed."""
-    for degree in (library.degree or 0, library.denominators):
-        if (count := comb(states + degree, states)) > MOST_TERMS:
-            raise ValueError(
-                f"library: must have at most {MOST_TERMS} monomials, got {count} of degree "
-                f"{degree} in {states} variables"
-            )
 
 
 def _vanishes(function: Function, d: int) -> bool:

@@ -22,7 +22,9 @@ WEIGHTS, THIRD, FIFTH = (row[:STAGES, None] for row in (DOP853.B, DOP853.E3, DOP
 MUCH_BETTER = 2.0**-9
 """Error over tolerance below which a step of order 8 may be twice as long."""
 MOST_STEPS = 50_000
-"""Steps of a whole motion; one that needs more is stiff, or as good as lost."""
+"""Steps of a motion that gets nowhere; one that needs more is stiff, or as good as lost. ..."""
+STEPS_A_LENGTH = 1000
+"""... For each of its own sizes by which it moves on it has so many more: then it is just long."""
 SHORTEST_STEP = 1e-13
 """Least step over the length of the whole motion."""
 
@@ -117,37 +119,51 @@ def integrate(
     Returns
     -------
     ndarray, shape (n, d)
-        Rows after a blow-up are NaN, or after so many steps that the motion is too stiff to follow.
+        Rows after a blow-up are NaN, or from where the motion is too stiff to follow; however long
+        it is, it is followed to its end.
 
     References
     ----------
     E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, sec. II.10.
     """
+    return followed(rate, t, x0, tolerance, farthest)[0]
+
+
+def followed(
+    rate: Callable[[Floats], Floats],
+    t: Floats,
+    x0: Floats,
+    tolerance: float = 1e-11,
+    farthest: float = np.inf,
+) -> tuple[Floats, str]:
+    """The path of `integrate`, and what happens where it ends early, in words; else empty."""
     path = np.full((len(t), len(x0)), np.nan)
     path[0] = x = x0
     step, span = float(np.diff(t[:2]).sum()), float(t[-1] - t[0])
-    steps = MOST_STEPS + len(t)
+    steps, size = float(MOST_STEPS), float(np.abs(x0).max())
     for row, (now, end) in enumerate(zip(t[:-1].tolist(), t[1:].tolist(), strict=True), start=1):
         while now < end:
-            steps -= 1
-            if not steps:
-                return path
             last = step >= end - now
+            steps -= not last  # that a row is near is no fault of the motion
+            if steps < 0:
+                return path, "is too stiff to be followed"
             taken = end - now if last else step
             with np.errstate(over="ignore", invalid="ignore"):  # of steps that are too long
                 moved, error = _step(rate, x, taken, tolerance)
             if not error < 1:
                 step = taken / 2
                 if step < SHORTEST_STEP * span:
-                    return path
+                    return path, "diverges"
                 continue
+            size = max(size, float(np.abs(moved).max()))
+            steps += STEPS_A_LENGTH * float(np.abs(moved - x).max()) / (size or 1.0)
             x, now = moved, end if last else now + taken
             if np.abs(x).max() > farthest:
-                return path
+                return path, "diverges"
             if error < MUCH_BETTER and not taken < step:
                 step = 2 * taken
         path[row] = x
-    return path
+    return path, ""
 
 
 def _step(

@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..checks import check_array, check_integer, check_number, check_times, check_vector
 from .candidates import Library
-from .integrate import integrate, one_by_one
+from .integrate import followed, one_by_one
 from .library import (
     CLOCK,
     Function,
@@ -321,6 +321,10 @@ class PolynomialSystem:
             If the times do not increase, a time or a number of the state is not finite, or an input
             is not known at a time.
         """
+        return self.followed(t, x0)[0]
+
+    def followed(self, t: Floats, x0: Floats) -> tuple[Floats, str]:
+        """The path that `simulate` finds, and what happens at its end; empty if it has all rows."""
         t = check_times(t)
         if self.timed and np.shape(x0) != (self.d,):
             x0 = np.append(check_vector("x0", x0, self.states), t[0])
@@ -339,7 +343,7 @@ class PolynomialSystem:
             with np.errstate(divide="ignore", invalid="ignore"):  # at a pole the path ends
                 return np.array(above(z)) / (1 - np.array(below(z)))
 
-        return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
+        return followed(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
 
     def check_inputs(self, t: Floats) -> None:
         """Refuse times (n,) at which an input in the law is not known."""

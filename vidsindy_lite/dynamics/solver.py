@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from ..arrays import Floats
@@ -41,6 +40,7 @@ from .selection import inverse
 from .settling import EXACT, persists, settle
 from .shape import is_on_circle
 from .swing import LIBRARY, NAME, Swing, swinging
+from .threads import one_blas_thread
 from .trajectories import (
     Trajectory,
     check_sigma,
@@ -145,7 +145,7 @@ def discover(
     measured = trajectories, shared, check_sigma(sigma, times, trajectories)
     task = _Task(measured, names, library, origin, seed, progress)
     # Matrices this small gain nothing by threads, which wait for each other on a busy machine.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_blas_thread():
         found = _of_order(task, order)
         return found if orientation == "data" else _oriented(task, found)
 

@@ -29,7 +29,7 @@ from .reducing import ReducedFrames
 from .reel import Reel
 from .refining import scatter
 from .steadying import carry
-from .video import read_video
+from .video import read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
 
@@ -130,7 +130,10 @@ def track(
         if detector != "auto":
             raise ValueError(f"target: may be given for detector='auto', got {detector!r:.60}")
     found = _track(path, detector, target)
-    doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in found.warnings + _lost(found))
+    lacking, stated = found.warnings + _lost(found), video_info(path).frames
+    if len(found.pixels) != stated:
+        lacking += (f"{len(found.pixels)} of its {stated} frames can be read: it is cut off",)
+    doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in lacking)
     return replace(found, warnings=doubts)
 
 

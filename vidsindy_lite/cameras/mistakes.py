@@ -1,0 +1,220 @@
+"""Mistakes that make views disagree grossly, and that can be tried: one after the other, all.
+
+Tracks in another order than the cameras, a mirrored view, v counted upwards, a video of another
+frame rate than stated, dropped frames: each is one of a few, and what is right is known at once.
+Two views at a time, the epipolar equation tells by how much they disagree at all whole lags; the
+mistake that mends that best is tried with all cameras. Frames were dropped where the best lag of
+two views jumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+import numpy as np
+
+from ..arrays import Floats
+from .alignment import Curve, Lags, align
+from .calibrate import learn_cameras
+from .camera import Camera
+from .pairs import lag_misses
+from .rig import Rig
+from .synchronise import learn_lags
+from .timing import DISAGREEMENT
+from .triangulate import disagreement, epipolar_lines, epipolar_rows
+from .unknowns import Unknowns
+
+RATES = (25 / 30, 30 / 25, 24 / 30, 30 / 24, 24 / 25, 25 / 24, 1 / 2, 2.0)
+"""Rates over those stated that are taken for each other."""
+BETTER = 3.0
+"""Times by which a mistake has to mend the disagreement of two views, and of all together."""
+_INSTANTS = 60  # at which two views are compared
+_TRIED = 6  # mistakes that mend most, tried with all cameras
+_PART = 0.4  # of the videos, in which their cameras are learned if frames were dropped elsewhere
+_FRAMES = 1500  # of the first video at which a jump of the lag is sought
+_LONGEST = 60  # frames by which it may jump
+_MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
+
+
+_UNTOLD = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Mistake:
+    """What may have been done to the tracks, and what they are without it."""
+
+    what: str
+    tracks: tuple[Floats, ...]
+    rates: Floats
+    clocks: tuple[Floats, ...]
+    lags: Lags = _UNTOLD
+    before: float = np.inf
+
+    @property
+    def text(self) -> str:
+        """What explains that the views did not agree."""
+        return (
+            f"the rig does not agree with the tracks as they are given: {self.what} explains it "
+            f"({self.lags.residual:.2g} pixels apart instead of {self.before:.3g}), and was put "
+            "right here: do so in what is given"
+        )
+
+    def paired(self, unknowns: Unknowns) -> tuple[float, Floats]:
+        """By how much two views disagree at their best lags, all pairs; and these lags."""
+        curves = tuple(map(Curve, self.tracks, self.clocks))
+        known = next(i for i, camera in enumerate(unknowns.cameras) if camera.is_calibrated)
+        least, lags = [], []
+        for tried, misses in lag_misses(curves, self.rates, unknowns, _INSTANTS, (False,)):
+            least.append(misses[0].min())
+            lags.append(tried[misses[0].argmin()])
+        behind = np.insert(lags, known, 0.0)
+        return float(np.linalg.norm(least)), behind - behind[0]
+
+    def left(self, rig: Rig, lags: Floats) -> float:
+        """Pixels by which the worst view disagrees at these lags."""
+        try:
+            aligned = align(self.tracks, lags, self.rates, self.clocks)
+            return max(disagreement(aligned, learn_cameras(aligned, rig)))
+        except ValueError:
+            return np.inf
+
+
+def find_mistake(
+    tracks: Sequence[Floats],
+    rig: Rig,
+    rates: Floats,
+    clocks: Sequence[Floats] | None,
+    start: Floats,
+    names: Sequence[str],
+) -> Mistake | None:
+    """The one mistake without which the views agree; None if they do anyway, or with none.
+
+    Parameters
+    ----------
+    tracks, rig, rates, clocks, start
+        See `learn_lags`.
+    names : sequence of str
+        What the videos are called.
+    """
+    even = [np.arange(len(track), dtype=float) for track in tracks]
+    none = Mistake("", tuple(tracks), rates, tuple(even if clocks is None else clocks))
+    if none.left(rig, start) <= 2 * DISAGREEMENT:
+        return None
+    unknowns = Unknowns.of(rig)
+    before, lags = none.paired(unknowns)
+    left = none.left(rig, lags)
+    found = [(one.paired(unknowns), one) for one in _mistakes(none, rig, names)]
+    found = sorted((pair for pair in found if BETTER * pair[0][0] < before), key=lambda f: f[0][0])
+    tried = [
+        (one.left(rig, lags), k, one, lags) for k, ((_, lags), one) in enumerate(found[:_TRIED])
+    ]
+    tried += [
+        (one.left(rig, lags), -1, one, lags) for one, lags in _dropped(none, rig, unknowns, names)
+    ]
+    for missed, _, one, lags in sorted(tried, key=lambda one: one[:2]):
+        if BETTER * missed < left:
+            told = learn_lags(one.tracks, rig, one.rates, lags, one.clocks)
+            if told.residual <= DISAGREEMENT:
+                return replace(one, lags=told, before=left)
+            break
+    return None
+
+
+def _mistakes(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
+    """All that change whole views: their order, their axes, their frame rates."""
+    count, sizes = len(names), [camera.image_size for camera in rig.cameras]
+    for order in permutations(range(count)):
+        moved = [i for i in range(count) if order[i] != i]
+        if moved and len(moved) <= 3 and len({sizes[i] for i in moved}) == 1:
+            tracks, rates, clocks = (
+                [part[i] for i in order] for part in (none.tracks, none.rates, none.clocks)
+            )
+            what = f"{' and '.join(names[i] for i in moved)} in another order than their cameras"
+            yield Mistake(what, tuple(tracks), np.array(rates) / rates[0], tuple(clocks))
+    for axis, what in ((0, "mirrored"), (1, "counted upwards in v")):
+        for views in [*([i] for i in range(count)), [*range(count)]]:
+            tracks = list(none.tracks)
+            for i in views:
+                turned = [tracks[i][:, 0], tracks[i][:, 1]]
+                turned[axis] = sizes[i][axis] - 1 - turned[axis]
+                tracks[i] = np.column_stack(turned)
+            told = names[views[0]] if len(views) == 1 else "all views"
+            yield replace(none, what=f"{told} {what}", tracks=tuple(tracks))
+    for i in range(count):
+        for rate in RATES:
+            rates = np.where(np.arange(count) == i, rate, 1.0) * none.rates
+            what = f"{names[i]} of {rate:.3g} times the frame rate that is stated"
+            yield replace(none, what=what, rates=rates / rates[0])
+
+
+def _dropped(
+    none: Mistake, rig: Rig, unknowns: Unknowns, names: Sequence[str]
+) -> Iterator[tuple[Mistake, Floats]]:
+    """Videos of which frames were dropped, each with the clock by which it agrees all the time."""
+    shares = ((0.0, _PART), (1 - _PART, 1.0))  # of a video, in one of which none is dropped, maybe
+    for low, high in shares:
+        rows = [slice(int(low * len(t)), int(high * len(t))) for t in none.tracks]
+        tracks = tuple(t[part] for t, part in zip(none.tracks, rows, strict=True))
+        clocks = tuple(c[part] for c, part in zip(none.clocks, rows, strict=True))
+        part = replace(none, tracks=tracks, clocks=clocks)
+        _, lags = part.paired(unknowns)
+        try:
+            learned = learn_cameras(align(tracks, lags, none.rates, clocks), rig)
+        except ValueError:
+            continue
+        curves = tuple(map(Curve, none.tracks, none.clocks))
+        jumps = [_jumps(curves, none.rates, learned.cameras, lags, j) for j in range(1, len(names))]
+        if all(found and found[0][1] < 0 for found in jumps):  # it is the first that lacks some
+            each = {0: [(frame, -lag) for frame, lag in jumps[0]]}
+        else:
+            each = {j: found for j, found in enumerate(jumps, start=1) if found}
+        clocks, told = list(none.clocks), []
+        for j, found in each.items():
+            clock, lag = (
+                clocks[j].copy(),
+                lags[j] if low == 0 else lags[j] - sum(n for _, n in found),
+            )
+            for frame, jump in found:
+                row = int(np.clip(np.rint((frame - lag) * none.rates[j]), 0, len(clock) - 1))
+                count, lag = round(jump * none.rates[j]), lag + jump
+                clock[row:] += count
+                told.append(f"{count} frames missing in {names[j]} before its frame {row}")
+            clocks[j] = clock
+        if told and all((np.diff(clock) > 0).all() for clock in clocks):
+            whole = replace(none, what=", ".join(told), clocks=tuple(clocks))
+            yield whole, whole.paired(unknowns)[1]
+
+
+def _jumps(
+    curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera], lags: Floats, j: int
+) -> list[tuple[float, float]]:
+    """Where the lag of a video behind the first jumps for good, and by how much.
+
+    The lags that leave the least, each jump at a price, by dynamic programming.
+    """
+    frames = curves[0].clock[:: -(-len(curves[0].clock) // _FRAMES)]
+    tried = lags[j] - lags[0] + np.arange(-_LONGEST, _LONGEST + 1)
+    lines = epipolar_lines(cameras[0], curves[0].at(frames), cameras[j])
+    theirs = curves[j].at((frames - tried[:, None]) * rates[j])
+    design, target = epipolar_rows(lines, cameras[j], theirs)
+    scale, angle = cameras[j].calibration
+    missed = np.abs(target - design @ [scale * np.cos(angle), scale * np.sin(angle)])
+    typical = np.nanquantile(missed[_LONGEST], _PART / 2)
+    cost = np.nan_to_num(np.minimum(missed / typical, _MOST), nan=1.0)
+    total, before = cost[:, 0], []
+    for now in cost[:, 1:].T:
+        best = int(total.argmin())
+        jumped = total > total[best] + _PRICE
+        before.append(np.where(jumped, best, np.arange(len(total))))
+        total = np.where(jumped, total[best] + _PRICE, total) + now
+    path = [int(total.argmin())]
+    for step in before[::-1]:
+        path.append(int(step[path[-1]]))
+    path = path[::-1]
+    return [
+        (float(frames[k]), float(path[k] - path[k - 1]))
+        for k in range(1, len(path))
+        if path[k] != path[k - 1]
+    ]
