@@ -245,3 +245,82 @@ def test_no_such_file(tmp_path):
 def test_one_name_is_no_list_of_files(paths):
     with pytest.raises(ValueError, match="paths: must be a list of files, got"):
         read_calibration(paths)
+
+
+# -------------------------------------------------------------------------- what is told or refused
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("model", "fisheye"), ("camera_model", "FISHEYE"), ("distortion_model", "equidistant"),
+        ("distortion_model", "kannala_brandt"), ("fisheye_model", 1), ("fisheye", True),
+        ("lens_model", "LENSMODEL_OPENCV_FISHEYE"), ("camera_model", "omni"),
+        ("is_fisheye", "yes"),
+        ("model", "OPENCV_FISHEYE"), ("projection_type", "stereographic"),
+        ("camera_type", "fisheye"),
+    ],
+)  # fmt: skip
+def test_other_lenses_are_refused_by_name(tmp_path, key, value):
+    plain = [{k: np.asarray(v).tolist() for k, v in part.items()} for part in rooms(5)]
+    named = {f"cam{i}": {key: value, **part} for i, part in enumerate(plain)}
+    for content in (named, {key: value, "cameras": plain}):
+        (tmp_path / "a.json").write_text(json.dumps(content), encoding="utf-8")
+        with pytest.raises(ValueError, match=rf"a\.json', (camera cam0: )?{key}: must be none but"):
+            read_calibration([tmp_path / "a.json"])
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("model", "pinhole"), ("camera_model", "OPENCV"), ("distortion_model", "plumb_bob"),
+        ("fisheye_model", 0), ("fisheye", "false"), ("lens_model", "rational_polynomial"),
+    ],
+)  # fmt: skip
+def test_our_lens_under_its_names(tmp_path, key, value):
+    parts = rooms(5)
+    plain = [{key: value, **{k: np.asarray(v).tolist() for k, v in p.items()}} for p in parts]
+    (tmp_path / "a.json").write_text(json.dumps(plain), encoding="utf-8")
+    rig = read_calibration([tmp_path / "a.json"])
+    assert_same(rig, parts)
+    assert rig.warnings == ()
+
+
+def test_a_lens_that_nobody_knows_is_told_and_so_are_other_keys(tmp_path):
+    plain = [{k: np.asarray(v).tolist() for k, v in part.items()} for part in rooms(5)]
+    plain[1] |= {"model": "Hero 7", "shift_x": 3}
+    (tmp_path / "a.json").write_text(json.dumps({"cameras": plain}), encoding="utf-8")
+    lens, key = read_calibration([tmp_path / "a.json"]).warnings
+    assert lens.startswith("a.json: camera cameras[1]: model = 'Hero 7' is taken for a lens of k1")
+    assert key == "a.json: camera cameras[1]: nothing is known of shift_x, which is left out"
+    plain[1]["k1"] = 0.1
+    (tmp_path / "a.json").write_text(json.dumps({"cameras": plain}), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"cameras\[1\]: k1: must stand in dist"):
+        read_calibration([tmp_path / "a.json"])
+
+
+@pytest.mark.parametrize("mark", [{"ignore": True}, {"enabled": False}, {"Disabled": 1}])
+def test_cameras_that_are_to_be_ignored(tmp_path, mark):
+    parts = rooms(5)
+    plain = [{k: np.asarray(v).tolist() for k, v in part.items()} for part in parts]
+    plain[1] |= mark
+    plain[0] |= {key: not value for key, value in mark.items()}
+    (tmp_path / "a.json").write_text(json.dumps(plain), encoding="utf-8")
+    rig = read_calibration([tmp_path / "a.json"])
+    assert_same(rig, parts[::2])
+    assert "this camera is left out" in rig.warnings[0]
+
+
+def test_eight_coefficients(tmp_path):
+    parts = rooms(6)
+    for part in parts:
+        part["dist"] = np.append(part["dist"], [0.02, 0.01, -0.005])
+    (tmp_path / "a.toml").write_text(toml(parts), encoding="utf-8")
+    rig = read_calibration([tmp_path / "a.toml"])
+    assert_same(rig, parts)
+    rig.save(tmp_path / "rig.toml")
+    assert vl.Rig.load(tmp_path / "rig.toml") == rig
+    pixels = rig.cameras[0].project(POINTS)
+    tracks = [camera.project(POINTS) for camera in rig.cameras]
+    assert np.isfinite(pixels).all()
+    np.testing.assert_allclose(vl.reconstruct(tracks, rig), POINTS, atol=1e-9)

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite
-from vidsindy_lite.dynamics.integrate import integrate, runge_kutta_4
+from vidsindy_lite.dynamics.integrate import followed, integrate, runge_kutta_4
 from vidsindy_lite.dynamics.polynomials import PolynomialSystem
 
 LORENZ = PolynomialSystem.from_terms(
@@ -120,3 +120,19 @@ def test_a_motion_too_stiff_to_follow_ends(monkeypatch):
     path = integrate(rate, t, np.array([0.0]))
     assert np.isfinite(path[0]).all()
     assert np.isnan(path[-1]).all()
+
+
+def test_a_long_motion_is_followed_to_its_end(monkeypatch):
+    monkeypatch.setitem(integrate.__globals__, "MOST_STEPS", 200)
+    path, end = followed(circle, np.array([0.0, 2000.0]), np.array([0.0, 1.0]))
+    np.testing.assert_allclose(path[-1], [np.sin(2000.0), np.cos(2000.0)], atol=1e-6)
+    assert end == ""
+
+
+def test_what_ends_a_path_is_told(monkeypatch):
+    t = np.linspace(0.0, 20.0, 50)
+    assert followed(lambda x: x**2, t, np.ones(1), farthest=1e6)[1] == "diverges"
+    assert followed(lambda x: x**2, t, np.ones(1))[1] == "diverges"
+    monkeypatch.setitem(integrate.__globals__, "MOST_STEPS", 200)
+    stiff = followed(lambda x: -1e6 * (x - 1), t, np.zeros(1))
+    assert stiff[1] == "is too stiff to be followed"

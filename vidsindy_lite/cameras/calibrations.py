@@ -194,7 +194,9 @@ def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str,
     sides = next((sides for sides in _SIZES if set(sides) <= set(lower)), ())
     if sides and "size" not in known:
         known["size"] = [lower[side] for side in sides]
-    strange = [key for key in lower if key not in _KNOWN and _is_set(lower[key])]
+    strange = [
+        key for key in lower if not (key in _KNOWN or _LENS.search(key)) and _is_set(lower[key])
+    ]
     if strange:
         warnings.append(f"{name}nothing is known of {', '.join(strange):.80}, which is left out")
     stacked = np.ndim(known.get("K", 0)) == 3

@@ -105,25 +105,21 @@ def find_mistake(
     unknowns = Unknowns.of(rig)
     before, lags = none.paired(unknowns)
     left = none.left(rig, lags)
-    found = [(one.paired(unknowns), one) for one in _mistakes(none, rig, names)]
-    found = sorted((pair for pair in found if BETTER * pair[0][0] < before), key=lambda f: f[0][0])
-    tried = [
-        (one.left(rig, lags), k, one, lags) for k, ((_, lags), one) in enumerate(found[:_TRIED])
-    ]
-    tried += [
-        (one.left(rig, lags), -1, one, lags) for one, lags in _dropped(none, rig, unknowns, names)
-    ]
-    for missed, _, one, lags in sorted(tried, key=lambda one: one[:2]):
-        if BETTER * missed < left:
+    for kind in (_views, _rates, _dropped):
+        found = [(*one.paired(unknowns), one) for one in kind(none, rig, unknowns, names)]
+        found = sorted((one for one in found if BETTER * one[0] < before), key=lambda one: one[0])
+        tried = [(one.left(rig, lags), k, lags) for k, (_, lags, one) in enumerate(found[:_TRIED])]
+        if tried and BETTER * min(tried, key=lambda one: one[:2])[0] < left:
+            _, k, lags = min(tried, key=lambda one: one[:2])
+            one = found[k][2]
             told = learn_lags(one.tracks, rig, one.rates, lags, one.clocks)
             if told.residual <= DISAGREEMENT:
                 return replace(one, lags=told, before=left)
-            break
     return None
 
 
-def _mistakes(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
-    """All that change whole views: their order, their axes, their frame rates."""
+def _views(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterator[Mistake]:
+    """All that change whole views: their order, and their axes."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
     for order in permutations(range(count)):
         moved = [i for i in range(count) if order[i] != i]
@@ -142,6 +138,11 @@ def _mistakes(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake
                 tracks[i] = np.column_stack(turned)
             told = names[views[0]] if len(views) == 1 else "all views"
             yield replace(none, what=f"{told} {what}", tracks=tuple(tracks))
+
+
+def _rates(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterator[Mistake]:
+    """Frame rates that are taken for each other."""
+    count = len(names)
     for i in range(count):
         for rate in RATES:
             rates = np.where(np.arange(count) == i, rate, 1.0) * none.rates
@@ -151,7 +152,7 @@ def _mistakes(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake
 
 def _dropped(
     none: Mistake, rig: Rig, unknowns: Unknowns, names: Sequence[str]
-) -> Iterator[tuple[Mistake, Floats]]:
+) -> Iterator[Mistake]:
     """Videos of which frames were dropped, each with the clock by which it agrees all the time."""
     shares = ((0.0, _PART), (1 - _PART, 1.0))  # of a video, in one of which none is dropped, maybe
     for low, high in shares:
@@ -183,8 +184,7 @@ def _dropped(
                 told.append(f"{count} frames missing in {names[j]} before its frame {row}")
             clocks[j] = clock
         if told and all((np.diff(clock) > 0).all() for clock in clocks):
-            whole = replace(none, what=", ".join(told), clocks=tuple(clocks))
-            yield whole, whole.paired(unknowns)[1]
+            yield replace(none, what=", ".join(told), clocks=tuple(clocks))
 
 
 def _jumps(
