@@ -105,7 +105,7 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
     ("options", "message"),
     [
         (["--rig", "none.toml"], "rig: no such file, got 'none.toml'"),
-        (["--rig", "a.avi"], "rig: must be a TOML file, got 'a.avi': "),
+        (["--rig", "a.avi"], "rig: must be a TOML file in UTF-8, got 'a.avi', which is none"),
         (["--rig", "rig.toml", "--lag", "0,7"], "lag: must be 3 finite numbers"),
         (
             ["--rig", "rig.toml", "--lag", "0,9999,0"],
@@ -291,7 +291,10 @@ def test_frames_of_files_count_from_the_start_of_their_videos(tracked):
         (["--tracks", "a.csv", "b.csv", "c.csv"], "t: must be given, or fps, as a.csv states no"),
         (["--tracks", "a.csv", "none.csv"], "tracks: no such file, got 'none.csv'"),
         (["--tracks", "a.csv", "--fps", "9"], "tracks: must be one per camera, got 1 for 3"),
-        (["--tracks", "rig.toml", "--fps", "9"], "tracks: rig.toml must"),
+        (
+            ["--tracks", "rig.toml", "--fps", "9"],
+            "tracks: must hold rows of numbers, got none, in 'rig.toml'",
+        ),
         (["--tracks", "1.csv", "1.csv", "1.csv", "--fps", "9"], "tracks: must have two frames or"),
     ],
 )

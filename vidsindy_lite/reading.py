@@ -41,10 +41,10 @@ def reading(name: str, path: Path) -> Iterator[None]:
     except MALFORMED as error:
         first = (str(error).splitlines() or [""])[0]
         if isinstance(error, RecursionError):
-            first = "it is nested too deeply"
+            first = "must not be nested so deeply"
         elif not isinstance(error, ValueError):
-            first = f"it is malformed ({type(error).__name__}: {first:.60})"
-        raise ValueError(f"{name}: in '{path}', {first}") from error
+            first = f"must not be malformed ({type(error).__name__}: {first:.60})"
+        raise ValueError(f"{name}: {first}, in '{path}'") from error
 
 
 def check_file(name: str, path: str | os.PathLike, what: str = "file") -> Path:

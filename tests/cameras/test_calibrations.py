@@ -101,7 +101,7 @@ def test_plain_json_and_arrays(tmp_path):
     for path, part in zip(paths, parts, strict=True):
         np.savez(path, mtx=part["K"], dist=part["dist"], R=part["R"], T=part["t"])
     assert_same(read_calibration(paths, SIZE), parts)
-    with pytest.raises(ValueError, match=r"paths: in '.*0\.npz', image_size: must be given"):
+    with pytest.raises(ValueError, match=r"^paths: image_size: must be given .*, in '.*0\.npz'"):
         read_calibration(paths)
 
 
@@ -182,7 +182,7 @@ def test_the_command_line_names_what_cannot_be_written(tmp_path, capsys, name):
         (
             "rotation = ",
             "rotated = ",
-            r"paths: in '.*a\.toml', camera cam_0: R: must be given \(r, rotation",
+            r"^paths: camera cam_0: R: must be given \(r, rotation",
         ),
         ("translation = [", "translation = [1.0, ", "t: must be finite and of shape"),
         ("[metadata]", "[", r"paths: must be a TOML file, got '.*a\.toml': "),
@@ -266,7 +266,7 @@ def test_other_lenses_are_refused_by_name(tmp_path, key, value):
     named = {f"cam{i}": {key: value, **part} for i, part in enumerate(plain)}
     for content in (named, {key: value, "cameras": plain}):
         (tmp_path / "a.json").write_text(json.dumps(content), encoding="utf-8")
-        with pytest.raises(ValueError, match=rf"a\.json', (camera cam0: )?{key}: must be none but"):
+        with pytest.raises(ValueError, match=rf"^paths: (camera cam0: )?{key}: must be none but"):
             read_calibration([tmp_path / "a.json"])
 
 

@@ -30,7 +30,7 @@ def swapped(rig, tracks, sampled, rng):
     i, j = sorted(rng.choice(3, 2, replace=False))
     order = [*range(3)]
     order[i], order[j] = j, i
-    return [tracks[k] for k in order], f"{NAMES[i]} and {NAMES[j]} in another order"
+    return [tracks[k] for k in order], f"{NAMES[i]} and {NAMES[j]} swapped"
 
 
 def flipped(axis, what):
@@ -46,18 +46,18 @@ def flipped(axis, what):
 def slow(rig, tracks, sampled, rng):
     k = int(rng.integers(3))
     given = [sampled(i, 25 / 30) if i == k else track for i, track in enumerate(tracks)]
-    return given, f"{NAMES[k]} of 0.833 times the frame rate"
+    return given, f"{NAMES[k]} with 25 frames for 30"
 
 
 def dropped(rig, tracks, sampled, rng):
     k, at, count = int(rng.integers(3)), int(rng.integers(60, 340)), int(rng.integers(3, 20))
     given = [np.delete(p, slice(at, at + count), 0) if i == k else p for i, p in enumerate(tracks)]
-    return given, f"{count} frames missing in {NAMES[k]} before its frame"
+    return given, f"{count} frames dropped of {NAMES[k]} before its frame"
 
 
 CAUSES = {
     "swapped": swapped, "mirrored": flipped(0, "mirrored"), "slow": slow, "dropped": dropped,
-    "upwards": flipped(1, "counted upwards in v"),
+    "upwards": flipped(1, "with v counted upwards"),
 }  # fmt: skip
 
 

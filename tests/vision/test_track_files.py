@@ -109,7 +109,8 @@ def test_encodings(tmp_path, encoding):
 @pytest.mark.parametrize(
     ("text", "name"),
     [
-        (INDIVIDUALS, "one"), (INDIVIDUALS, "one ball"), (SLEAP, "one nose"),
+        (INDIVIDUALS, "one"), (INDIVIDUALS.replace("one", "1").replace("two", "2"), "1"),
+        (INDIVIDUALS, "one ball"), (SLEAP, "one nose"),
         (TRACKMATE + "ID1,1,1,1,5,5,0,0,0\n", "0"), (KINOVEA + "# other\n0 1 2\n", "ball"),
         (TRACKMATE_XML.replace("</Tracks>", '<particle>\n<detection t="0" x="1" y="2"/>'), "0"),
         ("frame,id,x,y\n0,7,10.25,20.5\n0,8,1,2\n1,7,11,21\n3,7,13,23\n3,8,1,2\n", "7"),
@@ -189,11 +190,11 @@ def test_trackers_world_is_not_taken_for_pixels(tmp_path):
         ("pt1_cam1_X\n1\n2\n", "must have a column pt1_cam1_y"),
         ("x,y,x,y\n1,2,3,4\n", "must hold one target, got x 2 times, y 2 times"),
         ("x (mm),y (mm)\n1,2\n", r"must have columns u and v, got x \(mm\), y \(mm\)"),
-        (TRACKMATE.replace("(pixel)", "(micron)"), "positions must be in pixels, got micron"),
+        (TRACKMATE.replace("(pixel)", "(micron)"), "must have positions in pixels, got micron"),
         ("<TrackMate><Model/></TrackMate>", "must be a table, or <Tracks> of TrackMate"),
         ("u,v\n" + "1" * 400 + ",2\n", "must hold numbers of less than 300 digits"),
         ("u,v\n1,2\n3,soon\n", "must hold numbers below its header, got 'soon' in row 2"),
-        ("t,u,v\n0,1,2\n0,1,2\n", "t must be increasing times"),
+        ("t,u,v\n0,1,2\n0,1,2\n", "must have increasing times, got others as t"),
         ("frame,u,v\n1,1,2\n0,1,2\n", "must have increasing whole numbers of frames"),
         ("frame,u,v\n0,1,2\n99999999999,1,2\n", "must have increasing whole numbers"),
         ("t,u1,v1,u2\n0,1,2,3\n", "must have a column 'v2'"),

@@ -21,12 +21,12 @@ from .calibrate import learn_cameras
 from .camera import Camera
 from .pairs import lag_misses
 from .rig import Rig
-from .synchronise import learn_lags
+from .synchronise import learn_lags, nearest
 from .timing import DISAGREEMENT
 from .triangulate import disagreement, epipolar_lines, epipolar_rows
 from .unknowns import Unknowns
 
-RATES = (25 / 30, 30 / 25, 24 / 30, 30 / 24, 24 / 25, 25 / 24, 1 / 2, 2.0)
+RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
 """Rates over those stated that are taken for each other."""
 BETTER = 3.0
 """Times by which a mistake has to mend the disagreement of two views, and of all together."""
@@ -36,8 +36,6 @@ _PART = 0.4  # of the videos, in which their cameras are learned if frames were 
 _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
 _MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
-
-
 _UNTOLD = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
 
 
@@ -104,13 +102,16 @@ def find_mistake(
         return None
     unknowns = Unknowns.of(rig)
     before, lags = none.paired(unknowns)
+    # Lags that are no whole numbers, and rigs that are a little off, are no such mistakes.
+    if nearest(tracks, rig, rates, lags, none.clocks) <= 2 * DISAGREEMENT:
+        return None
     left = none.left(rig, lags)
     for kind in (_views, _rates, _dropped):
         found = [(*one.paired(unknowns), one) for one in kind(none, rig, unknowns, names)]
         found = sorted((one for one in found if BETTER * one[0] < before), key=lambda one: one[0])
         tried = [(one.left(rig, lags), k, lags) for k, (_, lags, one) in enumerate(found[:_TRIED])]
-        if tried and BETTER * min(tried, key=lambda one: one[:2])[0] < left:
-            _, k, lags = min(tried, key=lambda one: one[:2])
+        missed, k, lags = min(tried, key=lambda one: one[:2], default=(np.inf, 0, lags))
+        if BETTER * missed < left:
             one = found[k][2]
             told = learn_lags(one.tracks, rig, one.rates, lags, one.clocks)
             if told.residual <= DISAGREEMENT:
@@ -121,15 +122,15 @@ def find_mistake(
 def _views(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterator[Mistake]:
     """All that change whole views: their order, and their axes."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
-    for order in permutations(range(count)):
-        moved = [i for i in range(count) if order[i] != i]
-        if moved and len(moved) <= 3 and len({sizes[i] for i in moved}) == 1:
+    for moved, order in _orders(count):
+        if len({sizes[i] for i in moved}) == 1:
             tracks, rates, clocks = (
                 [part[i] for i in order] for part in (none.tracks, none.rates, none.clocks)
             )
-            what = f"{' and '.join(names[i] for i in moved)} in another order than their cameras"
+            how = "swapped" if len(moved) == 2 else "in another order than their cameras"
+            what = f"{' and '.join(names[i] for i in moved)} {how}"
             yield Mistake(what, tuple(tracks), np.array(rates) / rates[0], tuple(clocks))
-    for axis, what in ((0, "mirrored"), (1, "counted upwards in v")):
+    for axis, what in ((0, "mirrored"), (1, "with v counted upwards")):
         for views in [*([i] for i in range(count)), [*range(count)]]:
             tracks = list(none.tracks)
             for i in views:
@@ -140,13 +141,24 @@ def _views(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterat
             yield replace(none, what=f"{told} {what}", tracks=tuple(tracks))
 
 
+def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
+    """Orders in which two views change places, or three in a ring; and which these are."""
+    for size in (2, 3):
+        for ring in permutations(range(count), size):
+            if ring[0] == min(ring):  # the others are the same ones
+                order = [*range(count)]
+                for i, j in zip(ring, (*ring[1:], ring[0]), strict=True):
+                    order[i] = j
+                yield tuple(sorted(ring)), order
+
+
 def _rates(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterator[Mistake]:
     """Frame rates that are taken for each other."""
     count = len(names)
     for i in range(count):
-        for rate in RATES:
-            rates = np.where(np.arange(count) == i, rate, 1.0) * none.rates
-            what = f"{names[i]} of {rate:.3g} times the frame rate that is stated"
+        for real, stated in RATES:
+            rates = np.where(np.arange(count) == i, real / stated, 1.0) * none.rates
+            what = f"{names[i]} with {real} frames for {stated} that are supposed"
             yield replace(none, what=what, rates=rates / rates[0])
 
 
@@ -173,15 +185,13 @@ def _dropped(
             each = {j: found for j, found in enumerate(jumps, start=1) if found}
         clocks, told = list(none.clocks), []
         for j, found in each.items():
-            clock, lag = (
-                clocks[j].copy(),
-                lags[j] if low == 0 else lags[j] - sum(n for _, n in found),
-            )
+            clock = clocks[j].copy()
+            lag = 0.0 if j == 0 else lags[j] - (low > 0) * sum(jump for _, jump in found)
             for frame, jump in found:
                 row = int(np.clip(np.rint((frame - lag) * none.rates[j]), 0, len(clock) - 1))
                 count, lag = round(jump * none.rates[j]), lag + jump
                 clock[row:] += count
-                told.append(f"{count} frames missing in {names[j]} before its frame {row}")
+                told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
             clocks[j] = clock
         if told and all((np.diff(clock) > 0).all() for clock in clocks):
             yield replace(none, what=", ".join(told), clocks=tuple(clocks))

@@ -47,6 +47,7 @@ _BINARY = {
     ".ods": "a spreadsheet", ".kva": "Kinovea's own", ".trk": "Tracker's own", ".npy": "an array",
 }  # fmt: skip
 _SURE = 0.6  # DeepLabCut's own limit of the likelihood
+_HEADS = ("scorer", "individuals", "bodyparts", "coords")  # of its rows, whatever stands in these
 _MOST_FRAMES = 10_000_000  # a larger number of a frame is none
 _POINT = re.compile(r"(.+)_cam(_?)(\d+)_([xy])")
 _OURS = re.compile(r"([uv])_?(\d+)")
@@ -161,16 +162,17 @@ def _tracks(
         unit = units[names.index("position_x")].strip("() ").lower() if units else "pixel"
         if not unit.startswith("pix"):
             raise ValueError(
-                f"positions must be in pixels, got {unit}: remove the scale in TrackMate"
+                f"must have positions in pixels, got {unit}: remove the scale in TrackMate"
             )
-    keys = {key: [row[i] for row in rows if i < len(row)] for i, key in enumerate(names)}
-    who = next((key for key in _WHOSE if key in keys), None)
-    words = {cell.strip() for cell in keys[who]} - {""} if who is not None else set()
+    width = len(names) or max(map(len, rows))
+    rows = [[*row, *[""] * (width - len(row))] for row in rows]
+    who = next((names.index(key) for key in _WHOSE if key in names), None)
+    words = {row[who].strip() for row in rows} - {""} if who is not None else set()
     if who is not None and 0 < len(words) < max(len(rows), 2):  # else they count the rows
         whose = sorted(words, key=lambda word: (len(word), word))
         chosen = _chosen(_matching(whose, individual) or whose, None)
-        rows = [row for row in rows if row[names.index(who)].strip() == chosen]
-    values = _numbers(rows, len(names) or max(map(len, rows)), names)
+        rows = [row for row in rows if row[who].strip() == chosen]
+    values = _numbers(rows, width, names)
     frame = next((names.index(key) for key in _FRAME if key in names), None)
     if who is not None and frame is not None:
         values = values[np.argsort(values[:, frame], kind="stable")]
@@ -261,6 +263,8 @@ def _split(cells: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
 
 def _is_of_numbers(row: Sequence[str]) -> bool:
     """Whether a line holds values: numbers or nothing, but for a name in front."""
+    if row and row[0].strip().lower() in _HEADS:
+        return False
     rest = row[1:] if len(row) > 1 and _number(row[0]) is None else row
     numbers = [_number(cell) for cell in rest if cell.strip()]
     return None not in numbers and (bool(numbers) or rest is row)
@@ -282,8 +286,7 @@ def _numbers(rows: list[list[str]], width: int, names: Sequence[str] = ()) -> Fl
             number = _number(cell)
             if number is None and j not in free:
                 raise ValueError(
-                    f"it must hold numbers below its header, got {cell!r:.40} in row {i + 1} of "
-                    "them"
+                    f"must hold numbers below its header, got {cell!r:.40} in row {i + 1} of them"
                 )
             values[i, j] = np.nan if number is None or np.isinf(number) else number
     return values
@@ -310,7 +313,7 @@ def _chosen(names: Sequence[str], individual: str | None) -> str:
 
 def _several(names: Sequence[str]) -> ValueError:
     return ValueError(
-        f"it must hold one target, got {', '.join(names):.80}: leave one in it, or choose one by "
+        f"must hold one target, got {', '.join(names):.80}: leave one in it, or choose one by "
         "its name as individual"
     )
 
@@ -330,7 +333,7 @@ def _of_points(name: str, columns: Mapping[str, Floats], individual: str | None)
     for (one, camera), axes in shown.items():
         if one == point and len(axes) < 2:
             missing = "y" if "x" in axes else "x"
-            raise ValueError(f"it must have a column {point}_cam{camera}_{missing}")
+            raise ValueError(f"must have a column {point}_cam{camera}_{missing}")
     return [
         _whole(f"{name}, cam{camera}", shown[point, camera]["x"] - 1,
                shown[point, camera]["y"] - (0 if upwards else 1), {}, upwards=upwards)
@@ -345,7 +348,7 @@ def _of_deeplabcut(
     coords = [cell.strip().lower() for cell in header[-1]]
     width = min(map(len, header))
     if len(header) < 3 or not {"x", "y"} <= set(coords[:width]):
-        raise ValueError("it must have rows scorer, bodyparts and coords, with x and y in the last")
+        raise ValueError("must have rows scorer, bodyparts and coords, with x and y in the last")
     labels = [" ".join(row[i].strip() for row in header[1:-1]) for i in range(width)]
     of = [i for i in range(1, width) if coords[i] in ("x", "y", "likelihood")]
     chosen = _chosen(sorted({labels[i] for i in of}), individual)
@@ -364,7 +367,7 @@ def _of_cameras(name: str, columns: Mapping[str, Floats]) -> list[TrackFile]:
             _whole(f"{name}, camera {i}", tidy[f"u{i}"], tidy[f"v{i}"], columns) for i in numbers
         ]
     except KeyError as missing:
-        raise ValueError(f"it must have a column {missing}") from None
+        raise ValueError(f"must have a column {missing}") from None
 
 
 def _of_columns(name: str, columns: Mapping[str, Floats], of_world: bool) -> TrackFile:
@@ -388,7 +391,7 @@ def _of_columns(name: str, columns: Mapping[str, Floats], of_world: bool) -> Tra
         )
         doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(corners)}",)
     elif pair is None:
-        raise ValueError(f"it must have columns u and v, got {', '.join(columns) or 'none':.80}")
+        raise ValueError(f"must have columns u and v, got {', '.join(columns) or 'none':.80}")
     else:
         u, v = (columns[key] for key in pair)
     if pair == ("pixelx", "pixely"):  # corners at integers
@@ -396,7 +399,7 @@ def _of_columns(name: str, columns: Mapping[str, Floats], of_world: bool) -> Tra
     if of_world and pair == ("x", "y"):
         if min(np.nanmin(u, initial=0), np.nanmin(v, initial=0)) < 0:
             raise ValueError(
-                "it must hold pixels from the upper left corner, got x and y of Tracker or Kinovea "
+                "must hold pixels from the upper left corner, got x and y of Tracker or Kinovea "
                 "with another origin: export columns pixelx and pixely, or move the origin there"
             )
         doubts += (
@@ -445,10 +448,10 @@ def _whole(
         doubts += (f"{name}: {marks} in {unset.sum()} of {len(unset)} rows is taken for not seen",)
     pixels[unset | ~np.isfinite(pixels).all(axis=1)] = np.nan
     if t is not None and (not np.isfinite(t).all() or (np.diff(t) <= 0).any()):
-        raise ValueError(f"{clock} must be increasing times")
+        raise ValueError(f"must have increasing times, got others as {clock}")
     if frames is not None and not _counts(frames):
         if t is None:
-            raise ValueError("it must have increasing whole numbers of frames")
+            raise ValueError("must have increasing whole numbers of frames")
         frames = None
     if t is not None and len(t) > 1 and np.median(np.diff(t)) > _LONG:
         doubts += (
