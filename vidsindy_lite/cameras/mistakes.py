@@ -36,6 +36,7 @@ _PART = 0.4  # of the videos, in which their cameras are learned if frames were 
 _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
 _MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
+_ROUNDING = 1e-9  # scene units
 _UNTOLD = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
 
 
@@ -96,6 +97,21 @@ def find_mistake(
     names : sequence of str
         What the videos are called.
     """
+    try:
+        return _found(tracks, rig, rates, clocks, start, names)
+    except ValueError:  # what cannot be compared at all is told where cameras and lags are learned
+        return None
+
+
+def _found(
+    tracks: Sequence[Floats],
+    rig: Rig,
+    rates: Floats,
+    clocks: Sequence[Floats] | None,
+    start: Floats,
+    names: Sequence[str],
+) -> Mistake | None:
+    """The same, where the tracks can be compared."""
     even = [np.arange(len(track), dtype=float) for track in tracks]
     none = Mistake("", tuple(tracks), rates, tuple(even if clocks is None else clocks))
     if none.left(rig, start) <= 2 * DISAGREEMENT:
@@ -211,7 +227,10 @@ def _jumps(
     design, target = epipolar_rows(lines, cameras[j], theirs)
     scale, angle = cameras[j].calibration
     missed = np.abs(target - design @ [scale * np.cos(angle), scale * np.sin(angle)])
-    typical = np.nanquantile(missed[_LONGEST], _PART / 2)
+    usual = missed[_LONGEST][np.isfinite(missed[_LONGEST])]
+    if not usual.size:
+        return []
+    typical = max(float(np.quantile(usual, _PART / 2)), _ROUNDING)
     cost = np.nan_to_num(np.minimum(missed / typical, _MOST), nan=1.0)
     total, before = cost[:, 0], []
     for now in cost[:, 1:].T:

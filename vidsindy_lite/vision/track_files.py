@@ -297,8 +297,10 @@ def _numbers(rows: list[list[str]], width: int, names: Sequence[str] = ()) -> Fl
 
 def _matching(names: Sequence[str], individual: str | None) -> list[str]:
     """Those of the names that a user may mean by one: it, some of its words, or all and more."""
-    if individual is None or individual in names:
-        return [individual] if individual in names else list(names)
+    if individual is None:
+        return list(names)
+    if individual in names:
+        return [individual]
     said = set(individual.split())
     return [name for name in names if said <= set(name.split()) or set(name.split()) <= said]
 
