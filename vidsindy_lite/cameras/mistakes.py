@@ -23,7 +23,7 @@ from .pairs import lag_misses
 from .rig import Rig
 from .synchronise import learn_lags, nearest
 from .timing import DISAGREEMENT
-from .triangulate import disagreement, epipolar_lines, epipolar_rows
+from .triangulate import epipolar_lines, epipolar_rows
 from .unknowns import Unknowns
 
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
@@ -72,12 +72,8 @@ class Mistake:
         return float(np.linalg.norm(least)), behind - behind[0]
 
     def left(self, rig: Rig, lags: Floats) -> float:
-        """Pixels by which the worst view disagrees at these lags."""
-        try:
-            aligned = align(self.tracks, lags, self.rates, self.clocks)
-            return max(disagreement(aligned, learn_cameras(aligned, rig)))
-        except ValueError:
-            return np.inf
+        """Pixels by which the worst view disagrees near these lags; rigs may be a little off."""
+        return nearest(self.tracks, rig, self.rates, lags, self.clocks)
 
 
 def find_mistake(
@@ -118,10 +114,9 @@ def _found(
         return None
     unknowns = Unknowns.of(rig)
     before, lags = none.paired(unknowns)
-    # Lags that are no whole numbers, and rigs that are a little off, are no such mistakes.
-    if nearest(tracks, rig, rates, lags, none.clocks) <= 2 * DISAGREEMENT:
-        return None
     left = none.left(rig, lags)
+    if left <= 2 * DISAGREEMENT:
+        return None
     for kind in (_views, _rates, _dropped):
         found = [(*one.paired(unknowns), one) for one in kind(none, rig, unknowns, names)]
         found = sorted((one for one in found if BETTER * one[0] < before), key=lambda one: one[0])
