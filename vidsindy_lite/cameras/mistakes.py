@@ -135,21 +135,20 @@ def _views(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterat
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
     for moved, order in _orders(count):
         if len({sizes[i] for i in moved}) == 1:
-            tracks, rates, clocks = (
-                [part[i] for i in order] for part in (none.tracks, none.rates, none.clocks)
-            )
+            tracks, clocks = (tuple(one[i] for i in order) for one in (none.tracks, none.clocks))
+            rates = none.rates[order] / none.rates[order[0]]
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
-            yield Mistake(what, tuple(tracks), np.array(rates) / rates[0], tuple(clocks))
+            yield Mistake(what, tracks, rates, clocks)
     for axis, what in ((0, "mirrored"), (1, "with v counted upwards")):
         for views in [*([i] for i in range(count)), [*range(count)]]:
-            tracks = list(none.tracks)
+            given = list(none.tracks)
             for i in views:
-                turned = [tracks[i][:, 0], tracks[i][:, 1]]
+                turned = [given[i][:, 0], given[i][:, 1]]
                 turned[axis] = sizes[i][axis] - 1 - turned[axis]
-                tracks[i] = np.column_stack(turned)
+                given[i] = np.column_stack(turned)
             told = names[views[0]] if len(views) == 1 else "all views"
-            yield replace(none, what=f"{told} {what}", tracks=tuple(tracks))
+            yield replace(none, what=f"{told} {what}", tracks=tuple(given))
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
@@ -194,18 +193,18 @@ def _dropped(
             each = {0: [(frame, -lag) for frame, lag in jumps[0]]}
         else:
             each = {j: found for j, found in enumerate(jumps, start=1) if found}
-        clocks, told = list(none.clocks), []
+        mended, told = list(none.clocks), []
         for j, found in each.items():
-            clock = clocks[j].copy()
+            clock = mended[j].copy()
             lag = 0.0 if j == 0 else lags[j] - (low > 0) * sum(jump for _, jump in found)
             for frame, jump in found:
                 row = int(np.clip(np.rint((frame - lag) * none.rates[j]), 0, len(clock) - 1))
                 count, lag = round(jump * none.rates[j]), lag + jump
                 clock[row:] += count
                 told.append(f"{count} frames dropped of {names[j]} before its frame {row}")
-            clocks[j] = clock
-        if told and all((np.diff(clock) > 0).all() for clock in clocks):
-            yield replace(none, what=", ".join(told), clocks=tuple(clocks))
+            mended[j] = clock
+        if told and all((np.diff(clock) > 0).all() for clock in mended):
+            yield replace(none, what=", ".join(told), clocks=tuple(mended))
 
 
 def _jumps(
