@@ -37,6 +37,7 @@ _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
 _MOST, _PRICE = 8.0, 40.0  # typical misses: the most that one frame counts, and the price of a jump
 _ROUNDING = 1e-9  # scene units
+_MANY = 6  # cameras, of which only two are taken for each other
 _UNTOLD = Lags(np.zeros(0), np.zeros(0), np.zeros(0), np.inf)
 
 
@@ -153,7 +154,7 @@ def _views(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterat
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
     """Orders in which two views change places, or three in a ring; and which these are."""
-    for size in (2, 3):
+    for size in (2, 3) if count < _MANY else (2,):
         for ring in permutations(range(count), size):
             if ring[0] == min(ring):  # the others are the same ones
                 order = [*range(count)]
