@@ -251,7 +251,7 @@ def _observed(
         mistake = find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
             first, raw = [mistake.text], mistake.tracks
-            clock = replace(clock, rates=mistake.rates, frames=mistake.clocks)
+            clock = clock.mended(mistake.rates, mistake.clocks)
             lags, start = None, mistake.lags.frames
     with refusing("lags", raw, names):
         best = learn_lags(
