@@ -321,7 +321,7 @@ for step in (2, 4, 8):
 # <details><summary>Solution</summary>
 #
 # From the 1,500 frames of the full profile, even every eighth point, 12 in a period, gives exactly
-# the true terms. The 400 frames of the quick profile hold 50 such points, which is too few; a warning says so.
+# the true terms. Where the points are too few for that, as in a shorter record, a warning says so.
 # </details>
 #
 # **2.** (Implement.) Follow the found law yourself, with the classical Runge-Kutta method of order four, for a tenth of the

@@ -15,17 +15,18 @@
 # %% [markdown]
 # # Seven systems, from videos to equations
 #
-# In this notebook, we present the main result: seven chaotic systems, each discovered from three
-# videos with only the first camera calibrated, and scored as in the paper.
+# In this notebook, we present the main result: seven systems, each discovered from three videos with
+# only the first camera calibrated, by six methods from the same tracks, and scored as in the paper.
 #
 # **What you will see**
 #
 # * the systems as data, in two frames of reference;
 # * the equations found, term by term with standard errors, beside the truth;
 # * the discovered laws set in motion, and for how long their forecasts hold;
-# * PySINDy in five trials, and E-SINDy, WeakSINDy and Model-A in some, on the same trajectories;
-# * all of it from a learned detector's tracks in whole pixels, which is the paper's regime, and from sub-pixel tracks,
-#   which is an upper bound.
+# * the paper's own optimiser, **spline-ADO**, beside **Gauss-Newton**, which this package uses for the same model,
+#   and beside PySINDy, E-SINDy, WeakSINDy and Model-A;
+# * all of it from a learned detector's tracks in whole pixels, which is the paper's regime, with sub-pixel tracks as
+#   an upper bound.
 #
 # **Afterwards you can** read the paper's main tables, and compare methods on equal terms.
 #
@@ -66,11 +67,13 @@ from vidsindy_lite.study import (
     rate,
     run_film,
     run_trial,
+    run_trials,
     score,
     significant,
     summary,
     sweep,
     tabulate,
+    trial_path,
 )
 
 # %%
@@ -116,7 +119,8 @@ save_table("table_S1", rows, caption="The seven systems; initial conditions in t
 # ## From videos to paths
 #
 # One trial by hand, with fewer frames: film a system with three cameras against random backgrounds, forget the
-# calibration of cameras 2 and 3, and `observe`: track, learn the cameras, reconstruct. Then find the law, and score it.
+# calibration of cameras 2 and 3, and `observe`: track (here with the background model), learn the cameras, reconstruct.
+# Then find the law, and score it.
 
 # %%
 with TemporaryDirectory() as folder:
@@ -125,7 +129,7 @@ with TemporaryDirectory() as folder:
 law = discover(seen.t, seen.x, systematic=seen.systematic, order=1)
 print(law.equations(), score(law, shot.truth), sep="\n\n")
 assert score(law, shot.truth).exact
-by_package = run_trial(Trial("Lorenz", trial=seed, frames=300))
+by_package = run_trial(Trial("Lorenz", trial=seed, source="sub-pixel", frames=300))
 assert np.allclose(by_package.law.coefficients, law.system.coefficients, rtol=1e-6)
 
 # %% [markdown]
@@ -136,10 +140,24 @@ assert np.allclose(by_package.law.coefficients, law.system.coefficients, rtol=1e
 films = sweep(run_film, [FilmTask(name, n, frames) for name in names for n in trials], jobs=jobs)
 
 # %% [markdown]
-# ## Discovery, by five methods (Tables 1 and S3)
+# ## Discovery, by six methods (Tables 1 and S3)
 #
-# Ours, and each method of the paper's tables, on the same reconstructed paths, in the reference
-# frame, with the same 20 candidate terms. Here are the settings of the others.
+# "Camera pixels can only take approximate integer values", says the paper, and it tracks with a detector that sees
+# one frame at a time. So this is the regime of all main numbers: tracks of our **learned detector**, rounded to whole pixels,
+# cameras and path learned from them. It is off by some tenths of a pixel, by other amounts at other places. (To spare time it
+# looks in a square of 64 px around the target, along the grid of its anchors; what it says there is what it says in the whole
+# frame, to a tenth of a pixel or three.)
+#
+# The background model is more exact: its **sub-pixel** tracks are read to a thousandth of a pixel from clean and lossless
+# videos. What a method makes of those is an upper bound, of no use in a comparison with the paper.
+#
+# All methods get the same paths in the reference frame, and the same 20 candidate terms:
+#
+# * **spline-ADO** is the paper's method with the paper's optimiser: gradient descent on spline, coefficients and offset,
+#   alternating with STRidge ([notebook 04](04_spline_ado.ipynb)). The paper does not print its two weights; one pair for all
+#   systems and conditions is chosen on samples that were held out ([notebook 06](06_robustness_and_ablation.ipynb));
+# * **Gauss-Newton** is `discover`: the same model and the same losses, with another optimiser and another choice of terms;
+# * the others stand in the paper's tables. Here are their settings.
 
 # %%
 common = {"ridge": f"{baselines.RIDGE:g}", "pysindy's default ridge": "0.05"}
@@ -156,11 +174,11 @@ caption = "Settings of the baselines; everything else is pysindy's default."
 save_table("table_baselines", rows, caption=caption)
 
 # %% [markdown]
-# The paper names no thresholds. Here each method chooses its own without the truth: fitted to the
+# The paper names no thresholds. Here each baseline chooses its own without the truth: fitted to the
 # first part of the record with every threshold of a grid, judged by the rest, and of the good ones
 # the largest wins. But the tolerance of that choice, the ridge and the width of the windows were
 # picked among several **by their scores on these very systems**, with the truth at hand. That
-# favours the baselines. (The defaults of our solver were made with these systems in view as well;
+# favours the baselines. (The defaults of Gauss-Newton were made with these systems in view as well;
 # it has no setting that a user would turn.)
 
 # %%
@@ -168,108 +186,125 @@ print(f"thresholds: {baselines.THRESHOLDS[0]:g} to {baselines.THRESHOLDS[-1]:g},
       f"{len(baselines.THRESHOLDS)} values; fitted to the first {baselines.TRAINING:.0%}; "
       f"as good as the best: up to {baselines.TOLERANCE:g} times its error")  # fmt: skip
 
-# %% [markdown]
-# "Camera pixels can only take approximate integer values", says the paper, and it tracks with a detector that sees
-# one frame at a time. So this is its regime: tracks of our **learned detector**, rounded to whole pixels, cameras and path
-# learned anew from them. It is off by some tenths of a pixel, by other amounts at other places. (To spare time it looks in a
-# square of 64 px around the target, along the grid of its anchors; what it says there is what it says in the whole
-# frame, to a tenth of a pixel or three.)
-#
-# The background model is more exact. Rounded to **whole pixels**, its tracks hold the rounding alone. **Sub-pixel**, as
-# they are, they are read to a thousandth of a pixel from clean and lossless videos. What our method makes of
-# those is an upper bound, of no use in a comparison with the paper.
-
 # %%
-two = ("ours", "PySINDy")
-sources = {"detector": "detector", "whole pixels": "whole", "videos": "sub"}
-slower = {"detector": (), "whole pixels": trials[:1], "videos": trials[:3]}  # trials of the other methods
-tasks = [
-    replace(task, source=source)
-    for source in sources
-    for task in grid(names, {"clean": (0,)}, trials, METHODS, frames)
-    if task.method in two or task.trial in slower[source]
-]
-trialled = tabulate(sweep(run_trial, tasks, jobs=jobs, desc="trials"))
-detected, whole, results = (trialled[trialled.source == source] for source in sources)
+clean = {"clean": (0,)}
+results, bound = (
+    tabulate(run_trials(grid(names, clean, trials, METHODS, frames, source), jobs=jobs, desc=source))
+    for source in ("detector", "sub-pixel")
+)
 
 # %% [markdown]
-# Medians over the trials, in the paper's units and beside its numbers. "Terms found" counts the
-# trials with all true terms, "exact" those with no others.
+# In the paper's units and beside its numbers. "Exact" counts the trials with all true terms and no others, "wrong terms" are
+# the missing and the false ones trial by trial; errors are the median, the least and the most of the trials. Gauss-Newton alone
+# says whether it doubts its law: how many exact laws it doubts and how many wrong ones it does not.
 
 
 # %%
-def beside_paper(table, results, methods):
+def beside_paper(table, methods):
     rows = summary(results[results.method.isin(methods)], ["system", "method"])
-    keys = zip(rows.method.replace("ours", "Ours"), rows.system, strict=True)
-    printed = [SCORES.get((table, *key)) for key in keys]
+    best = summary(bound[bound.method.isin(methods)], ["system", "method"])
+    rows["upper bound: l2 (e-2)"] = best["l2 (e-2)"]
+    printed_as = rows.method.replace(["Gauss-Newton", "spline-ADO"], "Ours")
+    printed = [SCORES.get((table, *key)) for key in zip(printed_as, rows.system, strict=True)]
     rows["paper: false positives"] = pd.array([p and p.false_positives for p in printed], "object")
     rows["paper: l2 (e-2)"] = [p and 100 * p.l2 for p in printed]
     return rows
 
 
-groups = trialled.groupby("source", sort=False)
-parts = {sources[source]: beside_paper("Table 1", group, two) for source, group in groups}
-table_1 = pd.concat(parts, names=["pixels"]).reset_index(level=0)
-caption = f"Ours and PySINDy on the same tracks, medians of {len(trials)} trials; detector and whole: in whole pixels; 0.001 is 0.001 or less."
-save_table("table_1", table_1.to_dict("records"), caption=caption, tolerance={"l2 (e-2)": 0.2})
+errors = dict.fromkeys(["l2 (e-2)", "least", "most", "upper bound: l2 (e-2)"], 0.2)
+caption = f"From the detector's tracks in whole pixels, {len(trials)} trials; upper bound: from sub-pixel tracks; 0.001 is 0.001 or less."
+table_1 = beside_paper("Table 1", ("Gauss-Newton", "spline-ADO", "PySINDy"))
+save_table("table_1", table_1.to_dict("records"), caption=caption, tolerance=errors)
 
 # %%
-table_S3 = beside_paper("Table S3", results, ("ours", "E-SINDy", "WeakSINDy", "Model-A"))
-caption = "Ours, E-SINDy, WeakSINDy and Model-A, from sub-pixel tracks, medians of the trials; 0.001 is 0.001 or less."
-save_table("table_S3", table_S3.to_dict("records"), caption=caption, tolerance={"l2 (e-2)": 0.2})
-
-# %%
-ours = results[results.method == "ours"]
-assert ours.exact.all()
-assert (ours.precision == 1).all()
-assert (ours.recall == 1).all()
-assert (ours.l2 <= (0.1e-2 if full else 0.5e-2)).all()
+table_S3 = beside_paper("Table S3", [method for method in METHODS if method != "PySINDy"])
+save_table("table_S3", table_S3.to_dict("records"), caption=caption, tolerance=errors)
 
 # %% [markdown]
-# From sub-pixel tracks, no method is better than ours in any row to the two decimals that the paper prints; beyond them
-# there is only what the tracker left. An error of 0.001 stands for any below: a few grey levels of the
-# videos decide on it.
+# How often is the law exact, from whole pixels and from sub-pixel tracks?
 
 # %%
-assert ours.groupby("system").l2.median().max() < LEAST
-rows = pd.concat((parts["sub"], table_S3))
-best = rows[rows.method == "ours"].drop_duplicates("system").set_index("system")["l2 (e-2)"]
-assert (rows["l2 (e-2)"] > rows.system.map(best) - 0.005).all()
+both = pd.concat((results, bound))
+counts = both.groupby(["source", "method"], sort=False).exact.agg(rate).unstack(sort=False)
+print(counts.to_string())
+right = both.groupby(["source", "method"], sort=False).exact.mean()
+middle = results.groupby("method").l2.median()
+both_optimisers = ("Gauss-Newton", "spline-ADO")
+ado = table_1[table_1.method == "spline-ADO"].set_index("system")
+plain = table_1[table_1.method == "PySINDy"].set_index("system")["l2 (e-2)"]
+assert right["sub-pixel", "Gauss-Newton"] == 1
+
+# %%
+if full:
+    assert right["sub-pixel", "spline-ADO"] == 1
+    assert right["detector", "Gauss-Newton"] >= 0.9
+    assert right["detector", "spline-ADO"] >= 0.75
+    assert middle[list(both_optimisers)].max() < 2e-3
+    assert middle["spline-ADO"] < 3 * middle["Gauss-Newton"]
+    assert middle["PySINDy"] > 5 * middle["spline-ADO"]
+    assert (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all()
+    assert (plain[["NoseHoover", "WangSun"]] < 20).all()
 
 # %% [markdown]
-# All terms, no false one, and errors far below those of the paper. Where do they come from? These
-# videos are clean and lossless, and the tracker reads them to a thousandth of a pixel:
+# **The paper's method works.** From sub-pixel tracks both optimisers of its model find every law in every trial. From whole
+# pixels here is one picture of all of them:
 
 # %%
+pictured = both[both.trial == seed]
+fig = plots.plot_methods(pictured)
+caption = "Relative error of each method on each system, one trial; open symbols: the terms are wrong."
+numbers = {
+    f"{method}, {source}": {
+        name: significant(l2, 3, LEAST) for name, l2 in zip(g.system, g.l2, strict=True)
+    }
+    for (source, method), g in pictured.groupby(["source", "method"], sort=False)
+}
+save_figure("discovery_methods", fig, caption=caption, numbers=numbers, tolerance=0.2)
+
+# %% [markdown]
+# *Relative error of each method in the first trial, from whole pixels (left) and from sub-pixel tracks (right); open symbols
+# show where a term was lost or a false one found. The weak form depends on its random windows; this is one draw.*
+
+# %%
+ours = results[results.method == "Gauss-Newton"]
 rows = []
 for name, mine in ours.groupby("system", sort=False):
     shots = [film for film in films if film.truth.name == name]
+    off = [np.sqrt(np.nanmean(np.sum((np.round(d) - t) ** 2, axis=1)))
+           for f in shots for d, t in zip(f.detected, f.tracks, strict=True)]  # fmt: skip
     rows.append({
-        "system": name, "exact": rate(mine.exact),
-        "l2 (e-2)": significant(100 * mine.l2.median(), least=100 * LEAST),
-        "worst coefficient (%)": significant(100 * mine.max_coefficient_error.median(), least=0.01),
-        "pixel error (px)": significant(np.median([film.pixel_error for film in shots])),
-        "path error": significant(np.median([np.linalg.norm(f.path_error) for f in shots])),
+        "system": name, "exact": rate(mine.exact), "l2 (e-2)": significant(100 * mine.l2.median()),
+        "worst coefficient (%)": significant(100 * mine.max_coefficient_error.median()),
+        "detector (px)": significant(np.median(off)),
+        "background model (px)": significant(np.median([film.pixel_error for film in shots])),
         "seconds": shots[0].seconds + mine.seconds.iloc[0],
     })  # fmt: skip
-caption = f"Seven systems from videos, medians of {len(trials)} trials, path errors in scene units; l2 0.001 is 0.001 or less."
-loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)", "pixel error (px)", "path error"], 0.2)
+
+# %%
+caption = f"Gauss-Newton from the detector's whole pixels, and errors (rms) of both trackers; medians of {len(trials)} trials."
+loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)", "detector (px)", "background model (px)"], 0.2)
 save_table("table_systems", rows, caption=caption, tolerance=loose)
 
 # %%
 assert max(max(film.pixel_error) for film in films) < 0.1
+assert all(row["detector (px)"] > 4 * row["background model (px)"] for row in rows)
 
 # %% [markdown]
 # ## The equations (Table S2)
 #
-# Each law of the first trial as it was found, with standard errors, and the truth in the same
+# The laws of the first trial, from whole pixels: Gauss-Newton's with standard errors, spline-ADO's, and the truth in the same
 # frame.
 
 # %%
 first = {film.truth.name: film for film in films if film.task.trial == seed}
-found = {name: discover(f.t, f.x, systematic=f.systematic) for name, f in first.items()}
+paths = {name: trial_path(Trial(name, trial=seed, frames=frames)) for name in names}
+found = {
+    name: discover(path.t, path.x, systematic=path.systematic, order=1) for name, path in paths.items()
+}
+by_gradients = results[(results.method == "spline-ADO") & (results.trial == seed)].set_index("system").law
 for name, law in found.items():
-    print(f"{name}, found:\n{law.equations()}")
+    print(f"{name}, Gauss-Newton:\n{law.equations()}")
+    print(f"spline-ADO:\n{by_gradients[name].text()}")
     print(f"truth:\n{first[name].truth.text()}\n")
 
 # %% [markdown]
@@ -281,7 +316,7 @@ for name, law in found.items():
     offset = ", ".join(f"{value:.6f}" for value in law.offset)
     print(f"{name}, offset ({offset}):\n{law.equations('native')}")
     print(f"truth, offset {REFERENCE_OFFSET}:\n{SYSTEMS[name].text()}\n")
-    assert np.allclose(law.offset, REFERENCE_OFFSET, atol=1e-2)
+    assert np.allclose(law.offset, REFERENCE_OFFSET, atol=0.3)
 
 # %% [markdown]
 # Are the standard errors to be trusted? If so, the distance of a coefficient from the truth is
@@ -291,7 +326,8 @@ for name, law in found.items():
 pulled = {n: np.concatenate(list(group)) for n, group in ours.groupby("system", sort=False).pulls}
 every = np.concatenate(list(pulled.values()))
 print(f"{len(every)} coefficients, {np.mean(np.abs(every) < 2):.0%} within two standard errors")
-assert np.mean(np.abs(every) < 2) > (0.9 if full else 0.7)
+if full:
+    assert 0.7 < np.mean(np.abs(every) < 2) < 0.95
 
 # %%
 fig = plots.plot_pulls(pulled)
@@ -303,30 +339,38 @@ save_figure("discovery_pulls", fig, caption=caption, numbers=pulled, tolerance=0
 # errors, all trials. Those of one trial stray together, since they share one path and one offset.*
 
 # %%
-rows = [
-    {
-        "system": name, "equation": f"d{law.system.names[equation]}/dt", "term": term,
-        "truth": truth.coefficients[truth.terms.index(term), equation],
-        "found": law.coefficients[row, equation],
-        "standard error": law.standard_errors[row, equation],
+def by_term(law):
+    """Coefficients of a law by equation and term."""
+    return {
+        (f"d{name}/dt", term): law.coefficients[row, k]
+        for k, name in enumerate("xyz")
+        for row, term in enumerate(law.terms)
+        if law.coefficients[row, k]
     }
-    for name, law in found.items()
-    for truth in [first[name].truth]
-    for equation in range(3)
-    for row, term in enumerate(law.terms)
-    if law.coefficients[row, equation]
-]  # fmt: skip
+
 
 # %%
-caption = "Every discovered term in the reference frame, with its standard error, and the truth."
-save_table("table_S2", rows, caption=caption, tolerance={"standard error": 0.1})
+rows = []
+for name, law in found.items():
+    true, newton, ado = map(by_term, (first[name].truth, law.system, by_gradients[name]))
+    spread = by_term(replace(law.system, coefficients=law.standard_errors))
+    rows += [
+        {"system": name, "equation": key[0], "term": key[1], "truth": true.get(key),
+         "Gauss-Newton": newton.get(key), "standard error": newton.get(key) and spread.get(key),
+         "spline-ADO": ado.get(key)}
+        for key in sorted({*true, *newton, *ado}, key=lambda key: (key[0], len(key[1]), key[1]))
+    ]  # fmt: skip
+
+# %%
+caption = "Every term of the laws of the first trial and of the truth, in the reference frame; empty: the term is not in the law."
+save_table("table_S2", rows, caption=caption, tolerance={"Gauss-Newton": 0.02, "spline-ADO": 0.02, "standard error": 0.2})
 print(len(rows), "terms, stored as table_S2")
 
 # %% [markdown]
 # ## The laws in motion (Fig. 2)
 #
 # A law is more than its coefficients: let it run. We start each discovered law at the first point
-# of its curve and the truth at its initial condition. The systems are chaotic, and any error grows
+# of its curve and the truth at its initial condition. Where a motion is chaotic a small error grows
 # exponentially; a forecast counts as good until the distance exceeds a tenth of the spread of the
 # motion. A law should also hold where nobody filmed: so both start at other points, too, off the first one by a fifth of
 # the spread in each coordinate.
@@ -345,7 +389,7 @@ def forecast(benchmark, law, start, begin, periods, rate):
 
 
 forecasts = {
-    name: forecast(first[name].truth, law, first[name].truth.x0, law.curve(first[name].t[:1])[0], horizon, 400)
+    name: forecast(first[name].truth, law, first[name].truth.x0, law.curve(paths[name].t[:1])[0], horizon, 400)
     for name, law in found.items()
 }
 
@@ -363,8 +407,9 @@ rows = [
     }
     for name, (truth, _) in forecasts.items()
 ]  # fmt: skip
-assert all(row["forecast good for (periods)"] > 4 for row in rows)
-assert all(row["from three other starts, least (at most 10)"] > (2 if full else 1) for row in rows)
+if full:
+    assert all(row["forecast good for (periods)"] > 1 for row in rows)
+    assert all(row["from three other starts, least (at most 10)"] > 0.5 for row in rows)
 
 # %%
 caption = f"Forecast from the first frame and from other points, at most {horizon} periods; the videos last {frames / 100:g}."
@@ -383,87 +428,29 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 # the forecast is good, at most 15 periods.*
 
 # %% [markdown]
-# ## Whole pixels
-#
-# What do all methods make of whole pixels? Here is the first trial.
-
-# %%
-rows = [
-    {
-        "system": row.system, "method": row.method,
-        "false positives": row.false_positives, "missing": row.missing,
-        "l2 (e-2)": significant(100 * row.l2),
-        "worst coefficient (%)": significant(100 * row.max_coefficient_error),
-    }
-    for row in whole[whole.trial == seed].itertuples()
-]  # fmt: skip
-caption = "From tracks rounded to whole pixels, one trial."
-loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)"], 0.2)
-save_table("discovery_whole_pixels", rows, caption=caption, tolerance=loose)
-
-# %%
-for name, group, share in (("detector", detected, 0.8), ("whole pixels", whole, 0.9)):
-    mine = group[group.method == "ours"]
-    print(f"{name}: {rate(mine.exact)} exact, {rate(mine.status == 'ok')} not doubted")
-    assert mine.exact.mean() >= share
-    assert (mine[mine.exact].l2 <= 0.5e-2).all()
-    assert (mine.status == "ok").mean() >= 0.7
-
-# %% [markdown]
-# The errors are far larger than before and still well below the paper's.
-
-# %%
-both = trialled[(trialled.trial == seed) & (trialled.source != "detector")].copy()
-both["source"] = both.source.replace("videos", "sub-pixel")
-fig = plots.plot_methods(both)
-caption = (
-    "Relative error of each method on each system, one trial; open symbols: the terms are wrong."
-)
-numbers = {
-    f"{method}, {source}": {
-        name: significant(l2, 3, LEAST) for name, l2 in zip(g.system, g.l2, strict=True)
-    }
-    for (source, method), g in both.groupby(["source", "method"], sort=False)
-}
-save_figure("discovery_methods", fig, caption=caption, numbers=numbers)
-
-# %% [markdown]
-# *Relative error of each method in the first trial. From exact paths (right), PySINDy and E-SINDy
-# err by a percent and more: that is what their finite differences cost. Splines and integrals do
-# better. From whole pixels (left) most errors are larger, and open symbols show where a term was lost or
-# a false one found. The weak form depends on its random windows; this is one draw.*
-
-# %%
-print(
-    both.groupby(["source", "method"], sort=False).exact.agg(rate).unstack(sort=False).to_string()
-)
-error = whole[whole.trial == seed].groupby("method").l2.median()
-assert all(error[method] > 2 * error["ours"] for method in baselines.BASELINES)
-
-# %% [markdown]
 # ## What we learned
 #
-# * Seven systems, one call, nothing chosen by hand: all true terms, no false one, from three videos
-#   with one calibrated camera. From whole pixels the relative error is of the order of $10^{-4}$, from the sub-pixel tracks of
-#   lossless videos below $10^{-5}$. A learned detector's tracks give an error of the order of $10^{-3}$, and now and then a false term.
-#   <!-- by: ours.exact.all(); ours.groupby("system").l2.median().max() < LEAST; mine.exact.mean() >= share; figure table_1 -->
+# * **The paper's method works.** From whole pixels of a detector, nothing chosen by system, both optimisers of its model find
+#   the terms of most laws, with errors of the order of $10^{-3}$; from the sub-pixel tracks of lossless videos they find all of them.
+#   <!-- by: right["detector", "Gauss-Newton"] >= 0.9; right["detector", "spline-ADO"] >= 0.75; right["sub-pixel", "spline-ADO"] == 1; middle[list(both_optimisers)].max() < 2e-3 -->
 # * The offset of the reference frame was not given and is found with the law.
 #   <!-- by: np.allclose(law.offset, REFERENCE_OFFSET -->
-# * The standard errors are not too small: more than nine of ten coefficients lie within two of them.
-#   <!-- by: np.mean(np.abs(every) < 2) -->
-# * With paths as exact as these, other methods find most laws as well. What sets them apart is
-#   noise, of which whole pixels are a first taste.
-#   <!-- by: figure table_S3; error[method] > 2 * error["ours"]; 06: error.loc[level, others] > 1.5 -->
+# * The standard errors are a little too small here, for the errors of a detector are not all told by the tracks: fewer than 95 % of
+#   the coefficients lie within two of them, more than 70 %.
+#   <!-- by: 0.7 < np.mean(np.abs(every) < 2) < 0.95 -->
+# * On such tracks the two optimisers are alike, and Model-A errs little more in the median. PySINDy and E-SINDy err by per cents, which
+#   is what their finite differences cost. What sets the optimisers apart is noise.
+#   <!-- by: middle["spline-ADO"] < 3 * middle["Gauss-Newton"]; middle["PySINDy"] > 5 * middle["spline-ADO"]; 06: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2 -->
 #
 # **What the paper says and what we found.**
 #
-# * The paper's errors are 0.15 to 6.22 (in $10^{-2}$) with four false positives in seven systems;
-#   here they are below 0.03 from whole pixels, with none, and below 0.2 from the detector's tracks, with a false
-#   one in a few of the trials. Five trials differ in nothing but their scenes, so their spread is that of the tracker.
-#   <!-- by: figure table_1 -->
+# * The paper's errors are 0.15 to 6.22 (in $10^{-2}$) with four false positives in seven systems. From whole pixels the median of
+#   spline-ADO is below the paper's error in every system, with a false term in some trials, of Tsucs2 in most. Trials differ in
+#   nothing but their scenes, so their spread is that of the tracker.
+#   <!-- by: (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all(); figure table_1 -->
 # * PySINDy's 824 % (NoseHoover) and 856 % (WangSun) are coefficients ten times too large
-#   throughout: a time step wrong by that factor. With the right step they are 1 to 15 % here.
-#   <!-- by: 10: 9 < medians[name] < 11; figure table_1 -->
+#   throughout: a time step wrong by that factor. With the right step the medians are below 20 % here.
+#   <!-- by: 10: 9 < medians[name] < 11; (plain[["NoseHoover", "WangSun"]] < 20).all(); figure table_1 -->
 # * "Nine datasets" are seven, and the paper's frame of reference has to be guessed from its own
 #   ground truths.
 #   <!-- by: 10: len(SYSTEMS_S1) != DATASETS_CLAIMED; 10: all(scored.exact for scored in ground.values()) -->
@@ -501,18 +488,17 @@ assert round(scored.max_coefficient_error, 2) == 0.37
 # %% tags=["hide-cell"]
 from vidsindy_lite.study import Trial
 
-under = {m: run_trial(Trial(names[0], "noise", noise, seed, m, frames=frames)).score for m in METHODS}
+under = {m: run_trial(Trial(names[0], "noise", noise, seed, m, "path", frames)).score for m in METHODS}
 print(*(f"{method}: {scored}" for method, scored in under.items()), sep="\n")
-assert under["ours"].exact
-assert under["ours"].max_coefficient_error <= min(scored.max_coefficient_error for scored in under.values())
+assert under["Gauss-Newton"].exact
 if full:  # with few frames all methods may be exact
     assert not all(scored.exact for scored in under.values())
 
 # %% [markdown]
 # <details><summary>Solution</summary>
 #
-# A twentieth of the spread is enough to tell the methods apart: ours keeps exactly the true terms, and its
-# worst coefficient is the closest; some of the others find a false term or lose a true one.
+# A twentieth of the spread is enough to tell the methods apart: Gauss-Newton keeps exactly the true terms, some of the
+# others find a false one or lose a true one.
 # </details>
 #
 # **3.** (Prove.) Which terms does a shift of the origin add to Lorenz' law, axis by axis?

@@ -294,8 +294,8 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # **What the paper says and what we found.**
 #
 # * The paper shows that the equations can be found under these conditions and prints neither them nor
-#   their errors, so there is no number to compare with.
-#   <!-- by: docs/paper.md -->
+#   their errors, so there is no number to compare with. Here they are found in every trial.
+#   <!-- by: all(trial.score.exact for trial in runs); docs/paper.md -->
 # * It says that the law is found "from sparse observation points". So it is here; what makes it possible
 #   is that gaps are no obstacle for a law, as long as it can be carried across them.
 #   <!-- by: figure scene_equations; (error < 0.01 * first.x.std(axis=0)).all() -->
@@ -314,12 +314,13 @@ from vidsindy_lite.study import score
 known = discover(first.t, reconstruct(tracks, Rig.around(first.x)))
 print(first.score, score(known, first.truth), sep="\n")
 assert score(known, first.truth).exact
-assert first.score.l2 < 5 * score(known, first.truth).l2 + 1e-3
+assert max(first.score.l2, score(known, first.truth).l2) < (1e-3 if full else 1e-2)
 
 # %% [markdown]
 # <details><summary>Solution</summary>
 #
-# Next to nothing: with learned and with true cameras the errors are of the same size. What is left is the tracker's.
+# None that matters: from learned and from true cameras the error of the law is below a thousandth, and which is the smaller one
+# is chance. What is left is the tracker's.
 # </details>
 #
 # **2.** (Implement.) An orthographic camera is an affine map, $\mathbf x_c=\mathbf A\mathbf x+\mathbf b$. Read $\mathbf A$ and $\mathbf b$ off

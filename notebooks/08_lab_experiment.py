@@ -101,6 +101,7 @@ paths = lab.paths(frames)
 x = paths.reshape(-1, 3)
 marked = frames // 2  # index of the frame in which the ball is there
 assert np.allclose(x[marked], lab.MARKED, atol=1e-3)
+assert abs(2 * lab.RADIUS - 52.5) < 0.1  # of a snooker ball, mm
 for one in truth.cameras:
     print(f"at {one.position.round()} mm, focal length {one.focal_length:.0f} px")
 
@@ -287,7 +288,7 @@ caption = "The paths from above: true, by orthographic and by perspective camera
 save_figure("lab_table", fig, caption=caption, numbers={"truth": paths, **found})
 
 # %% [markdown]
-# *Left: the paths from above; orthographic cameras (vermilion) bend them, perspective cameras (blue) put them
+# *Left: the paths from above; orthographic cameras (vermilion) miss them, perspective cameras (blue) put them
 # on the truth (grey). Right: the scene, with the part of the table that the cameras look at.*
 
 # %% [markdown]
@@ -433,7 +434,7 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 #   tracked to a few thousandths of a pixel, and the orthographic error stays what it is.
 #   <!-- by: np.max(tracking) < 0.005; 3 < length(error)[marked] < 20 -->
 # * "A standard billiard ball": by its height, a snooker ball.
-#   <!-- by: figure lab_marked_point -->
+#   <!-- by: abs(2 * lab.RADIUS - 52.5) < 0.1; figure lab_marked_point -->
 #
 # Not modelled: lens distortion, a principal point off the middle of the image, and cameras that are not
 # synchronised.

@@ -783,7 +783,7 @@ save_table("audit", findings, caption=caption)
 #
 # **What the paper says and what we found.** The table above is the answer; our own numbers for the same
 # tables are in [notebook 05](05_discovery.ipynb).
-# <!-- by: figure audit; figure audit_coordinates; figure table_1 -->
+# <!-- by: explained == {; len(SYSTEMS_S1) != DATASETS_CLAIMED; figure audit; figure audit_coordinates; figure table_1 -->
 
 # %% [markdown]
 # ## Exercises

@@ -15,7 +15,7 @@
 # %% [markdown]
 # # The scoreboard
 #
-# In this notebook, we present benchmarks that others use, and errors that are no white noise. Ours and three other
+# In this notebook, we present benchmarks that others use, and errors that are no white noise. Gauss-Newton (`discover`) and three other
 # methods get the same samples in one run; what is published of the same benchmarks stands beside it.
 #
 # **What you will see**
@@ -42,6 +42,7 @@ from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 from vidsindy_lite import discover
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
@@ -69,17 +70,20 @@ from vidsindy_lite.study import (
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
-both = CONTESTANTS[:2]  # ours and PySINDy see everything, the slower ones less
+both = CONTESTANTS[:2]  # Gauss-Newton and PySINDy see everything, the slower ones less
+sindy = CONTESTANTS[-2:]  # SINDy with a smoothing spline, and with the truth to choose by
 
 # %% [markdown]
 # ## The rules
 #
 # * Everybody gets the same samples, candidate terms up to the same degree, and nothing else: no noise level, no
-#   origin, no threshold. Ours runs with its defaults.
+#   origin, no threshold. Gauss-Newton runs with its defaults.
 # * The baselines are those of [notebook 05](05_discovery.ipynb). Their thresholds are chosen without the truth, by
-#   the error of the derivatives on the last fifth of the record.
+#   the error of the derivatives on the last fifth of the record. Model-A is SINDy as a careful user has it: with the derivatives of
+#   a smoothing spline. The **oracle** is no contestant: of all thresholds, with differences and with splines, it takes the law
+#   whose path comes closest to the clean one.
 # * **Exact** means: every true term and no other.
-# * Only ours says whether it trusts its law. *Wrong and ok* is the worst that can happen, *right but doubted* the
+# * Only Gauss-Newton says whether it trusts its law. *Wrong and ok* is the worst that can happen, *right but doubted* the
 #   price of caution.
 
 
@@ -91,8 +95,8 @@ def count(table):
         {
             "condition": condition, "method": method, "cases": len(group),
             "exact (%)": 100 * group.exact.mean(),
-            "wrong and ok": group["wrong, ok"].sum() if method == "ours" else None,
-            "right but doubted": group["exact, doubted"].sum() if method == "ours" else None,
+            "wrong and ok": group["wrong, ok"].sum() if method == "Gauss-Newton" else None,
+            "right but doubted": group["exact, doubted"].sum() if method == "Gauss-Newton" else None,
             "seconds": group.seconds.median(),
         }
         for (condition, method), group in groups
@@ -140,7 +144,7 @@ levels = [(0, 0), (0.02, 0), (0.05, 0), (0.05, 0.5)] if full else [(0, 0), (0.02
 tasks = [OdeContest(n, tight=True, methods=both, seed=seed) for n in cubic]
 for noise, dropped in levels:
     for n in numbers:
-        methods = CONTESTANTS if full and not noise and n in cubic else both
+        methods = CONTESTANTS if full and not noise and n in cubic else (*both, *sindy)
         tasks += [OdeContest(n, 0, noise, dropped, methods=methods, seed=seed)]
 ode = standings(sweep(run_contest, tasks, jobs=jobs, desc="ODEBench"))
 laws, others = ode[ode.inside], ode[~ode.inside]
@@ -152,16 +156,17 @@ save_table("score_odebench", count(laws), caption=caption)
 # %%
 rate = shares(laws)
 if full:
-    assert rate.ours["exact"] > 0.8
-    assert rate.ours["stored"] > 0.75
-    assert rate.ours["stored"] > rate.drop(columns="ours").loc["stored"].max() + 0.05
-    assert (rate.ours > rate.PySINDy + 0.1).all()
+    assert rate["Gauss-Newton"]["exact"] > 0.8
+    assert rate["Gauss-Newton"]["stored"] > 0.75
+    assert rate["Gauss-Newton"]["stored"] > rate.drop(columns="Gauss-Newton").loc["stored"].max() + 0.05
+    assert (rate["Gauss-Newton"] > rate.PySINDy + 0.1).all()
     assert (laws.groupby("condition")["wrong, ok"].sum() <= 7).all()
+    assert (abs(rate.loc["exact", list(both)] - rate.loc["stored", list(both)]) < 0.05).all()
 
 # %% [markdown]
 # Least squares finds about half of these laws even without errors: a threshold on coefficients keeps what is large,
-# not what is needed. A smooth error of $10^{-4}$ is a change of the law, small terms that every noise model
-# accepts. Ours looks for the law that *persists* while more and more error is tolerated ([notebook 04](04_spline_ado.ipynb)); `found.plot_path()`
+# not what is needed. The smooth error of the stored integration, of the order of $10^{-4}$, costs neither method a law.
+# It looks like small terms to a solver that takes errors for white noise; Gauss-Newton looks for the law that *persists* while more and more error is tolerated ([notebook 04](04_spline_ado.ipynb)); `found.plot_path()`
 # draws that.
 
 # %%
@@ -182,13 +187,15 @@ save_figure("score_path", fig, caption=caption, numbers=dict(zip("xy", path, str
 # the path. What does the status say of it?
 
 # %%
-mine = others[(others.method == "ours") & others.condition.isin(["stored", "stored, noise 2 %"])]
+mine = others[(others.method == "Gauss-Newton") & others.condition.isin(["stored", "stored, noise 2 %"])]
 rows = [
     {"condition": condition} | group.status.value_counts().to_dict()
     for condition, group in mine.groupby("condition", sort=False)
 ]
 rows = [{key: row.get(key, 0) for key in ("condition", "ok", "suspect", "refused")} for row in rows]
 caption = "Status of laws that cannot be right: the library lacks a function that the equation needs."
+rows_outside = rows
+assert rows_outside[0]["ok"] > 0 or not full
 save_table("score_outside", rows, caption=caption)
 
 # %% [markdown]
@@ -202,27 +209,35 @@ save_table("score_outside", rows, caption=caption)
 
 # %%
 print(f"published: {R2_SOURCE}; given: {R2_GIVEN}")
-everyone = ode[ode.condition.str.startswith("stored") & ode.method.isin(both)]
-ours = everyone.assign(good=everyone.r2 > 0.9).pivot_table("good", "level", "method", sort=False)
+compared = (*both, *sindy)
+everyone = ode[ode.condition.str.startswith("stored") & ode.method.isin(compared)]
+good = everyone.assign(good=everyone.r2 > 0.9).pivot_table("good", "level", "method", sort=False)
 rows = [
     {"noise (%)": 100 * noise, "dropped (%)": 100 * dropped}
-    | {f"{method}, here": 100 * ours.loc[[(noise, dropped)], method].iloc[0] for method in both}
+    | {f"{method}, here": 100 * good.loc[[(noise, dropped)], method].iloc[0] for method in compared}
     | {method: 100 * known[noise, dropped] for method, known in R2_RATES.items()}
     for noise, dropped in levels
 ]
 caption = "ODEBench, percent of 63 laws with R2 above 0.9; columns without 'here' are published."
-save_table("score_r2", rows, caption=caption, tolerance={"ours, here": 0.05})
+save_table("score_r2", rows, caption=caption, tolerance={f"{method}, here": 0.05 for method in compared})
 
 # %%
 if full:
-    assert all(row["ours, here"] > 60 for row in rows)
+    assert all(row["Gauss-Newton, here"] > 60 for row in rows)
+    assert all(row["SINDy, oracle, here"] > row["PySINDy, here"] + 10 for row in rows)
+    assert all(row["Model-A, here"] > row["PySINDy, here"] for row in rows[1:])
+
+# %% [markdown]
+# Why is PySINDy so far below its published rate? There its threshold and its derivatives are those that suit the benchmark. With
+# both chosen by the clean truth, and nothing else changed, the oracle's column is what it reaches here; a smoothing spline
+# without an oracle brings it a part of the way under noise.
 
 # %% [markdown]
 # ## The Lorenz system over noise and length
 #
 # Start at $(-8,8,27)$, steps of .01, quadratic terms; the noise is relative to the standard deviation of all
 # coordinates *together*, so that 40 % of it is 69 % of that of $x$. The best published method,
-# ODR-BINDy, is told the variance of the noise, and takes the origin of the data for that of the law. Ours is told
+# ODR-BINDy, is told the variance of the noise, and takes the origin of the data for that of the law. Gauss-Newton is told
 # neither; a second run is told the origin. With two draws a cell the two may differ by chance either way.
 
 # %%
@@ -241,20 +256,20 @@ print(f"{LORENZ_GRID.method}: {LORENZ_GRID.source}; given: {LORENZ_GRID.given}")
 shape = shown.sum(), len(lengths), len(draws)
 exact, given = (table.exact.to_numpy(float).reshape(shape).mean(axis=2) for table in (lorenz, told))
 theirs = LORENZ_GRID.rates[shown][:, np.isin(LORENZ_GRID.lengths, lengths)]
-grids = {f"ours, {len(draws)} draws": exact, f"{LORENZ_GRID.method}, published": theirs}
+grids = {f"Gauss-Newton, {len(draws)} draws": exact, f"{LORENZ_GRID.method}, published": theirs}
 fig = plots.plot_lorenz_grids(grids, LORENZ_GRID.levels[shown], lengths)
-caption = "Share of exact Lorenz laws in percent, over noise and length: ours beside the published."
+caption = "Share of exact Lorenz laws in percent, over noise and length: Gauss-Newton beside the published."
 save_figure("score_lorenz", fig, caption=caption, numbers=grids)
 
 # %% [markdown]
-# *Percent of exact laws by length (column) and noise (row). Ours is not told the noise. With two draws a cell, a
+# *Percent of exact laws by length (column) and noise (row). Gauss-Newton is not told the noise. With two draws a cell, a
 # cell says little and a row something.*
 
 # %%
 rows = [
     {
-        "noise (%)": 100 * level, "ours (%)": 100 * mine.mean(),
-        "ours, origin given (%)": 100 * home.mean(), "ODR-BINDy (%)": 100 * known.mean(),
+        "noise (%)": 100 * level, "Gauss-Newton (%)": 100 * mine.mean(),
+        "the same, origin given (%)": 100 * home.mean(), "ODR-BINDy (%)": 100 * known.mean(),
     }  # fmt: skip
     for level, mine, home, known in zip(LORENZ_GRID.levels[shown], exact, given, theirs, strict=True)
 ]
@@ -286,7 +301,7 @@ flows = (*four, "Roessler", "Arneodo", "Halvorsen", "Chen") if full else four[:1
 errors = (*ERRORS, *MOTIONS) if full else ("64 values", "drift 0.2 %", "kicks 1 %")
 few = flows[::4]  # of the slower methods
 tasks = [
-    FlowContest(flow, error, methods=CONTESTANTS if full and flow in few else both, seed=seed)
+    FlowContest(flow, error, methods=CONTESTANTS[:5] if full and flow in few else both, seed=seed)
     for error in errors
     for flow in flows
 ]
@@ -301,14 +316,14 @@ numbers = {f"{c}, {m}": value for table in (rate, rate_flows) for m in table for
 save_figure("score_methods", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
-# *Exact laws in percent. The slower methods, E-SINDy and WeakSINDy, see the stored data of ODEBench and two of the
+# *Exact laws in percent. The slower methods see the stored data of ODEBench and two of the
 # flows.*
 
 # %%
 print(rate_flows.mul(100).round().to_string(na_rep=""))  # percent
 if full:
-    assert rate_flows.ours.mean() > 0.75
-    assert rate_flows.ours.mean() > rate_flows.PySINDy.mean() + 0.15
+    assert rate_flows["Gauss-Newton"].mean() > 0.75
+    assert rate_flows["Gauss-Newton"].mean() > rate_flows.PySINDy.mean() + 0.15
 
 # %% [markdown]
 # ## How far can the status be trusted?
@@ -319,14 +334,14 @@ if full:
 together = {"ODEBench": laws, "Lorenz grid": lorenz, "flows": flow_table}
 rows = []
 for benchmark, table in together.items():
-    mine = table[table.method == "ours"]
+    mine = table[table.method == "Gauss-Newton"]
     doubted = mine["exact, doubted"].sum() / max(mine.exact.sum(), 1)
     rows.append({
         "benchmark": benchmark, "cases": len(mine), "exact (%)": 100 * mine.exact.mean(),
         "wrong and ok (%)": 100 * mine["wrong, ok"].mean(), "doubted of the exact (%)": 100 * doubted,
         "seconds": mine.seconds.median(),
     })  # fmt: skip
-save_table("score_summary", rows, caption="Ours on all benchmarks of this page.")
+save_table("score_summary", rows, caption="Gauss-Newton on all benchmarks of this page.")
 
 # %%
 if full:
@@ -334,27 +349,46 @@ if full:
     assert rows[0]["wrong and ok (%)"] < 15
     assert rows[2]["wrong and ok (%)"] < 15
 
+# %%
+grid_row = rows[1]
+every = pd.concat([table[table.method == "Gauss-Newton"] for table in together.values()])
+trusted = every[every.status == "ok"]
+print(f"of {len(trusted)} laws with the status ok {trusted.exact.mean():.0%} are exact, "
+      f"of {len(every) - len(trusted)} others {every[every.status != 'ok'].exact.mean():.0%}")  # fmt: skip
+if full:
+    assert trusted.exact.mean() > 0.85
+    assert grid_row["doubted of the exact (%)"] > 35
+
+# %% [markdown]
+# An *ok* can be trusted in more than five cases of six, and nearly always on ODEBench and with the flows. A *suspect* says
+# less: on the Lorenz grid, with few samples and much noise, about half of the laws that are exact are doubted.
+
 # %% [markdown]
 # ## What we learned
 #
 # * On motions from textbooks, even without errors, a threshold on coefficients finds about half of the laws; what
 #   persists while more error is tolerated is right nearly always.
-#   <!-- by: rate.ours["exact"] > 0.8; (rate.ours > rate.PySINDy + 0.1).all(); figure score_odebench -->
-# * On the Lorenz grid ours, which is told neither the noise nor the origin, comes near the best published method,
+#   <!-- by: rate["Gauss-Newton"]["exact"] > 0.8; (rate["Gauss-Newton"] > rate.PySINDy + 0.1).all(); figure score_odebench -->
+# * On the Lorenz grid Gauss-Newton, which is told neither the noise nor the origin, comes near the best published method,
 #   which takes both as known. Its misses lose one term, as a rule.
 #   <!-- by: exact.mean() > theirs.mean() - 0.2; buried > 0.8 * len(misses); figure score_lorenz_rows -->
 # * Explained variance says little about terms: most laws explain 90 % of a trajectory, and far fewer are right.
-#   <!-- by: row["ours, here"] > 60; figure score_r2; figure score_odebench -->
+#   <!-- by: row["Gauss-Newton, here"] > 60; figure score_r2; figure score_odebench -->
+# * The status "ok" can be trusted in more than five cases of six; "suspect" also falls on laws that are exact, on the Lorenz grid on
+#   about half of them.
+#   <!-- by: trusted.exact.mean() > 0.85; grid_row["doubted of the exact (%)"] > 35 -->
+# * Published rates of SINDy need thresholds that know the truth: with such an oracle it is far above PySINDy as a user has it.
+#   <!-- by: row["SINDy, oracle, here"] > row["PySINDy, here"] + 10; figure score_r2 -->
 # * Whether a law is outside the library, one record cannot always say. Then the status is ok and the law an
 #   approximation.
-#   <!-- by: figure score_outside -->
+#   <!-- by: rows_outside[0]["ok"] > 0; figure score_outside -->
 #
 # **What the paper says and what we found.**
 #
 # * The paper's errors are white noise and gaps, its systems seven. Of integration, drift, distortion, correlated
-#   noise or kicks it says nothing, and compares with PySINDy, E-SINDy and WeakSINDy alone. Ours is before
-#   them here, too, on systems and errors that nobody chose for it.
-#   <!-- by: rate_flows.ours.mean() > rate_flows.PySINDy.mean() + 0.15; figure score_methods -->
+#   noise or kicks it says nothing, and compares with PySINDy, E-SINDy and WeakSINDy alone. Gauss-Newton
+#   finds more of these laws than PySINDy does.
+#   <!-- by: rate_flows["Gauss-Newton"].mean() > rate_flows.PySINDy.mean() + 0.15; figure score_methods -->
 
 # %% [markdown]
 # ## Exercises
@@ -408,7 +442,7 @@ print(f"{score(told, flow)}; {told.status}")
 # %% [markdown]
 # ## Run time and versions
 #
-# All cells take about 5 minutes on two cores, beside two other notebooks.
+# All cells take about 15 minutes on two cores.
 
 # %%
 print(versions())

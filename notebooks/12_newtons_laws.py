@@ -431,7 +431,7 @@ assert abs(by_law - length) < 5 * by_law_error
 assert abs(sphere.radius - length) < 5 * sphere.radius_error
 
 # %% [markdown]
-# ## All laws of this page
+# ## Four laws of this page
 
 # %%
 laws = {

@@ -1,8 +1,9 @@
 """The claims of the README and of the notebooks, each with the check behind it.
 
 After a claim stands a comment that no reader sees, ``<!-- by: CHECK; CHECK -->``. A check is a part
-of an assertion in the notebook's code; ``05: part`` is one in notebook 05; ``figure ID`` is a
-figure or table with its numbers; a path is a page of docs/, or a test as pytest names it.
+of an assertion in the notebook's code; ``05: part`` is one in notebook 05; a path with a name is a
+test as pytest names it. The claim is false if one of them fails, so it has at least one. Beside
+them, ``figure ID`` and a page of docs/ say where its numbers are shown.
 """
 
 import ast
@@ -88,7 +89,10 @@ def _claim(item: str, page: Path) -> Claim:
     text = re.sub(r"\]\((?:notebooks/)?(?=\d\d_)", "](../notebooks/", text)  # as from docs/
     if not (by := BY.search(item)):
         raise ValueError(f"{page.name}: no check is named behind {text!r}")
-    return Claim(text, tuple(_check(" ".join(check.split()), page) for check in by[1].split("; ")))
+    checks = tuple(_check(" ".join(check.split()), page) for check in by[1].split("; "))
+    if not any(check.startswith("false unless") for check in checks):
+        raise ValueError(f"{page.name}: nothing could make it false: {text!r}")
+    return Claim(text, checks)
 
 
 def _check(name: str, page: Path) -> str:
@@ -97,16 +101,16 @@ def _check(name: str, page: Path) -> str:
     kind, _, rest = name.partition(" ")
     path, _, test = name.partition("::")
     if kind == "figure" and (root / "figures" / f"{rest}.json").exists():
-        return f"[{rest}](../figures/README.md#{rest.lower()})"
+        return f"shown in [{rest}](../figures/README.md#{rest.lower()})"
     if test and (root / path).exists() and f"def {test}(" in (root / path).read_text("utf-8"):
-        return f"`{name}`"
+        return f"false unless `{name}`"
     if path.startswith("docs/") and (root / path).exists():
-        return f"[{path}]({Path(path).name})"
+        return f"stated in [{path}]({Path(path).name})"
     number = re.match(r"(\d\d): ", name)
     (notebook,) = (root / "notebooks").glob(f"{number[1]}_*.py") if number else [page]
     part = name.removeprefix(number[0]) if number else name
     if notebook.suffix == ".py" and (found := _assertion(part, notebook)):
-        return f"`{found}`" + (f" in {number[1]}" if number else "")
+        return f"false unless `{found}`" + (f" in {number[1]}" if number else "")
     raise ValueError(f"{page.name}: no assertion, figure, test or page is {name!r}")
 
 

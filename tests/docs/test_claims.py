@@ -62,16 +62,18 @@ def test_a_claim_is_listed_with_its_checks(page):
     first, second = claims_of(page)
     assert first.text == "One and one are two ([02](../notebooks/02_two.ipynb))."
     assert first.checks == (
-        '`( one + one == 2 ), "no"`', "[sum](../figures/README.md#sum)", "[docs/page.md](page.md)",
-        "`two > 1` in 02",
+        'false unless `( one + one == 2 ), "no"`', "shown in [sum](../figures/README.md#sum)",
+        "stated in [docs/page.md](page.md)", "false unless `two > 1` in 02",
     )  # fmt: skip
     assert second.text.endswith("what we found.** Nothing.")
-    assert second.checks == ("`tests/test_sum.py::test_one`",)
+    assert second.checks == ("false unless `tests/test_sum.py::test_one`",)
 
 
 def test_a_page_of_words_claims_what_is_marked(page):
     readme = page.parent.parent / "README.md"
-    readme.write_text("# One\n\nIt adds up.\n<!-- by: figure sum -->\n\n* [two](docs/page.md)\n")
+    readme.write_text(
+        "# One\n\nIt adds up.\n<!-- by: tests/test_sum.py::test_one -->\n\n* [two](docs/page.md)\n"
+    )
     assert [claim.text for claim in claims_of(readme)] == ["It adds up."]
 
 
@@ -92,6 +94,14 @@ def test_a_claim_without_a_check_is_seen(page, old, new):
     assert old in CELLS
     page.write_text(CELLS.replace(old, new, 1))
     with pytest.raises(ValueError, match=r"01_one.py: no (check|assertion)"):
+        claims_of(page)
+
+
+def test_a_claim_that_nothing_could_make_false_is_seen(page):
+    page.write_text(
+        CELLS.replace("one + one == 2; figure sum; docs/page.md; 02: two > 1", "figure sum")
+    )
+    with pytest.raises(ValueError, match=r"01_one.py: nothing could make it false: 'One and one"):
         claims_of(page)
 
 

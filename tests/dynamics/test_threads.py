@@ -4,7 +4,7 @@ from threading import Barrier, Thread
 
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from vidsindy_lite.dynamics.threads import one_blas_thread
+from vidsindy_lite.dynamics.solver import one_blas_thread
 
 
 def threads():

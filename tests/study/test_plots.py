@@ -96,7 +96,7 @@ def test_frames_of_different_sizes_keep_their_own_axes():
 
 
 def test_wrong_terms_are_counted_in_whole_numbers_at_the_levels_tried():
-    columns = {"condition": "noise", "method": "ours", "level": [0, 0.15, 0.3], "l2": 0.01}
+    columns = {"condition": "noise", "method": "Gauss-Newton", "level": [0, 0.15, 0.3], "l2": 0.01}
     figure = plots.plot_robustness(pandas.DataFrame(columns | {"wrong_terms": [0, 6, 12]}))
     _, below = figure.axes
     assert all(tick == round(tick) for tick in below.get_yticks())
@@ -112,21 +112,21 @@ def test_the_map_of_origins_counts_in_whole_terms():
 
 def test_standings_show_every_rate_and_leave_out_who_did_not_take_part():
     rates = pandas.DataFrame(
-        {"ours": [1.0, 0.5], "PySINDy": [0.25, np.nan]}, index=["stored", "noise 2 %"]
+        {"Gauss-Newton": [1.0, 0.5], "PySINDy": [0.25, np.nan]}, index=["stored", "noise 2 %"]
     )
     figure = plots.plot_standings({"ODEBench": rates, "flows": rates})
     for axes in figure.axes:
         lines = {line.get_label(): line for line in axes.lines}
-        np.testing.assert_array_equal(lines["ours"].get_xdata(), [100, 50])
+        np.testing.assert_array_equal(lines["Gauss-Newton"].get_xdata(), [100, 50])
         np.testing.assert_array_equal(lines["PySINDy"].get_xdata(), [25, np.nan])
         assert [text.get_text() for text in axes.get_yticklabels()] == ["stored", "noise 2 %"]
-        assert (np.abs(lines["ours"].get_ydata() - axes.get_yticks()) < 0.4).all()
-    assert [text.get_text() for text in figure.legends[0].texts] == ["ours", "PySINDy"]
+        assert (np.abs(lines["Gauss-Newton"].get_ydata() - axes.get_yticks()) < 0.4).all()
+    assert [text.get_text() for text in figure.legends[0].texts] == ["Gauss-Newton", "PySINDy"]
 
 
 def test_lorenz_grids_have_the_rate_in_every_cell():
     rates = np.array([[1.0, 0.5, 0.25], [0.0, 0.75, 1.0]])
-    grids = {"ours": rates, "theirs": 1 - rates}
+    grids = {"Gauss-Newton": rates, "theirs": 1 - rates}
     figure = plots.plot_lorenz_grids(grids, np.array([0.1, 0.4]), np.array([4.0, 7.0, 10.0]))
     for axes, shown in zip(figure.axes, grids.values(), strict=True):
         texts = {text.get_position(): text.get_text() for text in axes.texts}

@@ -3,20 +3,31 @@
 import pickle
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from vidsindy_lite import discover
 from vidsindy_lite.observation import Observation
-from vidsindy_lite.study import baselines, score
+from vidsindy_lite.refusal import Refused
+from vidsindy_lite.study import baselines, score, spline_ado
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.baselines import BASELINES
 from vidsindy_lite.study.corruption import add_noise, drop_blocks, drop_fibers
 from vidsindy_lite.study.films import FilmResult, FilmTask, detect_near, film, run_film
 from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.tables import by_condition, rate, significant, summary, tabulate
-from vidsindy_lite.study.trials import Trial, grid, run_trial, source_path
+from vidsindy_lite.study.trials import (
+    SOURCES,
+    Comparison,
+    Trial,
+    grid,
+    run_comparison,
+    run_trial,
+    run_trials,
+    trial_path,
+)
 from vidsindy_lite.vision import LearnedDetector, detections, read_video
 
 pytestmark = pytest.mark.slow  # films and discovers
@@ -54,25 +65,34 @@ def filmed():
 # ------------------------------------------------------------------------------------------ films
 
 
-def test_film_result_reports_every_error(filmed):
-    assert filmed.x.shape == (200, 3)
-    assert max(filmed.pixel_error) < 0.1
-    truth = source_path(filmed, "truth")[0]
-    np.testing.assert_array_equal(truth, filmed.truth.trajectory(200)[1])
-    np.testing.assert_allclose(filmed.path_error, np.sqrt(np.mean((filmed.x - truth) ** 2, axis=0)))
-    assert (filmed.path_error < 0.01 * truth.std(axis=0)).all()
-    assert all(camera.is_calibrated for camera in filmed.rig.cameras)
+@pytest.fixture
+def this_film(filmed, monkeypatch):
+    monkeypatch.setattr(experiments, "film_result", lambda task: filmed)
+    return filmed
 
 
-def test_whole_pixels_are_coarser_but_near(filmed):
-    truth = source_path(filmed, "truth")[0]
-    fine, coarse = (
-        np.abs(source_path(filmed, s)[0] - truth).max() for s in ("videos", "whole pixels")
-    )
-    pixel = max(camera.scale for camera in filmed.rig.cameras)
-    assert fine < 0.2 * coarse
-    assert coarse < 2 * pixel
-    assert np.abs(source_path(filmed, "detector")[0] - truth).max() < 4 * pixel
+def from_source(source, **fields):
+    return trial_path(Trial("SprottE", trial=1, source=source, frames=200, **fields))
+
+
+def test_film_result_reports_every_error(this_film):
+    assert this_film.x.shape == (200, 3)
+    assert max(this_film.pixel_error) < 0.1
+    truth = from_source("truth").x
+    np.testing.assert_array_equal(truth, this_film.truth.trajectory(200)[1])
+    error = np.sqrt(np.mean((this_film.x - truth) ** 2, axis=0))
+    np.testing.assert_allclose(this_film.path_error, error)
+    assert (this_film.path_error < 0.01 * truth.std(axis=0)).all()
+    assert all(camera.is_calibrated for camera in this_film.rig.cameras)
+
+
+def test_whole_pixels_of_the_detector_are_coarser_but_near(this_film):
+    truth = from_source("truth").x
+    off = {source: np.abs(from_source(source).x - truth).max() for source in SOURCES}
+    pixel = max(camera.scale for camera in this_film.rig.cameras)
+    assert off["path"] == pytest.approx(off["sub-pixel"], rel=1e-6)
+    assert off["sub-pixel"] < 0.2 * off["detector"]
+    assert off["detector"] < 4 * pixel
 
 
 def test_near_its_target_the_detector_sees_what_it_sees_in_the_whole_frame(tmp_path):
@@ -96,45 +116,67 @@ def test_the_detector_keeps_windows_of_the_frames_not_the_frames(tmp_path):
     assert peak < 60 * 512 * 512 * 3 / 2
 
 
-def test_ours_is_told_the_systematic_errors_of_what_cameras_reconstructed(filmed, monkeypatch):
+def test_gauss_newton_is_told_the_systematic_errors_of_what_cameras_reconstructed(
+    this_film, monkeypatch
+):
     told = {}
 
     def watch(t, x, systematic=None, **_):
         told[source] = systematic
         return SYSTEMS["SprottE"]
 
-    monkeypatch.setattr(experiments, "film_result", lambda task: filmed)
     monkeypatch.setattr(experiments, "discover", watch)
-    for source in experiments.SOURCES:
+    for source in SOURCES:
         run_trial(Trial("SprottE", "blocks", 0.2, 1, source=source, frames=200))
     assert told["truth"] is None
-    np.testing.assert_array_equal(told["videos"], filmed.systematic)
-    assert told["whole pixels"].shape == filmed.systematic.shape
-    rms = {source: np.sqrt((told[source] ** 2).mean()) for source in ("videos", "whole pixels")}
-    assert 0 < 10 * rms["videos"] < rms["whole pixels"]
+    np.testing.assert_array_equal(told["path"], this_film.systematic)
+    rms = {source: np.sqrt((told[source] ** 2).mean()) for source in ("sub-pixel", "detector")}
+    assert 0 < 10 * rms["sub-pixel"] < rms["detector"]
 
 
+@pytest.mark.parametrize("source", ["sub-pixel", "detector"])
 def test_tracks_are_corrupted_each_by_its_own_draw_before_the_cameras_are_learned(
-    filmed, monkeypatch
+    source, this_film, monkeypatch
 ):
     given, observe = [], experiments.observe_tracks
-    monkeypatch.setattr(experiments, "film_result", lambda task: filmed)
-    monkeypatch.setattr(experiments, "discover", lambda t, x, **_: SYSTEMS["SprottE"])
     monkeypatch.setattr(
         experiments,
         "observe_tracks",
         lambda tracks, *rest, **o: given.extend(tracks) or observe(tracks, *rest, **o),
     )
-    run_trial(Trial("SprottE", "noise", 0.02, 1, source="tracks", frames=200))
-    off = [track - true for track, true in zip(given, filmed.tracks, strict=True)]
-    for wrong, true in zip(off, filmed.tracks, strict=True):
+    from_source(source, condition="noise", level=0.02)
+    seen = this_film.detected if source == "detector" else this_film.tracks
+    off = [track - true for track, true in zip(given, seen, strict=True)]
+    for wrong, true in zip(off, seen, strict=True):
         np.testing.assert_allclose(wrong.std(axis=0), 0.02 * true.std(axis=0), rtol=0.2)
     assert abs(np.corrcoef(off[0][:, 0], off[1][:, 0])[0, 1]) < 0.3
+    whole = all((track == np.round(track)).all() for track in given)
+    assert whole == (source == "detector")
 
 
-def test_unknown_source_is_named(filmed):
-    with pytest.raises(ValueError, match="source: must be one of videos, .* got 'memory'"):
-        source_path(filmed, "memory")
+def test_where_cameras_cannot_be_learned_no_method_has_a_law(this_film, monkeypatch):
+    def refuse(tracks, *_, **__):
+        raise Refused("tracks: the motion must determine the cameras", "cameras", tracks)
+
+    monkeypatch.setattr(experiments, "observe_tracks", refuse)
+    trials = grid(["SprottE"], {"clean": (0,)}, [1], experiments.METHODS, 200)
+    results = run_comparison(Comparison(tuple(trials)))
+    assert {result.verdict for result in results} == {"wrong, refused"}
+    assert {result.score.missing for result in results} == {8}
+    assert results[0].warnings == ("tracks: the motion must determine the cameras",)
+    row = summary(tabulate(results), "system").iloc[0]
+    assert (row["exact"], row["no path"], row["wrong, ok"]) == ("0 of 6", 6, None)
+
+
+def test_doubts_of_the_observation_are_doubts_of_the_trial(this_film, monkeypatch):
+    path = experiments.trial_path
+    doubtful = lambda trial: path(trial)._replace(warnings=("the views disagree",))  # noqa: E731
+    trial = Trial("SprottE", trial=1, source="truth", frames=200)
+    assert run_trial(trial).status == "ok"
+    monkeypatch.setattr(experiments, "trial_path", doubtful)
+    result = run_trial(trial)
+    assert (result.status, result.warnings[0]) == ("suspect", "the views disagree")
+    assert run_trial(replace(trial, method="PySINDy")).status is None
 
 
 def test_film_result_is_small_enough_to_store(filmed):
@@ -152,7 +194,7 @@ def test_data_depend_on_system_condition_level_and_number_alone(condition, level
     np.random.default_rng(0).random(100)
     Trial("SprottF", condition, level, 3).corrupt(x)  # what ran before does not matter
     for method in experiments.METHODS:
-        for source in experiments.SOURCES:
+        for source in SOURCES:
             same = replace(trial, method=method, source=source)
             np.testing.assert_array_equal(same.corrupt(x), expected)
     others = [
@@ -173,26 +215,45 @@ def test_noise_of_two_levels_is_not_the_same_noise_scaled():
 @pytest.mark.parametrize(("condition", "level"), CORRUPT)
 def test_every_method_gets_the_same_data(condition, level, no_videos, monkeypatch):
     seen = {}
-    for method in experiments.METHODS:
 
-        def watch(t, x, *_, method=method, **__):
-            seen[method] = (t, x)
-            return SYSTEMS["Lorenz"]
+    def watch(method, t, x, systematic, seed):
+        seen[method] = (t, x)
+        return SYSTEMS["Lorenz"]
 
-        if method == "ours":
-            monkeypatch.setattr(experiments, "discover", watch)
-        else:
-            monkeypatch.setitem(BASELINES, method, watch)
-        run_trial(Trial("Lorenz", condition, level, 1, method, frames=FRAMES))
-    t, x = seen["ours"]
+    def watch_all(t, records, seeds):
+        seen["spline-ADO"] = (t, records[0])
+        return [SimpleNamespace(system=SYSTEMS["Lorenz"]) for _ in records]
+
+    monkeypatch.setattr(experiments, "find_law", watch)
+    monkeypatch.setattr(spline_ado, "spline_ado_batch", watch_all)
+    trial = Trial("Lorenz", condition, level, 1, source="truth", frames=FRAMES)
+    methods = [replace(trial, method=method) for method in experiments.METHODS]
+    results = run_comparison(Comparison(tuple(methods)))
+    assert [result.trial for result in results] == methods
+    t, x = seen["Gauss-Newton"]
     assert set(seen) == set(experiments.METHODS)
     for other_t, other_x in seen.values():
         np.testing.assert_array_equal(other_t, t)
         np.testing.assert_array_equal(other_x, x)
 
 
-def test_methods_are_ours_and_every_baseline():
-    assert ("ours", *BASELINES) == experiments.METHODS
+def test_methods_are_two_optimisers_and_every_baseline():
+    assert ("Gauss-Newton", "spline-ADO", *BASELINES) == experiments.METHODS
+
+
+def test_spline_ado_takes_all_draws_at_once_and_each_by_its_own_seed(no_videos, monkeypatch):
+    given = []
+
+    def watch(t, records, seeds):
+        given.append((len(records), list(seeds)))
+        return [SimpleNamespace(system=SYSTEMS["Lorenz"]) for _ in records]
+
+    monkeypatch.setattr(spline_ado, "spline_ado_batch", watch)
+    levels = {"noise": (0, 0.1)}
+    trials = grid(["Lorenz"], levels, (4, 2), ["spline-ADO"], FRAMES, "truth")
+    results = run_trials(trials, jobs=1)
+    assert given == [(2, [4, 2])] * 2
+    assert [result.trial for result in results] == trials
 
 
 def test_corruption_is_that_of_the_protocol():
@@ -211,8 +272,8 @@ def test_corruption_is_that_of_the_protocol():
 # ----------------------------------------------------------------------------------------- results
 
 
-def test_result_of_ours_equals_a_direct_computation(no_videos):
-    trial = Trial("SprottE", "noise", 0.02, 2, frames=FRAMES)
+def test_result_of_gauss_newton_equals_a_direct_computation(no_videos):
+    trial = Trial("SprottE", "noise", 0.02, 2, source="truth", frames=FRAMES)
     truth = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET)
     t, x = truth.trajectory(FRAMES)
     found = discover(t, trial.corrupt(x))
@@ -232,7 +293,7 @@ def test_result_of_ours_equals_a_direct_computation(no_videos):
 def test_result_of_a_baseline_equals_a_direct_computation(method, no_videos, monkeypatch):
     # That each baseline is what pysindy does when called by hand is in test_baselines.
     monkeypatch.setattr(baselines, "THRESHOLDS", (0.1, 0.3))
-    result = run_trial(Trial("Lorenz", trial=2, method=method, frames=FRAMES))
+    result = run_trial(Trial("Lorenz", trial=2, method=method, source="truth", frames=FRAMES))
     data = simulated(FilmTask("Lorenz", 2, FRAMES))
     options = {} if method == "PySINDy" else {"seed": 2}
     found = BASELINES[method](data.t, data.x, **options)
@@ -244,7 +305,7 @@ def test_result_of_a_baseline_equals_a_direct_computation(method, no_videos, mon
 @pytest.mark.parametrize("method", BASELINES)
 def test_gaps_reach_no_baseline(method, no_videos, monkeypatch):
     monkeypatch.setattr(baselines, "THRESHOLDS", (0.1, 0.3))
-    result = run_trial(Trial("Lorenz", "blocks", 0.5, 0, method, frames=FRAMES))
+    result = run_trial(Trial("Lorenz", "blocks", 0.5, 0, method, "truth", FRAMES))
     assert np.isfinite(result.law.coefficients).all()
     assert result.law.support.any()
 
@@ -254,7 +315,7 @@ def test_gaps_reach_no_baseline(method, no_videos, monkeypatch):
 
 def test_grid_is_every_combination_once_and_zero_is_clean():
     levels = {"noise": (0, 0.1), "blocks": (0, 0.1)}
-    trials = grid(["Lorenz", "SprottF"], levels, range(3), ["ours", "PySINDy"], frames=50)
+    trials = grid(["Lorenz", "SprottF"], levels, range(3), ["Gauss-Newton", "PySINDy"], frames=50)
     assert len(set(trials)) == len(trials) == 2 * 3 * 2 * 3
     assert {(t.condition, t.level) for t in trials} == {
         ("clean", 0.0), ("noise", 0.1), ("blocks", 0.1),
@@ -279,7 +340,8 @@ def trials():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(experiments, "film_result", simulated)
         patch.setattr(experiments, "discover", found)
-        return tabulate(run_trial(t) for t in grid(["Lorenz"], levels, range(3), frames=FRAMES))
+        tasks = grid(["Lorenz"], levels, range(3), frames=FRAMES, source="truth")
+        return tabulate(map(run_trial, tasks))
 
 
 def test_a_row_a_trial(trials):
@@ -303,20 +365,24 @@ def test_clean_trials_stand_in_every_condition(trials):
     assert by_condition(trials[trials.condition == "clean"]).empty
 
 
-def test_summary_is_rates_and_medians_in_the_papers_units(trials):
+def test_summary_counts_by_trial_and_gives_median_and_range(trials):
     rows = summary(trials, ["condition", "level"])
     assert list(rows.level) == [0, 0.2, 0.1, 0.3]
-    row = rows.iloc[1]
-    assert (row["terms found"], row["exact"]) == ("2 of 3", "2 of 3")
-    assert row["false positives"] == 0  # one trial of three moves no median
-    assert row["l2 (e-2)"] == 0.001  # as good as exact, and given as the least that is told apart
+    row, odd = rows.iloc[1], trials[~trials.exact].iloc[0]
+    assert row["exact"] == "2 of 3"
+    assert row["wrong terms"] == f"0 {odd.wrong_terms} 0"  # one trial of three moves no median
+    assert row["l2 (e-2)"] == row["least"] == 0.001  # given as the least that is told apart
+    assert row["most"] == float(f"{100 * odd.l2:.1e}")
     assert row["precision (%)"] == row["recall (%)"] == 100
-    one = summary(trials[~trials.exact], "system").iloc[0]
-    truth, found = SYSTEMS["Lorenz"].shift(REFERENCE_OFFSET), SYSTEMS["Lorenz"]
-    direct = score(found, truth)
-    assert one["l2 (e-2)"] == float(f"{100 * direct.l2:.1e}")
-    assert one["precision (%)"] == pytest.approx(100 * direct.precision, abs=0.005)
-    assert one["recall (%)"] == pytest.approx(100 * direct.recall, abs=0.005)
+    assert (row["exact, doubted"], row["wrong, ok"]) == (None, None)  # the stand-in has no status
+
+
+def test_summary_counts_what_a_status_gets_wrong(trials):
+    told = trials.assign(verdict=[f"{'exact' if e else 'wrong'}, {s}" for e, s in zip(
+        trials.exact, ["ok", "suspect"] * 6, strict=True)])  # fmt: skip
+    row = summary(told, "system").iloc[0]
+    assert row["exact, doubted"] == (told.verdict == "exact, suspect").sum() > 0
+    assert row["wrong, ok"] == (told.verdict == "wrong, ok").sum()
 
 
 def test_digits_that_are_printed(trials):
@@ -332,8 +398,8 @@ def test_digits_that_are_printed(trials):
     [
         ({"system": "Lorentz"}, "system: must be one of Lorenz, .*, got 'Lorentz'"),
         ({"condition": "rain", "level": 0.1}, "condition: must be one of clean, noise"),
-        ({"method": "guess"}, "method: must be one of ours, PySINDy, .*, got 'guess'"),
-        ({"source": "memory"}, "source: must be one of videos"),
+        ({"method": "guess"}, "method: must be one of Gauss-Newton, spline-ADO, .*, got 'guess'"),
+        ({"source": "memory"}, "source: must be one of detector"),
         ({"condition": "noise"}, "level: must be 0 in the condition 'clean' and above 0 in all"),
         ({"level": 0.1}, r"level: .*, got 0.1 in 'clean'"),
         ({"condition": "noise", "level": np.nan}, "level: .*, got nan"),

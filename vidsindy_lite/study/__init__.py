@@ -9,21 +9,23 @@
 * `systems`, `corruption`: the seven benchmarks and other flows; noise and gaps as the paper names
   them, and the errors that measurements have.
 * `films`, `realistic`, `lab`: what is filmed: benchmarks, a scene with trees, a ball on a table.
-* `trials`, `baselines`, `paper_ado`: who finds the law: `discover`, the methods of the paper's
+* `trials`, `baselines`, `spline_ado`: who finds the law: `discover`, the methods of the paper's
   tables, the paper's own optimiser.
 * `asking`: where the law is asked for, and what that does to it.
 * `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
 * `metrics`, `tables`: how good a law is, and many of them side by side.
 * `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
+* `ablation`: our solver without each of its mechanisms.
 * `published`, `audit`: the paper's numbers, and whether they agree with each other.
 * `sweeps`: many tasks in parallel, each computed once.
 * `plots`: a figure a function.
 
 The names below are at hand at once. Modules that need large libraries are imported by name, as in
-``from vidsindy_lite.study import baselines, plots``: `baselines` needs pysindy, `paper_ado` torch,
+``from vidsindy_lite.study import baselines, plots``: `baselines` needs pysindy, `spline_ado` torch,
 `plots` matplotlib and seaborn.
 """
 
+from .ablation import ablation_table, ablations, run_ablation
 from .asking import Asked, law_error
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
@@ -38,4 +40,4 @@ from .scoreboard import run_contest, standings
 from .sweeps import sweep
 from .systems import FLOWS, REFERENCE_OFFSET, SYSTEMS, Benchmark
 from .tables import LEAST, by_condition, rate, significant, summary, tabulate
-from .trials import METHODS, Trial, grid, run_trial
+from .trials import METHODS, Trial, Weights, grid, run_trial, run_trials, run_weights, trial_path

@@ -172,6 +172,29 @@ BASELINES: dict[str, Callable[..., PolynomialSystem]] = {
 """The baselines by the names of the paper's tables; all are called as ``method(t, x)``."""
 
 
+def candidates(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> list[PolynomialSystem]:
+    """The laws of PySINDy and of Model-A with every threshold, on the whole record, each once.
+
+    From these an oracle can choose, which no user has: see `scoreboard`.
+
+    Parameters
+    ----------
+    t, x, degree, seed
+        See `stlsq` and `model_a`.
+    """
+    t, x = check_trajectory(t, x)
+    library = pysindy.PolynomialLibrary(degree=degree).fit(x)
+    segments = _segments((t, x), LONGEST_STEP * typical_step([(t, x)]))
+    found = [
+        _fit(_least_squares(threshold), rows)
+        for rows in (_difference_rows(segments, library), _spline_rows(segments, library, seed))
+        for threshold in THRESHOLDS
+    ]
+    distinct = {coefficients.tobytes(): coefficients for coefficients in found}
+    names = variable_names(x.shape[1])
+    return [PolynomialSystem(names, library.powers_, one) for one in distinct.values()]
+
+
 def _discover(
     t: Floats,
     x: Floats,

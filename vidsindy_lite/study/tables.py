@@ -1,12 +1,12 @@
 """Trials as pandas frames: one row a trial, and from these the rows of the paper's tables.
 
-A mean over five trials hangs on the worst of them, and which trial of a baseline is bad depends on
-the processor. So tables show medians and rates.
+A mean over five trials hangs on the worst of them: tables show medians with the range beside them,
+and count by trial, for all methods alike.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from .trials import CORRUPTIONS, TrialResult
@@ -86,21 +86,38 @@ def summary(trials: DataFrame, by: str | list[str]) -> DataFrame:
     Returns
     -------
     DataFrame
-        One row a group, in the order of their first trials: in how many trials all true terms were
-        found, and in how many these and no others; medians of false positives, relative l2 error,
-        precision and recall. Errors have two significant digits, and one below `LEAST` is given as
-        that: the rest is rounding noise.
+        One row a group, in the order of their first trials: in how many trials the terms are the
+        true ones and no others; wrong terms, missing or false, trial by trial; median and range of
+        the relative l2 error, medians of precision and recall; exact laws that are doubted and
+        wrong ones that are not, None for methods without a status; trials whose cameras could not
+        be learned; processor time of a trial.
+        Errors have two significant digits, and one below `LEAST` is given as that: the rest is
+        rounding noise.
     """
+
+    def percent(value: float) -> float:
+        return significant(100 * max(value, LEAST))
+
+    def count(verdict: str) -> Callable[[Series], int | None]:
+        silent = ("None", "refused")
+        return lambda v: None if v.str.endswith(silent).all() else int((v == verdict).sum())
+
     rows = trials.groupby(by, sort=False).agg(
         **{
-            "terms found": ("terms_found", rate),
             "exact": ("exact", rate),
-            "false positives": ("false_positives", "median"),
-            "l2 (e-2)": ("l2", lambda values: significant(100 * max(values.median(), LEAST))),
+            "wrong terms": ("wrong_terms", lambda values: " ".join(map(str, values))),
+            "l2 (e-2)": ("l2", lambda values: percent(values.median())),
+            "least": ("l2", lambda values: percent(values.min())),
+            "most": ("l2", lambda values: percent(values.max())),
             "precision (%)": ("precision", lambda values: round(100 * values.median(), 2)),
             "recall (%)": ("recall", lambda values: round(100 * values.median(), 2)),
+            "exact, doubted": ("verdict", count("exact, suspect")),
+            "wrong, ok": ("verdict", count("wrong, ok")),
+            "no path": ("verdict", lambda v: int(v.str.endswith("refused").sum())),
+            "seconds": ("seconds", "median"),
         }
     )
+    rows[["exact, doubted", "wrong, ok"]] = rows[["exact, doubted", "wrong, ok"]].astype(object)
     return rows.reset_index()
 
 

@@ -1,18 +1,19 @@
 """The paper's experiments on synthetic videos, as typed trials; protocol of docs/results.md.
 
-A `Trial` takes the path that was recovered from a film (`films`), adds noise or hides rows, and
-gives what is left to one method::
+A `Trial` takes the tracks of a film (`films`), adds noise or hides rows, learns cameras and path
+from what is left, and gives the path to one method::
 
-    results = sweep(run_trial, grid(["Lorenz"], {"noise": (0, 0.1, 0.2)}, range(5)))
+    results = run_trials(grid(["Lorenz"], {"noise": (0, 0.1, 0.2)}, range(5), METHODS))
 
 The number of a trial seeds all that is random in it: scenes, noise, gaps, and the methods that draw
-numbers; ours runs with its default seed. `tables` turns results into rows.
+numbers. All methods get the same data. `tables` turns results into rows.
 """
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,26 +21,28 @@ from ..arrays import Floats
 from ..checks import check_choice
 from ..dynamics import Discovery, PolynomialSystem, discover
 from ..observation import observe_tracks
+from ..refusal import Refused
 from .corruption import add_noise, drop_blocks, drop_fibers
-from .films import TOGETHER, FilmResult, FilmTask, film_result
+from .films import FilmTask, film_result
 from .metrics import Score, pulls, score
-from .systems import SYSTEMS
+from .sweeps import sweep
+from .systems import REFERENCE_OFFSET, SYSTEMS
 
 CORRUPTIONS: dict[str, Callable[[Floats, float, np.random.Generator], Floats]] = {
     "noise": add_noise,
     "blocks": drop_blocks,
     "fibers": drop_fibers,
 }
-"""What a condition does to a path, at a level that is a fraction."""
+"""What a condition does to tracks or to a path, at a level that is a fraction."""
 CONDITIONS = ("clean", *CORRUPTIONS)
-METHODS = ("ours", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
-"""Ours, and the `baselines.BASELINES` by their names there."""
+METHODS = ("Gauss-Newton", "spline-ADO", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
+"""`dynamics.discover`, the paper's own optimiser (`spline_ado`), and `baselines.BASELINES`."""
 RANDOM_METHODS = ("E-SINDy", "WeakSINDy", "Model-A")
 """The baselines that draw random numbers: the number of the trial is their seed."""
-SOURCES = ("videos", "tracks", "whole pixels", "detector", "truth")
-"""Where a path comes from: the tracks; the tracks, which are corrupted in its place before the
-cameras are learned; the tracks rounded to whole pixels; those of the learned detector, rounded to
-whole pixels; or the simulation."""
+SOURCES = ("detector", "sub-pixel", "path", "truth")
+"""Where a path comes from, and what a condition is done to: tracks of the learned detector in
+whole pixels (the paper's regime), and tracks of the background model, before cameras are learned
+from them; the path that the latter give; or the simulation."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,9 @@ class Trial:
     condition : str
         One of `CONDITIONS`.
     level : float
-        Standard deviation of the noise over that of each coordinate (of the path, or of the pixels
-        if the source is "tracks"), or fraction of the rows that are hidden, in each view anew; 0
-        if, and only if, the condition is "clean".
+        Standard deviation of the noise over that of each coordinate (of the pixels, or of the path
+        if that is the source), or fraction of the rows that are hidden, in each view anew; 0 if,
+        and only if, the condition is "clean".
     trial : int
         Number of the repetition, the seed of its film, corruption and method.
     method : str
@@ -75,8 +78,8 @@ class Trial:
     condition: str = "clean"
     level: float = 0.0
     trial: int = 0
-    method: str = "ours"
-    source: str = "videos"
+    method: str = "Gauss-Newton"
+    source: str = "detector"
     frames: int = 1500
 
     def __post_init__(self) -> None:
@@ -122,10 +125,12 @@ class TrialResult:
     score : Score
         Of the law.
     seconds : float
-        From path to law.
+        Of processor time from path to law, the mean of the draws that were run together.
     status : str or None
-        ``"ok"`` or ``"suspect"``; None for the methods that do not say.
+        ``"ok"`` or ``"suspect"``, as `discover_from_tracks` says; None for the methods that do not
+        say; ``"refused"`` for all of them where the cameras could not be learned.
     warnings : tuple of str
+        Of the observation and of the law.
     promised_l2 : float or None
         The relative l2 error that the standard errors of the coefficients amount to; None for the
         methods without standard errors.
@@ -153,8 +158,95 @@ class TrialResult:
         return f"{'exact' if self.score.exact else 'wrong'}, {self.status}"
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """Trials of one system in one condition: several methods and draws, all on the same data.
+
+    Parameters
+    ----------
+    trials : tuple of Trial
+        They differ in method and number alone.
+    """
+
+    trials: tuple[Trial, ...]
+
+
+def run_trials(
+    trials: Iterable[Trial], *, jobs: int = 2, desc: str = "trials"
+) -> list[TrialResult]:
+    """Run many trials, each condition of a system as one task of a `sweep`.
+
+    Parameters
+    ----------
+    trials : iterable of Trial
+    jobs, desc
+        See `sweep`.
+
+    Returns
+    -------
+    list of TrialResult
+        In the order of the trials.
+    """
+    trials = list(trials)
+    groups: dict[Trial, list[Trial]] = {}
+    for trial in trials:
+        groups.setdefault(replace(trial, trial=0, method=METHODS[0]), []).append(trial)
+    tasks = [Comparison(tuple(dict.fromkeys(group))) for group in groups.values()]
+    found = {
+        result.trial: result
+        for results in sweep(run_comparison, tasks, jobs=jobs, desc=desc)
+        for result in results
+    }
+    return [found[trial] for trial in trials]
+
+
 def run_trial(trial: Trial) -> TrialResult:
-    """Corrupt the path of a film and let a method find its law.
+    """Corrupt what was seen of a film and let a method find its law; see `run_trials`."""
+    return run_comparison(Comparison((trial,)))[0]
+
+
+def run_comparison(comparison: Comparison) -> list[TrialResult]:
+    """Make the data of each draw once, and let each method find the laws in all of them.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    list of TrialResult
+        One a trial. All draws of spline-ADO are one computation, whose time they share.
+    """
+    data = {trial.trial: trial_path(trial) for trial in comparison.trials}
+    results: dict[Trial, TrialResult] = {}
+    for method in dict.fromkeys(trial.method for trial in comparison.trials):
+        mine = [trial for trial in comparison.trials if trial.method == method]
+        able = [trial for trial in mine if np.isfinite(data[trial.trial].x).any()]
+        results |= {
+            trial: _refused(trial, data[trial.trial].warnings)
+            for trial in mine
+            if trial not in able
+        }
+        draws = [data[trial.trial] for trial in able]
+        began = time.process_time()
+        laws = _laws(method, draws, [trial.trial for trial in able])
+        seconds = (time.process_time() - began) / max(len(able), 1)
+        for trial, draw, law in zip(able, draws, laws, strict=True):
+            results[trial] = _result(trial, law, seconds, draw.warnings)
+    return [results[trial] for trial in comparison.trials]
+
+
+class TrialPath(NamedTuple):
+    """The path that a trial is about: times (n,), states (n, 3), systematic errors, warnings."""
+
+    t: Floats
+    x: Floats
+    systematic: Floats | None
+    warnings: tuple[str, ...]
+
+
+def trial_path(trial: Trial) -> TrialPath:
+    """The data of a trial: what its condition leaves of what its film gave.
 
     Parameters
     ----------
@@ -162,51 +254,70 @@ def run_trial(trial: Trial) -> TrialResult:
 
     Returns
     -------
-    TrialResult
+    TrialPath
+        In the reference frame; the systematic errors are known where cameras were learned. Where
+        the cameras cannot be learned from the tracks, all rows are missing and the warning says
+        why.
     """
     filmed = film_result(trial.film)
-    x, systematic = _corrupted_path(filmed, trial)
-    began = time.perf_counter()
-    found = find_law(trial.method, filmed.t, x, systematic, trial.trial)
-    seconds = time.perf_counter() - began
-    law = found if isinstance(found, PolynomialSystem) else found.system
-    result = TrialResult(trial, law, score(law, filmed.truth), seconds)
+    if trial.source == "truth":
+        path = filmed.truth.simulate(filmed.t, np.array(filmed.truth.x0))
+        return TrialPath(filmed.t, trial.corrupt(path), None, ())
+    if trial.source == "path":
+        path = trial.corrupt(filmed.x)
+        return TrialPath(filmed.t, path, filmed.systematic, filmed.warnings)
+    whole = trial.source == "detector"
+    tracks = trial.corrupt_each(filmed.detected if whole else filmed.tracks)
+    tracks = [np.round(track) if whole else track for track in tracks]
+    try:
+        seen = observe_tracks(tracks, filmed.rig.uncalibrated(keep=0), filmed.t, lags="synchronous")
+    except Refused as refusal:
+        return TrialPath(filmed.t, np.full(filmed.x.shape, np.nan), None, (str(refusal),))
+    return TrialPath(seen.t, seen.x, seen.systematic, seen.warnings)
+
+
+def _refused(trial: Trial, warnings: tuple[str, ...]) -> TrialResult:
+    """Without cameras there is no path, and no method has a law: one without any term."""
+    truth = SYSTEMS[trial.system].shift(REFERENCE_OFFSET)
+    nothing = replace(truth, coefficients=np.zeros_like(truth.coefficients))
+    return TrialResult(trial, nothing, score(nothing, truth), 0.0, "refused", warnings)
+
+
+def _result(
+    trial: Trial, found: Discovery | PolynomialSystem, seconds: float, doubts: tuple[str, ...]
+) -> TrialResult:
+    truth = SYSTEMS[trial.system].shift(REFERENCE_OFFSET)
     if isinstance(found, PolynomialSystem):
-        return result
-    promised = np.linalg.norm(found.standard_errors) / np.linalg.norm(filmed.truth.coefficients)
-    return replace(
-        result,
-        status=found.status,
-        warnings=found.warnings,
+        return TrialResult(trial, found, score(found, truth), seconds)
+    promised = np.linalg.norm(found.standard_errors) / np.linalg.norm(truth.coefficients)
+    warnings = (*doubts, *found.warnings)
+    return TrialResult(
+        trial,
+        found.system,
+        score(found, truth),
+        seconds,
+        status="suspect" if warnings else "ok",
+        warnings=warnings,
         promised_l2=float(promised),
-        pulls=pulls(found, filmed.truth),
+        pulls=pulls(found, truth),
     )
 
 
-def source_path(filmed: FilmResult, source: str) -> tuple[Floats, Floats | None]:
-    """The path of a film from one of the `SOURCES`, (n, 3), and its systematic errors, if any."""
-    check_choice("source", source, SOURCES)
-    if source == "truth":
-        return filmed.truth.simulate(filmed.t, np.array(filmed.truth.x0)), None
-    if source == "whole pixels":
-        return _reconstructed(filmed, [np.round(track) for track in filmed.tracks])
-    if source == "detector":
-        return _reconstructed(filmed, [np.round(track) for track in filmed.detected])
-    return filmed.x, filmed.systematic
+def _laws(
+    method: str, draws: Sequence[TrialPath], seeds: Sequence[int]
+) -> Sequence[Discovery | PolynomialSystem]:
+    """The law that a method finds in each draw; spline-ADO takes them all at once."""
+    if method != "spline-ADO":
+        return [
+            find_law(method, t, x, systematic, seed)
+            for (t, x, systematic, _), seed in zip(draws, seeds, strict=True)
+        ]
+    if not draws:
+        return []
+    from .spline_ado import spline_ado_batch  # torch takes seconds to import
 
-
-def _corrupted_path(filmed: FilmResult, trial: Trial) -> tuple[Floats, Floats | None]:
-    """The path that a trial is about, and its systematic errors, if any."""
-    if trial.source == "tracks":
-        return _reconstructed(filmed, trial.corrupt_each(filmed.tracks))
-    path, systematic = source_path(filmed, trial.source)
-    return trial.corrupt(path), systematic
-
-
-def _reconstructed(filmed: FilmResult, tracks: list[Floats]) -> tuple[Floats, Floats]:
-    """The path that other tracks of a film give, and its systematic errors."""
-    seen = observe_tracks(tracks, filmed.rig.uncalibrated(keep=0), filmed.t, lags=TOGETHER)
-    return seen.x, seen.systematic
+    found = spline_ado_batch(draws[0].t, [draw.x for draw in draws], seeds=seeds)
+    return [law.system for law in found]
 
 
 def find_law(
@@ -218,11 +329,12 @@ def find_law(
     degree: int = 3,
     origin: str = "learn",
 ) -> Discovery | PolynomialSystem:
-    """What one of the `METHODS` finds.
+    """What Gauss-Newton or one of the baselines finds in one record.
 
-    Only ours can use what is known of systematic errors, and looks for the law's origin.
+    Only Gauss-Newton can use what is known of systematic errors, and looks for the law's origin,
+    which it can be told.
     """
-    if method == "ours":
+    if method == "Gauss-Newton":
         return discover(t, x, degree=degree, systematic=systematic, order=1, origin=origin)
     from .baselines import BASELINES  # pysindy takes seconds to import
 
@@ -230,18 +342,46 @@ def find_law(
     return BASELINES[method](t, x, degree, **options)
 
 
+@dataclass(frozen=True)
+class Weights:
+    """Pairs of weights of spline-ADO to be judged on the data of a trial.
+
+    Parameters
+    ----------
+    trial : Trial
+    pairs : tuple of tuple of float
+        ``physics_weight`` and ``sparsity_weight`` of each, see `spline_ado.SplineADOSettings`.
+    """
+
+    trial: Trial
+    pairs: tuple[tuple[float, float], ...]
+
+
+def run_weights(weights: Weights) -> list[float]:
+    """The misfit of held-out samples with each pair, see `spline_ado.held_out_misfits`."""
+    from .spline_ado import held_out_misfits
+
+    path, number = trial_path(weights.trial), len(weights.pairs)
+    alphas, betas = zip(*weights.pairs, strict=True)
+    seeds = [weights.trial.trial] * number
+    return held_out_misfits(
+        path.t, [path.x] * number, seeds, physics_weight=alphas, sparsity_weight=betas
+    )
+
+
 def grid(
     systems: Iterable[str],
     levels: Mapping[str, Iterable[float]],
     trials: Iterable[int],
-    methods: Iterable[str] = ("ours",),
+    methods: Iterable[str] = METHODS[:1],
     frames: int = 1500,
+    source: str = "detector",
 ) -> list[Trial]:
     """Every combination, trial by trial of each film; a level of 0 is the condition "clean".
 
     Parameters
     ----------
-    systems, trials, methods, frames
+    systems, trials, methods, frames, source
         See `Trial`.
     levels : mapping of str to iterable of float
         Levels of each condition.
@@ -252,6 +392,6 @@ def grid(
         for level in values
     )
     return [
-        Trial(system, condition, level, trial, method, frames=frames)
+        Trial(system, condition, level, trial, method, source, frames)
         for system, trial, (condition, level), method in product(systems, trials, cases, methods)
     ]
