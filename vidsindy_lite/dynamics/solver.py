@@ -19,7 +19,7 @@ from typing import cast
 
 import numpy as np
 from scipy.interpolate import BSpline
-from threadpoolctl import threadpool_limits
+from threadpoolctl import OpenBLASController, threadpool_limits
 from tqdm import tqdm
 
 from ..arrays import Floats
@@ -85,7 +85,10 @@ def one_blas_thread() -> Iterator[None]:
         with _lock:
             limits = _at_work.pop()
             if not _at_work:
+                # Of OpenBLAS only the thread that set a limit may lift it, unless it is released.
+                OpenBLASController.clear_controlling_thread(force=True)
                 limits.restore_original_limits()
+                OpenBLASController.clear_controlling_thread(force=True)
 
 
 def discover(
