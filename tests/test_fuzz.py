@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import read_calibration
-from vidsindy_lite.vision import load_hints, read_tracks
+from vidsindy_lite.vision import load_hints, read_tracks, video_info
 from vidsindy_lite.vision.detector import OnnxDetector
 
 CLEAR = (ValueError, OSError)
@@ -184,8 +184,8 @@ READERS = {
         }.items()
     },
     "net.onnx": (OnnxDetector, texts("\x08\x07", "x")),
-    "film.mkv": (vl.video_info, texts("\x1aE\xdf\xa3", "RIFF", "II*\0")),
-    "film.tif": (vl.video_info, texts("II*\0", "MM\0*")),
+    "film.mkv": (video_info, texts("\x1aE\xdf\xa3", "RIFF", "II*\0")),
+    "film.tif": (video_info, texts("II*\0", "MM\0*")),
 }  # fmt: skip
 
 quick = settings(max_examples=12, suppress_health_check=list(HealthCheck))
