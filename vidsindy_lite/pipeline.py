@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import Floats
 from .cameras import Rig
-from .checks import check_integer, check_positive, check_rows
+from .checks import check_integer, check_positive, check_rows, shown
 from .dynamics import (
     Discovery,
     Form,
@@ -210,7 +210,7 @@ def _read(
 ) -> list[TrackFile]:
     """All tracks, those of files read, v down in the images of the rig."""
     if not isinstance(tracks, list | tuple | np.ndarray):
-        raise ValueError(f"tracks: must be a list of arrays or of files, got {tracks!r:.60}")
+        raise ValueError(f"tracks: must be a list of arrays or of files, got {shown(tracks)}")
     read: list[TrackFile] = []
     for track in tracks:
         if isinstance(track, str | os.PathLike):

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..checks import check_array, check_rows
+from ..checks import check_array, check_rows, shown
 from . import lens
 from .camera import Camera, frozen, turn
 from .geometry import PARALLEL
@@ -125,7 +125,7 @@ class PerspectiveCamera(Camera):
             if given.ndim != 1 or len(given) > len(lens.NAMES) or not np.isfinite(given).all():
                 raise ValueError(
                     f"distortion: must be at most {len(lens.NAMES)} finite numbers, "
-                    f"{', '.join(lens.NAMES)}, got {self.distortion!r:.60}"
+                    f"{', '.join(lens.NAMES)}, got {shown(self.distortion)}"
                 )
             size = lens.USUAL if len(given) <= lens.USUAL else len(lens.NAMES)
             self._set(distortion=frozen(np.pad(given, (0, size - len(given)))))

@@ -88,7 +88,9 @@ def check_trajectories(
     if not isinstance(pairs, list | tuple) or not all(
         isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs
     ):
-        raise ValueError(f"x: must be given, unless t is a list of pairs (t, x), got t = {t!r:.60}")
+        raise ValueError(
+            f"x: must be given, unless t is a list of pairs (t, x), got t = {shown(t)}"
+        )
     trajectories = []
     for i, pair in enumerate(pairs):
         try:

@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import comb as binomial
 
 from ..arrays import Bools, Floats, Ints
-from ..checks import check_array, check_instance, check_integer, check_number, check_times
+from ..checks import check_array, check_instance, check_integer, check_number, check_times, shown
 
 # --------------------------------------------------------------------------------------------------
 # The library: monomials of the state, and what a shift of the origin does to them (paper: Eq. 10).
@@ -281,7 +281,7 @@ class Input:
             If the name is none, times or values are not such, or times of trajectories overlap.
         """
         if not isinstance(name, str) or not name.isidentifier():
-            raise ValueError(f"inputs: must be named like variables, such as u, got {name!r:.60}")
+            raise ValueError(f"inputs: must be named like variables, such as u, got {shown(name)}")
         several = isinstance(t, list | tuple) and any(np.ndim(part) for part in t)
         times = cast("Sequence[Floats]", t if several else [t])
         runs = cast("Sequence[Floats]", values if several else [values])
@@ -416,12 +416,12 @@ class Library:
         """
         if not isinstance(functions, Mapping) or not functions:
             raise ValueError(
-                f"functions: must map names to functions of the variables, got {functions!r:.60}"
+                f"functions: must map names to functions of the variables, got {shown(functions)}"
             )
         for name, rule in functions.items():
             if not isinstance(name, str) or not name.strip() or not callable(rule):
                 raise ValueError(
-                    f"functions: must map names to functions, got {name!r:.60}: {rule!r:.60}"
+                    f"functions: must map names to functions, got {shown(name)}: {shown(rule)}"
                 )
         return cls(functions=tuple(functions.items()))
 
@@ -453,7 +453,7 @@ class Library:
         >>> vl.discover(t, x, library=library, order=2)  # x'' = -x - x^3 - 0.2 vx + 0.5 u
         """
         if not isinstance(values, Mapping) or not values:
-            raise ValueError(f"inputs: must map names to values at t, got {values!r:.60}")
+            raise ValueError(f"inputs: must map names to values at t, got {shown(values)}")
         return cls.terms({name: Input.of(name, t, given) for name, given in values.items()})
 
     def where(self, equations: Mapping[str, Mapping[str, float | None]]) -> Library:
@@ -486,7 +486,7 @@ class Library:
         if not given or not all(isinstance(terms, Mapping) for _, terms in given):
             raise ValueError(
                 "equations: must give variables what is known of their terms, e.g. "
-                f"{{'x': {{'y': 10, 'z': 0}}}}, got {equations!r:.60}"
+                f"{{'x': {{'y': 10, 'z': 0}}}}, got {shown(equations)}"
             )
         for name, terms in given:
             checked = {

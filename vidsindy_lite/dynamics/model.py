@@ -16,7 +16,15 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from ..arrays import Bools, Floats, Ints
-from ..checks import check_array, check_integer, check_number, check_times, check_vector
+from ..checks import (
+    check_array,
+    check_instance,
+    check_integer,
+    check_number,
+    check_times,
+    check_vector,
+    shown,
+)
 from .library import (
     CLOCK,
     OTHERS,
@@ -253,11 +261,16 @@ class PolynomialSystem:
         named = all(isinstance(name, str) and name.isidentifier() for name in names)
         if not names or not named or len(set(names)) != len(names):
             raise ValueError(
-                f"names: must be distinct names such as x or x1, at least one, got {self.names!r}"
+                "names: must be distinct names such as x or x1, at least one, "
+                f"got {shown(self.names)}"
             )
         powers = check_array("exponents", self.exponents)
         coefficients = check_array("coefficients", self.coefficients).copy()
-        width = len(names) + len(self.functions)
+        functions = tuple(self.functions) if isinstance(self.functions, Iterable) else (None,)
+        # A law that is read from a file has the names of its functions at first.
+        if not all(isinstance(function, Function | str) for function in functions):
+            raise ValueError(f"functions: must be of a Library, got {shown(self.functions)}")
+        width = len(names) + len(functions)
         if powers.ndim != 2 or powers.shape[1] not in (width, width + len(names)):
             raise ValueError(f"exponents: must have shape (l, {width}), got shape {powers.shape}")
         whole = np.isfinite(powers) & (powers >= 0) & (powers == np.rint(powers))
@@ -306,9 +319,10 @@ class PolynomialSystem:
         if not given or not all(isinstance(terms, Mapping) for terms in given):
             raise ValueError(
                 "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
-                f"'y': {{'x': 1}}}}, got {equations!r:.60}"
+                f"'y': {{'x': 1}}}}, got {shown(equations)}"
             )
-        names, held = tuple(equations), library or Library()
+        names, held = tuple(equations), Library() if library is None else library
+        check_instance("library", held, Library)
         states = names[:-1] if CLOCK in names[-1:] and held.timed(names[:-1]) else names
         m = len(states) // 2
         measured = m if m and states[m:] == velocity_names(states[:m]) else len(states)
@@ -455,7 +469,7 @@ class PolynomialSystem:
         moves = all(function.of_time for function in self.functions)
         if shift[self.states :].any() or (shift.any() and not moves):
             raise ValueError(
-                f"offset: must be zero for a law with functions of the state, got {offset!r:.60}"
+                f"offset: must be zero for a law with functions of the state, got {shown(offset)}"
             )
         exponents = closure(self.exponents)
         rows = {tuple(e): row for row, e in enumerate(exponents)}
@@ -470,7 +484,7 @@ class PolynomialSystem:
         slopes &= exponents.sum(axis=1) == 1
         below = 1 - shifted[slopes].sum(axis=0)
         if (np.abs(below) <= 1e-13).any():
-            raise ValueError(f"offset: no denominator may vanish there, got {offset!r:.60}")
+            raise ValueError(f"offset: no denominator may vanish there, got {shown(offset)}")
         shifted[slopes] = 0.0
         return replace(self, exponents=exponents, coefficients=shifted / below)
 

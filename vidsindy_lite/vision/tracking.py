@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays import Floats, Image
-from ..checks import check_instance
+from ..checks import check_instance, shown
 from .background import BackgroundModel, sample_frames, track_blobs, view_distances, whole_views
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
@@ -128,7 +128,7 @@ def track(
     if target is not None:
         check_instance("target", target, Hint)
         if detector != "auto":
-            raise ValueError(f"target: may be given for detector='auto', got {detector!r:.60}")
+            raise ValueError(f"target: may be given for detector='auto', got {shown(detector)}")
     found = _track(path, detector, target)
     lacking, stated = found.warnings + _lost(found), video_info(path).frames
     if len(found.pixels) != stated:
@@ -197,7 +197,7 @@ def check_detector(name: str | os.PathLike) -> None:
     if not isinstance(name, str | os.PathLike) or Path(name).suffix.lower() != ".onnx":
         raise ValueError(
             f"detector: must be one of {', '.join(DETECTORS)}, or the name of an .onnx file, "
-            f"got {name!r:.60}"
+            f"got {shown(name)}"
         )
     if not Path(name).is_file():
         raise FileNotFoundError(f"detector: no such file, got '{name}'")
