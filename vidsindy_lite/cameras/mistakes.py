@@ -73,7 +73,7 @@ class Mistake:
         return float(np.linalg.norm(least)), behind - behind[0]
 
     def left(self, rig: Rig, lags: Floats) -> float:
-        """Pixels by which the worst view disagrees near these lags; rigs may be a little off."""
+        """Pixels by which the worst view disagrees near these lags."""
         return nearest(self.tracks, rig, self.rates, lags, self.clocks)
 
 
@@ -121,13 +121,11 @@ def _found(
     for kind in (_views, _rates, _dropped):
         found = [(*one.paired(unknowns), one) for one in kind(none, rig, unknowns, names)]
         found = sorted((one for one in found if BETTER * one[0] < before), key=lambda one: one[0])
-        tried = [(one.left(rig, lags), k, lags) for k, (_, lags, one) in enumerate(found[:_TRIED])]
-        missed, k, lags = min(tried, key=lambda one: one[:2], default=(np.inf, 0, lags))
-        if BETTER * missed < left:
-            one = found[k][2]
-            told = learn_lags(one.tracks, rig, one.rates, lags, one.clocks)
-            if told.residual <= DISAGREEMENT:
-                return replace(one, lags=told, before=left)
+        for _, best, one in found[:_TRIED]:
+            if BETTER * one.left(rig, best) < left:
+                told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
+                if told.residual <= DISAGREEMENT:
+                    return replace(one, lags=told, before=left)
     return None
 
 

@@ -124,9 +124,9 @@ def nearest(
     lags: Floats,
     clocks: Sequence[ArrayLike] | None,
 ) -> float:
-    """Residual in pixels at the best lags near given ones, of cameras that may turn and zoom."""
+    """Residual in pixels at the best lags near given ones."""
     with tqdm(disable=True) as bar:
-        found = _Videos.of(tracks, rig, rates, clocks, bar).fitted(lags, rough=True, loose=True)
+        found = _Videos.of(tracks, rig, rates, clocks, bar).fitted(lags, rough=True)
     return np.inf if found is None else found.score
 
 
