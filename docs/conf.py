@@ -18,6 +18,7 @@ CONTENTS = """
 :caption: The book
 
 docs/guide
+docs/formats
 docs/results
 docs/paper
 docs/claims

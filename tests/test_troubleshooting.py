@@ -11,6 +11,7 @@ from phones import write_at
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
+from vidsindy_lite import study
 from vidsindy_lite.companion.report import check_folder_is_free
 from vidsindy_lite.repository import PACKAGE
 from vidsindy_lite.study import add_noise
@@ -153,7 +154,17 @@ def jumping(studio):
 
 
 def occupied(studio):
-    return told(check_folder_is_free, studio.folder)
+    (studio.folder / "occupied").mkdir(exist_ok=True)
+    (studio.folder / "occupied" / "rig.toml").write_text("")
+    return told(check_folder_is_free, studio.folder / "occupied")
+
+
+def swapped(studio):
+    """Tracks in another order than the cameras."""
+    t, x = study.SYSTEMS["Lorenz"].trajectory(200)
+    rig = vl.Rig.around(x)
+    tracks = [camera.project(x) for camera in rig.cameras]
+    return vl.observe_tracks([tracks[0], tracks[2], tracks[1]], rig, t).warnings[0]
 
 
 def dropping(studio):
@@ -209,7 +220,8 @@ TROUBLES = {
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),
     "sample faster": lambda studio: oscillation(1.3, 200, 0.02),
     "from a drive or a force that nobody named": driven,
-    "must be a new folder or hold an earlier report": occupied,
+    "must hold no files of the names": occupied,
+    "explains it": swapped,
 }
 
 

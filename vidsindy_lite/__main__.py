@@ -18,12 +18,13 @@ from .study import SYSTEMS
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     typed: dict[str, str] = {}
+    kept = _KEPT
     try:
         options = _parser().parse_args(arguments)
-        typed = options.typed
+        typed, kept = options.typed, options.kept
         return options.command(options)
     except KeyboardInterrupt:
-        print("\nstopped; nothing was written", file=sys.stderr)
+        print(f"\nstopped; {kept}", file=sys.stderr)
         return 130
     except (ValueError, OSError) as error:
         name, colon, rest = str(error).partition(":")
@@ -52,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
         )
         for option, settings in command.options.items():
             one.add_argument(option, **settings)
-        one.set_defaults(command=command.work, typed=command.typed)
+        one.set_defaults(command=command.work, typed=command.typed, kept=command.kept)
     return parser
 
 
@@ -66,7 +67,7 @@ def _discover(options: argparse.Namespace) -> int:
     moves. They may start at different times, differ in length and in frame rate; the first one is
     the clock. A video may be a file, a folder of images, or a pattern of their names in quotes.
     Who has tracked the target elsewhere gives --tracks in place of videos: text files as DLTdv,
-    Tracker, DeepLabCut and this command write them.
+    Argus, Tracker, Kinovea, TrackMate, DeepLabCut, SLEAP, detectors and this command write them.
 
     examples:
       python -m vidsindy_lite rig-template --output rig.toml           and fill it in
@@ -76,8 +77,8 @@ def _discover(options: argparse.Namespace) -> int:
       python -m vidsindy_lite discover --tracks a.csv b.csv c.csv --rig rig.toml --fps 30
 
     The folder then holds report.html (one page, images included), result.json (the same as data),
-    tracks.csv and rig.toml (the learned cameras). If tracks were found but no law, it holds a
-    picture of them; if anything else fails, what it held before.
+    tracks.csv and rig.toml (the learned cameras), beside whatever else is there. If tracks were
+    found but no law, it holds a picture of them; if anything else fails, what it held before.
 
     exit status: 0 if there is no reason to doubt the law, 1 if there is (the report says which),
     2 if there is no law; the error says why.
@@ -90,6 +91,8 @@ def _discover(options: argparse.Namespace) -> int:
 
     if bool(options.videos) == bool(options.tracks):
         raise ValueError("videos: give either one video per camera, or --tracks")
+    if options.individual is not None and not options.tracks:
+        raise ValueError(f"individual: must be given with --tracks, got {options.individual!r}")
     if options.tracks and options.targets != 1:
         raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
@@ -131,7 +134,8 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
     shared |= {"lags": options.lag, "progress": True}
     if options.tracks:
-        return discover_from_tracks(options.tracks, rig, fps=options.fps, **shared)
+        shared |= {"individual": options.individual, "fps": options.fps}
+        return discover_from_tracks(options.tracks, rig, **shared)
     t = None
     if options.fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
@@ -181,26 +185,15 @@ def _rig_import(options: argparse.Namespace) -> int:
     return _write(rig.text(), options.output)
 
 
-def _rig_export(options: argparse.Namespace) -> int:
-    """Write a rig as .toml (Anipose, Pose2Sim), .yaml, .xml, .json (OpenCV), .npz, or .csv (DLT).
-
-    examples:
-      python -m vidsindy_lite rig-export report/rig.toml calibration.toml
-    """
-    from .cameras import Rig, write_calibration
-
-    write_calibration(Rig.load(options.rig), options.file)
-    return 0
-
-
 def _write(text: str, output: str | None) -> int:
     """Text for the terminal, or in UTF-8 for a file."""
     from .checks import check_output
+    from .repository import write_file
 
     if output is None:
         print(text, end="")
     else:
-        check_output("output", output).write_text(text, encoding="utf-8")
+        write_file(check_output("output", output), text.encode())
     return 0
 
 
@@ -290,16 +283,21 @@ def _compare(options: argparse.Namespace) -> int:
 # ------------------------------------------------------------------------------------ their options
 
 
+_KEPT = "files are as they were"  # as they are written in one step, at the end
+
+
 class _Command(NamedTuple):
     """What a command does, a line on it, and what `add_argument` takes for each of its options.
 
-    What messages call by its name in the package, ``typed`` calls as the user does.
+    What messages call by its name in the package, ``typed`` calls as the user does; ``kept`` says
+    what there is after an interruption.
     """
 
     work: Callable[[argparse.Namespace], int]
     help: str
     options: dict[str, dict[str, Any]]
     typed: dict[str, str] = {}
+    kept: str = _KEPT
 
 
 COMMANDS = {
@@ -308,6 +306,9 @@ COMMANDS = {
         "--tracks": words(
             "FILE", "text files of tracks, one per camera of the rig or one of all, in place of "
             "videos", nargs="+"
+        ),
+        "--individual": words(
+            "NAME", "which of several targets of these files, by its name there"
         ),
         "--rig": words("FILE", "where the cameras stand", required=True),
         "--out": words("DIR", "folder of the report (default: report)", default="report"),
@@ -372,10 +373,6 @@ COMMANDS = {
         "--size": words("WxH", "of the videos in pixels, if the files do not say", type=as_size),
         "--output": words("FILE", "write it there, in UTF-8 (default: print it)"),
     }, {"image_size": "size", "paths": "files"}),
-    "rig-export": _Command(_rig_export, "a rig file as a calibration for other tools", {
-        "rig": words("RIG", "a rig file of perspective cameras, all calibrated"),
-        "file": words("FILE", "to write: .toml, .yaml, .xml, .json, .npz or .csv"),
-    }, {"path": "file"}),
     "run": _Command(_run, "execute the notebooks, regenerate figures and tables", {
         "notebooks": words("NOTEBOOK", "number, name or path (default: all)", nargs="*"),
         "--profile": choice("full", ("full", "quick"), "size (default: full)"),
@@ -383,7 +380,7 @@ COMMANDS = {
             "action": "store_true",
             "help": "execute also what has been executed here with the same code",
         },
-    }),
+    }, kept="notebooks that have ended are kept, and results in build/cache: start it again"),
     "demo": _Command(_demo, "from three videos to the first equation, in a minute", {
         "--system": choice("Lorenz", tuple(SYSTEMS), "default: Lorenz"),
         "--frames": count(500, "per camera (default: 500)"),
@@ -393,7 +390,7 @@ COMMANDS = {
         "--seed": count(0, "of weights and frames (default: 0)"),
         "--steps": count(None, "batches of 16 frames (default: as shipped)"),
         "--output": words("FILE", "weights (default: those of the package)"),
-    }),
+    }, kept="the last checkpoint is kept: start it again to go on"),
     "compare": _Command(_compare, "two folders of figures, by their numbers", {
         "committed": words("COMMITTED", "a folder like figures/"),
         "regenerated": words("REGENERATED", "the same from another run"),

@@ -10,7 +10,7 @@ import numpy as np
 
 from .arrays import Floats
 from .cameras import Clock, Rig
-from .checks import check_path, check_vector
+from .checks import check_path, check_vector, shown
 from .vision import Hint, VideoInfo, video_info
 
 
@@ -38,7 +38,7 @@ def check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str])
 def check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
     """One file name per camera."""
     if isinstance(paths, str) or not isinstance(paths, Iterable):
-        raise ValueError(f"paths: must be a list of files, one per camera, got {paths!r:.60}")
+        raise ValueError(f"paths: must be a list of files, one per camera, got {shown(paths)}")
     files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
     if len(files) != len(rig.cameras):
         raise ValueError(
@@ -61,7 +61,7 @@ def check_several(
     if detector != "auto" or any(hints or ()):
         raise ValueError(
             f"targets: {targets} are found by detector='auto' alone, without hints, got "
-            f"detector={detector!r:.60}, hints={hints!r:.60}"
+            f"detector={shown(detector)}, hints={shown(hints)}"
         )
 
 
@@ -86,5 +86,5 @@ def check_hints(
     if hints is None:
         return [None] * len(files)
     if not isinstance(hints, Sequence) or len(hints) != len(files):
-        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {hints!r:.60}")
+        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {shown(hints)}")
     return hints

@@ -5,12 +5,15 @@ Booleans are no numbers here, and text is none even where numpy would read it as
 
 from __future__ import annotations
 
-import math
 import os
+import struct
+import zlib
 from collections.abc import Iterable, Sequence
+from datetime import date, timedelta
 from fractions import Fraction
 from numbers import Integral, Real
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,11 +26,21 @@ FARTHEST = 1e100
 """Largest value of a state, for the same reason."""
 LARGEST_SIDE = 32768
 """Pixels of a camera's image, in width and in height: no sensor has more."""
+LARGEST_INTEGER = 2**63 - 1
+"""Larger ones are none to numpy and to most files."""
+MALFORMED = (
+    ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError, ImportError,
+    EOFError, MemoryError, SyntaxError, SystemError, BadZipFile, zlib.error, struct.error,
+)  # fmt: skip
+"""What is raised where something from outside is turned into values, and is malformed."""
 
 
 def shown(value: object) -> str:
     """A value as a message shows it: the start of it, in one line."""
-    return " ".join(repr(value).split())[:60]
+    try:
+        return " ".join(repr(value).split())[:60]
+    except MALFORMED:  # such as an integer of 5,000 digits
+        return f"a value of type {type(value).__name__}"
 
 
 def check_instance(name: str, value: object, kind: type) -> None:
@@ -58,7 +71,7 @@ def check_output(name: str, value: str | os.PathLike) -> Path:
 
 def check_choice(name: str, value: str, known: Iterable[str]) -> None:
     """One of the known names."""
-    if value not in known:
+    if not isinstance(value, str) or value not in known:
         raise ValueError(f"{name}: must be one of {', '.join(known)}, got {shown(value)}")
 
 
@@ -66,14 +79,20 @@ def check_integer(name: str, value: int, least: int = 0) -> int:
     """An integer of at least ``least``; with the default, a seed or an index."""
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise ValueError(f"{name}: must be an integer of at least {least}, got {shown(value)}")
+    if value > LARGEST_INTEGER:
+        raise ValueError(f"{name}: must be an integer below 2^63, got {shown(value)}")
     return int(value)
 
 
 def check_number(name: str, value: float | Fraction) -> float:
     """A finite real number."""
-    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
+    try:
+        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else np.nan
+    except OverflowError:
+        number = np.inf
+    if not np.isfinite(number):
         raise ValueError(f"{name}: must be a finite number, got {shown(value)}")
-    return float(value)
+    return number
 
 
 def check_positive(name: str, value: float) -> float:
@@ -85,13 +104,24 @@ def check_positive(name: str, value: float) -> float:
 
 def check_array(name: str, values: ArrayLike) -> Floats:
     """Real numbers as an array of floats, in which the masked entries of a masked array are NaN."""
+    advice = ""
     try:
         array = values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+        first = next(array.flat, None) if array.dtype.kind in "MmO" else None
+        if isinstance(first, np.datetime64 | date):
+            advice = (
+                ": give seconds since the first: with t = np.array(t, 'datetime64[us]'), "
+                "(t - t[0]) / np.timedelta64(1, 's')"
+            )
+        elif isinstance(first, np.timedelta64 | timedelta):
+            advice = ": give seconds, np.array(t, 'timedelta64[us]') / np.timedelta64(1, 's')"
         if array.dtype.kind not in "biufO":
             raise TypeError
         return np.ma.filled(array.astype(float, copy=False), np.nan)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: must be an array of real numbers, got {shown(values)}") from None
+    except MALFORMED:
+        raise ValueError(
+            f"{name}: must be an array of real numbers, got {shown(values)}{advice}"
+        ) from None
 
 
 def check_vector(name: str, values: ArrayLike, size: int) -> Floats:
@@ -142,9 +172,11 @@ def check_times(t: ArrayLike) -> Floats:
         raise ValueError(f"t: must be finite, got {t[~np.isfinite(t)][0]}")
     if (np.diff(t) <= 0).any():
         row = int(np.flatnonzero(np.diff(t) <= 0)[0])
-        raise ValueError(
-            f"t: must increase, got t[{row}] = {t[row]:g} before t[{row + 1}] = {t[row + 1]:g}"
-        )
+        digits = 17 if t[row] == t[row + 1] else 6
+        pair = f"t[{row}] = {t[row]:.{digits}g} before t[{row + 1}] = {t[row + 1]:.{digits}g}"
+        single = digits == 17 and np.array_equal(t, t.astype(np.float32))
+        advice = ", equal in single precision: give t in float64, or from zero" if single else ""
+        raise ValueError(f"t: must increase, got {pair}{advice}")
     return t
 
 

@@ -23,6 +23,7 @@ from .cameras import (
     check_learnable,
     disagreement,
     explain,
+    find_mistake,
     identify,
     learn_cameras,
     learn_lags,
@@ -203,7 +204,7 @@ def observe_tracks(
         See `observe`.
     lags : sequence of float or "synchronous", optional
         See `observe`. Synchronous are cameras that share a trigger: no other lags are tried, which
-        takes most of the time where tracks are noisy.
+        takes most of the time where tracks are noisy, nor what mistake would make views agree.
     t : array_like, shape (n_0,), or a sequence of such
         Time of each frame of the first track, increasing; all cameras then have its frame rate. Or
         the times of each track by its own clock, if rates differ or frames are missing.
@@ -250,12 +251,21 @@ def _observed(
             begun = np.zeros(len(raw)) if lags is None else lags
             rig = posed(align(raw, begun, clock.rates, clock.uneven), rig, lags is not None)
             doubts = (*rig.warnings, *doubts)
+    first: list[str] = []
+    start = lags
+    if rig.is_measured and not synchronous:
+        begun = np.zeros(len(raw)) if lags is None else lags
+        mistake = find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
+        if mistake is not None:  # and is put right, as nothing can be learned with it
+            first, raw = [mistake.text], mistake.tracks
+            clock = clock.mended(mistake.rates, mistake.clocks)
+            lags, start = None, mistake.lags.frames
     with refusing("lags", raw, names):
         if synchronous:
             nothing = np.zeros(len(raw))
             best = Lags(nothing, clock.rates, nothing, 0.0, clocks=tuple(clock.uneven or ()))
         else:
-            start, uneven = lags, clock.uneven
+            uneven = clock.uneven
             best = learn_lags(raw, rig, clock.rates, start=start, clocks=uneven, progress=progress)
         if lags is not None:
             _refuse_wrong(lags, best)
@@ -279,6 +289,7 @@ def _observed(
         x=x,
         systematic=np.concatenate((learning, trails)),
         warnings=(
+            *first,
             *_rig_warnings(missed, tracks, rig, learned, names, used, best),
             *learned.warnings,
             *doubts,

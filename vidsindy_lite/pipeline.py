@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import Floats
 from .cameras import Rig
-from .checks import check_integer, check_positive, check_rows
+from .checks import check_integer, check_positive, check_rows, shown
 from .dynamics import (
     Discovery,
     Form,
@@ -120,6 +120,7 @@ def discover_from_tracks(
     t: ArrayLike | Sequence[ArrayLike] | None = None,
     *,
     fps: float | None = None,
+    individual: str | None = None,
     lags: Sequence[float] | None = None,
     degree: int | None = None,
     library: Library | None = None,
@@ -137,13 +138,16 @@ def discover_from_tracks(
     ----------
     tracks : sequence of array_like, shape (n_i, 2), or of path
         Pixels of the target, one track per camera of the rig, NaN where it was not seen; or text
-        files of them, as DLTdv, Tracker (OSP), DeepLabCut and this package write them. A file may
-        hold the tracks of several cameras.
+        files of them, as DLTdv, Argus, Tracker (OSP), Kinovea, TrackMate, DeepLabCut, SLEAP,
+        detectors of boxes and this package write them. A file may hold the tracks of several
+        cameras.
     rig, t, lags
         See `observe_tracks`.
     fps : float, optional
         Frames of every camera in one unit of time, in place of ``t``. Without either, files have
         to state the times of their rows.
+    individual : str, optional
+        Which of several targets of the files, by its name there; see `read_tracks`.
     degree, library, order, origin, orientation, seed, progress
         See `discover_from_videos`.
 
@@ -158,7 +162,7 @@ def discover_from_tracks(
         `observe_tracks` and `discover` do.
     """
     how = _checked(degree, library, order, origin, orientation, seed) | {"progress": progress}
-    read = _read(tracks)
+    read = _read(tracks, rig, individual)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
     times, doubts = _times(read, t, fps)
     seen = observe_tracks(pixels, rig, times, lags=lags, names=names, progress=progress)
@@ -201,19 +205,23 @@ def _driven(law: PolynomialSystem) -> str:
     return "; ".join([alone] * bool(free) + said)
 
 
-def _read(tracks: Sequence[ArrayLike | str | os.PathLike]) -> list[TrackFile]:
-    """All tracks, those of files read."""
+def _read(
+    tracks: Sequence[ArrayLike | str | os.PathLike], rig: Rig, individual: str | None
+) -> list[TrackFile]:
+    """All tracks, those of files read, v down in the images of the rig."""
     if not isinstance(tracks, list | tuple | np.ndarray):
-        raise ValueError(f"tracks: must be a list of arrays or of files, got {tracks!r:.60}")
+        raise ValueError(f"tracks: must be a list of arrays or of files, got {shown(tracks)}")
     read: list[TrackFile] = []
     for track in tracks:
         if isinstance(track, str | os.PathLike):
-            read += read_tracks(track)
+            read += read_tracks(track, individual)
         else:
             name = f"tracks[{len(read)}]"
             read.append(TrackFile(name, check_rows(name, cast("ArrayLike", track), 2), None))
     # Files that count frames from the start of their videos may begin at different ones.
     first = min((track.start for track in read), default=0)
+    for i, (track, camera) in enumerate(zip(read, rig.cameras, strict=False)):
+        read[i] = replace(track, pixels=track.downwards(camera.image_size[1]))
     return [replace(track, pixels=_later(track.pixels, track.start - first)) for track in read]
 
 

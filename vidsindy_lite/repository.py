@@ -1,8 +1,10 @@
 """The repository: where it is, files written in one step, and one hash of the code of results."""
 
 import ast
+import glob
 import hashlib
 import os
+from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -43,13 +45,46 @@ def repository_root(start: str | os.PathLike | None = None) -> Path:
 
 def write_file(path: Path, content: bytes) -> None:
     """Replace a file in one step, so an interrupted run leaves the old one or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    write_files({path: content})
+
+
+def write_files(contents: Mapping[Path, bytes]) -> None:
+    """Replace files when all are written beside them; a link is followed, a device written to.
+
+    A full disk or a killed run leaves the old ones. What a killed run of this machine has left
+    beside them is removed.
+    """
+    beside: dict[Path, Path] = {}
     try:
-        beside.write_bytes(content)
-        beside.replace(path)
+        for given, content in contents.items():
+            path = given.resolve()  # a link stays one
+            if path.exists() and not path.is_file():  # such as /dev/stdout
+                path.write_bytes(content)
+                continue
+            path.parent.mkdir(parents=True, exist_ok=True)
+            for left in path.parent.glob(f".{glob.escape(path.name)}.*"):
+                if left.suffix[1:].isdecimal() and not _is_running(int(left.suffix[1:])):
+                    left.unlink(missing_ok=True)
+            beside[path] = path.with_name(f".{path.name}.{os.getpid()}")
+            beside[path].write_bytes(content)
+            if path.exists():
+                beside[path].chmod(path.stat().st_mode)
+        for path, new in beside.items():
+            new.replace(path)
     finally:
-        beside.unlink(missing_ok=True)
+        for new in beside.values():
+            new.unlink(missing_ok=True)
+
+
+def _is_running(process: int) -> bool:
+    """Whether a process of this number is there; where that cannot be told, it is."""
+    try:
+        os.kill(process, 0) if os.name == "posix" else None
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        return True
+    return True
 
 
 def library_versions() -> list[str]:

@@ -3,7 +3,8 @@
 import base64
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -87,6 +88,50 @@ def decoded(tree: Any, build: Callable[[str, dict[str, Any]], Any]) -> Any:
         return dict(decoded(tree["items"], build))
     parts = {name: decoded(part, build) for name, part in tree.items() if name != "type"}
     return BSpline(parts["t"], parts["c"], parts["k"]) if kind == "spline" else build(kind, parts)
+
+
+def built(kind: type, parts: dict[str, Any], known: dict[str, Any]) -> Any:
+    """A dataclass of its fields, if each is of the type that its annotation states.
+
+    Parameters
+    ----------
+    kind : type
+    parts : dict
+        Values of all fields that have no default, by name.
+    known : dict of str to type
+        What annotations may name besides what the module of `kind` does.
+
+    Raises
+    ------
+    ValueError
+        If a field is missing, of another type, or none.
+    """
+    hints = get_type_hints(kind, localns=known)
+    names = [field.name for field in fields(kind)]
+    strange = next((name for name in parts if name not in names), None)
+    if strange is not None:
+        raise ValueError(f"{kind.__name__} must have no {strange!r:.40}")
+    for name, value in parts.items():
+        if not _is_of(value, hints[name]):
+            wanted = getattr(hints[name], "__name__", hints[name])
+            raise ValueError(f"{name} of {kind.__name__} must be {wanted}, got {value!r:.40}")
+    return kind(**parts)
+
+
+def _is_of(value: Any, hint: Any) -> bool:
+    """Whether a value is of the type of an annotation, those of its items included."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if hint is Any:
+        return True
+    if origin in (Union, UnionType):
+        return any(_is_of(value, one) for one in inner)
+    if origin is tuple:
+        return isinstance(value, tuple) and all(_is_of(item, inner[0]) for item in value)
+    if hint in (float, int):
+        return isinstance(value, hint | int) and not isinstance(value, bool)
+    if origin is np.ndarray:
+        return isinstance(value, np.ndarray)
+    return value is None if hint is NoneType else isinstance(value, origin or hint)
 
 
 def as_json(value: object, name: str, digits: int = 17) -> Any:

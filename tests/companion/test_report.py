@@ -142,51 +142,85 @@ def test_the_learned_rig_is_there(page, case):
     assert {path.name for path in page.parent.iterdir()} == set(FILES)
 
 
-def test_an_earlier_report_is_replaced(case, page, tmp_path):
-    folder = tmp_path / "report"
-    folder.mkdir()
-    (folder / "report.html").write_text("old")
-    write_report(*case, folder)
-    assert {path.name for path in folder.iterdir()} == set(FILES)
-    assert "old" not in (folder / "report.html").read_text(encoding="utf-8")[:10]
-    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+OLD = "<title>Law of a moving target</title> old"
 
 
-def test_a_report_that_fails_leaves_what_was_there(case, tmp_path):
+@pytest.fixture
+def old(tmp_path):
+    """A folder with an earlier report, as a link to where it is, and a file of somebody's."""
+    (tmp_path / "there").mkdir()
+    (tmp_path / "report").symlink_to(tmp_path / "there")
+    (tmp_path / "there" / "report.html").write_text(OLD)
+    (tmp_path / "there" / "thesis.tex").write_text("mine")
+    return tmp_path / "report"
+
+
+def assert_old(folder):
+    assert (folder / "report.html").read_text() == OLD
+    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "thesis.tex"]
+
+
+def test_an_earlier_report_is_replaced_and_nothing_else(case, old):
+    inode = old.stat().st_ino
+    write_report(*case, old)
+    assert {path.name for path in old.iterdir()} == {*FILES, "thesis.tex"}
+    assert "old" not in (old / "report.html").read_text(encoding="utf-8")[:200]
+    assert old.is_symlink()
+    assert old.stat().st_ino == inode
+    assert sorted(path.name for path in old.parent.iterdir()) == ["report", "there"]
+
+
+def test_the_working_folder_may_be_that_of_the_report(case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_report(case[0], None, ".")
+    assert {path.name for path in tmp_path.iterdir()} == set(FILES)
+    assert os.listdir(".")  # it is still there
+
+
+def test_a_report_that_fails_leaves_what_was_there(case, old):
     found, paths = case
-    folder = tmp_path / "report"
-    folder.mkdir()
-    (folder / "report.html").write_text("old")
     with pytest.raises(FileNotFoundError, match="gone"):
-        write_report(found, [*paths[:2], tmp_path / "gone.mov"], folder)
-    assert (folder / "report.html").read_text() == "old"
-    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+        write_report(found, [*paths[:2], old / "gone.mov"], old)
+    assert_old(old)
 
 
-def test_an_earlier_report_survives_a_last_rename_that_fails(case, tmp_path, monkeypatch):
-    folder, rename = tmp_path / "report", Path.rename
-    folder.mkdir()
-    (folder / "report.html").write_text("old")
+@pytest.mark.parametrize("call", ["write_bytes", "replace"])
+def test_a_full_disk_leaves_what_was_there(case, old, tmp_path, monkeypatch, call):
+    def full(path, *rest):
+        raise OSError(28, "No space left on device", str(path))
 
-    def refuse(path, target):
-        if path.name == "new":
-            raise OSError("the disk has gone")
-        return rename(path, target)
+    monkeypatch.setattr(Path, call, full)
+    for folder in (old, tmp_path / "new"):
+        with pytest.raises(OSError, match="No space left on device"):
+            write_report(case[0], None, folder)
+    monkeypatch.undo()
+    assert_old(old)
+    assert not (tmp_path / "new").exists()
 
-    monkeypatch.setattr(Path, "rename", refuse)
-    with pytest.raises(OSError, match="the disk has gone"):
-        write_report(*case, folder)
-    assert (folder / "report.html").read_text() == "old"
-    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+def test_what_a_killed_run_has_left_is_cleared_by_the_next(case, old):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    for name in FILES:
+        (old / f".{name}.{gone.pid}").write_text("left")
+        (old / f".{name}.{os.getppid()}").write_text("of a run that goes on")
+    (old / "report.html").unlink()
+    (old / "result.json").write_text('{\n "format": 1')
+    write_report(case[0], None, old)
+    hidden = {f".{name}.{os.getppid()}" for name in FILES}
+    assert {path.name for path in old.iterdir()} == {*FILES, *hidden, "thesis.tex"}
 
 
 def test_other_peoples_files_are_not_overwritten(tmp_path):
-    (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(ValueError, match="out: must be a new folder .* with thesis.tex"):
+    (tmp_path / "rig.toml").write_text("")
+    with pytest.raises(ValueError, match=r"out: must hold no files of the names .* with rig\.toml"):
         check_folder_is_free(tmp_path)
-    with pytest.raises(ValueError, match="out: must be a folder, got the file"):
-        check_folder_is_free(tmp_path / "thesis.tex")
-    with pytest.raises(ValueError, match="out: the folder around it must exist"):
+    (tmp_path / "report.html").write_text("a report of mine")
+    with pytest.raises(ValueError, match=r"got '.*' with report\.html, rig\.toml"):
+        check_folder_is_free(tmp_path)
+    with pytest.raises(ValueError, match="out: the folder must be one that exists, got"):
+        check_folder_is_free(tmp_path / "rig.toml")
+    with pytest.raises(ValueError, match="out: the folder around it must be one that exists"):
         check_folder_is_free(tmp_path / "a" / "b")
 
 
@@ -317,40 +351,6 @@ def test_a_refusal_shows_the_tracks_and_the_step(case, tmp_path, with_videos):
     assert data["share_of_frames_seen"][2] == 0
     check_folder_is_free(page.parent)  # the next run may replace it
     np.testing.assert_allclose(read_tracks(page.parent / "tracks.csv")[0].pixels, tracks[0])
-
-
-def test_a_full_disk_leaves_what_was_there(case, tmp_path, monkeypatch):
-    folder = tmp_path / "report"
-    folder.mkdir()
-    (folder / "report.html").write_text("old")
-
-    def full(path, *rest):
-        raise OSError(28, "No space left on device", str(path))
-
-    monkeypatch.setattr(Path, "write_text", full)
-    with pytest.raises(OSError, match="No space left on device"):
-        write_report(*case, folder)
-    monkeypatch.undo()
-    assert (folder / "report.html").read_text() == "old"
-    assert [path.name for path in tmp_path.iterdir()] == ["report"]
-
-
-def test_two_runs_on_one_folder_leave_one_whole_report(case, tmp_path, monkeypatch):
-    folder, rename, turns = tmp_path / "report", Path.rename, []
-
-    def beaten(path, target):
-        """The other run's folder is there first, once."""
-        if path.name == "new" and not turns:
-            turns.append(path)
-            folder.mkdir()
-            (folder / "report.html").write_text("theirs")
-        return rename(path, target)
-
-    monkeypatch.setattr(Path, "rename", beaten)
-    write_report(*case, folder)
-    assert turns
-    assert {path.name for path in folder.iterdir()} == set(FILES)
-    assert [path.name for path in tmp_path.iterdir()] == ["report"]
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the page in")

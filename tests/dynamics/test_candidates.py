@@ -341,6 +341,7 @@ def test_a_law_is_saved_and_its_own_functions_are_given_again(tmp_path):
         ("polynomial(3)", "library: must be of type Library"),
         (Library.terms({"a": lambda q: q}), r"arguments of 'a' must be named .*\(x, y\), .* got q"),
         (Library.terms({"a": np.hypot}), r"arguments of 'a' .* as in lambda .*, got x1, x2$"),
+        (Library.fourier(10**6), r"library: must have at most 1000 sines and cosines, got [246]0"),
         (Library.polynomial(60), r"library: must have at most 1000 monomials, got 1891 of degree"),
         (Library.polynomial(1) + Library.rational(60), r"at most 1000 monomials, got 1891"),
         (Library.terms({"x": lambda x: x**2}), "a term must have a name of its own, got 'x' twice"),

@@ -34,14 +34,14 @@ def circle(x):
 @pytest.mark.parametrize("t", [np.linspace(0, 20, 201), np.linspace(0, 20, 3), [0.0, 1e-3, 7, 20]])
 def test_a_circle_is_closed_whatever_the_times(t):
     t = np.asarray(t)
-    path = integrate(circle, t, np.array([0.0, 1.0]))
+    path, _ = integrate(circle, t, np.array([0.0, 1.0]))
     np.testing.assert_allclose(path, np.stack([np.sin(t), np.cos(t)], axis=1), atol=3e-10)
 
 
 def test_the_tolerance_is_met():
     t = np.linspace(0, 10, 11)
     errors = [
-        np.abs(integrate(circle, t, np.array([0.0, 1.0]), tolerance)[:, 0] - np.sin(t)).max()
+        np.abs(integrate(circle, t, np.array([0.0, 1.0]), tolerance)[0][:, 0] - np.sin(t)).max()
         for tolerance in (1e-5, 1e-8, 1e-11)
     ]
     assert errors[0] < 1e-3
@@ -58,7 +58,7 @@ def test_no_more_steps_than_scipy_needs():
         calls.append(1)
         return LORENZ(x)
 
-    ours = integrate(rate, t, np.array([-8.0, 7, 27]))
+    ours, _ = integrate(rate, t, np.array([-8.0, 7, 27]))
     theirs = solve_ivp(lambda _, x: LORENZ(x), t, ours[0], method="DOP853", rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(ours[-1], theirs.y[:, -1], rtol=1e-5)
     assert len(calls) < 1.6 * theirs.nfev
@@ -66,15 +66,15 @@ def test_no_more_steps_than_scipy_needs():
 
 def test_after_a_blow_up_there_is_nothing():
     t = np.linspace(0, 2, 21)  # 1 / (1 - t)
-    path = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)[:, 0]
+    path = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)[0][:, 0]
     np.testing.assert_allclose(path[:10], 1 / (1 - t[:10]), rtol=1e-9)
     assert np.isnan(path[10:]).all()
-    endless = integrate(lambda x: x**2, t, np.array([1.0]))[:, 0]
+    endless = integrate(lambda x: x**2, t, np.array([1.0]))[0][:, 0]
     assert np.isnan(endless[11:]).all()
 
 
 def test_one_time_is_the_initial_condition():
-    np.testing.assert_array_equal(integrate(circle, np.array([3.0]), np.ones(2)), [[1, 1]])
+    np.testing.assert_array_equal(integrate(circle, np.array([3.0]), np.ones(2))[0], [[1, 1]])
 
 
 def test_the_classical_method_is_of_fourth_order():
@@ -105,7 +105,7 @@ def test_a_chaotic_path_is_the_same_with_every_kernel_of_linear_algebra():
 
 def test_rows_that_lie_close_are_no_stiffness(monkeypatch):
     monkeypatch.setitem(integrate.__globals__, "MOST_STEPS", 60)  # besides one a row
-    path = integrate(lambda x: 0 * x + 2, np.linspace(0.0, 1.0, 50), np.array([0.0]))
+    path, _ = integrate(lambda x: 0 * x + 2, np.linspace(0.0, 1.0, 50), np.array([0.0]))
     np.testing.assert_allclose(path[:, 0], np.linspace(0.0, 2.0, 50), atol=1e-12)
 
 
@@ -116,6 +116,22 @@ def test_a_motion_too_stiff_to_follow_ends(monkeypatch):
         return -1e6 * (x - 1)
 
     monkeypatch.setitem(integrate.__globals__, "MOST_STEPS", 200)
-    path = integrate(rate, t, np.array([0.0]))
+    path, _ = integrate(rate, t, np.array([0.0]))
     assert np.isfinite(path[0]).all()
     assert np.isnan(path[-1]).all()
+
+
+def test_a_long_motion_is_followed_to_its_end(monkeypatch):
+    monkeypatch.setitem(integrate.__globals__, "MOST_STEPS", 200)
+    path, end = integrate(circle, np.array([0.0, 2000.0]), np.array([0.0, 1.0]))
+    np.testing.assert_allclose(path[-1], [np.sin(2000.0), np.cos(2000.0)], atol=1e-6)
+    assert end == ""
+
+
+def test_what_ends_a_path_is_told(monkeypatch):
+    t = np.linspace(0.0, 20.0, 50)
+    assert integrate(lambda x: x**2, t, np.ones(1), farthest=1e6)[1] == "diverges"
+    assert integrate(lambda x: x**2, t, np.ones(1))[1] == "diverges"
+    monkeypatch.setitem(integrate.__globals__, "MOST_STEPS", 200)
+    stiff = integrate(lambda x: -1e6 * (x - 1), t, np.zeros(1))
+    assert stiff[1] == "is too stiff to be followed"

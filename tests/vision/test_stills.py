@@ -94,3 +94,48 @@ def test_a_folder_is_tracked_as_the_video_is(tmp_path):
     for i, frame in enumerate(vl.read_video(video)):
         cv2.imwrite(str(tmp_path / "a" / f"{i:05d}.png"), frame)
     np.testing.assert_array_equal(vl.track(tmp_path / "a").pixels, vl.track(video).pixels)
+
+
+def pages(dtype, shift=0):
+    """A bright disc that goes to and fro, 40 images."""
+    for k in range(40):
+        page = np.full((60, 80), 90, np.uint8)
+        cv2.circle(
+            page, (round(40 + 25 * np.cos(k / 5)), round(30 + 17 * np.sin(k / 5))), 5, 230, -1
+        )
+        yield page.astype(dtype) << shift
+
+
+@pytest.mark.parametrize("name", ["film.tif", "弾む.TIFF"])
+def test_pages_of_one_tiff_are_a_film(tmp_path, name):
+    cv2.imwritemulti(str(tmp_path / "a.tif"), list(pages(np.uint8)))
+    path = (tmp_path / "a.tif").rename(tmp_path / name)
+    assert video_info(path)[::2] == (40, (80, 60))
+    film = [page[..., 0] for page in vl.read_video(path)]
+    np.testing.assert_array_equal(film, list(pages(np.uint8)))
+    assert len(vl.track(path).pixels) == 40
+    (tmp_path / "bad.tif").write_bytes(path.read_bytes()[:100])
+    with pytest.raises(ValueError, match=r"path: must hold .* frame, got none in '.*bad.tif'"):
+        video_info(tmp_path / "bad.tif")
+
+
+@pytest.mark.parametrize("bits", [10, 12, 16])
+def test_images_of_fewer_bits_than_they_have_room_for(tmp_path, bits):
+    (tmp_path / "film").mkdir()
+    for k, page in enumerate(pages(np.uint16, bits - 8)):
+        cv2.imwrite(str(tmp_path / "film" / f"{k:03d}.png"), page)
+    film = [page[..., 0] for page in vl.read_video(tmp_path / "film")]
+    np.testing.assert_array_equal(film, list(pages(np.uint8)))
+
+
+def test_one_image_is_no_film(tmp_path):
+    (tmp_path / "one").mkdir()
+    cv2.imwrite(str(tmp_path / "one" / "1.png"), np.zeros((10, 10, 3), np.uint8))
+    with pytest.raises(ValueError, match="path: must hold two frames or more, got one in"):
+        vl.track(tmp_path / "one")
+
+
+def test_images_of_real_numbers_are_refused(tmp_path):
+    cv2.imwritemulti(str(tmp_path / "a.tif"), [np.zeros((9, 9), np.float32)] * 3)
+    with pytest.raises(ValueError, match="path: must be an image that OpenCV can read"):
+        video_info(tmp_path / "a.tif")

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from phones import waver, write_at
 
+from vidsindy_lite import track
 from vidsindy_lite.vision import frame_clock, read_frame, read_video, video_info, write_video
 
 SIZE = (32, 24)
@@ -101,3 +102,32 @@ def test_what_phones_code_is_read_in_eight_bits(tmp_path, name, codec, pixels, s
     for ours, true in zip(read_video(path), frames, strict=True):
         assert ours.dtype == np.uint8
         assert np.abs(ours.astype(int) - true).mean() < 4
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "sound"),
+    [("a.avi", "mjpeg", False), ("a.webm", "libvpx", False), ("a.mkv", "ffv1", True)],
+)
+def test_half_a_file_is_told(tmp_path, name, codec, sound):
+    pixels = {"mjpeg": "yuvj420p", "ffv1": "bgr0"}.get(codec, "yuv420p")
+    with av.open(str(tmp_path / name), "w") as out:
+        stream = out.add_stream(codec, rate=30)
+        stream.width, stream.height, stream.pix_fmt = 80, 60, pixels
+        voice = out.add_stream("pcm_s16le", rate=8000, layout="mono") if sound else None
+        noise = np.random.default_rng(0).integers(0, 99, (60, 80, 3))
+        for k in range(60):
+            image = noise.copy()
+            image[20:30, 5 + k : 15 + k] = 230
+            frame = av.VideoFrame.from_ndarray(image.astype(np.uint8), format="bgr24")
+            out.mux(stream.encode(frame))
+            if voice:
+                heard = av.AudioFrame.from_ndarray(np.zeros((1, 267), np.int16), "s16", "mono")
+                heard.sample_rate, heard.pts = 8000, 267 * k
+                out.mux(voice.encode(heard))
+        out.mux(stream.encode())
+    whole = (tmp_path / name).read_bytes()
+    assert video_info(tmp_path / name).frames == 60
+    (tmp_path / name).write_bytes(whole[: len(whole) // 2])
+    assert video_info(tmp_path / name).frames == pytest.approx(60, abs=1)
+    told = track(tmp_path / name).warnings
+    assert any("frames can be read: it is cut off" in warning for warning in told)

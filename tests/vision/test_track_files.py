@@ -32,10 +32,52 @@ TRACKER_6 = (
 )
 
 
+ARGUS = "Track 1_cam_1_x,Track 1_cam_1_y\n11.25,79.5\n12.0,79\nnan,nan\n14.0,77\n"
+INDIVIDUALS = (
+    "scorer,net,net,net,net,net,net\nindividuals,one,one,one,two,two,two\n"
+    "bodyparts,ball,ball,ball,ball,ball,ball\ncoords,x,y,likelihood,x,y,likelihood\n"
+    "0,10.25,20.5,0.99,1,2,0.9\n1,11,21,0.9,1,2,0.9\n2,400,3,0.1,1,2,0.9\n3,13,23,1.0,1,2,0.9\n"
+)
+SLEAP = (
+    "track,frame_idx,instance.score,nose.x,nose.y,nose.score,tail.x,tail.y,tail.score\n"
+    "one,0,0.9,10.25,20.5,0.9,1,2,0.9\none,1,0.9,11,21,0.9,1,2,0.9\n"
+    "one,3,0.9,13,23,0.9,1,2,0.9\ntwo,0,0.9,5,6,0.9,7,8,0.9\n"
+)
+TRACKMATE = (
+    "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME\n"
+    "Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame\nLabel,Spot ID,Track ID,Quality,X,Y,Z,T,Frame\n"
+    ",,,(quality),(pixel),(pixel),(pixel),(frame),\n"
+    "ID9,9,0,1,13,23,0,3,3\nID7,7,0,1,10.25,20.5,0,0,0\nID8,8,0,1,11,21,0,1,1\n"
+)
+TRACKMATE_XML = (
+    '<?xml version="1.0"?>\n<Tracks nTracks="1" spaceUnits="pixel" timeUnits="frame">\n'
+    '<particle nSpots="3">\n<detection t="0" x="10.25" y="20.5" z="0.0" />\n'
+    '<detection t="3" x="13" y="23" z="0.0" />\n<detection t="1" x="11" y="21" z="0.0" />\n'
+    "</particle>\n</Tracks>\n"
+)
+KINOVEA = (
+    "#Kinovea Trajectory data export\n#T X Y\n\n"
+    "# ball\n0 10.25 20.5\n33 11 21\n66 nan nan\n99 13 23\n\n"
+)
+
+
 @pytest.mark.parametrize(
     "text",
     [
         OURS,
+        TRACKMATE,
+        TRACKMATE_XML,
+        KINOVEA,
+        KINOVEA.replace("# ball\n", "").replace("33", "0:00:00:03"),
+        OURS.replace("u,v", "u [px],V (pixels)"),
+        OURS.replace("2,,", "2,NA,lost"),
+        OURS.replace("2,,", "2,-1,-1"),
+        OURS.replace("2,,", "2,-9999,-9999"),
+        "frame,x,y,visible\n0,10.25,20.5,1\n1,11,21,1\n2,3,4,0\n3,13,23,1\n",
+        "x,y,lost\n10.25,20.5,0\n11,21,0\n3,4,1\n13,23,0\n",
+        "frame,x,y,w,h\n0,9.75,20,2,2\n1,10.5,20.5,2,2\n2,-1,-1,-1,-1\n3,12.5,22.5,2,2\n",
+        "frame,xmin,ymin,xmax,ymax\n0,9.75,20,11.75,22\n1,10.5,20.5,12.5,22.5\n3,12.5,22.5,14.5,24.5\n",
+        "frame,particle,y,x\n0,4,20.5,10.25\n1,4,21,11\n3,4,23,13\n",
         GAP,
         TIMES,
         DLTDV,
@@ -55,6 +97,60 @@ TRACKER_6 = (
 def test_every_kind_is_read(tmp_path, text):
     (track,) = read(tmp_path, text)
     np.testing.assert_allclose(track.pixels, PIXELS)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig", "latin-1"])
+def test_encodings(tmp_path, encoding):
+    path = tmp_path / "a.csv"
+    path.write_bytes(("Bildé,u,v\n" + OURS.partition("\n")[2]).encode(encoding))
+    np.testing.assert_allclose(read_tracks(path)[0].pixels, PIXELS)
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        (INDIVIDUALS, "one"), (INDIVIDUALS.replace("one", "1").replace("two", "2"), "1"),
+        (INDIVIDUALS, "one ball"), (SLEAP, "one nose"),
+        (TRACKMATE + "ID1,1,1,1,5,5,0,0,0\n", "0"), (KINOVEA + "# other\n0 1 2\n", "ball"),
+        (TRACKMATE_XML.replace("</Tracks>", '<particle>\n<detection t="0" x="1" y="2"/>'), "0"),
+        ("frame,id,x,y\n0,7,10.25,20.5\n0,8,1,2\n1,7,11,21\n3,7,13,23\n3,8,1,2\n", "7"),
+    ],
+)  # fmt: skip
+def test_one_of_several_targets_is_chosen_by_its_name(tmp_path, text, name):
+    with pytest.raises(ValueError, match="must hold one target, got .* as individual"):
+        read(tmp_path, text)
+    with pytest.raises(ValueError, match="must hold one target, got "):
+        read_tracks(tmp_path / "a.csv", "nobody")
+    (track,) = read_tracks(tmp_path / "a.csv", name)
+    np.testing.assert_allclose(track.pixels, PIXELS)
+
+
+def test_argus_counts_from_the_lower_left(tmp_path):
+    (track,) = read(tmp_path, ARGUS)
+    assert track.upwards
+    np.testing.assert_allclose(track.downwards(100), PIXELS)
+
+
+def test_boxes_say_so(tmp_path):
+    for head, sides in (("x,y,w,h", "85,190,30,20"), ("x1,y1,x2,y2", "85,190,115,210")):
+        (track,) = read(tmp_path, f"{head}\n{sides}\n{sides}\n")
+        np.testing.assert_allclose(track.pixels, [[99.5, 199.5]] * 2)
+        assert "the middles of its boxes are taken" in track.warnings[0]
+
+
+def test_milliseconds_are_seconds_if_their_column_says_so(tmp_path):
+    for head in ("t_ms", "Time (ms)", "milliseconds", "time [ms]"):
+        (track,) = read(tmp_path, f"{head},u,v\n0,1,2\n40,3,4\n")
+        np.testing.assert_allclose(track.t, [0, 0.04])
+    (track,) = read(tmp_path, "t,u,v\n0,1,2\n40,3,4\n")
+    assert "its times are 40 apart: if these are milliseconds, call the column" in track.warnings[0]
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".slp", ".mat", ".xlsx", ".kva"])
+def test_tables_of_other_kinds_are_refused_by_name(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_bytes(b"\x89HDF")
+    with pytest.raises(ValueError, match=rf"must be a table as text, got 'a\{suffix}', .* as CSV"):
+        read_tracks(tmp_path / f"a{suffix}")
 
 
 def test_times_are_kept(tmp_path):
@@ -79,7 +175,7 @@ def test_trackers_world_is_not_taken_for_pixels(tmp_path):
     (track,) = read(tmp_path, TRACKER_6)
     assert "export its columns pixelx and pixely" in track.warnings[0]
     assert read(tmp_path, TRACKER_5)[0].warnings == ()
-    with pytest.raises(ValueError, match="got x and y of Tracker with another origin"):
+    with pytest.raises(ValueError, match="got x and y of Tracker or Kinovea with another"):
         read(tmp_path, TRACKER_6.replace("20,5", "-20,5"))
 
 
@@ -90,8 +186,15 @@ def test_trackers_world_is_not_taken_for_pixels(tmp_path):
         ("u,v\n", "must hold rows of numbers"),
         ("a,b\n1,2\n", "must have columns u and v, got a, b"),
         ("1,2,3,4\n", "must have a header, or columns u and v"),
+        ("scorer,a,a,a\n0,1,2,.9\n", "must have rows scorer, bodyparts and coords"),
+        ("pt1_cam1_X\n1\n2\n", "must have a column pt1_cam1_y"),
+        ("x,y,x,y\n1,2,3,4\n", "must hold one target, got x 2 times, y 2 times"),
+        ("x (mm),y (mm)\n1,2\n", r"must have columns u and v, got x \(mm\), y \(mm\)"),
+        (TRACKMATE.replace("(pixel)", "(micron)"), "must have positions in pixels, got micron"),
+        ("<TrackMate><Model/></TrackMate>", "must be a table, or <Tracks> of TrackMate"),
+        ("u,v\n" + "1" * 400 + ",2\n", "must hold numbers of less than 300 digits"),
         ("u,v\n1,2\n3,soon\n", "must hold numbers below its header, got 'soon' in row 2"),
-        ("t,u,v\n0,1,2\n0,1,2\n", "must have increasing times"),
+        ("t,u,v\n0,1,2\n0,1,2\n", "must have increasing times, got others as t"),
         ("frame,u,v\n1,1,2\n0,1,2\n", "must have increasing whole numbers of frames"),
         ("frame,u,v\n0,1,2\n99999999999,1,2\n", "must have increasing whole numbers"),
         ("t,u1,v1,u2\n0,1,2,3\n", "must have a column 'v2'"),
@@ -108,7 +211,7 @@ def test_files_that_hold_no_track(tmp_path, text, message):
 @pytest.mark.parametrize("content", [b"RIFF\0\0AVI u,v\n1,2\n" * 9, b"\x89PNG\r\n\x1a\n\xff1,2\n"])
 def test_a_file_that_is_no_text_is_not_printed(tmp_path, content):
     (tmp_path / "a.avi").write_bytes(content)
-    with pytest.raises(ValueError, match=r"got 'a\.avi', which is no table of numbers$"):
+    with pytest.raises(ValueError, match=r"got 'a\.avi', which is none$"):
         read_tracks(tmp_path / "a.avi")
 
 

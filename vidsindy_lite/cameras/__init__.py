@@ -18,6 +18,7 @@
  3. triangulate   tracks of a calibrated rig -> path in space, and by how much it misses them
  4. uncertainty   what errors of cameras, lags and codecs do to the path: systematic errors
     adjust        bundle adjustment: cameras, clocks, path together (`changes`: of what), `shutter`
+    mistakes      views swapped, mirrored, upside down, of another rate, or with frames missing
     causes        why views do not agree, by trying one thing at a time
     unmeasured    rigs of which only the lenses are known: a start
     covariance    of errors that depend on their neighbours
@@ -31,10 +32,11 @@ The other rooms import from here alone.
 from .alignment import Lags, align, list_lags
 from .calibrate import calibration_errors, check_learnable, learn_cameras
 from .clocks import Clock
-from .calibrations import read_calibration, write_calibration
+from .calibrations import read_calibration
 from .causes import GROSS, explain, smooth
 from .eq4 import learn_cameras_eq4, learn_cameras_lbfgs
 from .identities import identify, side_by_side, stacked
+from .mistakes import find_mistake
 from .geometry import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance
 from .camera import Camera
 from .models import OrthographicCamera, PerspectiveCamera

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
 from ..arrays import Bools, Floats
-from ..checks import check_positive, check_tracks, check_vector
+from ..checks import check_positive, check_tracks, check_vector, shown
 
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
@@ -263,6 +263,6 @@ def check_clocks(given: Sequence[ArrayLike] | None, tracks: Sequence[Floats]) ->
     for i, (clock, track) in enumerate(zip(given, tracks, strict=True)):
         checked = check_vector(f"clocks[{i}]", clock, len(track))
         if (np.diff(checked) <= 0).any():
-            raise ValueError(f"clocks[{i}]: must increase, got {checked!r:.60}")
+            raise ValueError(f"clocks[{i}]: must increase, got {shown(checked)}")
         clocks.append(checked - checked[0])
     return tuple(clocks)

@@ -1,4 +1,4 @@
-"""Calibrations of other tools: from their files to a rig, and back.
+"""Calibrations of other tools: from their files to a rig.
 
 What they have in common is OpenCV's camera: a point X of the scene is seen at the pixel of
 K (R X + t), bent by the lens, x to the right, y down and z forward. Its centre is -R' t, our normal
@@ -13,33 +13,32 @@ is minus the third row of R, our scale 1 / fx. Understood are::
                        projection matrices of 3 x 4, one below the other
 
 DLT coefficients count pixels from 1, from the upper left (DLTdv8) or, if their image is mirrored,
-which the determinant tells, from the lower left (earlier ones).
+which the determinant tells, from the lower left (earlier ones). What a table says of a lens that is
+none of ours is refused; a camera that is to be ignored is left out, and that is told, as are keys
+of which nothing is known.
 
 Hartley & Zisserman 2004, "Multiple View Geometry", 6.2; Abdel-Aziz & Karara 1971 (DLT).
 """
 
 from __future__ import annotations
 
-import json
 import os
-import tomllib
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import rq
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Floats
-from ..checks import check_array, check_image_size, check_output, check_path
-from .camera import turn
+from ..checks import check_array, check_image_size, shown
+from ..reading import TREES, check_file, read_arrays, read_text, read_tree, reading
+from . import lens
 from .models import PerspectiveCamera
 from .rig import Rig
-from .triangulate import check_calibrated
 
 _NAMES = {
     "K": ("k", "matrix", "camera_matrix", "cameramatrix", "intrinsics", "intrinsic_matrix", "mtx"),
@@ -50,8 +49,33 @@ _NAMES = {
     "R": ("r", "rotation", "rvec", "rotation_matrix", "rot"),
     "t": ("t", "translation", "tvec", "translation_vector"),
     "size": ("size", "image_size", "imagesize", "resolution", "img_size"),
+    "P": ("p", "projection_matrix"),
 }  # fmt: skip
-_STORAGE = (".yaml", ".yml", ".xml", ".json")  # of OpenCV
+_SIZES = (("image_width", "image_height"), ("width", "height"), ("img_width", "img_height"))
+_MARKS = dict.fromkeys(("ignore", "ignored", "disabled", "exclude", "excluded", "skip"), True)
+_MARKS |= dict.fromkeys(("enabled", "active", "use", "used", "included", "valid"), False)
+"""Keys that mark a camera as one to be left out: if they are set, or if they are not."""
+_LENS = re.compile(r"model|lens|projection_?type|^camera_?type")
+"""Keys that say which lens it is, ..."""
+_OURS = (
+    "pinhole", "perspective", "opencv", "plumb", "radtan", "radial", "brown", "standard",
+    "rational", "polynomial", "simple", "lensmodel_opencv", "lensmodel_pinhole",
+)  # fmt: skip
+"""... the beginnings of the names of ours, ..."""
+_OTHERS = re.compile(
+    "fish|equi|kannala|kb4|omni|mei|spher|ucm|unified|fov|atan|scaramuzza|ocam|division|thin|tilt|"
+    "ortho|panor|theta|stereograph"
+)
+"""... and parts of the names of others."""
+_LENSES = f"of {', '.join(lens.NAMES)}"
+_KNOWN = {key for keys in (*_NAMES.values(), *_SIZES, _MARKS) for key in keys} | {
+    "name", "camera", "camera_name", "cam_id", "id", "serial", "serial_number", "port", "index",
+    "error", "rms", "reprojection_error", "avg_reprojection_error", "grid_count", "flags", "date",
+    "calibration_time", "calibration_date", "verified_resolutions", "exposure", "board_width",
+    "board_height", "square_size", "nframes", "nr_of_frames", "fps", "frame_rate", "fisheye",
+    "rotation_count", "distortion_model", "distortion_type",
+}  # fmt: skip
+"""Keys that are read, and those that change nothing of what a camera sees."""
 _SKEW = 1e-6  # pixels, at the edge of the image, that are rounding; and ...
 _MOST_SKEW = 5.0  # ... that are no camera's
 
@@ -84,15 +108,14 @@ def read_calibration(
     cameras: list[PerspectiveCamera] = []
     warnings: list[str] = []
     if isinstance(paths, str | os.PathLike) or not isinstance(paths, Iterable):
-        raise ValueError(f"paths: must be a list of files, got {paths!r:.60}")
+        raise ValueError(f"paths: must be a list of files, got {shown(paths)}")
     for given in paths:
-        path = check_path("paths", given)
-        if not path.is_file():
-            raise FileNotFoundError(f"paths: no such calibration file, got '{path}'")
-        try:
-            found = list(_cameras(path, size))
-        except (ValueError, KeyError, TypeError, OSError) as error:
-            raise ValueError(f"paths: in '{path}', {error}") from error
+        path = check_file("paths", given, "calibration file")
+        content = _content(path)
+        before = len(warnings)
+        with reading("paths", path):
+            found = list(_cameras(content, size, warnings))
+        warnings[before:] = [f"{path.name}: {warning}" for warning in warnings[before:]]
         if not found:
             raise ValueError(
                 f"paths: must hold a camera matrix (K), DLT coefficients or P, got none in '{path}'"
@@ -107,136 +130,105 @@ def read_calibration(
     return Rig(tuple(cameras), tuple(warnings))
 
 
-def write_calibration(rig: Rig, path: str | os.PathLike) -> None:
-    """Write a rig for other tools.
-
-    Parameters
-    ----------
-    rig : Rig
-        Perspective cameras, all calibrated.
-    path : path
-        ``.toml`` for Anipose and Pose2Sim; ``.yaml``, ``.yml``, ``.xml`` or ``.json`` for OpenCV's
-        FileStorage, a map per camera; ``.npz`` with K, dist, R, t and size, stacked; or ``.csv``
-        for DLT coefficients (pixels from 1, from the upper left, as DLTdv8; without distortion).
-
-    Raises
-    ------
-    ValueError
-        If a camera is orthographic or not calibrated, has a distortion that a ``.csv`` cannot hold,
-        the name ends otherwise, or its folder does not exist.
-    """
-    check_calibrated("rig", rig)
-    file = check_output("path", path)
-    parts = [_opencv(i, camera) for i, camera in enumerate(rig.cameras)]
-    if file.suffix == ".toml":
-        tables = [_table(i, part) for i, part in enumerate(parts)]
-        file.write_text("\n".join([*tables, "[metadata]\n"]), encoding="utf-8")
-    elif file.suffix in _STORAGE:
-        file.write_text(_storage(file.suffix, parts), encoding="utf-8")
-    elif file.suffix == ".npz":
-        inner, dist, rotation, shift, size = (
-            np.array([part[key] for part in parts]) for key in ("K", "dist", "R", "t", "size")
-        )
-        np.savez(file, K=inner, dist=dist, R=rotation, t=shift, size=size)
-    elif file.suffix == ".csv":
-        columns = [_coefficients(i, part) for i, part in enumerate(parts)]
-        np.savetxt(file, np.column_stack(columns), delimiter=",", fmt="%.17g")
-    else:
-        known = ", ".join((".toml", *_STORAGE, ".npz"))
-        raise ValueError(f"path: must end in {known} or .csv, got '{file.name}'")
-
-
-def _cameras(path: Path, size: tuple[int, int] | None) -> Iterator[tuple[PerspectiveCamera, float]]:
-    """The cameras of a file, each with the skew of its pixels."""
+def _content(path: Path) -> Any:
+    """A file as mappings and lists, or as an array of numbers."""
     suffix = path.suffix.lower()
-    if suffix in (".csv", ".txt", ".npy"):
-        yield from _from_matrices(_table_of(path), size)
-        return
-    for table in _tables(_content(path, suffix)):
-        if "K" in table:
-            yield _from_opencv(table, size), 0.0
-        else:
-            yield from _from_matrices(check_array("P", table["P"]), size)
-
-
-def _content(path: Path, suffix: str) -> object:
-    """A file as mappings, lists and numbers."""
-    try:
-        if suffix == ".toml":
-            return tomllib.loads(path.read_text(encoding="utf-8"))
-        if suffix == ".npz":
-            with np.load(path) as archive:
-                return dict(archive)
-        if suffix == ".json" and '"opencv-matrix"' not in path.read_text(encoding="utf-8"):
-            return json.loads(path.read_text(encoding="utf-8"))
-        if suffix in _STORAGE:
-            storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-            try:
-                return _plain(storage.root())
-            finally:
-                storage.release()
-    except (ValueError, cv2.error, SystemError, EOFError, BadZipFile) as error:
-        first = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ValueError(f"must be a {suffix} file of its kind: {first}") from None
+    if suffix in TREES:
+        return read_tree("paths", path, suffix)
+    if suffix in (".npy", ".npz"):
+        return read_arrays("paths", path)
+    if suffix in (".csv", ".txt"):
+        text = read_text("paths", path, "a table")
+        with reading("paths", path):
+            return _table_of(text)
     raise ValueError(
-        f"must end in .toml, .yaml, .yml, .xml, .json, .npz, .npy, .csv or .txt, got '{path.name}'"
+        "paths: must end in .toml, .yaml, .yml, .xml, .json, .npz, .npy, .csv or .txt, got "
+        f"'{path}'"
     )
 
 
-def _plain(node: Any) -> object:
-    """A node of OpenCV's files as mappings, lists and numbers."""
-    if node.isMap():
-        keys = node.keys()
-        if {"rows", "cols", "data"} <= set(keys):
-            matrix = node.mat()
-            if matrix is not None:
-                return matrix
-            values = np.array(_plain(node.getNode("data")), dtype=float)
-            return values.reshape(int(node.getNode("rows").real()), -1)
-        return {key: _plain(node.getNode(key)) for key in keys}
-    if node.isSeq():
-        return [_plain(node.at(i)) for i in range(node.size())]
-    return node.string() if node.isString() else node.real()
+def _cameras(
+    content: Any, size: tuple[int, int] | None, warnings: list[str]
+) -> Iterator[tuple[PerspectiveCamera, float]]:
+    """The cameras of a file, each with the skew of its pixels."""
+    if isinstance(content, np.ndarray):
+        yield from _from_matrices(check_array("array", content), size)
+        return
+    for name, table in _tables(content, "", warnings):
+        try:
+            if "K" in table:
+                yield _from_opencv(table, size), 0.0
+            else:
+                own = check_image_size(table["size"]) if "size" in table else size
+                yield from _from_matrices(check_array("P", table["P"]), own)
+        except ValueError as error:
+            raise ValueError(f"{name}{error}") from None
 
 
-def _tables(content: object) -> Iterator[dict[str, Any]]:
-    """All parts of a file that describe a camera, in its order, under our names."""
+def _tables(content: Any, name: str, warnings: list[str]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """All parts of a file that describe a camera, in its order: their names, and our keys' values.
+
+    Names end in ": ", as they stand before what is wrong.
+    """
     if isinstance(content, list):
-        for part in content:
-            yield from _tables(part)
+        for i, part in enumerate(content):
+            yield from _tables(part, f"{name or 'camera '}[{i}]: ".replace(": [", "["), warnings)
     if not isinstance(content, Mapping):
         return
     lower = {str(key).lower(): value for key, value in content.items()}
     known = {
-        name: lower[other] for name, others in _NAMES.items() for other in others if other in lower
+        ours: lower[other] for ours, others in _NAMES.items() for other in others if other in lower
     }
-    if "K" in known:
-        if "size" not in known and {"image_width", "image_height"} <= set(lower):
-            known["size"] = [lower["image_width"], lower["image_height"]]
-        for key in ("fisheye", "rotation_count"):
-            if lower.get(key):
-                raise ValueError(f"{key}: must be {type(lower[key])()}, got {lower[key]}")
-        stacked = np.ndim(known["K"]) == 3
-        count = len(known["K"]) if stacked else 1
-        for i in range(count):
-            yield {name: value[i] if stacked else value for name, value in known.items()}
-    elif "p" in lower or "projection_matrix" in lower:
-        yield {"P": lower.get("p", lower.get("projection_matrix"))}
-    else:
-        for part in content.values():
-            yield from _tables(part)
+    is_camera = "K" in known or "P" in known
+    ignored = [key for key in lower if key in _MARKS and _is_set(lower[key]) == _MARKS[key]]
+    if ignored:
+        warnings.append(f"{name}{ignored[0]} = {shown(lower[ignored[0]])}: this camera is left out")
+        return
+    for key, value in lower.items():
+        if _is_set(value):
+            _check_lens(key, value, name, warnings if is_camera else [])
+    if not is_camera:
+        for key, part in content.items():
+            yield from _tables(part, f"camera {key}: ", warnings)
+        return
+    sides = next((sides for sides in _SIZES if set(sides) <= set(lower)), ())
+    if sides and "size" not in known:
+        known["size"] = [lower[side] for side in sides]
+    strange = [
+        key for key in lower if not (key in _KNOWN or _LENS.search(key)) and _is_set(lower[key])
+    ]
+    if strange:
+        warnings.append(f"{name}nothing is known of {', '.join(strange):.80}, which is left out")
+    stacked = np.ndim(known.get("K", 0)) == 3
+    for i in range(len(known["K"]) if stacked else 1):
+        yield name, {key: value[i] if stacked else value for key, value in known.items()}
 
 
-def _table_of(path: Path) -> Floats:
-    """The numbers of a text file or array."""
-    if path.suffix.lower() == ".npy":
-        return check_array("array", np.load(path))
+def _is_set(value: Any) -> bool:
+    """Whether a value says yes: neither zero, nor empty, nor a word for no."""
+    if isinstance(value, str):
+        return value.strip().lower() not in ("", "0", "false", "no", "none", "off", "null")
+    return value is not None and (not np.isscalar(value) or bool(value))
+
+
+def _check_lens(key: str, value: Any, name: str, warnings: list[str]) -> None:
+    """Refuse a key that says of another lens than ours, or of turned pixels; tell one that may."""
+    named = f"{key} {value}".lower()
+    if key == "rotation_count":
+        raise ValueError(f"{name}{key}: must be 0, got {shown(value)}")
+    if np.isscalar(value) and ("fisheye" in key or (_LENS.search(key) and _OTHERS.search(named))):
+        raise ValueError(f"{name}{key}: must be none but of a lens {_LENSES}, got {shown(value)}")
+    if re.fullmatch(r"[kp][1-6]|skew", key) or ("dist" in key and key not in _KNOWN):
+        raise ValueError(f"{name}{key}: must stand in dist, {_LENSES}, got {shown(value)}")
+    if _LENS.search(key) and not str(value).lower().startswith(_OURS):
+        warnings.append(f"{name}{key} = {shown(value)} is taken for a lens {_LENSES}")
+
+
+def _table_of(text: str) -> Floats:
+    """The numbers of a text."""
     try:
-        text = path.read_text(encoding="utf-8-sig").replace(",", " ").replace(";", " ")
-        rows = [
-            [float(part) for part in line.split()] for line in text.splitlines() if line.strip()
-        ]
-        return np.array(rows)
+        lines = text.replace(",", " ").replace(";", " ").splitlines()
+        return np.array([[float(part) for part in line.split()] for line in lines if line.strip()])
     except ValueError:
         raise ValueError("must hold rows of as many numbers each and nothing else") from None
 
@@ -256,7 +248,7 @@ def _from_matrices(
             # Pixels from 1, and from the lower left if the image is mirrored.
             first = [[1, 0, -1], [0, -1, size[1]] if up else [0, 1, -1], [0, 0, 1]]
             yield _from_projection(np.array(first) @ matrix, size)
-    elif values.shape[-1] == 4 and values.size % 12 == 0:
+    elif values.ndim in (2, 3) and values.shape[-1] == 4 and values.size % 12 == 0:
         for matrix in values.reshape(-1, 3, 4):
             yield _from_projection(matrix * (np.sign(np.linalg.det(matrix[:, :3])) or 1.0), size)
     else:
@@ -309,11 +301,9 @@ def _from_opencv(table: dict[str, Any], given: tuple[int, int] | None) -> Perspe
     if size is None:
         raise ValueError("image_size: must be given (--size WxH), as this file does not say")
     width, height = _shaped("size", size, (2,))
-    dist = check_array("dist", table.get("dist", [])).ravel()
-    if dist.size > 5 and not dist[5:].any():
-        dist = dist[:5]
-    if dist.size > 5:
-        raise ValueError(f"dist: must be k1, k2, p1, p2, k3, got {dist.size} coefficients")
+    dist = np.trim_zeros(check_array("dist", table.get("dist", [])).ravel(), "b")
+    if dist.size > len(lens.NAMES):
+        raise ValueError(f"dist: must be {', '.join(lens.NAMES)}, got {dist.size} coefficients")
     shift = _shaped("t", table["t"], (3,))
     return _camera(inner, dist, rotation, shift, (round(width), round(height)))
 
@@ -322,7 +312,7 @@ def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Finite numbers of a shape; those of a vector may stand in a column."""
     array = check_array(name, value)
     if array.size != np.prod(shape) or not np.isfinite(array).all():
-        raise ValueError(f"{name}: must be finite and of shape {shape}, got {value!r:.60}")
+        raise ValueError(f"{name}: must be finite and of shape {shape}, got {shown(value)}")
     return array.reshape(shape)
 
 
@@ -338,58 +328,3 @@ def _camera(
         distortion=dist if dist.any() else None,
     )
     return camera.posed(rotation, shift)
-
-
-def _opencv(i: int, camera: object) -> dict[str, Floats]:
-    """K, dist, R, t and size of one of ours."""
-    if not isinstance(camera, PerspectiveCamera):
-        raise ValueError(f"rig: cameras must be perspective, got cameras[{i}] orthographic")
-    scale, angle = camera.calibration
-    right, up = turn(angle).T @ camera.rows
-    rotation = np.array([right, -up, -camera.normal])
-    (u, v), f = camera.seen(np.zeros((1, 2)))[0], 1 / scale
-    return {
-        "K": np.array([[f, 0, u], [0, camera.aspect * f, v], [0, 0, 1]]),
-        "dist": np.zeros(5) if camera.distortion is None else camera.distortion,
-        "R": rotation,
-        "t": -rotation @ np.asarray(camera.position),
-        "size": np.array(camera.image_size),
-    }
-
-
-def _table(i: int, part: dict[str, Floats]) -> str:
-    """One camera for Anipose and Pose2Sim."""
-    turned = Rotation.from_matrix(part["R"]).as_rotvec()
-    return (
-        f'[cam_{i}]\nname = "cam_{i}"\nsize = {part["size"].tolist()}\n'
-        f"matrix = {part['K'].tolist()}\ndistortions = {part['dist'].tolist()}\n"
-        f"rotation = {turned.tolist()}\ntranslation = {part['t'].tolist()}\nfisheye = false\n"
-    )
-
-
-def _storage(suffix: str, parts: Sequence[dict[str, Floats]]) -> str:
-    """All cameras for OpenCV, in the names of its own calibration samples."""
-    storage = cv2.FileStorage(suffix, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
-    for i, part in enumerate(parts):
-        storage.startWriteStruct(f"cam_{i}", cv2.FileNode_MAP)
-        for name, pixels in zip(("image_width", "image_height"), part["size"], strict=True):
-            storage.write(name, int(pixels))
-        storage.write("camera_matrix", part["K"])
-        storage.write("distortion_coefficients", part["dist"][:, None])
-        storage.write("R", part["R"])
-        storage.write("T", part["t"][:, None])
-        storage.endWriteStruct()
-    return storage.releaseAndGetString()
-
-
-def _coefficients(i: int, part: dict[str, Floats]) -> Floats:
-    """DLT coefficients of one camera, pixels from 1 and from the upper left, as DLTdv8's."""
-    if part["dist"].any():
-        raise ValueError(f"rig: DLT coefficients hold no distortion, got one in cameras[{i}]")
-    last = np.array([[1, 0, 1], [0, 1, 1], [0, 0, 1]])
-    matrix = last @ part["K"] @ np.column_stack((part["R"], part["t"]))
-    if matrix[2, 3] <= 0:
-        raise ValueError(
-            f"rig: for DLT coefficients the origin must lie in front of all cameras, not of {i}"
-        )
-    return (matrix / matrix[2, 3]).ravel()[:11]

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import Floats
 from .camera import Camera, frozen
+from .lens import USUAL
 from .models import OrthographicCamera, PerspectiveCamera
 
 PARTS = {
@@ -91,8 +92,9 @@ def changed(camera: Camera, change: Floats) -> Camera:
     if part["principal point"].any():
         values["principal_point"] = frozen(camera.centre + part["principal point"])
     if part["distortion"].any() and isinstance(camera, PerspectiveCamera):
-        before = np.zeros(5) if camera.distortion is None else camera.distortion
-        values["distortion"] = frozen(before + np.append(part["distortion"], 0.0))
+        before = np.zeros(USUAL) if camera.distortion is None else camera.distortion
+        step = np.pad(part["distortion"], (0, len(before) - len(part["distortion"])))
+        values["distortion"] = frozen(before + step)
     if part["readout"].any():
         values["readout"] = float(np.clip(camera.readout + part["readout"][0], -1, 1))
     if part["nearness"].any() and isinstance(camera, NearCamera):

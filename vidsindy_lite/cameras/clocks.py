@@ -45,6 +45,14 @@ class Clock:
         """How long each video takes, in frames of the first, shape (m,)."""
         return np.array([frames[-1] + 1 for frames in self.frames]) / self.rates
 
+    def mended(self, rates: Floats, frames: Sequence[Floats]) -> Clock:
+        """The same with other rates and frames; the times are those of the new first video's."""
+        times, old, new = self.times, self.frames[0], frames[0]
+        if not np.array_equal(new, old):
+            step = np.ptp(times) / np.ptp(old)
+            times = times[0] + step * (new - new[0])
+        return Clock(times, rates, frames)
+
     @classmethod
     def of_tracks(cls, t: ArrayLike | Sequence[ArrayLike], tracks: Sequence[Floats]) -> Clock:
         """The clock of tracks, by the times of the first, or by a sequence of those of each.

@@ -3,17 +3,21 @@
 A point that a pinhole of focal length 1 would show at (x, y), x to the right and y *down* from the
 principal point, is seen through the lens at
 
-    x (1 + k1 r2 + k2 r2^2 + k3 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2),
-    y (1 + k1 r2 + k2 r2^2 + k3 r2^3) + p1 (r2 + 2 y^2) + 2 p2 x y,      r2 = x^2 + y^2.
+    x q + 2 p1 x y + p2 (r2 + 2 x^2),      y q + p1 (r2 + 2 y^2) + 2 p2 x y,
 
-Brown 1966, Photogrammetric Engineering 32; coefficients in OpenCV's order, k1, k2, p1, p2, k3.
+    q = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3),      r2 = x^2 + y^2.
+
+Brown 1966, Photogrammetric Engineering 32; coefficients in OpenCV's order, k1, k2, p1, p2, k3, and
+k4, k5, k6 of its rational model.
 """
 
 import numpy as np
 
 from ..arrays import Floats
 
-NAMES = ("k1", "k2", "p1", "p2", "k3")
+NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+USUAL = 5
+"""How many of these most lenses have; the others are those of a fraction."""
 
 _STEPS = 30  # of Newton, from the distorted point
 _SETTLED = 1e-14  # of the focal length
@@ -49,12 +53,14 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
 
 def _distorted(points: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
     """Where points are seen, (n, 2), and the slope of that, (n, 2, 2)."""
-    k1, k2, p1, p2, k3 = coefficients
+    k1, k2, p1, p2, k3, k4, k5, k6 = np.pad(coefficients, (0, len(NAMES) - len(coefficients)))
     x, y = points.T
-    with np.errstate(over="ignore", invalid="ignore"):  # a step of Newton's may lead far away
+    with np.errstate(all="ignore"):  # a step of Newton's may lead far away
         r2 = x**2 + y**2
-        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        growth = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # of radial, along x: x times this
+        below = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / below
+        growth = k1 + r2 * (2 * k2 + r2 * 3 * k3) - radial * (k4 + r2 * (2 * k5 + r2 * 3 * k6))
+        growth *= 2 / below  # of radial, along x: x times this
         seen = np.column_stack(
             (
                 x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2),

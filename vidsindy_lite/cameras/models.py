@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..checks import check_array, check_rows
+from ..checks import check_array, check_rows, shown
 from . import lens
 from .camera import Camera, frozen, turn
 from .geometry import PARALLEL
@@ -92,10 +92,12 @@ class PerspectiveCamera(Camera):
         theta, in-plane angle in radians. None: to be learned, together with the scale.
     image_size : tuple of int, default (512, 512)
         Width and height in pixels.
-    distortion : array_like, shape (5,), optional
-        Of the lens: k1, k2, p1, p2, k3, OpenCV's (trailing zeros may be left out). None: none.
+    distortion : array_like, shape (5,) or (8,), optional
+        Of the lens: k1, k2, p1, p2, k3, or k4, k5, k6 after them, OpenCV's (trailing zeros may be
+        left out). None: none.
     distortion_error : float, default 0
-        Standard error of k1 and of k2; that of p1 and p2 is a tenth of it, k3 stays as given.
+        Standard error of k1 and of k2; that of p1 and p2 is a tenth of it; k3 to k6
+        stay as given.
     principal_point, aspect, readout, and the errors of what was measured
         See `Camera`.
 
@@ -123,9 +125,10 @@ class PerspectiveCamera(Camera):
             if given.ndim != 1 or len(given) > len(lens.NAMES) or not np.isfinite(given).all():
                 raise ValueError(
                     f"distortion: must be at most {len(lens.NAMES)} finite numbers, "
-                    f"{', '.join(lens.NAMES)}, got {self.distortion!r:.60}"
+                    f"{', '.join(lens.NAMES)}, got {shown(self.distortion)}"
                 )
-            self._set(distortion=frozen(np.pad(given, (0, len(lens.NAMES) - len(given)))))
+            size = lens.USUAL if len(given) <= lens.USUAL else len(lens.NAMES)
+            self._set(distortion=frozen(np.pad(given, (0, size - len(given)))))
 
     def _bent(self, centred: Floats) -> Floats:
         if self.distortion is None:

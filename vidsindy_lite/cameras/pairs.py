@@ -8,7 +8,7 @@ measured normal or position does.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -72,32 +72,43 @@ def _turned(views: Views, cameras: Sequence[Camera], i: int) -> complex:
 def promising_lags(curves: Sequence[Curve], rates: Floats, unknowns: Unknowns) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
     known = next(i for i, camera in enumerate(unknowns.cameras) if camera.is_calibrated)
-    others = range(len(curves))
-    return [[0.0] if i == known else _pair_lags(curves, rates, unknowns, known, i) for i in others]
+    found = []
+    for lags, missed in lag_misses(curves, rates, unknowns):
+        choices = [_dips(lags, part)[:_PROMISING] for part in missed]
+        found.append(_apart(np.concatenate(choices)).tolist() or [0.0])
+    return [*found[:known], [0.0], *found[known:]]
 
 
-def _pair_lags(
-    curves: Sequence[Curve], rates: Floats, unknowns: Unknowns, known: int, other: int
-) -> list[float]:
-    """The most promising lags of one camera behind a calibrated one, best first."""
-    ends = np.array([curve.clock[-1] + 1 for curve in curves]) / rates  # on the first one's clock
-    margin = _OVERLAP * min(ends[known], ends[other])
-    lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
+def lag_misses(
+    curves: Sequence[Curve],
+    rates: Floats,
+    unknowns: Unknowns,
+    most: int = _INSTANTS,
+    shifts: Sequence[bool] = (False, True),
+) -> Iterator[tuple[Floats, Floats]]:
+    """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
+
+    The misses are those without and with a shift, at so many instants at most.
+    """
+    known = next(i for i, camera in enumerate(unknowns.cameras) if camera.is_calibrated)
     frames = curves[known].clock
-    frames = frames[:: max(1, len(frames) // _INSTANTS)]
-    first, second = unknowns.cameras[known], unknowns.cameras[other]
-    placed = first.is_placed and second.is_placed
-    near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
-    lines = epipolar_lines(near, curves[known].at(frames), far)
-    instants, rate = frames / rates[known], rates[other]
-    missed = []
-    for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
-        theirs = curves[other].at((instants - block[:, None]) * rate)
-        missed.append(
-            [pair_missed(second, placed, lines, theirs, shift) for shift in (False, True)]
-        )
-    choices = [_dips(lags, part)[:_PROMISING] for part in np.concatenate(missed, axis=1)]
-    return _apart(np.concatenate(choices)).tolist() or [0.0]
+    frames = frames[:: max(1, len(frames) // most)]
+    ends = np.array([curve.clock[-1] + 1 for curve in curves]) / rates  # on the first one's clock
+    for other in range(len(curves)):
+        if other == known:
+            continue
+        margin = _OVERLAP * min(ends[known], ends[other])
+        lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
+        first, second = unknowns.cameras[known], unknowns.cameras[other]
+        placed = first.is_placed and second.is_placed
+        near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
+        lines = epipolar_lines(near, curves[known].at(frames), far)
+        instants, rate = frames / rates[known], rates[other]
+        missed = []
+        for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
+            theirs = curves[other].at((instants - block[:, None]) * rate)
+            missed.append([pair_missed(second, placed, lines, theirs, shift) for shift in shifts])
+        yield lags, np.concatenate(missed, axis=1)
 
 
 def _dips(lags: Floats, missed: Floats) -> Floats:

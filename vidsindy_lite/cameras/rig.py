@@ -11,7 +11,6 @@ how far the first is from the second.
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -27,11 +26,13 @@ from ..checks import (
     check_integer,
     check_number,
     check_output,
-    check_path,
     check_positive,
     check_rows,
     check_vector,
+    shown,
 )
+from ..reading import check_file, read_tree, reading
+from ..repository import write_file
 from .camera import Camera
 from .geometry import rotation_to_z
 from .models import MODELS, OrthographicCamera, all_orthographic, independent
@@ -207,24 +208,17 @@ class Rig:
         ValueError
             If the file is not TOML or does not describe a rig; names file, camera and key.
         """
-        path = check_path("rig", path)
-        if not path.is_file():
-            raise FileNotFoundError(f"rig: no such file, got '{path}'")
-        try:
-            content = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ValueError(f"rig: must be a TOML file, got '{path}': {error}") from error
+        file = check_file("rig", path)
+        content = read_tree("rig", file, ".toml")
         tables = content.get("camera")
         if not content.keys() <= {"camera", "distance"} or not isinstance(tables, list):
             raise ValueError(
                 "rig: must hold [[camera]] tables and at most a distance, got "
-                f"{sorted(content)} in '{path}'"
+                f"{shown(sorted(content))} in '{path}'"
             )
-        try:
+        with reading("rig", file):
             cameras = tuple(_from_table(i, table) for i, table in enumerate(tables))
             return cls(cameras, distance=content.get("distance"))
-        except ValueError as error:
-            raise ValueError(f"rig: {error}, in '{path}'") from error
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the rig to a TOML file, from which `load` gives back exactly this rig.
@@ -239,7 +233,7 @@ class Rig:
         ValueError
             If the file cannot be there: it is a folder, or its folder does not exist.
         """
-        check_output("path", path).write_text(self.text(), encoding="utf-8")
+        write_file(check_output("path", path), self.text().encode())
 
     def text(self) -> str:
         """What `save` writes."""

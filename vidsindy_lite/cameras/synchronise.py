@@ -112,14 +112,22 @@ def learn_lags(
     given = check_rates(rates, len(tracks))
     rig = posed(align(tracks, first, given, clocks), rig, synchronous=False)
     with tqdm(desc="synchronise", unit="fit", delay=2, disable=not progress) as bar:
-        still = [
-            steadied(track, camera.readout, camera.image_size[1])
-            for track, camera in zip(tracks, rig.cameras, strict=True)
-        ]
-        at_once = Rig(tuple(replace(camera, readout=0.0) for camera in rig.cameras))
-        curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
-        found = _learned(_Videos(curves, Unknowns.of(at_once), given, bar), first)
-    return found if clocks is None else replace(found, clocks=tuple(c.clock for c in curves))
+        videos = _Videos.of(tracks, rig, given, clocks, bar)
+        found = _learned(videos, first)
+    return found if clocks is None else replace(found, clocks=tuple(c.clock for c in videos.curves))
+
+
+def nearest(
+    tracks: Sequence[Floats],
+    rig: Rig,
+    rates: Floats,
+    lags: Floats,
+    clocks: Sequence[ArrayLike] | None,
+) -> float:
+    """Residual in pixels at the best lags near given ones."""
+    with tqdm(disable=True) as bar:
+        found = _Videos.of(tracks, rig, rates, clocks, bar).fitted(lags, rough=True)
+    return np.inf if found is None else found.score
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +138,24 @@ class _Videos:
     unknowns: Unknowns
     rates: Floats
     bar: tqdm
+
+    @classmethod
+    def of(
+        cls,
+        tracks: Sequence[Floats],
+        rig: Rig,
+        rates: Floats,
+        clocks: Sequence[ArrayLike] | None,
+        bar: tqdm,
+    ) -> _Videos:
+        """Of tracks as they are given."""
+        still = [
+            steadied(track, camera.readout, camera.image_size[1])
+            for track, camera in zip(tracks, rig.cameras, strict=True)
+        ]
+        at_once = Rig(tuple(replace(camera, readout=0.0) for camera in rig.cameras))
+        curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
+        return cls(curves, Unknowns.of(at_once), rates, bar)
 
     @property
     def step(self) -> int:

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from ..checks import check_path
+from ..repository import write_file
 from ..vision import pick_frames, video_info
 from .pages import page
 
@@ -46,7 +47,8 @@ def write_pick_page(paths: Sequence[str | os.PathLike], out: str | os.PathLike) 
     out = check_path("out", out)
     if out.exists() and not (out.is_file() and _MARK in out.read_text("utf-8", "replace")):
         raise ValueError(f"out: must be a new file or an earlier page of pick, got '{out}'")
-    out.write_text(page("pick.html", videos=[_video(Path(path)) for path in paths]), "utf-8")
+    text = page("pick.html", videos=[_video(Path(path)) for path in paths])
+    write_file(out, text.encode())
     return out
 
 

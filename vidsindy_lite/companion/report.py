@@ -1,10 +1,10 @@
 """The report on a law discovered from videos: a page to read, and the same as data.
 
-`write_report` makes a folder of four files: ``report.html``, which needs no other file and no
+`write_report` writes four files into a folder: ``report.html``, which needs no other file and no
 network, ``result.json`` (``result.schema.json`` beside this module says what is in it),
 ``tracks.csv``, and ``rig.toml`` with the learned cameras. `write_refusal` does the same, without
-cameras, if there is no law to report: then a picture of the tracks is what helps. The folder
-appears under its name only when it is complete.
+cameras, if there is no law to report: then a picture of the tracks is what helps. All of them
+appear when all are made; the folder itself and whatever else it holds stay as they are.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ import base64
 import io
 import json
 import os
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import suppress
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -30,6 +29,7 @@ from ..checks import check_path
 from ..dynamics import Discovery, Swing
 from ..pipeline import VideoDiscovery
 from ..refusal import Refused
+from ..repository import write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
 from ..vision import VideoInfo, read_frame, video_info
@@ -47,32 +47,44 @@ STEPS = {
     "cameras": "The cameras could not be learned.",
     "law": "The path has no law that could be found.",
 }
-_TURNS = 5  # attempts to put a folder in place while another run does
+_TITLES = ("<title>Law of a moving target", "<title>No law: ")  # of pages that are ours
+_BEGIN = b'{\n "format": '  # of data that are
 
 
 def check_folder_is_free(folder: str | Path) -> Path:
-    """That a report may be written there: nothing is, or an earlier report that it replaces.
+    """That a report may be written there: none of its files is, or those of an earlier report.
 
     Raises
     ------
     ValueError
-        If something else is there, or the folder around it does not exist or is not writable.
+        If files of these names are none of a report, it is no folder, or cannot be written to.
     """
     folder = check_path("out", folder)
-    if not folder.absolute().parent.is_dir():
-        raise ValueError(f"out: the folder around it must exist, got '{folder}'")
-    if not os.access(folder.absolute().parent, os.W_OK):
-        raise ValueError(f"out: the folder around it must be writable, got '{folder}'")
-    if folder.is_dir():
-        strange = sorted({path.name for path in folder.iterdir()} - set(FILES))
-        if strange:
-            raise ValueError(
-                f"out: must be a new folder or hold an earlier report, got '{folder}' with "
-                f"{', '.join(strange[:3])}"
-            )
-    elif folder.exists():
-        raise ValueError(f"out: must be a folder, got the file '{folder}'")
+    there = folder if folder.exists() else folder.absolute().parent
+    whose = "folder" if there == folder else "folder around it"
+    if not there.is_dir():
+        raise ValueError(f"out: the {whose} must be one that exists, got '{folder}'")
+    if not os.access(there, os.W_OK):
+        raise ValueError(f"out: the {whose} must be writable, got '{folder}'")
+    strange = [name for name in FILES if (folder / name).exists()]
+    if strange and not _is_earlier(folder):
+        raise ValueError(
+            f"out: must hold no files of the names {', '.join(FILES)} but of an earlier report, "
+            f"got '{folder}' with {', '.join(strange)}"
+        )
     return folder
+
+
+def _is_earlier(folder: Path) -> bool:
+    """Whether a folder holds an earlier report, or what an interruption has left of one."""
+    page, data = folder / PAGE, folder / DATA
+    try:
+        if page.exists():
+            return any(mark in page.read_text("utf-8", "replace") for mark in _TITLES)
+        with data.open("rb") as file:
+            return file.read(len(_BEGIN)) == _BEGIN
+    except OSError:
+        return False
 
 
 def write_report(
@@ -90,7 +102,7 @@ def write_report(
     paths : sequence of path, or None
         The videos, one per camera; None if there are tracks alone.
     folder : path
-        Where; an earlier report is replaced.
+        Where; the files of an earlier report are replaced.
     options : mapping, optional
         How the law was asked for, to be told in the report.
     progress : bool
@@ -104,16 +116,15 @@ def write_report(
     Raises
     ------
     ValueError
-        If there is not one video per camera, or the folder holds anything but a report.
+        If there is not one video per camera, or the folder holds files of these names that are none
+        of a report.
     """
     folder = check_folder_is_free(folder).absolute()
     if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)
-    with _replacing(folder) as new:
-        _write_data(new, content, found.t, found.tracks)
-        found.rig.save(new / RIG)
-        (new / PAGE).write_text(_page(found, paths, content, progress), "utf-8")
+    files = _data(content, found.t, found.tracks) | {RIG: found.rig.text()}
+    _put(folder, files | {PAGE: _page(found, paths, content, progress)})
     return folder / PAGE
 
 
@@ -153,44 +164,31 @@ def write_refusal(
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
         look = _encoded(_overview(refused.tracks, paths, names, sizes))
     frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
-    with _replacing(folder) as new:
-        _write_data(new, content, frames, refused.tracks, "frame")
-        text = page("refusal.html", look=look, what=STEPS[refused.step], data_file=DATA, **content)
-        (new / PAGE).write_text(text, "utf-8")
+    files = _data(content, frames, refused.tracks, "frame")
+    text = page("refusal.html", look=look, what=STEPS[refused.step], data_file=DATA, **content)
+    _put(folder, files | {PAGE: text})
     return folder / PAGE
 
 
-@contextmanager
-def _replacing(folder: Path) -> Iterator[Path]:
-    """A new folder, which takes the place of another when all is written into it."""
-    with tempfile.TemporaryDirectory(prefix=".report-", dir=folder.parent) as scratch:
-        new = Path(scratch) / "new"
-        new.mkdir()
-        yield new
-        for turn in range(_TURNS):  # another run may put its folder there in between
-            old = Path(scratch) / f"old{turn}"
-            if folder.exists():
-                folder.rename(old)
-            try:
-                new.rename(folder)
-                return
-            except OSError:
-                if old.exists() and not folder.exists():
-                    old.rename(folder)
-                    raise
-                if turn == _TURNS - 1:
-                    raise
+def _put(folder: Path, texts: Mapping[str, str]) -> None:
+    """Put the files of a report into its folder, and take away those of an earlier one."""
+    check_folder_is_free(folder)  # again: a while has passed
+    is_new = not folder.exists()
+    try:
+        folder.mkdir(exist_ok=True)
+        write_files({folder / name: text.encode() for name, text in texts.items()})
+    finally:
+        if is_new:  # and still empty
+            with suppress(OSError):
+                folder.rmdir()
+    for name in set(FILES) - set(texts):
+        (folder / name).unlink(missing_ok=True)
 
 
-def _write_data(
-    folder: Path,
-    content: Mapping[str, object],
-    instants: Floats,
-    tracks: Sequence[Floats],
-    instant: str = "t",
-) -> None:
+def _data(
+    content: Mapping[str, object], instants: Floats, tracks: Sequence[Floats], instant: str = "t"
+) -> dict[str, str]:
     """The data as JSON, and the tracks as a table that `discover --tracks` reads."""
-    (folder / DATA).write_text(json.dumps(content, allow_nan=False, indent=1) + "\n", "utf-8")
     several = [""] if tracks[0].shape[1] == 2 else LETTERS[: tracks[0].shape[1] // 2]
     columns = [f"{axis}{i + 1}{n}" for i in range(len(tracks)) for n in several for axis in "uv"]
     longest = len(instants)
@@ -199,8 +197,8 @@ def _write_data(
         ",".join(f"{value:.10g}" if np.isfinite(value) else "" for value in row)
         for row in np.column_stack((instants, *whole))
     )
-    lines = [",".join((instant, *columns)), *rows]
-    (folder / TRACKS).write_text("\n".join(lines) + "\n", "utf-8")
+    table = "\n".join([",".join((instant, *columns)), *rows]) + "\n"
+    return {DATA: json.dumps(content, allow_nan=False, indent=1) + "\n", TRACKS: table}
 
 
 def _names(paths: Sequence[str | Path] | None, count: int) -> list[str]:

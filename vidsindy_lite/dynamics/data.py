@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..checks import FARTHEST, check_array, check_times
+from ..checks import FARTHEST, check_array, check_times, shown
 from .library import variable_names
 
 # --------------------------------------------------------------------------------------------------
@@ -19,6 +19,8 @@ CHANCE = 4.0
 """Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent."""
 Trajectory = tuple[Floats, Floats]
 """Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was."""
+CLOCKS = ("t", "time", "times", "seconds", "timestamp")
+"""What a column of times is called."""
 
 
 def check_trajectory(t: Floats, x: Floats) -> Trajectory:
@@ -52,7 +54,8 @@ def _check_samples(t: Floats, x: Floats) -> Trajectory:
     """The same of all rows in which a coordinate was seen."""
     t, x = check_array("t", t), check_array("x", x)
     if x.ndim != 2 or x.shape[1] < 1:
-        raise ValueError(f"x: must have shape (n, d) with d of at least 1, got {x.shape}")
+        advice = ": one coordinate is a column, x[:, None]" if x.ndim == 1 and len(x) else ""
+        raise ValueError(f"x: must have shape (n, d) with d of at least 1, got {x.shape}{advice}")
     if t.shape != (len(x),):
         raise ValueError(f"t: must have shape ({len(x)},) as x has {len(x)} rows, got {t.shape}")
     t = check_times(t)
@@ -85,8 +88,17 @@ def check_trajectories(
     if not isinstance(pairs, list | tuple) or not all(
         isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs
     ):
-        raise ValueError(f"x: must be given, unless t is a list of pairs (t, x), got t = {t!r:.60}")
-    trajectories = [_check_samples(*pair) for pair in pairs]
+        raise ValueError(
+            f"x: must be given, unless t is a list of pairs (t, x), got t = {shown(t)}"
+        )
+    trajectories = []
+    for i, pair in enumerate(pairs):
+        try:
+            trajectories.append(_check_samples(*pair))
+        except ValueError as error:
+            if x is not None or len(pairs) == 1:
+                raise
+            raise ValueError(f"{error}, in trajectory {i}") from None
     if len({values.shape[1] for _, values in trajectories}) != 1:
         raise ValueError(
             "t: a list of trajectories must hold at least one, all of the same dimension, "
@@ -116,6 +128,10 @@ def coordinate_names(
     columns = [list(getattr(frame, "columns", [])) for frame in frames]
     if any(names != columns[0] for names in columns):
         raise ValueError(f"x: columns must be named alike in all trajectories, got {columns}")
+    for times, frame in [(t, x)] if x is not None else t:
+        for name in columns[0]:
+            if str(name).lower() in CLOCKS and np.array_equal(frame[name], times):
+                raise ValueError(f"x: must hold states alone, got the times as column {name!r}")
     if columns[0] and all(isinstance(name, str) and name.isidentifier() for name in columns[0]):
         return tuple(columns[0])
     return variable_names(np.shape(frames[0])[1])
@@ -195,8 +211,8 @@ def check_systematic(
     """
     if systematic is None:
         return [np.empty((*x.shape, 0)) for _, x in trajectories]
-    if np.isscalar(systematic):
-        raise ValueError(f"systematic: must have shape (k, n, d), got {systematic!r:.60}")
+    if not isinstance(systematic, np.ndarray | list | tuple):
+        raise ValueError(f"systematic: must have shape (k, n, d), got {shown(systematic)}")
     parts = [systematic] if len(trajectories) == 1 and np.ndim(systematic) == 3 else systematic
     if len(parts) != len(trajectories):
         raise ValueError(

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations_with_replacement
+from math import comb
 from typing import cast
 
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import comb as binomial
 
 from ..arrays import Bools, Floats, Ints
-from ..checks import check_array, check_instance, check_integer, check_number, check_times
+from ..checks import check_array, check_instance, check_integer, check_number, check_times, shown
 
 # --------------------------------------------------------------------------------------------------
 # The library: monomials of the state, and what a shift of the origin does to them (paper: Eq. 10).
@@ -280,7 +281,7 @@ class Input:
             If the name is none, times or values are not such, or times of trajectories overlap.
         """
         if not isinstance(name, str) or not name.isidentifier():
-            raise ValueError(f"inputs: must be named like variables, such as u, got {name!r:.60}")
+            raise ValueError(f"inputs: must be named like variables, such as u, got {shown(name)}")
         several = isinstance(t, list | tuple) and any(np.ndim(part) for part in t)
         times = cast("Sequence[Floats]", t if several else [t])
         runs = cast("Sequence[Floats]", values if several else [values])
@@ -330,6 +331,8 @@ def _spline(name: str, t: Floats, values: Floats) -> CubicSpline:
 # own. For given variables it becomes what `library` works with: functions of the state, and the
 # exponents of products of coordinates and functions.
 
+MOST_TERMS = 1000
+"""Most monomials of a law, of its denominators, or waves: a search among more would not end."""
 FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
 """What can be written as text."""
 OTHERS = "..."
@@ -413,12 +416,12 @@ class Library:
         """
         if not isinstance(functions, Mapping) or not functions:
             raise ValueError(
-                f"functions: must map names to functions of the variables, got {functions!r:.60}"
+                f"functions: must map names to functions of the variables, got {shown(functions)}"
             )
         for name, rule in functions.items():
             if not isinstance(name, str) or not name.strip() or not callable(rule):
                 raise ValueError(
-                    f"functions: must map names to functions, got {name!r:.60}: {rule!r:.60}"
+                    f"functions: must map names to functions, got {shown(name)}: {shown(rule)}"
                 )
         return cls(functions=tuple(functions.items()))
 
@@ -450,7 +453,7 @@ class Library:
         >>> vl.discover(t, x, library=library, order=2)  # x'' = -x - x^3 - 0.2 vx + 0.5 u
         """
         if not isinstance(values, Mapping) or not values:
-            raise ValueError(f"inputs: must map names to values at t, got {values!r:.60}")
+            raise ValueError(f"inputs: must map names to values at t, got {shown(values)}")
         return cls.terms({name: Input.of(name, t, given) for name, given in values.items()})
 
     def where(self, equations: Mapping[str, Mapping[str, float | None]]) -> Library:
@@ -483,7 +486,7 @@ class Library:
         if not given or not all(isinstance(terms, Mapping) for _, terms in given):
             raise ValueError(
                 "equations: must give variables what is known of their terms, e.g. "
-                f"{{'x': {{'y': 10, 'z': 0}}}}, got {equations!r:.60}"
+                f"{{'x': {{'y': 10, 'z': 0}}}}, got {shown(equations)}"
             )
         for name, terms in given:
             checked = {
@@ -581,10 +584,11 @@ class Library:
         Raises
         ------
         ValueError
-            If a function has an argument that is no variable.
+            If a function has an argument that is no variable, or there are too many terms.
         """
         d = len(names)
         states = d - (CLOCK in names[measured:])
+        self._check_size(states, measured)
         functions = [
             harmonic(names, axis, multiple, kind)
             for axis in range(measured)
@@ -611,6 +615,21 @@ class Library:
                 rows[:, :states], rows[:, slope - d] = below, 1
                 exponents = np.concatenate([exponents, rows])
         return exponents, tuple(functions)
+
+    def _check_size(self, states: int, measured: int) -> None:
+        """Refuse more terms than a search can try, before they are listed."""
+        counts = [
+            ("monomials", comb(states + degree, states), f"of degree {degree}")
+            for degree in (self.degree or 0, self.denominators)
+        ]
+        waves = 2 * self.harmonics * measured
+        counts += [("sines and cosines", waves, f"of {self.harmonics} multiples")]
+        for what, count, which in counts:
+            if count > MOST_TERMS:
+                raise ValueError(
+                    f"library: must have at most {MOST_TERMS} {what}, got {count} {which} in "
+                    f"{states} variables"
+                )
 
 
 def check_library(degree: int | None, library: Library | None) -> Library:

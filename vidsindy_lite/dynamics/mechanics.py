@@ -13,7 +13,7 @@ from scipy.interpolate import BSpline
 from scipy.optimize import least_squares
 
 from ..arrays import Bools, Floats
-from ..checks import check_array, check_vector
+from ..checks import check_array, check_vector, shown
 from .data import inflation
 from .l0 import LEAST
 from .library import extended
@@ -733,11 +733,11 @@ def _axes(away: Floats, zero: ArrayLike | None, span: Floats) -> Floats:
     """
     first = away.mean(axis=0) if zero is None else check_array("zero", zero)
     if first.shape != away.shape[1:] or not np.isfinite(first).all():
-        raise ValueError(f"zero: must be {away.shape[1]} finite numbers, got {zero!r:.60}")
+        raise ValueError(f"zero: must be {away.shape[1]} finite numbers, got {shown(zero)}")
     within = span.T @ (span @ first)
     length = np.linalg.norm(within)
     if not length > 1e-6 * np.linalg.norm(first):
-        raise ValueError(f"zero: must be a direction in the plane of the circle, got {zero!r:.60}")
+        raise ValueError(f"zero: must be a direction in the plane of the circle, got {shown(zero)}")
     first = within / length
     rest = away @ (span.T @ span)
     rest = rest - np.outer(rest @ first, first)

@@ -11,13 +11,20 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import comb
 
 import numpy as np
 from scipy.integrate import DOP853
 
 from ..arrays import Bools, Floats, Ints
-from ..checks import check_array, check_integer, check_number, check_times, check_vector
+from ..checks import (
+    check_array,
+    check_instance,
+    check_integer,
+    check_number,
+    check_times,
+    check_vector,
+    shown,
+)
 from .library import (
     CLOCK,
     OTHERS,
@@ -48,7 +55,9 @@ WEIGHTS, THIRD, FIFTH = (row[:STAGES, None] for row in (DOP853.B, DOP853.E3, DOP
 MUCH_BETTER = 2.0**-9
 """Error over tolerance below which a step of order 8 may be twice as long."""
 MOST_STEPS = 50_000
-"""Steps of a whole motion; one that needs more is stiff, or as good as lost."""
+"""Steps of a motion that gets nowhere; one that needs more is stiff, or as good as lost. ..."""
+STEPS_A_LENGTH = 1000
+"""... For each of its own sizes by which it moves on it has so many more: then it is just long."""
 SHORTEST_STEP = 1e-13
 """Least step over the length of the whole motion."""
 
@@ -124,7 +133,7 @@ def integrate(
     x0: Floats,
     tolerance: float = 1e-11,
     farthest: float = np.inf,
-) -> Floats:
+) -> tuple[Floats, str]:
     """Integrate with the Dormand-Prince method of order 8, its steps halved and doubled as needed.
 
     Parameters
@@ -142,8 +151,11 @@ def integrate(
 
     Returns
     -------
-    ndarray, shape (n, d)
-        Rows after a blow-up are NaN, or after so many steps that the motion is too stiff to follow.
+    path : ndarray, shape (n, d)
+        Rows after a blow-up are NaN, or from where the motion is too stiff to follow; however long
+        it is, it is followed to its end.
+    end : str
+        What happens where the path ends early, in words; else empty.
 
     References
     ----------
@@ -152,28 +164,30 @@ def integrate(
     path = np.full((len(t), len(x0)), np.nan)
     path[0] = x = x0
     step, span = float(np.diff(t[:2]).sum()), float(t[-1] - t[0])
-    steps = MOST_STEPS + len(t)
+    steps, size = float(MOST_STEPS), float(np.abs(x0).max())
     for row, (now, end) in enumerate(zip(t[:-1].tolist(), t[1:].tolist(), strict=True), start=1):
         while now < end:
-            steps -= 1
-            if not steps:
-                return path
             last = step >= end - now
+            steps -= not last  # that a row is near is no fault of the motion
+            if steps < 0:
+                return path, "is too stiff to be followed"
             taken = end - now if last else step
             with np.errstate(over="ignore", invalid="ignore"):  # of steps that are too long
                 moved, error = _step(rate, x, taken, tolerance)
             if not error < 1:
                 step = taken / 2
                 if step < SHORTEST_STEP * span:
-                    return path
+                    return path, "diverges"
                 continue
+            size = max(size, float(np.abs(moved).max()))
+            steps += STEPS_A_LENGTH * float(np.abs(moved - x).max()) / (size or 1.0)
             x, now = moved, end if last else now + taken
             if np.abs(x).max() > farthest:
-                return path
+                return path, "diverges"
             if error < MUCH_BETTER and not taken < step:
                 step = 2 * taken
         path[row] = x
-    return path
+    return path, ""
 
 
 def _step(
@@ -247,11 +261,16 @@ class PolynomialSystem:
         named = all(isinstance(name, str) and name.isidentifier() for name in names)
         if not names or not named or len(set(names)) != len(names):
             raise ValueError(
-                f"names: must be distinct names such as x or x1, at least one, got {self.names!r}"
+                "names: must be distinct names such as x or x1, at least one, "
+                f"got {shown(self.names)}"
             )
         powers = check_array("exponents", self.exponents)
         coefficients = check_array("coefficients", self.coefficients).copy()
-        width = len(names) + len(self.functions)
+        functions = tuple(self.functions) if isinstance(self.functions, Iterable) else (None,)
+        # A law that is read from a file has the names of its functions at first.
+        if not all(isinstance(function, Function | str) for function in functions):
+            raise ValueError(f"functions: must be of a Library, got {shown(self.functions)}")
+        width = len(names) + len(functions)
         if powers.ndim != 2 or powers.shape[1] not in (width, width + len(names)):
             raise ValueError(f"exponents: must have shape (l, {width}), got shape {powers.shape}")
         whole = np.isfinite(powers) & (powers >= 0) & (powers == np.rint(powers))
@@ -300,9 +319,10 @@ class PolynomialSystem:
         if not given or not all(isinstance(terms, Mapping) for terms in given):
             raise ValueError(
                 "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
-                f"'y': {{'x': 1}}}}, got {equations!r:.60}"
+                f"'y': {{'x': 1}}}}, got {shown(equations)}"
             )
-        names, held = tuple(equations), library or Library()
+        names, held = tuple(equations), Library() if library is None else library
+        check_instance("library", held, Library)
         states = names[:-1] if CLOCK in names[-1:] and held.timed(names[:-1]) else names
         m = len(states) // 2
         measured = m if m and states[m:] == velocity_names(states[:m]) else len(states)
@@ -449,7 +469,7 @@ class PolynomialSystem:
         moves = all(function.of_time for function in self.functions)
         if shift[self.states :].any() or (shift.any() and not moves):
             raise ValueError(
-                f"offset: must be zero for a law with functions of the state, got {offset!r:.60}"
+                f"offset: must be zero for a law with functions of the state, got {shown(offset)}"
             )
         exponents = closure(self.exponents)
         rows = {tuple(e): row for row, e in enumerate(exponents)}
@@ -464,7 +484,7 @@ class PolynomialSystem:
         slopes &= exponents.sum(axis=1) == 1
         below = 1 - shifted[slopes].sum(axis=0)
         if (np.abs(below) <= 1e-13).any():
-            raise ValueError(f"offset: no denominator may vanish there, got {offset!r:.60}")
+            raise ValueError(f"offset: no denominator may vanish there, got {shown(offset)}")
         shifted[slopes] = 0.0
         return replace(self, exponents=exponents, coefficients=shifted / below)
 
@@ -491,6 +511,10 @@ class PolynomialSystem:
             If the times do not increase, a time or a number of the state is not finite, or an input
             is not known at a time.
         """
+        return self.followed(t, x0)[0]
+
+    def followed(self, t: Floats, x0: Floats) -> tuple[Floats, str]:
+        """The path that `simulate` finds, and what happens at its end; empty if it has all rows."""
         t = check_times(t)
         if self.timed and np.shape(x0) != (self.d,):
             x0 = np.append(check_vector("x0", x0, self.states), t[0])
@@ -709,8 +733,6 @@ class State:
 # velocities are states that nobody has measured, and their half of the law is known: ``x' = v``.
 # So is the time, if there are inputs: a last state, with ``t' = 1``.
 
-MOST_TERMS = 1000
-"""Most monomials of a law, or of its denominators: a search among more would not end."""
 SIZES, POINTS = (-3, 6), 64
 """Decades of the sizes of points at which a function is asked whether it is none, and how many."""
 
@@ -757,7 +779,6 @@ class Form:
         if order == 2:
             names += velocity_names(coordinates)
         states = len(names)  # those that an equation is sought or known of
-        _check_size(library, states)
         if library.timed(names):
             names += (CLOCK,)
         d = len(names)
@@ -892,16 +913,6 @@ class Form:
         """The candidates' places in the coefficients, equation by equation."""
         own = self.shared == np.arange(len(self.shared))
         return np.flatnonzero(self.candidates.T.ravel() & own)
-
-
-def _check_size(library: Library, states: int) -> None:
-    """Refuse more monomials than a search can try, before they are listed."""
-    for degree in (library.degree or 0, library.denominators):
-        if (count := comb(states + degree, states)) > MOST_TERMS:
-            raise ValueError(
-                f"library: must have at most {MOST_TERMS} monomials, got {count} of degree "
-                f"{degree} in {states} variables"
-            )
 
 
 def _vanishes(function: Function, d: int) -> bool:

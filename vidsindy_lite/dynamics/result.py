@@ -16,8 +16,10 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from ..arrays import Bools, Floats
-from ..checks import check_array, check_output, check_path
-from ..values import decoded, encoded
+from ..checks import MALFORMED, check_array, check_output, shown
+from ..reading import check_file, read_tree
+from ..repository import write_file
+from ..values import built, decoded, encoded
 from .data import Trajectory
 from .library import Function, Library, extended, harmonic
 from .mechanics import Physics, Quantity, Round, on_circle, physics_of
@@ -101,7 +103,7 @@ class Simulation:
     x : ndarray, shape (n, d)
         NaN from where the path has left all bounds.
     status : str
-        ``"ok"``, or where the path diverges.
+        ``"ok"``, or where the path diverges, or is too stiff to be followed.
     """
 
     t: Floats
@@ -273,10 +275,9 @@ class Discovery:
         ValueError
             If the state has another shape, or an input of the law is not known at a time.
         """
-        x = self.system.simulate(t, x0)
-        lost = np.isnan(x).any(axis=1)
-        t = np.asarray(t, dtype=float)
-        status = f"diverges after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
+        x, end = self.system.followed(t, x0)
+        t, lost = np.asarray(t, dtype=float), np.isnan(x).any(axis=1)
+        status = f"{end} after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
         return Simulation(t, x, status)
 
     def physics(self, down: ArrayLike | None = None) -> Physics:
@@ -576,7 +577,7 @@ def write(found: Discovery, path: str | os.PathLike) -> None:
         "discovery": encoded(found, attrgetter("__name__"), (Function,)),
     }
     text = json.dumps(content, indent=1)
-    file.write_text(text + "\n", encoding="utf-8")
+    write_file(file, f"{text}\n".encode())
 
 
 def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
@@ -592,18 +593,19 @@ def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
     ValueError
         If the file holds none, or the library not all functions of the law, or others.
     """
-    file = check_path("path", path)
+    file = check_file("path", path, "file of a discovery")
+    content = read_tree("path", file, ".json")
     message = f"path: must be a file that Discovery.save has written, got '{file}'"
-    if not file.is_file():
-        raise FileNotFoundError(f"{message}, which does not exist")
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise ValueError(f"{message}, whose format is not {FORMAT!r}")
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-        found = decoded(content["discovery"], _built) if content["format"] == FORMAT else None
+        found = decoded(content["discovery"], _built)
         values = decoded(content.get("functions"), _built)
-    except (ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
-        raise ValueError(message) from error
-    if not isinstance(found, Discovery):
-        raise ValueError(message)
+        if values is not None:
+            values = check_array("functions", values)
+        _check_shapes(found)
+    except MALFORMED as error:
+        raise ValueError(f"{message}: {shown(error)}") from error
     found = _with_functions(found, library)
     if values is not None:  # of a file of today
         _check_alike(found, values)
@@ -680,8 +682,26 @@ def _check_alike(found: Discovery, written: Floats) -> None:
 
 
 def _built(kind: str, parts: dict[str, Any]) -> Any:
-    """What a file holds under the name of a type."""
-    return TYPES[kind](**parts)
+    """What a file holds under the name of a type; functions are there by their names."""
+    if kind not in TYPES:
+        raise ValueError(f"a type must be one of {', '.join(TYPES)}, got {shown(kind)}")
+    return built(TYPES[kind], parts, TYPES | {"Function": str})
+
+
+def _check_shapes(found: Any) -> None:
+    """Refuse a discovery whose parts are of different laws."""
+    if not isinstance(found, Discovery):
+        raise ValueError(f"it must hold a Discovery, got {type(found).__name__}")
+    d, here, native = found.system.d, *(len(law.exponents) for law in (found.system, found.native))
+    shapes = {
+        "offset": (d,), "offset_errors": (d,), "covariance": (here * d, here * d),
+        "native_covariance": (native * d, native * d), "absent": (native, d, 2),
+    }  # fmt: skip
+    for name, shape in shapes.items():
+        if getattr(found, name).shape != shape:
+            raise ValueError(f"{name} must have shape {shape}, got {getattr(found, name).shape}")
+    if not found.curves or found.native.d != d:
+        raise ValueError(f"it must hold curves, and two laws of {d} variables")
 
 
 # --------------------------------------------------------------------------------------------------

@@ -11,13 +11,15 @@ by hand per system.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from threading import Lock
 from typing import cast
 
 import numpy as np
 from scipy.interpolate import BSpline
-from threadpoolctl import threadpool_limits
+from threadpoolctl import OpenBLASController, threadpool_limits
 from tqdm import tqdm
 
 from ..arrays import Floats
@@ -62,6 +64,31 @@ DROWNED = 0.5
 """Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
 MOST_LAWS = 3
 """Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
+
+
+_lock = Lock()
+_at_work: list[threadpool_limits] = []  # one for each discovery, the first of which counts
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Keep BLAS to one thread, and give it back what it had when the last one at work has ended.
+
+    The limit is the process's own: who sets it while another has would take one thread for what
+    was there before.
+    """
+    with _lock:
+        _at_work.append(_at_work[0] if _at_work else threadpool_limits(limits=1, user_api="blas"))
+    try:
+        yield
+    finally:
+        with _lock:
+            limits = _at_work.pop()
+            if not _at_work:
+                # Of OpenBLAS only the thread that set a limit may lift it, unless it is released.
+                OpenBLASController.clear_controlling_thread(force=True)
+                limits.restore_original_limits()
+                OpenBLASController.clear_controlling_thread(force=True)
 
 
 def discover(
@@ -157,7 +184,7 @@ def discover(
     )
     task = _Task(measured, names, library, origin, seed, progress, end)
     # Matrices this small gain nothing by threads, which wait for each other on a busy machine.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_blas_thread():
         found = _of_order(task, order)
         return found if orientation == "data" else _oriented(task, found)
 

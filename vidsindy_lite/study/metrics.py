@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..checks import check_array
+from ..checks import check_array, shown
 from ..dynamics import Discovery, PolynomialSystem
 
 
@@ -87,7 +87,7 @@ def score(found: PolynomialSystem | Discovery, truth: PolynomialSystem) -> Score
         if not isinstance(one, PolynomialSystem):
             raise ValueError(
                 f"{name}: must be a PolynomialSystem (what was found comes first, the truth "
-                f"second), got {one!r:.60}"
+                f"second), got {shown(one)}"
             )
     if law.d != truth.d:
         raise ValueError(f"found: must have the dimension of truth, {truth.d}, got {law.d}")

@@ -34,18 +34,13 @@ from uuid import uuid4
 
 from tqdm import tqdm
 
+from ..checks import MALFORMED
 from ..repository import PACKAGE, RESULTLESS, code_hash, repository_root, write_file
 from ..values import decoded, encoded
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 Function = Callable[[Task], Result]
-
-NO_RESULT = (
-    OSError, ValueError, LookupError, TypeError, AttributeError, ImportError, ArithmeticError,
-    RecursionError,
-)  # fmt: skip
-"""What reading a file of a result raises that is damaged, or none."""
 
 
 class TaskError(RuntimeError):
@@ -259,7 +254,7 @@ def _stored(files: Mapping[int, Path], tasks: list) -> dict[int, Any]:
             entry = json.loads(content) if digest == _digest(content) else {}
             if entry["task"] == repr(tasks[number]):
                 results[number] = decoded(entry["result"], _built)
-        except NO_RESULT:
+        except (*MALFORMED, OSError):  # damaged, or none
             continue
     return results
 

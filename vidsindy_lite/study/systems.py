@@ -10,7 +10,7 @@ import numpy as np
 
 # Function, Ints: in the signature that is inherited.
 from ..arrays import Floats, Ints  # noqa: F401
-from ..checks import check_integer, check_positive, check_vector
+from ..checks import check_integer, check_positive, check_vector, shown
 from ..dynamics import Function, PolynomialSystem, monomial_exponents  # noqa: F401
 from .metrics import coefficients_in
 from .published import SYSTEMS_S1
@@ -83,7 +83,7 @@ class _Benchmarks(dict[str, Benchmark]):
 
     def __missing__(self, name: object) -> Benchmark:
         known = sorted(self, key=lambda one: SequenceMatcher(None, str(name), one).ratio())
-        raise KeyError(f"system: must be one of {', '.join(known[::-1])}, got {name!r:.60}")
+        raise KeyError(f"system: must be one of {', '.join(known[::-1])}, got {shown(name)}")
 
 
 SYSTEMS: dict[str, Benchmark] = _Benchmarks(

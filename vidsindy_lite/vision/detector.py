@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image
-from ..checks import check_path
+from ..checks import MALFORMED, check_path, shown
 
 WEIGHTS = Path(__file__).with_name("detector.pt")
 """The weights of the package's own network; detector.json beside it is their training log."""
@@ -101,9 +101,10 @@ class OnnxDetector:
         self.path = path
         try:
             self.network = cv2.dnn.readNetFromONNX(str(path), cv2.dnn.ENGINE_NEW)
-        except cv2.error as error:
+        except (*MALFORMED, cv2.error) as error:
             raise ValueError(
-                f"detector: must be an ONNX file that OpenCV can run, got '{self.path}': {error}"
+                f"detector: must be an ONNX file that OpenCV can run, got '{self.path}': "
+                f"{shown(str(error))}"
             ) from None
         # OpenCV tells the shape of an input only in its description of the whole network.
         shape = set(re.findall(r"<Input> \w+ \[1 x 3 x (\d+) x (\d+)\]", self.network.dump()))

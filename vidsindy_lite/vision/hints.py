@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
-from ..checks import check_integer, check_number, check_path
+from ..checks import check_integer, check_number, shown
+from ..reading import check_file, read_tree
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Hint:
     def __post_init__(self) -> None:
         if (self.frame is None) != (self.box is None):
             raise ValueError(
-                f"box: must come with its frame, got frame={self.frame!r}, box={self.box!r:.60}"
+                f"box: must come with its frame, got frame={self.frame!r}, box={shown(self.box)}"
             )
         if self.box is None and self.colour is None:
             raise ValueError("target: must be a frame and a box in it, or a colour, got neither")
@@ -55,7 +55,7 @@ class Hint:
 
 def _numbers(name: str, values: object, count: int, what: str) -> tuple[float, ...]:
     if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != count:
-        raise ValueError(f"{name}: must be {what}, got {values!r:.60}")
+        raise ValueError(f"{name}: must be {what}, got {shown(values)}")
     return tuple(check_number(name, value) for value in values)
 
 
@@ -76,7 +76,9 @@ def load_hints(path: str | os.PathLike) -> tuple[Hint | None, ...]:
     ValueError
         If a target is no hint; names file, camera and key.
     """
-    tables = tomllib.loads(check_path("path", path).read_text(encoding="utf-8"))["camera"]
+    tables = read_tree("path", check_file("path", path), ".toml").get("camera", ())
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise ValueError(f"path: must hold tables [[camera]], got {shown(tables)}, in '{path}'")
     return tuple(_from_table(f"{path}: camera {i}", table) for i, table in enumerate(tables))
 
 
@@ -87,7 +89,7 @@ def _from_table(where: str, table: Mapping[str, object]) -> Hint | None:
     known = [field.name for field in fields(Hint)]
     if not isinstance(told, dict) or not set(told) <= set(known):
         raise ValueError(
-            f"{where}: target: must be a table of {', '.join(known)}, got {told!r:.60}"
+            f"{where}: target: must be a table of {', '.join(known)}, got {shown(told)}"
         )
     try:
         return Hint(**told)

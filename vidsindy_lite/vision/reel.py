@@ -20,6 +20,8 @@ class Reel:
 
     def __init__(self, path: str | os.PathLike) -> None:
         self.path, self.info = path, video_info(path)
+        if self.info.frames < 2:
+            raise ValueError(f"path: must hold two frames or more, got one in '{path}'")
         width, height = self.info.size
         self.few = 3 * width * height * self.info.frames <= _ROOM
         self._kept: list[Image] | None = None

@@ -7,7 +7,14 @@ from typing import Any, Self
 import numpy as np
 
 from ..arrays import Floats
-from ..checks import check_choice, check_image_size, check_integer, check_number
+from ..checks import (
+    MALFORMED,
+    check_choice,
+    check_image_size,
+    check_integer,
+    check_number,
+    shown,
+)
 from .scenery import BACKGROUNDS, Size
 
 SHAPES = ("disc", "polygon", "irregular")
@@ -141,10 +148,15 @@ class Scene:
 
 def _check_rectangles(name: str, rectangles: Iterable[Box], size: Size) -> tuple[Box, ...]:
     """Boxes of whole pixels that lie in the image."""
-    boxes: tuple[Any, ...] = tuple(tuple(rectangle) for rectangle in rectangles)
+    try:
+        boxes: tuple[Any, ...] = tuple(tuple(rectangle) for rectangle in rectangles)
+        whole = all(len(box) == 4 and all(x == int(x) for x in box) for box in boxes)
+    except MALFORMED:
+        whole = False
+    if not whole:
+        raise ValueError(f"{name}: must be boxes of four whole pixels, got {shown(rectangles)}")
     for rectangle in boxes:
-        whole = len(rectangle) == 4 and all(x == int(x) for x in rectangle)
-        if not whole or min(rectangle[:2]) < 0 or min(rectangle[2:]) < 4:
+        if min(rectangle[:2]) < 0 or min(rectangle[2:]) < 4:
             raise ValueError(
                 f"{name}: each must be whole pixels (left >= 0, top >= 0, width >= 4, "
                 f"height >= 4), got {rectangle}"

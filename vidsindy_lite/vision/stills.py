@@ -1,7 +1,8 @@
-"""A film as a folder of images, or as images whose names follow a pattern.
+"""A film as a folder of images, as images whose names follow a pattern, or as pages of one TIFF.
 
 Such films state no frame rate. The numbers in the names are the clock: an image that is missing is
-a frame that was dropped.
+a frame that was dropped. Images of 16 bits of which the film uses fewer, as those of cameras of 10
+or 12 bits, are read by those it uses.
 """
 
 from __future__ import annotations
@@ -19,11 +20,50 @@ from ..arrays import Floats, Image
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
 
 
+_BITS = (8, 10, 12, 14, 16)  # of cameras
+_LOOKED_AT = 9  # images that tell how many bits a film uses
+
+
 class Stills(NamedTuple):
-    """The files of a film's images in their order, and when each was taken, in frames."""
+    """The files of a film's images in their order, and when each was taken, in frames.
+
+    Of pages, the file stands there once for each.
+    """
 
     files: list[Path]
     clock: Floats
+    pages: bool = False
+
+    def read(self, number: int, bits: int) -> Image:
+        """One image, upright, blue-green-red, of so many bits made eight."""
+        file = self.files[number]
+        image = self._decoded(number)
+        if image is None:
+            raise ValueError(f"path: must be an image that OpenCV can read, got '{file}'")
+        if image.dtype == np.uint16:
+            image = np.clip(image >> (bits - 8), 0, 255).astype(np.uint8)
+        return cast("Image", image)
+
+    def bits(self) -> int:
+        """How many bits the film uses, by some of its images."""
+        shown = np.unique(np.linspace(0, len(self.files) - 1, _LOOKED_AT).astype(int))
+        images = [self._decoded(int(k)) for k in shown]
+        if all(image is None or image.dtype == np.uint8 for image in images):
+            return 8
+        largest = max(int(image.max()) for image in images if image is not None)
+        return next((bits for bits in _BITS if largest < 2**bits), _BITS[-1])
+
+    def _decoded(self, number: int) -> np.ndarray | None:
+        """An image as it is stored, but for its colours."""
+        file, how = self.files[number], cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
+        try:
+            if self.pages:
+                _, images = cv2.imreadmulti(str(file), number, 1, flags=how)
+                return images[0] if images else None
+            # Not imread, which knows no Chinese name on some systems.
+            return cv2.imdecode(np.fromfile(file, np.uint8), how) if _holds(file) else None
+        except cv2.error:  # such as a header of more pixels than there are
+            return None
 
 
 def find_stills(path: Path) -> Stills | None:
@@ -36,13 +76,16 @@ def find_stills(path: Path) -> Stills | None:
     Returns
     -------
     Stills or None
-        None if the path is neither a folder nor a pattern, but the name of a file.
+        None if the path is neither a folder nor a pattern, but the name of a file that is no TIFF.
 
     Raises
     ------
     FileNotFoundError, ValueError
         If there are no such images, or their numbers do not tell their order.
     """
+    if path.is_file() and path.suffix.lower() in (".tif", ".tiff"):
+        count = cv2.imcount(str(path)) if _holds(path) else 0
+        return Stills([path] * count, np.arange(count, dtype=float), True) if count else None
     if path.is_file() or not (path.is_dir() or re.search(r"[*?]|%\d*d", path.name)):
         return None
     if path.is_dir():
@@ -105,9 +148,9 @@ def read_stills(stills: Stills) -> Iterator[Image]:
     ValueError
         Where an image cannot be read or has another size.
     """
-    size = None
-    for file in stills.files:
-        image = read_still(file)
+    size, bits = None, stills.bits()
+    for k, file in enumerate(stills.files):
+        image = stills.read(k, bits)
         size = size or image.shape[1::-1]
         if image.shape[1::-1] != size:
             raise ValueError(
@@ -115,15 +158,6 @@ def read_stills(stills: Stills) -> Iterator[Image]:
                 f"{image.shape[1::-1]} in '{file}'"
             )
         yield image
-
-
-def read_still(file: Path) -> Image:
-    """One image, upright, with eight bits a colour."""
-    # Not imread, which knows no Chinese name on some systems.
-    image = cv2.imdecode(np.fromfile(file, np.uint8), cv2.IMREAD_COLOR) if _holds(file) else None
-    if image is None:
-        raise ValueError(f"path: must be an image that OpenCV can read, got '{file}'")
-    return cast("Image", image)
 
 
 def _holds(file: Path) -> bool:

@@ -41,11 +41,18 @@ def timing(packets: Sequence[Shown], stream: VideoStream) -> tuple[Floats, float
     return seconds / usual, 1 / usual
 
 
-def cut_off(packets: Sequence[Shown], container: InputContainer, stream: VideoStream) -> int:
-    """Number of frames that were cut off the end of a file, by the duration that it states."""
+def cut_off(
+    packets: Sequence[Shown], end: float, container: InputContainer, stream: VideoStream
+) -> int:
+    """Number of frames that were cut off the end of a file, by the duration that it states.
+
+    `end` is when the last packet of all its streams ends, in seconds: a file whose sound goes on
+    to its end is whole.
+    """
     times = [time for time, _ in packets if time is not None]
-    # The duration of a file with sound may be that of the sound.
-    if len(container.streams) > 1 or not (container.duration and stream.time_base and times):
+    if not (container.duration and stream.time_base and times):
         return 0
-    after_last = container.duration / 1e6 - float(max(times) * stream.time_base)
-    return max(round(after_last * float(stream.guessed_rate or 0)) - 1, 0)
+    rate, whole = float(stream.guessed_rate or 0), container.duration / 1e6
+    if len(container.streams) > 1 and (whole - end) * rate < 2:
+        return 0
+    return max(round((whole - float(max(times) * stream.time_base)) * rate) - 1, 0)

@@ -6,15 +6,24 @@ written by         what marks it, and where its pixels count from
 this package       ``frame`` or ``t``, ``u``, ``v`` (``x``, ``y`` mean the same); or ``u1``, ``v1``,
                    ``u2``, ... with all cameras in one file; pixel centres at integers from 0
 DLTdv              ``pt1_cam1_X``, ``pt1_cam1_Y``, ...; the first pixel is 1, at the upper left
-DeepLabCut         rows ``scorer``, ``bodyparts``, ``coords``; frames of a likelihood below .6 do
-                   not count
+Argus              ``Track 1_cam_1_x``, ...; the first pixel is 1, at the lower left
+DeepLabCut         rows ``scorer``, ``individuals`` (if there are several), ``bodyparts``,
+                   ``coords``; frames of a likelihood below .6 do not count
+SLEAP              its analysis as CSV: ``track``, ``frame_idx``, ``nose.x``, ``nose.y``, ...
+TrackMate          its spots as CSV: ``TRACK_ID``, ``POSITION_X``, ..., ``FRAME``, or its tracks as
+                   XML; in pixels
+Kinovea            its trajectories as text, with ``#Kinovea`` in front
 Tracker (OSP)      the name of the mass over ``t``, ``x``, ``y``; better ``pixelx``, ``pixely``,
                    which count from the upper left corner of the image
+detectors          boxes, as ``x``, ``y``, ``w``, ``h`` (``left``, ``top``, ...), or two corners,
+                   ``x1``, ``y1``, ``x2``, ``y2`` (``xmin``, ...): their middles
 =================  ===============================================================================
 
 Separators may be commas, semicolons, tabs or spaces, and decimals commas where these separate
 nothing. A file without a header holds u and v, or a frame's number (or time), u and v. A row whose
-pixels are empty, no number or exactly 0, 0 is a frame in which the target was not seen.
+pixels are empty, no number, exactly 0, 0 or -1, -1 (or another negative number twice), or which
+says so in a column of its own, is a frame in which the target was not seen. Of several targets, or
+parts of one, one is chosen by its name.
 """
 
 from __future__ import annotations
@@ -24,22 +33,49 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Floats
-from ..checks import check_path
+from ..arrays import Bools, Floats
+from ..reading import check_file, read_text, reading
 
-SUFFIXES = frozenset({".csv", ".tsv", ".txt", ".dat"})
+SUFFIXES = frozenset({".csv", ".tsv", ".txt", ".dat", ".xml"})
 
+_BINARY = {
+    ".h5": "a table of DeepLabCut or SLEAP", ".hdf5": "a table in HDF5", ".slp": "a SLEAP project",
+    ".mat": "MATLAB's", ".pickle": "a pickle", ".pkl": "a pickle", ".xlsx": "a spreadsheet",
+    ".ods": "a spreadsheet", ".kva": "Kinovea's own", ".trk": "Tracker's own", ".npy": "an array",
+}  # fmt: skip
 _SURE = 0.6  # DeepLabCut's own limit of the likelihood
-_HEAD = 4096  # characters that tell text from what is none
+_HEADS = ("scorer", "individuals", "bodyparts", "coords")  # of its rows, whatever stands in these
 _MOST_FRAMES = 10_000_000  # a larger number of a frame is none
-_DLTDV = re.compile(r"pt(\d+)_cam(\d+)_([xy])")
+_POINT = re.compile(r"(.+)_cam(_?)(\d+)_([xy])")
 _OURS = re.compile(r"([uv])_?(\d+)")
-_TIME, _FRAME = ("t", "time", "seconds", "t_s"), ("frame", "frames", "step", "n")
-_PIXELS = (("u", "v"), ("pixelx", "pixely"), ("x", "y"), ("x_px", "y_px"))
+_TIME = re.compile(
+    r"(?:t|times?|timestamp)(?:[ _(\[/]*(s|sec|seconds|ms|msec|us|µs|ns)[)\]]*)?|"
+    r"(seconds|milliseconds|ms)"
+)
+_TICKS = {"ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+_LONG = 2.0  # units of time from one frame to the next that no camera takes, if these are seconds
+_FRAME = (
+    "frame", "frames", "step", "n", "frame_idx", "frame_id", "frame_number", "frame_no", "frameid",
+)  # fmt: skip
+_PIXELS = (
+    ("u", "v"),
+    ("pixelx", "pixely"),
+    ("x", "y"),
+    ("x_px", "y_px"),
+    ("position_x", "position_y"),
+)
+_WHOSE = ("track", "track_id", "particle", "id", "object_id", "tid", "individual")
+_CORNER = (("x", "y"), ("left", "top"), ("bb_left", "bb_top"), ("u", "v"), ("bbox_x", "bbox_y"))
+_WIDTH = (("w", "h"), ("width", "height"), ("bb_width", "bb_height"), ("bbox_w", "bbox_h"))
+_OPPOSITE = (
+    ("x1", "y1", "x2", "y2"), ("xmin", "ymin", "xmax", "ymax"), ("left", "top", "right", "bottom"),
+)  # fmt: skip
+_UNSEEN = {"na", "n/a", "#n/a", "null", "none", "-", "--", "missing", "lost", "?"}
+_SEEN = ("visible", "visibility", "seen", "detected", "found", "valid")
+_HIDDEN = ("occluded", "lost", "missing", "outside", "invisible")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +94,8 @@ class TrackFile:
         Why it may have been misunderstood.
     start : int
         Number of the frame of the first row.
+    upwards : bool
+        Whether v counts up from the lowest row of the image, which is 1: of Argus.
     """
 
     name: str
@@ -65,15 +103,23 @@ class TrackFile:
     t: Floats | None
     warnings: tuple[str, ...] = ()
     start: int = 0
+    upwards: bool = False
+
+    def downwards(self, height: int) -> Floats:
+        """The pixels in an image of so many rows, v down from 0."""
+        return np.array([0, height]) + [1, -1] * self.pixels if self.upwards else self.pixels
 
 
-def read_tracks(path: str | os.PathLike) -> list[TrackFile]:
+def read_tracks(path: str | os.PathLike, individual: str | None = None) -> list[TrackFile]:
     """The tracks in a text file, one per camera.
 
     Parameters
     ----------
     path : path
-        As this package, DLTdv, Tracker (OSP) or DeepLabCut write it; see `track_files`.
+        As the programs write it that `track_files` lists.
+    individual : str, optional
+        Which of several targets: the name of an individual, a body part, both with a space
+        between, or the number of a track, as the file has it.
 
     Returns
     -------
@@ -83,45 +129,81 @@ def read_tracks(path: str | os.PathLike) -> list[TrackFile]:
     Raises
     ------
     FileNotFoundError, ValueError
-        If the file is missing, holds no track, or those of several targets.
+        If the file is missing, holds no track, or those of several targets, of which none is
+        chosen.
     """
-    path = check_path("tracks", path)
-    if not path.is_file():
-        raise FileNotFoundError(f"tracks: no such file, got '{path}'")
-    header, rows = _split(path, _cells(path))
-    names = [name.strip().lower() for name in header[-1]] if header else []
-    values = _numbers(path, rows, len(names) or max(map(len, rows)))
-    columns = {name: values[:, names.index(name)] for name in names if name}
-    if any(_DLTDV.fullmatch(name) for name in columns):
-        return _of_dltdv(path, columns)
+    path = check_file("tracks", path)
+    if path.suffix.lower() in _BINARY:
+        raise ValueError(
+            f"tracks: must be a table as text, got '{path.name}', {_BINARY[path.suffix.lower()]}: "
+            "export it as CSV"
+        )
+    text = read_text("tracks", path, "a table of numbers", fallback="latin-1")
+    with reading("tracks", path):
+        if text.lstrip().startswith("<"):
+            header, rows = _of_xml(text)
+        elif text.lstrip().lower().startswith("#kinovea"):
+            header, rows = _of_kinovea(text)
+        else:
+            header, rows = _split(_cells(text))
+        return _tracks(path.name, header, rows, individual)
+
+
+def _tracks(
+    name: str, header: list[list[str]], rows: list[list[str]], individual: str | None
+) -> list[TrackFile]:
+    """The tracks in the cells of a file."""
+    names = [_plain(cell) for cell in header[-1]] if header else []
     if header and header[0][0].strip().lower() == "scorer":
-        return [_of_deeplabcut(path, header, values)]
-    if any(_OURS.fullmatch(name) for name in columns):
-        return _of_cameras(path, columns)
+        return [_of_deeplabcut(name, header, _numbers(rows, len(names)), individual)]
+    units = next((row for row in header if any(cell.strip().startswith("(") for cell in row)), None)
+    if header and "position_x" in map(_plain, header[0]):  # of TrackMate, above other names of them
+        names = [*map(_plain, header[0])]
+        unit = units[names.index("position_x")].strip("() ").lower() if units else "pixel"
+        if not unit.startswith("pix"):
+            raise ValueError(
+                f"must have positions in pixels, got {unit}: remove the scale in TrackMate"
+            )
+    width = len(names) or max(map(len, rows))
+    rows = [[*row, *[""] * (width - len(row))] for row in rows]
+    who = next((names.index(key) for key in _WHOSE if key in names), None)
+    words = {row[who].strip() for row in rows} - {""} if who is not None else set()
+    if who is not None and 0 < len(words) < max(len(rows), 2):  # else they count the rows
+        whose = sorted(words, key=lambda word: (len(word), word))
+        chosen = _chosen(_matching(whose, individual) or whose, None)
+        rows = [row for row in rows if row[who].strip() == chosen]
+    values = _numbers(rows, width, names)
+    frame = next((names.index(key) for key in _FRAME if key in names), None)
+    if who is not None and frame is not None:
+        values = values[np.argsort(values[:, frame], kind="stable")]
+    twice = {key for key in names if key and names.count(key) > 1}
+    if twice & {key for pair in _PIXELS for key in pair}:
+        raise _several([f"{key} {names.count(key)} times" for key in sorted(twice)])
+    columns = {key: values[:, names.index(key)] for key in names if key}
+    if any(_POINT.fullmatch(key) for key in columns):
+        return _of_points(name, columns, individual)
+    if any(_OURS.fullmatch(key) for key in columns):
+        return _of_cameras(name, columns)
+    parts = sorted({key[:-2] for key in columns if key.endswith(".x")})
+    if parts:  # of SLEAP
+        part = _chosen(_matching(parts, individual) or parts, None)
+        score = {"score": columns[f"{part}.score"]} if f"{part}.score" in columns else {}
+        columns |= {"u": columns[f"{part}.x"], "v": columns[f"{part}.y"]} | score
     if not header:
-        keys = {2: ("u", "v"), 3: ("frame", "u", "v")}.get(values.shape[1])
-        if keys is None:
-            raise ValueError(f"tracks: {path.name} must have a header, or columns u and v")
-        columns = {key: values[:, i] for i, key in enumerate(keys)}
-        if len(keys) == 3 and not _counts(columns["frame"]):
+        known = {2: ("u", "v"), 3: ("frame", "u", "v")}.get(values.shape[1])
+        if known is None:
+            raise ValueError("must have a header, or columns u and v")
+        columns = {key: values[:, i] for i, key in enumerate(known)}
+        if len(known) == 3 and not _counts(columns["frame"]):
             columns["t"] = columns.pop("frame")
-    return [_of_columns(path, columns, _is_of_tracker(path, header))]
+    return [_of_columns(name, columns, _is_of_tracker(header) if units is None else False)]
 
 
 # ------------------------------------------------------------------------------- text into numbers
 
 
-def _cells(path: Path) -> list[list[str]]:
+def _cells(text: str) -> list[list[str]]:
     """The cells of a text file, line by line; a line of empty cells is a frame without target."""
-    raw = path.read_bytes()
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")
-    if any(mark < " " and not mark.isspace() for mark in text[:_HEAD]):
-        raise ValueError(
-            f"tracks: must be tables in UTF-8, got '{path.name}', which is no table of numbers"
-        )
     lines = [line for line in text.splitlines() if line.strip(" ")]
     separator = next((mark for mark in "\t;," if any(mark in line for line in lines[-3:])), " ")
     if separator == " ":
@@ -132,16 +214,57 @@ def _cells(path: Path) -> list[list[str]]:
     return cells
 
 
-def _split(path: Path, cells: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
+def _of_xml(text: str) -> tuple[list[list[str]], list[list[str]]]:
+    """TrackMate's XML as a table; tracks are called by their numbers, from 0."""
+    whole = re.search(r"<Tracks\b[^>]*>", text)
+    if whole is None:
+        raise ValueError("must be a table, or <Tracks> of TrackMate, got other XML")
+    unit = re.search(r'spaceUnits="([^"]*)"', whole[0])
+    rows = [
+        [str(number), *(dict(re.findall(r'(\w+)="([^"]*)"', one)).get(key, "") for key in "txy")]
+        for number, part in enumerate(text[whole.end() :].split("<particle")[1:])
+        for one in re.findall(r"<detection\b([^>]*)>", part)
+    ]
+    if not rows:
+        raise ValueError("must hold rows of numbers, got none")
+    heads = ["TRACK_ID", "FRAME", "POSITION_X", "POSITION_Y"]
+    return [heads, ["", "", f"({unit[1] if unit else 'pixel'})", ""]], rows
+
+
+def _of_kinovea(text: str) -> tuple[list[list[str]], list[list[str]]]:
+    """Kinovea's trajectories as a table; those without a name are called by their numbers."""
+    rows: list[list[str]] = []
+    name, number = "", 0
+    for line in [*text.splitlines()[2:], ""]:
+        cells = line.replace(",", ".").split()
+        if cells and cells[0].startswith("#"):
+            name = line.lstrip("# ").strip()
+        elif len(cells) > 2:
+            rows.append([name or str(number), *cells[1:3]])
+        elif not cells and rows and rows[-1][0] == (name or str(number)):
+            name, number = "", number + 1
+    if not rows:
+        raise ValueError("must hold rows of numbers, got none")
+    return [["of Kinovea"], ["track", "x", "y"]], rows
+
+
+def _plain(cell: str) -> str:
+    """The name of a column without its unit, if that is pixels."""
+    return re.sub(r"\s*[(\[](px|pixels?)[)\]]$", "", cell.strip().lower())
+
+
+def _split(cells: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
     """Header and numbers."""
     start = next((i for i, row in enumerate(cells) if _is_of_numbers(row)), len(cells))
     if start == len(cells):
-        raise ValueError(f"tracks: {path.name} must hold rows of numbers, got none")
+        raise ValueError("must hold rows of numbers, got none")
     return cells[:start], cells[start:]
 
 
 def _is_of_numbers(row: Sequence[str]) -> bool:
-    """Whether a line holds values: numbers or nothing, but for a name of an image in front."""
+    """Whether a line holds values: numbers or nothing, but for a name in front."""
+    if row and row[0].strip().lower() in _HEADS:
+        return False
     rest = row[1:] if len(row) > 1 and _number(row[0]) is None else row
     numbers = [_number(cell) for cell in rest if cell.strip()]
     return None not in numbers and (bool(numbers) or rest is row)
@@ -149,21 +272,21 @@ def _is_of_numbers(row: Sequence[str]) -> bool:
 
 def _number(cell: str) -> float | None:
     try:
-        return float(cell) if cell.strip() else np.nan
+        return float(cell) if cell.strip().lower() not in _UNSEEN | {""} else np.nan
     except ValueError:
         return None
 
 
-def _numbers(path: Path, rows: list[list[str]], width: int) -> Floats:
-    """All values, NaN where a cell is empty or missing."""
+def _numbers(rows: list[list[str]], width: int, names: Sequence[str] = ()) -> Floats:
+    """All values, NaN where a cell is empty or missing, or names the target or the image."""
+    free = {0, *(i for i, name in enumerate(names) if name in (*_WHOSE, "label"))}
     values = np.full((len(rows), width), np.nan)
     for i, row in enumerate(rows):
         for j, cell in enumerate(row[:width]):
             number = _number(cell)
-            if number is None and j:
+            if number is None and j not in free:
                 raise ValueError(
-                    f"tracks: {path.name} must hold numbers below its header, got {cell!r:.40} "
-                    f"in row {i + 1} of them"
+                    f"must hold numbers below its header, got {cell!r:.40} in row {i + 1} of them"
                 )
             values[i, j] = np.nan if number is None or np.isinf(number) else number
     return values
@@ -172,97 +295,177 @@ def _numbers(path: Path, rows: list[list[str]], width: int) -> Floats:
 # ------------------------------------------------------------------------------ numbers into tracks
 
 
-def _of_dltdv(path: Path, columns: Mapping[str, Floats]) -> list[TrackFile]:
-    """DLTdv's table of all points in all cameras, of which one point must be the target."""
-    found: dict[tuple[int, int], dict[str, Floats]] = {}
-    for name, values in columns.items():
-        match = _DLTDV.fullmatch(name)
+def _matching(names: Sequence[str], individual: str | None) -> list[str]:
+    """Those of the names that a user may mean by one: it, some of its words, or all and more."""
+    if individual is None:
+        return list(names)
+    if individual in names:
+        return [individual]
+    said = set(individual.split())
+    return [name for name in names if said <= set(name.split()) or set(name.split()) <= said]
+
+
+def _chosen(names: Sequence[str], individual: str | None) -> str:
+    """The target that is meant, or the only one there is."""
+    wanted = _matching(names, individual)
+    if len(wanted) != 1:
+        raise _several(wanted or names)
+    return wanted[0]
+
+
+def _several(names: Sequence[str]) -> ValueError:
+    return ValueError(
+        f"must hold one target, got {', '.join(names):.80}: leave one in it, or choose one by "
+        "its name as individual"
+    )
+
+
+def _of_points(name: str, columns: Mapping[str, Floats], individual: str | None) -> list[TrackFile]:
+    """DLTdv's or Argus's table of all points in all cameras, of which one point is the target."""
+    found: dict[tuple[str, int], dict[str, Floats]] = {}
+    upwards = False
+    for key, values in columns.items():
+        match = _POINT.fullmatch(key)
         if match:
-            point, camera, axis = match.groups()
-            found.setdefault((int(point), int(camera)), {})[axis] = values - 1
+            point, below, camera, axis = match.groups()
+            upwards = upwards or bool(below)
+            found.setdefault((point, int(camera)), {})[axis] = values
     shown = {key: both for key, both in found.items() if np.isfinite([*both.values()]).any()}
-    points = sorted({point for point, _ in shown})
-    if len(points) > 1:
-        raise _several(path, [f"pt{point}" for point in points])
-    cameras = sorted(camera for _, camera in shown)
+    point = _chosen(sorted({point for point, _ in shown}), individual)
+    for (one, camera), axes in shown.items():
+        if one == point and len(axes) < 2:
+            missing = "y" if "x" in axes else "x"
+            raise ValueError(f"must have a column {point}_cam{camera}_{missing}")
     return [
-        _whole(f"{path.name}, cam{camera}", shown[points[0], camera]["x"],
-               shown[points[0], camera]["y"], {})
-        for camera in cameras
+        _whole(f"{name}, cam{camera}", shown[point, camera]["x"] - 1,
+               shown[point, camera]["y"] - (0 if upwards else 1), {}, upwards=upwards)
+        for camera in sorted(camera for one, camera in shown if one == point)
     ]  # fmt: skip
 
 
-def _of_deeplabcut(path: Path, header: list[list[str]], values: Floats) -> TrackFile:
-    """DeepLabCut's table of one body part."""
-    parts = sorted({name for row in header[1:-1] for name in row[1:] if name})
-    if len(set(header[-2][1:])) > 1:
-        raise _several(path, parts)
-    coords = [name.strip().lower() for name in header[-1]]
-    columns = {name: values[:, i] for i, name in enumerate(coords)}
+def _of_deeplabcut(
+    name: str, header: list[list[str]], values: Floats, individual: str | None
+) -> TrackFile:
+    """DeepLabCut's table: one individual's body part."""
+    coords = [cell.strip().lower() for cell in header[-1]]
+    width = min(map(len, header))
+    if len(header) < 3 or not {"x", "y"} <= set(coords[:width]):
+        raise ValueError("must have rows scorer, bodyparts and coords, with x and y in the last")
+    labels = [" ".join(row[i].strip() for row in header[1:-1]) for i in range(width)]
+    of = [i for i in range(1, width) if coords[i] in ("x", "y", "likelihood")]
+    chosen = _chosen(sorted({labels[i] for i in of}), individual)
+    columns = {coords[i]: values[:, i] for i in of if labels[i] == chosen}
     if np.isfinite(values[:, 0]).all():
         columns["frame"] = values[:, 0]
-    return _of_columns(path, columns, False)
+    return _of_columns(name, columns, False)
 
 
-def _of_cameras(path: Path, columns: Mapping[str, Floats]) -> list[TrackFile]:
+def _of_cameras(name: str, columns: Mapping[str, Floats]) -> list[TrackFile]:
     """Our own table of all cameras."""
-    numbers = sorted({int(m[2]) for name in columns if (m := _OURS.fullmatch(name))})
-    tidy = {name.replace("_", ""): values for name, values in columns.items()}
+    numbers = sorted({int(m[2]) for key in columns if (m := _OURS.fullmatch(key))})
+    tidy = {key.replace("_", ""): values for key, values in columns.items()}
     try:
         return [
-            _whole(f"{path.name}, camera {i}", tidy[f"u{i}"], tidy[f"v{i}"], columns)
-            for i in numbers
+            _whole(f"{name}, camera {i}", tidy[f"u{i}"], tidy[f"v{i}"], columns) for i in numbers
         ]
     except KeyError as missing:
-        raise ValueError(f"tracks: {path.name} must have a column {missing}") from None
+        raise ValueError(f"must have a column {missing}") from None
 
 
-def _of_columns(path: Path, columns: Mapping[str, Floats], of_tracker: bool) -> TrackFile:
-    """One camera's columns."""
+def _of_columns(name: str, columns: Mapping[str, Floats], of_world: bool) -> TrackFile:
+    """One camera's columns; those of the world of a program may have any origin and unit."""
+    doubts: tuple[str, ...] = ()
+    corner = next((pair for pair in _CORNER if set(pair) <= columns.keys()), None)
+    size = next((pair for pair in _WIDTH if set(pair) <= columns.keys()), None)
+    corners = next((four for four in _OPPOSITE if set(four) <= columns.keys()), None)
     pair = next((pair for pair in _PIXELS if set(pair) <= columns.keys()), None)
-    if pair is None:
-        names = ", ".join(columns) or "none"
-        raise ValueError(f"tracks: {path.name} must have columns u and v, got {names:.80}")
-    u, v = (columns[name] for name in pair)
+    if corner and size:  # edges of the first pixel are at -0.5 and 0.5
+        u, v = (columns[c] + columns[s] / 2 - 0.5 for c, s in zip(corner, size, strict=True))
+        marked = np.all([columns[key] == columns[corner[0]] for key in corner], axis=0)
+        unset = marked & np.all([columns[key] <= 0 for key in (*corner, *size)], axis=0)
+        u, v = np.where(unset, np.nan, u), np.where(unset, np.nan, v)
+        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(corner + size)}",)
+    elif corners:
+        left, top, right, bottom = (columns[key] for key in corners)
+        whole = (right > left) & (bottom > top)
+        u, v = (
+            np.where(whole, (a + b) / 2 - 0.5, np.nan) for a, b in ((left, right), (top, bottom))
+        )
+        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(corners)}",)
+    elif pair is None:
+        raise ValueError(f"must have columns u and v, got {', '.join(columns) or 'none':.80}")
+    else:
+        u, v = (columns[key] for key in pair)
     if pair == ("pixelx", "pixely"):  # corners at integers
         u, v = u - 0.5, v - 0.5
-    doubts: tuple[str, ...] = ()
-    if of_tracker and pair == ("x", "y"):
+    if of_world and pair == ("x", "y"):
         if min(np.nanmin(u, initial=0), np.nanmin(v, initial=0)) < 0:
             raise ValueError(
-                f"tracks: {path.name} must hold pixels from the upper left corner, got x and y of "
-                "Tracker with another origin: export its columns pixelx and pixely"
+                "must hold pixels from the upper left corner, got x and y of Tracker or Kinovea "
+                "with another origin: export columns pixelx and pixely, or move the origin there"
             )
-        doubts = (
-            f"{path.name}: Tracker's x and y are taken for pixels from the upper left corner, y "
-            "down, which holds only if the axes were set so: export its columns pixelx and pixely",
+        doubts += (
+            f"{name}: x and y of Tracker or Kinovea are taken for pixels from the upper left "
+            "corner, y down, which holds only if the axes were set so: export its columns pixelx "
+            "and pixely",
         )
-    if "likelihood" in columns:
-        u = np.where(columns["likelihood"] >= _SURE, u, np.nan)
-    return _whole(path.name, u, v, columns, doubts)
+    if max(np.nanmax(u, initial=0), np.nanmax(v, initial=0)) <= 1 and len(u) > 2:
+        doubts += (f"{name}: no pixel of it is beyond 1: are these fractions of the image?",)
+    seen = _seen(columns)
+    return _whole(name, np.where(seen, u, np.nan), np.where(seen, v, np.nan), columns, doubts)
+
+
+def _seen(columns: Mapping[str, Floats]) -> Bools:
+    """Where columns of their own do not say that the target was not seen, (n,)."""
+    seen = np.ones(len(next(iter(columns.values()))), bool)
+    for key, values in columns.items():
+        if key == "likelihood":
+            seen &= values >= _SURE
+        elif key in _SEEN or key in ("score", "conf", "confidence"):
+            seen &= ~(values <= 0)
+        elif key in _HIDDEN:
+            seen &= ~(values > 0)
+    return seen
 
 
 def _whole(
-    name: str, u: Floats, v: Floats, columns: Mapping[str, Floats], doubts: tuple[str, ...] = ()
+    name: str,
+    u: Floats,
+    v: Floats,
+    columns: Mapping[str, Floats],
+    doubts: tuple[str, ...] = (),
+    upwards: bool = False,
 ) -> TrackFile:
     """A track with the rows of the frames that a file leaves out."""
-    t = next((columns[key] for key in _TIME if key in columns), None)
-    frames = next((columns[key] for key in _FRAME if key in columns), None)
+    clock = next((key for key in columns if _TIME.fullmatch(key)), None)
+    t, frames = None, next((columns[key] for key in _FRAME if key in columns), None)
+    if clock is not None:
+        match = _TIME.fullmatch(clock)
+        t = columns[clock] * _TICKS.get((match and (match[1] or match[2])) or "", 1.0)
     pixels = np.column_stack((u, v))
-    unset = (pixels == 0).all(axis=1)
-    if unset.any():  # what many programs write where nothing was found
-        doubts += (f"{name}: 0, 0 in {unset.sum()} of {len(unset)} rows is taken for not seen",)
+    # What many programs write where nothing was found.
+    unset = (pixels[:, 0] == pixels[:, 1]) & (pixels[:, 0] <= 0) & (pixels[:, 0] % 1 == 0)
+    if unset.any():
+        marks = ", ".join(f"{value:g}, {value:g}" for value in np.unique(pixels[unset, 0]))
+        doubts += (f"{name}: {marks} in {unset.sum()} of {len(unset)} rows is taken for not seen",)
     pixels[unset | ~np.isfinite(pixels).all(axis=1)] = np.nan
     if t is not None and (not np.isfinite(t).all() or (np.diff(t) <= 0).any()):
-        raise ValueError(f"tracks: {name} must have increasing times")
+        raise ValueError(f"must have increasing times, got others as {clock}")
+    if frames is not None and not _counts(frames):
+        if t is None:
+            raise ValueError("must have increasing whole numbers of frames")
+        frames = None
+    if t is not None and len(t) > 1 and np.median(np.diff(t)) > _LONG:
+        doubts += (
+            f"{name}: its times are {np.median(np.diff(t)):.4g} apart: if these are milliseconds, "
+            f"call the column {clock}_ms",
+        )
     if frames is None or t is not None:
-        return TrackFile(name, pixels, None if t is None else _unrounded(t), doubts)
-    if not _counts(frames):
-        raise ValueError(f"tracks: {name} must have increasing whole numbers of frames")
+        return TrackFile(name, pixels, None if t is None else _unrounded(t), doubts, 0, upwards)
     whole = (frames - frames[0]).astype(int)
     filled = np.full((whole[-1] + 1, 2), np.nan)
     filled[whole] = pixels
-    return TrackFile(name, filled, None, doubts, int(frames[0]))
+    return TrackFile(name, filled, None, doubts, int(frames[0]), upwards)
 
 
 def _unrounded(t: Floats) -> Floats:
@@ -283,17 +486,11 @@ def _counts(frames: Floats) -> bool:
     return bool(whole and (np.diff(frames) > 0).all() and np.ptp(frames) < _MOST_FRAMES)
 
 
-def _is_of_tracker(path: Path, header: list[list[str]]) -> bool:
-    """Whether Tracker wrote it: the name of a mass above its columns."""
+def _is_of_tracker(header: list[list[str]]) -> bool:
+    """Whether the name of a mass, or of a program, stands above the columns."""
     if len(header) < 2:
         return False
     masses = [cell.strip() for cell in header[-2] if cell.strip() and cell[0] != "#"]
     if len(masses) > 1:
-        raise _several(path, masses)
+        raise _several(masses)
     return True
-
-
-def _several(path: Path, names: Sequence[str]) -> ValueError:
-    return ValueError(
-        f"tracks: {path.name} must hold one target, got {', '.join(names):.80}: leave one in it"
-    )

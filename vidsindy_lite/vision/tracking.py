@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays import Floats, Image
-from ..checks import check_instance
+from ..checks import check_instance, shown
 from .background import BackgroundModel, sample_frames, track_blobs, view_distances, whole_views
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
@@ -29,7 +29,7 @@ from .reducing import ReducedFrames
 from .reel import Reel
 from .refining import scatter
 from .steadying import carry
-from .video import read_video
+from .video import read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
 
@@ -128,9 +128,12 @@ def track(
     if target is not None:
         check_instance("target", target, Hint)
         if detector != "auto":
-            raise ValueError(f"target: may be given for detector='auto', got {detector!r:.60}")
+            raise ValueError(f"target: may be given for detector='auto', got {shown(detector)}")
     found = _track(path, detector, target)
-    doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in found.warnings + _lost(found))
+    lacking, stated = found.warnings + _lost(found), video_info(path).frames
+    if len(found.pixels) != stated:
+        lacking += (f"{len(found.pixels)} of its {stated} frames can be read: it is cut off",)
+    doubts = tuple(f"{Path(path).name}: {doubt}" for doubt in lacking)
     return replace(found, warnings=doubts)
 
 
@@ -194,7 +197,7 @@ def check_detector(name: str | os.PathLike) -> None:
     if not isinstance(name, str | os.PathLike) or Path(name).suffix.lower() != ".onnx":
         raise ValueError(
             f"detector: must be one of {', '.join(DETECTORS)}, or the name of an .onnx file, "
-            f"got {name!r:.60}"
+            f"got {shown(name)}"
         )
     if not Path(name).is_file():
         raise FileNotFoundError(f"detector: no such file, got '{name}'")

@@ -26,7 +26,7 @@ import numpy as np
 from ..arrays import Floats, Image
 from ..checks import check_choice, check_instance, check_integer, check_number, check_path
 from .interlaced import upper_field
-from .stills import find_stills, read_still, read_stills
+from .stills import find_stills, read_stills
 from .timing import Shown, cut_off, timing
 
 if TYPE_CHECKING:
@@ -219,8 +219,8 @@ def read_video(path: str | os.PathLike) -> Iterator[Image]:
     Parameters
     ----------
     path : path
-        A video file, a folder of images, or a pattern of their names as ``shots/a_%04d.png`` or
-        ``shots/*.png``. The numbers in the names tell the order.
+        A video file, a folder of images, a pattern of their names as ``shots/a_%04d.png`` or
+        ``shots/*.png``, or a TIFF of several pages. The numbers in the names tell the order.
 
     Yields
     ------
@@ -235,7 +235,7 @@ def read_video(path: str | os.PathLike) -> Iterator[Image]:
     """
     stills = find_stills(check_path("path", path))
     if stills:
-        read_still(stills.files[0])
+        stills.read(0, 16)
         return read_stills(stills)
     with _opened(path) as (container, stream):
         _first(path, container, stream)
@@ -290,7 +290,7 @@ def video_info(path: str | os.PathLike) -> VideoInfo:
     """
     stills = find_stills(check_path("path", path))
     if stills:
-        return VideoInfo(len(stills.files), 0.0, read_still(stills.files[0]).shape[1::-1])
+        return VideoInfo(len(stills.files), 0.0, stills.read(0, 16).shape[1::-1])
     with _opened(path) as (container, stream):
         size = _first(path, container, stream).shape[1::-1]
     clock, rate = _clock(path)
@@ -326,14 +326,18 @@ def frame_clock(path: str | os.PathLike) -> Floats:
 def _clock(path: str | os.PathLike) -> tuple[Floats, float]:
     """When each frame was taken, those included that were cut off a file later; and their rate."""
     with _opened(path) as (container, stream):
-        stated, hidden, packets = stream.frames, 0, []
-        for packet in container.demux(stream):
+        stated, hidden, packets, end = stream.frames, 0, [], 0.0
+        for packet in container.demux():
+            if packet.pts is not None and packet.size and packet.time_base is not None:
+                end = max(end, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+            if packet.stream.index != stream.index:
+                continue
             if packet.size and packet.is_discard:  # before the start that an editor has set
                 hidden += 1
             elif packet.size:  # the last one of a stream is empty
                 packets.append((packet.pts, packet.is_keyframe))
         clock, rate = timing(packets, stream)
-        count = stated - hidden if stated else len(clock) + cut_off(packets, container, stream)
+        count = stated - hidden if stated else len(clock) + cut_off(packets, end, container, stream)
     return (clock if len(clock) == count else np.arange(count, dtype=float)), rate
 
 
@@ -345,7 +349,8 @@ def pick_frames(path: str | os.PathLike, numbers: Sequence[int]) -> Iterator[Ima
     """
     stills = find_stills(check_path("path", path))
     if stills:
-        yield from (read_still(stills.files[k]) for k in numbers if k < len(stills.files))
+        bits = stills.bits()
+        yield from (stills.read(k, bits) for k in numbers if k < len(stills.files))
         return
     with _opened(path) as (container, stream):
         packets = _packets(container, stream)

@@ -1,0 +1,136 @@
+"""The one door for files from outside: whatever is wrong with them is one line."""
+
+import json
+
+import numpy as np
+import pytest
+
+import vidsindy_lite as vl
+from vidsindy_lite.__main__ import main
+from vidsindy_lite.cameras import read_calibration
+from vidsindy_lite.reading import DEEPEST, read_tree
+from vidsindy_lite.vision import read_tracks
+
+MANY = 30_000
+DEEP = {
+    "a.xml": '<?xml version="1.0"?><opencv_storage>' + "<a>" * MANY + "</a>" * MANY,
+    "b.xml": '<?xml version="1.0"?><opencv_storage><!--' + "</a>" * MANY + "-->" + "<a>" * MANY,
+    "a.yaml": "%YAML:1.0\n---\na: " + "[" * MANY + "]" * MANY,
+    "b.yaml": "%YAML:1.0\n---\na: " + "- " * MANY + "1",
+    "c.yaml": "%YAML:1.0\n---\n" + "".join(" " * i + "a:\n" for i in range(500)),
+    "d.yaml": '%YAML:1.0\n---\na: "' + "]" * MANY + '"\nb: ' + "[" * MANY,
+    "a.json": '{"opencv-matrix": 1, "a": ' + "[" * MANY + "]" * MANY + "}",
+    "b.json": '{"a":' * MANY,
+    "a.toml": "a = " + "[" * MANY,
+    "b.toml": "a." * MANY + "b = 1",
+    "c.toml": "[" + "a . " * MANY + "b]",
+}
+
+
+@pytest.mark.parametrize("name", DEEP)
+def test_nested_files_are_refused(tmp_path, name):
+    path = tmp_path / name
+    path.write_text(DEEP[name])
+    with pytest.raises(ValueError, match=f"at must be nested|must be nested {DEEPEST} levels"):
+        read_tree("paths", path, path.suffix)
+    assert main(["rig-import", str(path), "--size", "9x9"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.toml", b"a = " + b"9" * 400, "must hold numbers of less than 300 digits, got 999"),
+        ("a.toml", b"a = \x80", "must be a TOML file in UTF-8, got 'a.toml', which is none"),
+        ("a.toml", b"\0\0\0", "must be a TOML file in UTF-8, got 'a.toml', which is none"),
+        ("a.json", b'{"P": 5}', "must hold 11 DLT coefficients"),
+        ("a.json", b'{"K": "x", "R": 1, "t": 2}', "K: must be an array of real numbers"),
+        ("a.npy", b"", "must be a .npy file of numbers"),
+        ("a.npy", b"\x93NUMPY\x01\0v\0{'descr'", "must be a .npy file of numbers"),
+        ("a.npz", b"PK\x05\x06", "must be a .npz file of numbers"),
+        ("a.xml", b"<?xml", "must be a XML file"),
+        ("a.yaml", b"", "must be a YAML file"),
+    ],
+)
+def test_malformed_files_are_one_line(tmp_path, name, content, message):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=message) as caught:
+        read_calibration([tmp_path / name], (9, 9))
+    assert "\n" not in str(caught.value)
+    assert name in str(caught.value)
+
+
+def test_marks_of_byte_order(tmp_path):
+    rig = vl.Rig.around(np.random.default_rng(0).normal(size=(9, 3)))
+    for encoding in ("utf-8-sig", "utf-16"):
+        (tmp_path / "rig.toml").write_bytes(rig.text().encode(encoding))
+        assert vl.Rig.load(tmp_path / "rig.toml") == rig
+        (tmp_path / "a.csv").write_bytes("u,v\n1,2\n3,4\n".encode(encoding))
+        np.testing.assert_array_equal(read_tracks(tmp_path / "a.csv")[0].pixels, [[1, 2], [3, 4]])
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    path = tmp_path_factory.mktemp("law") / "law.json"
+    t = np.linspace(0, 10, 100)
+    vl.discover(t, np.c_[np.cos(t), -np.sin(t)], degree=1).save(path)
+    return json.loads(path.read_text())
+
+
+FIELDS = (
+    "system", "native", "swing", "curves", "noise", "warnings", "path", "history", "offset",
+    "covariance", "absent", "note", "orientation",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("value", [5, None, "x", [], {}, {"type": "Step"}, [1, [2]], {"type": 3}])
+@pytest.mark.parametrize("key", FIELDS)
+def test_a_saved_law_with_a_field_of_another_type_is_refused(saved, tmp_path, key, value):
+    if value == saved["discovery"][key] or (key, value) in [("note", "x"), ("warnings", [])]:
+        return
+    if value == [] and key in ("path", "history"):
+        return
+    broken = saved | {"discovery": saved["discovery"] | {key: value}}
+    (tmp_path / "law.json").write_text(json.dumps(broken))
+    with pytest.raises(ValueError, match="path: must be a file that Discovery.save has") as caught:
+        vl.Discovery.load(tmp_path / "law.json")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "{}", "[]", "5", '{"format": 1}', ""])
+def test_what_is_no_saved_law_is_refused(tmp_path, text):
+    (tmp_path / "law.json").write_text(text)
+    with pytest.raises(ValueError, match="path: must be a"):
+        vl.Discovery.load(tmp_path / "law.json")
+
+
+@pytest.mark.parametrize("call", ["write_bytes", "replace"])
+def test_a_full_disk_leaves_the_old_law_and_rig(saved, tmp_path, monkeypatch, call):
+    (tmp_path / "law.json").write_text(json.dumps(saved))
+    law, rig = vl.Discovery.load(tmp_path / "law.json"), vl.Rig.around(np.eye(3))
+    rig.save(tmp_path / "rig.toml")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def full(path, *rest):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(f"pathlib.Path.{call}", full)
+    for save in (law.save, rig.save):
+        for name in (*before, "new"):
+            with pytest.raises(OSError, match="No space left"):
+                save(tmp_path / name)
+    for command in (["rig-template"], ["rig-import", str(tmp_path / "rig.toml")]):
+        assert main([*command, "--output", str(tmp_path / "rig.toml")]) == 2
+    monkeypatch.undo()
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_link_stays_one_and_a_device_too(tmp_path):
+    rig = vl.Rig.around(np.eye(3))
+    (tmp_path / "there.toml").write_text("old")
+    (tmp_path / "there.toml").chmod(0o640)
+    (tmp_path / "rig.toml").symlink_to(tmp_path / "there.toml")
+    rig.save(tmp_path / "rig.toml")
+    assert (tmp_path / "rig.toml").is_symlink()
+    assert vl.Rig.load(tmp_path / "there.toml") == rig
+    assert (tmp_path / "there.toml").stat().st_mode & 0o777 == 0o640
+    rig.save("/dev/null")
