@@ -224,7 +224,9 @@ def _jumps(
     if not usual.size:
         return []
     typical = max(float(np.quantile(usual, _PART / 2)), _ROUNDING)
-    cost = np.nan_to_num(np.minimum(missed / typical, _MOST), nan=1.0)
+    # What nobody saw costs as much as what was seen: no lag is better for leaving frames out.
+    cost = np.minimum(missed / typical, _MOST)
+    cost = np.nan_to_num(cost, nan=float(np.minimum(usual / typical, _MOST).mean()))
     total, before = cost[:, 0], []
     for now in cost[:, 1:].T:
         best = int(total.argmin())
