@@ -284,6 +284,30 @@ def test_a_law_is_found_where_the_path_around_it_leads_nowhere_else(monkeypatch)
     assert not paths.has_terms(around[0].fit, around[0].widest())
 
 
+def test_no_path_is_followed_around_a_richer_law_that_did_not_converge(monkeypatch):
+    around, follow, at_own_errors = [], paths.follow, paths.at_own_errors
+
+    def noted(problem, fit):
+        around.append(fit)
+        return follow(problem, fit)
+
+    def unfinished(problem, fit):
+        return replace(at_own_errors(problem, fit), status=Status.MAX_STEPS)
+
+    problem = posed([np.linspace(0, 20, 400)])
+    fit = paths.first_law(problem, History())
+    path = follow(problem, fit)
+    monkeypatch.setattr(paths, "near", lambda *_: False)
+    monkeypatch.setattr(paths, "CONSISTENT", 1e-9)  # whatever it leaves, it has explained a lot
+    monkeypatch.setattr(paths, "follow", noted)
+    paths.deepest(problem, path, History())
+    assert around  # a richer law is followed
+    around.clear()
+    monkeypatch.setattr(paths, "at_own_errors", unfinished)
+    assert paths.deepest(problem, path, History()) is path
+    assert not around
+
+
 @pytest.mark.parametrize("seed", [0, 1, 3])
 def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over(seed):
     """A fall against drag, integrated coarsely: a constant slope promises what it cannot keep."""
@@ -312,6 +336,7 @@ def test_every_loop_ends_where_no_path_leads_to_its_law(monkeypatch, rounds):
     fit, refits, refit = paths.first_law(problem, History()), [], paths.refit
     monkeypatch.setattr(paths, "ROUNDS", rounds)
     monkeypatch.setattr(paths, "has_terms", lambda fit, goal: False)
+    monkeypatch.setattr(paths, "deepest", lambda problem, path, history: path)
     monkeypatch.setattr(paths, "refit", lambda *a: refits.append(a) or refit(*a))
     *_, persists = paths.persistent(problem, fit, History())
     assert len(refits) == rounds

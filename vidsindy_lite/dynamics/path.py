@@ -54,6 +54,9 @@ LARGEST, STEP = 1.0, 0.1
 """Largest error on a path, that of no law at all; and decades between two laws of a path."""
 ROUNDS = 6
 """Most laws to which paths lead, each followed around the law before."""
+DEEPEST, DESCENT, RICHEST = 6, 3.0, 2.0
+"""Most laws at smaller errors; by what the tolerated error falls from one to the next; and most
+terms of each over those of the one before."""
 MOST_PLATEAUS = 4
 """Most choices of plateaus that are fitted until a law has no pole on the curve."""
 CONSISTENT = 1.5
@@ -396,6 +399,8 @@ def persistent(
         coarse = k > 0 or not crossed or not near(problem, fit, TOLERATED)
         fit = at_own_errors(problem, fit) if coarse else polish(problem, fit, history)
         path = follow(problem, fit)
+        if k == 0:
+            path = deepest(problem, path, history)
         if crossed and coarse and has_terms(fit, path.widest()):
             fit, coarse = polish(problem, fit, history), False
             path = follow(problem, fit)
@@ -427,6 +432,30 @@ def near(problem: Problem, fit: Fit, tolerated: float) -> bool:
 def has_terms(fit: Fit, goal: Sequence[Plateau]) -> bool:
     """Whether a fit has the terms of these plateaus."""
     return all((p.terms == fit.state.active[:, p.equation]).all() for p in goal)
+
+
+def deepest(problem: Problem, path: Path, history: History) -> Path:
+    """The path around the last of the richer laws that explain what the one before left over.
+
+    A missing term leaves smooth errors, too, and only its own law tells: so the error that is
+    tolerated is lowered as long as what a law leaves falls with it.
+    """
+    for _ in range(DEEPEST):
+        errors = errors_left(problem, path.fit)
+        if near(problem, path.fit, 0.0) or history.over:
+            break
+        tolerant = replace(problem, noise=np.maximum(problem.noise, errors / DESCENT))
+        collocation = path.fit.collocation
+        weighted = collocation.weighted(tolerant.noise**-2, collocation.physics_weights)
+        start = replace(path.fit, collocation=weighted)
+        fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
+        fit = at_own_errors(problem, framed(tolerant, fit, history))
+        richer = fit.state.active.sum() > RICHEST * path.fit.state.active.sum()
+        explained = typical(errors_left(problem, fit)) < typical(errors) / CONSISTENT
+        if fit.status is not Status.CONVERGED or richer or not explained:
+            break  # around what has not converged nothing is told
+        path = follow(problem, fit)
+    return path
 
 
 def at_own_errors(problem: Problem, fit: Fit) -> Fit:

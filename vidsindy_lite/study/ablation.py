@@ -52,6 +52,7 @@ WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     "process noise": ((solver, "with_process_noise", _same),),
     "free offset": ((path, "framed", _own),),
     "offset freed at the end": ((path, "off_home", lambda problem, state, *_: state),),
+    "richer laws": ((path, "deepest", lambda problem, around, history: around),),
 }  # fmt: skip
 """Of each mechanism, what takes the place of what."""
 
