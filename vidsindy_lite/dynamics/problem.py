@@ -499,8 +499,9 @@ def pose(
     scale_errors = np.empty((0, len(scale)))
     if not form.functions:  # else the unit of a coordinate is part of the law
         # In other units a law has the same terms: no data tell of an error of the scale.
-        scale_errors = np.einsum("jjk->kj", pulls).copy()
-        pulls -= np.eye(len(scale))[:, :, None] * pulls
+        common = np.einsum("jjk->k", pulls) / len(scale)
+        scale_errors = np.repeat(common[:, None], len(scale), axis=1)
+        pulls -= np.eye(len(scale))[:, :, None] * common
         rest = [part - (centre / scale)[:, None] * scale_errors.T for part in rest]
     problem = Problem(
         measured=measured,
