@@ -158,13 +158,17 @@ def test_a_fit_says_how_it_ended(problem, state):
     assert problem.objective(further.state) <= problem.objective(done.state)
 
 
-def test_systematic_errors_are_eliminated_as_by_a_least_squares_fit():
-    rows = np.random.default_rng(0).normal(size=(9, 5))
-    gram = rows.T @ rows
-    left, sizes = _without_systematic(gram, 3)
-    np.testing.assert_allclose(left, np.linalg.inv(np.linalg.inv(gram)[:3, :3]))
-    best = np.linalg.lstsq(rows[:, 3:], rows[:, :3], rcond=None)[0]
-    np.testing.assert_allclose(sizes, -best)
+@pytest.mark.parametrize("share", [1.0, 1e-4])
+def test_systematic_errors_are_eliminated_as_by_a_least_squares_fit(share):
+    """Their own rows, one for each, are the prior: it does not fade where more is tolerated."""
+    rng = np.random.default_rng(0)
+    rows, sizes = rng.normal(size=(9, 5)), np.array([0.3, -0.2])
+    prior = np.hstack([sizes[:, None], np.zeros((2, 2)), np.eye(2)]) / np.sqrt(share)
+    whole = np.vstack([rows, prior])
+    left, shared = _without_systematic(rows.T @ rows, sizes, share)
+    np.testing.assert_allclose(left, np.linalg.inv(np.linalg.inv(whole.T @ whole)[:3, :3]))
+    best = np.linalg.lstsq(whole[:, 3:], whole[:, :3], rcond=None)[0]
+    np.testing.assert_allclose(shared, -best)
 
 
 def test_what_was_not_observed_has_no_weight_whatever_its_value(problem, state):

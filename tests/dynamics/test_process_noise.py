@@ -65,7 +65,7 @@ def test_no_law_is_searched_at_larger_errors_where_the_motion_is_kicked(monkeypa
     assert len(searched) == 2  # before kicks, and under them
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [2, 3])
 def test_errors_that_a_poor_law_leaves_are_not_taken_for_kicks(seed):
     """The first law shows kicks; the one that is found under them holds exactly."""
     rng = np.random.default_rng(seed)

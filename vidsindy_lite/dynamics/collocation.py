@@ -36,6 +36,9 @@ so firmly that a step leaves nothing of its residual but what is second order, t
 the next step would promise all of it: so the miss has to be below the tolerance, too."""
 AT_ONCE = 10_000
 """Rows that are multiplied at once where their product would be as large as what it is added to."""
+ROUNDING = 1e-14
+"""What rounding does to a banded factor, relative to its largest entry: less could leave it without
+a root, more would hold the curve back."""
 STRONGEST_DAMPING = 1e2
 """Relative Levenberg-Marquardt damping at which a fit that still finds no lower point stops."""
 
@@ -110,10 +113,26 @@ class WithCurve(Linearisation):
         What the control points do by themselves, with each column, and each systematic error.
     shared : ndarray, shape (s, 1 + m)
         What the sizes of the systematic errors do by themselves, and with each column.
+    gram : ndarray, shape (1 + m + s, 1 + m + s)
+        The problem before these sizes were eliminated, without what is known of them.
+    sizes : ndarray, shape (s,)
+        How large they are in the fit.
     """
 
     response: Floats
     shared: Floats
+    gram: Floats
+    sizes: Floats
+
+    def tolerating(self, share: float) -> Linearisation:
+        """The same where larger errors are tolerated: ``share`` times the data and physics loss.
+
+        All is given over ``share``. How large the systematic errors are is known as before.
+        """
+        if not self.sizes.size:
+            return self
+        gram, _ = _without_systematic(self.gram, self.sizes, share)
+        return Linearisation(self.fall, self.columns, gram[1:, 1:], -gram[1:, 0])
 
     def along(self, state: State, step: Floats, fraction: float) -> State:
         """The state after a fraction of a step, with the curve that goes with it."""
@@ -319,8 +338,8 @@ class Collocation:
         objective += sizes @ sizes
         for k in range(0, len(unknowns), AT_ONCE):
             unknowns[k : k + AT_ONCE] += physics[k : k + AT_ONCE] @ response
-        gram = self._gram(unknowns, response, data_residual, sizes)
-        gram, shared = _without_systematic(gram, 1 + len(columns))
+        whole = self._gram(unknowns, response, data_residual)
+        gram, shared = _without_systematic(whole, sizes)
         return WithCurve(
             fall=float(objective - gram[0, 0]),
             columns=columns,
@@ -328,12 +347,14 @@ class Collocation:
             gradient=-gram[1:, 0],
             response=response,
             shared=shared,
+            gram=whole,
+            sizes=sizes,
         )
 
     def _factor(self, physics: sparse.csr_array, damping: float = 0.0) -> Floats:
         """Cholesky factor of the normal matrix of the control points, in lower banded storage."""
         band = self._data_band + normal_band(physics, alike=self.d)
-        band[0] += damping * band[0] + 1e-12 * band[0].max()
+        band[0] += damping * band[0] + ROUNDING * band[0].max()
         return cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
 
     def factor(self, state: State) -> tuple[Floats, sparse.csr_array]:
@@ -376,26 +397,20 @@ class Collocation:
         unknowns[:, :, 1 + count : 1 + size] = jacobian[:, :, offset_columns]
         return self.grid.physics(root * below, jacobian), unknowns.reshape(-1, unknowns.shape[-1])
 
-    def _gram(self, left: Floats, solved: Floats, data_residual: Floats, sizes: Floats) -> Floats:
+    def _gram(self, left: Floats, solved: Floats, data_residual: Floats) -> Floats:
         """Gram matrix of what the curve cannot follow, in physics (``left``) and data.
 
         It is the Schur complement, without the cancellation between two large matrices that a
         large physics weight would bring.
         """
-        shared = slice(left.shape[1] - len(sizes), left.shape[1])
         gram = left.T @ left
         follow = self.grid.samples @ solved.reshape(self.grid.r, -1)
         follow = follow.reshape(-1, self.d, left.shape[1])
         follow[:, :, 0] += data_residual
-        follow[:, :, shared] += self.systematic
+        follow[:, :, left.shape[1] - self.systematic.shape[-1] :] += self.systematic
         follow *= np.sqrt(self.sample_weights)[:, :, None]
         follow = follow.reshape(-1, left.shape[1])
-        gram += follow.T @ follow
-        gram[shared, shared] += np.eye(len(sizes))
-        gram[0, 0] += sizes @ sizes
-        gram[0, shared] += sizes
-        gram[shared, 0] += sizes
-        return gram
+        return np.asarray(gram + follow.T @ follow)
 
     @np.errstate(over="ignore", invalid="ignore")  # of steps that go too far, and are refused
     def solve(self, state: State, tolerance: float = 1e-2, max_steps: int = 30) -> Fit:
@@ -446,7 +461,15 @@ class Collocation:
         return Fit(state, self, Status.CONVERGED if near else Status.MAX_STEPS)
 
 
-def _without_systematic(gram: Floats, size: int) -> tuple[Floats, Floats]:
-    """Eliminate the sizes of the systematic errors, which go with the law as the curve does."""
-    shared = -np.linalg.solve(gram[size:, size:], gram[size:, :size])
-    return gram[:size, :size] + gram[:size, size:] @ shared, np.asarray(shared, dtype=float)
+def _without_systematic(gram: Floats, sizes: Floats, share: float = 1.0) -> tuple[Floats, Floats]:
+    """Eliminate the sizes of the systematic errors, which go with the law as the curve does.
+
+    They have mean 0 and variance 1, or, as all else is divided by ``share``, its inverse.
+    """
+    size = len(gram) - len(sizes)
+    pull = gram[size:, :size].copy()
+    pull[:, 0] += sizes / share
+    shared = -np.linalg.solve(gram[size:, size:] + np.eye(len(sizes)) / share, pull)
+    left = gram[:size, :size] + pull.T @ shared
+    left[0, 0] += sizes @ sizes / share
+    return left, np.asarray(shared, dtype=float)

@@ -284,15 +284,12 @@ class Units:
     sizes : ndarray, shape (k,) or (k + d,)
         Root mean squares of the functions of the state in the library; of an implicit law also
         the units of the slopes.
-    scale_errors : ndarray, shape (m, d)
-        By what share each of m independent causes, off by one standard error, scales a coordinate.
     """
 
     centre: Floats
     scale: Floats
     time: float
     sizes: Floats = field(default_factory=lambda: np.empty(0))
-    scale_errors: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
     def standard(self, point: Floats) -> Floats:
         """A point of the data's frame in standard units."""

@@ -283,22 +283,11 @@ def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:
     covariance[np.ix_(columns, columns)] = inverse(model.of(columns).information)
     factors = units.factors(fit.collocation.exponents)
     unit = np.concatenate([factors.T.ravel(), units.scale])
-    if units.scale_errors.size:
-        scaled = _scaled(units, fit)
-        covariance += scaled.T @ scaled
     for entry, first in fit.state.followers():
         covariance[entry] = covariance[first]
     for entry, first in fit.state.followers():
         covariance[:, entry] = covariance[:, first]
     return covariance * (unit[:, None] * unit)
-
-
-def _scaled(units: Units, fit: Fit) -> Floats:
-    """What the errors of scale add to a state in standard units, (m, l d + d)."""
-    state, exponents, errors = fit.state, fit.collocation.exponents, units.scale_errors
-    power = errors[:, :, None] - (errors @ exponents.T)[:, None]
-    away = np.where(state.moving, state.offset + units.centre / units.scale, 0.0)
-    return np.hstack([(power * state.coefficients.T).reshape(len(errors), -1), errors * away])
 
 
 def _shifted(exponents: Ints, coefficients: Floats, offset: Floats) -> Floats:

@@ -175,7 +175,15 @@ def follow(problem: Problem, fit: Fit) -> Path:
     paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
     lows, highs = levels[:-1].tolist(), levels[1:].tolist()
     shares = [(own / low) ** 2 for low in lows]
-    searched = subset_path(model.information, model.gradient, present, prices, support, shares)
+    if problem.shared:
+        searched = []
+        for share in shares:
+            here = model.tolerating(share)
+            quadratic = here.information, here.gradient, present, prices
+            [support] = subset_path(*quadratic, support, [share])
+            searched.append(support)
+    else:
+        searched = subset_path(model.information, model.gradient, present, prices, support, shares)
     for low, high, support in zip(lows, highs, searched, strict=True):
         active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
         active.flat[problem.form.searched] = support[:terms_end]
@@ -438,7 +446,8 @@ def deepest(problem: Problem, path: Path, history: History) -> Path:
     """The path around the last of the richer laws that explain what the one before left over.
 
     A missing term leaves smooth errors, too, and only its own law tells: so the error that is
-    tolerated is lowered as long as what a law leaves falls with it.
+    tolerated is lowered as long as the errors of single samples fall with it. That smooth errors
+    fall alone is no sign: any term that lasts as long takes some of them.
     """
     for _ in range(DEEPEST):
         errors = errors_left(problem, path.fit)
@@ -451,7 +460,8 @@ def deepest(problem: Problem, path: Path, history: History) -> Path:
         fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
         fit = at_own_errors(problem, framed(tolerant, fit, history))
         richer = fit.state.active.sum() > RICHEST * path.fit.state.active.sum()
-        explained = typical(errors_left(problem, fit)) < typical(errors) / CONSISTENT
+        before, after = (typical(residual_noise(one)) for one in (path.fit, fit))
+        explained = after < before / CONSISTENT
         if fit.status is not Status.CONVERGED or richer or not explained:
             break  # around what has not converged nothing is told
         path = follow(problem, fit)

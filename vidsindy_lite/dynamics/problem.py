@@ -313,9 +313,7 @@ def with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
 
     curves = [with_velocity(spline) for spline in positions]
     seen = np.repeat([True, False], len(rms))
-    found = _with_states(problem, curves, rms * units.scale / units.time, seen)
-    both = np.tile(units.scale_errors, 2)
-    return replace(found, units=replace(found.units, scale_errors=both))
+    return _with_states(problem, curves, rms * units.scale / units.time, seen)
 
 
 def with_time(problem: Problem) -> Problem:
@@ -417,7 +415,6 @@ def _with_states(
 
     centres, scales = np.zeros(len(seen)), np.empty(len(seen))
     centres[seen], scales[seen], scales[~seen] = units.centre, units.scale, scale
-    scale_errors = among(units.scale_errors, 0.0)
     return replace(
         problem,
         trajectories=[(t, among(x, np.nan)) for t, x in problem.trajectories],
@@ -427,7 +424,7 @@ def _with_states(
         precision=[among(precision, 0.0) for precision in problem.precision],
         stretches=[(i, (t, among(x, np.nan))) for i, (t, x) in problem.stretches],
         curves=curves,
-        units=Units(centres, scales, units.time, scale_errors=scale_errors),
+        units=Units(centres, scales, units.time),
         noise=spread_to_unseen(problem.noise, seen),
     )
 
@@ -496,13 +493,6 @@ def pose(
         smoothed[i][np.searchsorted(trajectories[i][0], t)] = curve(t * speed)
     modes = [part.compress(seen, axis=1) / scale[:, None] for part in systematic]
     pulls, rest = _shared(trajectories, stretches, modes)
-    scale_errors = np.empty((0, len(scale)))
-    if not form.functions:  # else the unit of a coordinate is part of the law
-        # In other units a law has the same terms: no data tell of an error of the scale.
-        common = np.einsum("jjk->k", pulls) / len(scale)
-        scale_errors = np.repeat(common[:, None], len(scale), axis=1)
-        pulls -= np.eye(len(scale))[:, :, None] * common
-        rest = [part - (centre / scale)[:, None] * scale_errors.T for part in rest]
     problem = Problem(
         measured=measured,
         trajectories=[(t * speed, values) for t, values in trajectories],
@@ -515,7 +505,7 @@ def pose(
         precision=precision,
         stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
         curves=curves,
-        units=Units(centre, scale, step / speed, scale_errors=scale_errors),
+        units=Units(centre, scale, step / speed),
         noise=noise,
         form=form,
         penalties=term_penalties(form.exponents, len(seen)),
