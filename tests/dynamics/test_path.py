@@ -236,7 +236,8 @@ def test_of_long_data_a_search_has_enough_turns_and_samples():
 
 
 @pytest.mark.slow
-def test_four_species_are_found_among_terms_of_high_degree():
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_four_species_are_found_among_terms_of_high_degree(seed):
     # Chaotic competition (Vano et al. 2006); where the law hardly binds, cubic terms fit as well.
     growth = {"x": 1, "y": 0.72, "z": 1.53, "w": 1.27}
     harm = {
@@ -252,20 +253,18 @@ def test_four_species_are_found_among_terms_of_high_degree():
     truth = PolynomialSystem.from_terms(equations, degree=3)
     t = 0.5 * np.arange(1500)
     x = truth.simulate(t, np.array([0.3013, 0.4586, 0.1307, 0.3557]))
-    rng = np.random.default_rng([9, 3])
+    rng = np.random.default_rng([9, seed])
     found = discover(t, x + 0.05 * x.std(axis=0) * rng.standard_normal(x.shape), order=1)
     assert score(found.system, truth).exact
 
 
 @pytest.mark.slow
-def test_an_origin_that_moves_brings_no_terms_but_those_of_the_shift(monkeypatch):
-    """The path of a bent motion leads to the law at home; its origin is told at its own errors."""
+def test_the_origin_of_a_bent_motion_is_told_at_its_own_errors():
+    """The path leads to the law at home; where its origin is, larger errors would not tell."""
     data = FlowContest("NoseHoover", "bent space 0.3 %", seed=3).data()
     found = discover(data.t, data.x, degree=data.degree)
     assert score(found, data.truth).exact
     assert found.offset.all()
-    monkeypatch.setattr(paths, "closure_mask", lambda exponents, active, _: active | True)
-    assert not score(discover(data.t, data.x, degree=data.degree), data.truth).exact
 
 
 def test_a_law_is_found_where_the_path_around_it_leads_nowhere_else(monkeypatch):

@@ -34,7 +34,6 @@ from .collocation import Collocation, Fit, Status, WithCurve
 from .data import Trajectory
 from .frames import Origin, as_shifted, at_home, cheapest_at, closed, off_home, one_by_one, together
 from .l0 import PLATEAU, inverse, minimiser, subset_path, subset_search
-from .library import closure_mask
 from .model import PolynomialSystem, State, runge_kutta_4
 from .noise import effective_noise, errors_left, residual_noise, smoother_weights, time_inflation
 from .problem import COARSE, Problem, fit_curves
@@ -470,7 +469,7 @@ def deepest(problem: Problem, path: Path, history: History) -> Path:
 
 def at_own_errors(problem: Problem, fit: Fit) -> Fit:
     """The fit weighted with the errors that it leaves, the law exact."""
-    fit = problem.along(fit)
+    fit = replace(fit, collocation=problem.along(fit.collocation, fit.state))
     collocation = problem.weighted(fit.collocation, FINAL_WEIGHT)
     for _ in range(2):
         weights = errors_left(problem, fit) ** -2
@@ -497,13 +496,11 @@ def refit(problem: Problem, path: Path, history: History) -> Fit:
 
 
 def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: History) -> Fit:
-    """The law of these plateaus, fitted and framed where they begin; other terms only shift it."""
+    """The law of these plateaus, fitted and framed where they begin."""
     fit = path.fit
     active = fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
     tolerated = max(max(plateau.low for plateau in goal) / path.own, 1.0)
-    shifts = closure_mask(problem.exponents, active, problem.form.movable)
-    form = replace(problem.form, candidates=shifts & problem.form.candidates)
-    tolerant = replace(problem, noise=errors_left(problem, fit) * tolerated, form=form)
+    tolerant = replace(problem, noise=errors_left(problem, fit) * tolerated)
     collocation = fit.collocation.weighted(tolerant.noise**-2, fit.collocation.physics_weights)
     trial = tightened(tolerant, collocation, path.restricted(active))
     trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
@@ -515,8 +512,8 @@ def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: Hi
 
 def polish(problem: Problem, fit: Fit, history: History) -> Fit:
     """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
-    fit = problem.along(fit)
-    fit = first = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
+    collocation = problem.along(fit.collocation, fit.state)
+    fit = first = problem.weighted(collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
     columns, creeps = np.flatnonzero(fit.state.free()), first.status is Status.MAX_STEPS
     for halving in range(MOST_HALVINGS):
         if creeps and halving == MOST_CREEPING:
@@ -527,8 +524,7 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
         finer = problem.collocation(segments, errors_left(problem, fit))
         splines = fit.collocation.grid.splines(fit.state.control_points)
         state = replace(fit.state, control_points=fit_curves(finer, splines))
-        fit = problem.along(Fit(state, problem.weighted(finer, FINAL_WEIGHT), fit.status))
-        fit = fit.collocation.solve(state, EXACT)
+        fit = problem.weighted(problem.along(finer, state), FINAL_WEIGHT).solve(state, EXACT)
         creeps = creeps and fit.status is Status.MAX_STEPS
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))

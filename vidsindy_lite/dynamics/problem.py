@@ -56,11 +56,11 @@ class Problem:
     trajectories : list of Trajectory
         The same in standard units.
     systematic : list of ndarray, shape (n, d, k)
-        Errors that all samples share, for each trajectory, where the motion is at ``smoothed``.
+        Errors that all samples share, for each trajectory, without what grows with the place.
+    pulls : ndarray, shape (d, d, k)
+        By how much they grow with it.
     smoothed : list of ndarray, shape (n, d)
         Each trajectory without its noise, as its curves have it.
-    pulls : ndarray, shape (d, d, k)
-        By how much the shared errors grow with the place.
     precision : list of ndarray, shape (n, d)
         Weight of each measurement relative to ``noise ** -2``, for each trajectory; 0 where it was
         not observed.
@@ -87,8 +87,8 @@ class Problem:
     measured: list[Trajectory]
     trajectories: list[Trajectory]
     systematic: list[Floats]
-    smoothed: list[Floats]
     pulls: Floats
+    smoothed: list[Floats]
     precision: list[Floats]
     stretches: list[tuple[int, Trajectory]]
     curves: Sequence[Callable[[Floats], Floats]]
@@ -137,7 +137,7 @@ class Problem:
     @property
     def shared(self) -> bool:
         """Whether there are errors that all samples share, and that do not average out."""
-        return any(modes.size for modes in self.systematic)
+        return self.pulls.size > 0
 
     @property
     def cautious(self) -> Problem:
@@ -205,33 +205,31 @@ class Problem:
 
     def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
         """Data and physics loss on segments; by default for the noise of the smoothing."""
-        shared, precision = (
-            np.concatenate([self._at(segment, values) for segment in segments])
-            for values in (self.systematic, self.precision)
-        )
+        precision, smoothed = (self._at(segments, x) for x in (self.precision, self.smoothed))
+        shared = self._shared_at(segments, smoothed)
         weights = (self.noise if noise is None else noise) ** -2
         return Collocation.of(
             segments, self.exponents, weights, np.ones(self.d), shared, precision, self.known,
             self.functions,
         )  # fmt: skip
 
-    def along(self, fit: Fit) -> Fit:
-        """A fit whose shared errors are as its curve has them: where that is, and no noise."""
-        if not self.shared:
-            return fit
-        parts = [
-            [self._at(segment, values) for segment in fit.collocation.segments]
-            for values in (self.systematic, self.smoothed)
-        ]
-        modes, smoothed = map(np.concatenate, parts)
-        moved = fit.collocation.curve(fit.state.control_points) - smoothed
-        modes = modes + np.einsum("ni,ijk->njk", np.nan_to_num(moved), self.pulls)
-        return replace(fit, collocation=replace(fit.collocation, systematic=modes))
+    def along(self, collocation: Collocation, state: State) -> Collocation:
+        """The same with shared errors as the curve of a state has them: where that is, no noise."""
+        curve = collocation.curve(state.control_points)
+        return replace(collocation, systematic=self._shared_at(collocation.segments, curve))
 
-    def _at(self, segment: Segment, values: Sequence[Floats]) -> Floats:
-        """What is given for all samples of each trajectory, at those of a segment."""
-        t, _ = self.trajectories[segment.trajectory]
-        return values[segment.trajectory][np.searchsorted(t, segment.t)]
+    def _shared_at(self, segments: Sequence[Segment], places: Floats) -> Floats:
+        """The errors that all samples share at the samples of segments, which are at ``places``."""
+        grown = np.einsum("ni,ijk->njk", np.nan_to_num(places), self.pulls)
+        return self._at(segments, self.systematic) + grown
+
+    def _at(self, segments: Sequence[Segment], values: Sequence[Floats]) -> Floats:
+        """What is given for all samples of each trajectory, at those of segments."""
+        times = [self.trajectories[segment.trajectory][0] for segment in segments]
+        return np.concatenate([
+            values[segment.trajectory][np.searchsorted(t, segment.t)]
+            for segment, t in zip(segments, times, strict=True)
+        ])  # fmt: skip
 
     def weighted(self, collocation: Collocation, weight: float) -> Collocation:
         """The same with another physics weight, relative to the slack, as far as kicks allow."""
@@ -496,12 +494,9 @@ def pose(
     problem = Problem(
         measured=measured,
         trajectories=[(t * speed, values) for t, values in trajectories],
-        systematic=[
-            part + np.einsum("ni,ijk->njk", np.nan_to_num(x), pulls)
-            for part, x in zip(rest, smoothed, strict=True)
-        ],
-        smoothed=smoothed,
+        systematic=rest,
         pulls=pulls,
+        smoothed=smoothed,
         precision=precision,
         stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
         curves=curves,
