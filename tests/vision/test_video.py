@@ -340,7 +340,7 @@ def test_frames_that_no_other_needs_are_not_decoded_on_the_way(tmp_path, monkeyp
 def test_no_file_has_so_many_frames(tmp_path):
     path = write_video(tmp_path / "clip.mov", drawn(3))
     for number in (3, 10**6, 2**63, 10**30):
-        with pytest.raises(ValueError, match=rf"number: .* must have that frame, got {number}"):
+        with pytest.raises(ValueError, match=rf"number: .*must .*, got {number}"):
             read_frame(path, number)
 
 

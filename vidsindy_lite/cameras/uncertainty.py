@@ -29,6 +29,7 @@ from .triangulate import (
     check_views,
     points_of_views,
     residuals_of_views,
+    views_of,
 )
 
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
@@ -60,7 +61,25 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     footage = Footage(curves, clocks[0], lags.frames, lags.rates)
     near = linearised(footage, learned.cameras, errors)
     factor = fitted_factor(*near.weighed, near.prior, near.noise)
-    return np.einsum("ik,nji->knj", factor, near.path_slopes)
+    modes = np.einsum("ik,nji->knj", factor, near.path_slopes)
+    if not rig.note:
+        return modes
+    still = views_of(footage.aligned, learned.cameras)
+    return _of_shape(modes, points_of_views(still, learned.cameras))
+
+
+def _of_shape(modes: Floats, x: Floats) -> Floats:
+    """Modes, (k, n, 3), without moves and stretches of the whole path x, (n, 3).
+
+    Of a rig that nobody measured the path is the frame: its middle is the origin, and how far two
+    cameras are apart the unit of length.
+    """
+    seen = np.asarray(np.isfinite(x).all(axis=1))
+    centred = np.where(seen[:, None], x - x[seen].mean(axis=0), 0.0)
+    moves = [seen[:, None] * axis for axis in np.eye(3)]
+    frame, _ = np.linalg.qr(np.reshape([*moves, centred], (4, -1)).T)
+    flat = modes.reshape(len(modes), -1)
+    return (flat - flat @ frame @ frame.T).reshape(modes.shape)
 
 
 def trailing_errors(
