@@ -200,7 +200,7 @@ TROUBLES = {
     "must hold one target": lambda studio: track_file(
         studio, "pt1_cam1_X,pt1_cam1_Y,pt2_cam1_X,pt2_cam1_Y\n1,2,3,4\n"
     ),
-    "got x and y of Tracker with another origin": lambda studio: track_file(
+    "got x and y of Tracker or Kinovea with another origin": lambda studio: track_file(
         studio, "mass_A\nt,x,y\n0,-1.5,0.5\n1,-1.4,0.3\n"
     ),
     "there must be one video per camera": lambda studio: studio.says(studio.paths[:2]),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import Floats
 from .cameras import Rig
-from .checks import check_integer, check_positive, check_rows, shown
+from .checks import check_instance, check_integer, check_positive, check_rows, shown
 from .dynamics import (
     Discovery,
     Form,
@@ -162,6 +162,7 @@ def discover_from_tracks(
         `observe_tracks` and `discover` do.
     """
     how = _checked(degree, library, order, origin, orientation, seed) | {"progress": progress}
+    check_instance("rig", rig, Rig)
     read = _read(tracks, rig, individual)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
     times, doubts = _times(read, t, fps)
