@@ -236,7 +236,7 @@ def _times(
 ) -> tuple[ArrayLike | Sequence[ArrayLike], list[str]]:
     """The times that are given, or those that files state; and which files contradict them."""
     if t is not None and fps is not None:
-        raise ValueError(f"fps: must not be given with t, got {fps}")
+        raise ValueError(f"fps: must not be given with t, got {shown(fps)}")
     if t is not None:
         return t, []
     if fps is not None:
