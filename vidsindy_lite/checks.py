@@ -13,12 +13,15 @@ from datetime import date, timedelta
 from fractions import Fraction
 from numbers import Integral, Real
 from pathlib import Path
+from typing import TypeVar
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Floats
+
+T = TypeVar("T")
 
 FARTHEST_PIXEL = 1e100
 """Largest coordinate of a track: the squares of larger ones are no numbers any more."""
@@ -47,6 +50,14 @@ def check_instance(name: str, value: object, kind: type) -> None:
     """An object of a type of ours, not e.g. the name of its file."""
     if not isinstance(value, kind):
         raise ValueError(f"{name}: must be of type {kind.__name__}, got {shown(value)}")
+
+
+def check_items(name: str, values: Iterable[T]) -> tuple[T, ...]:
+    """The items of a list or the like."""
+    try:
+        return tuple(values)
+    except TypeError:  # also of a scalar that calls itself iterable
+        raise ValueError(f"{name}: must be a list, got {shown(values)}") from None
 
 
 def check_path(name: str, value: str | os.PathLike) -> Path:

@@ -37,7 +37,7 @@ from .cameras import (
     systematic_errors,
     trailing_errors,
 )
-from .checks import check_choice, check_integer, check_tracks
+from .checks import check_choice, check_integer, check_items, check_tracks
 from .dynamics import smooth as smooth_curves
 from .refusal import Refused, refusing
 from .vision import (
@@ -227,7 +227,10 @@ def observe_tracks(
     if min(map(len, raw)) < 2:
         raise ValueError(f"tracks: must have two frames or more, got {[*map(len, raw)]}")
     clock = Clock.of_tracks(t, raw)
-    names = names or [f"tracks[{i}]" for i in range(len(raw))]
+    called = [f"tracks[{i}]" for i in range(len(raw))] if names is None else names
+    names = [str(name) for name in check_items("names", called)]
+    if len(names) != len(raw):
+        raise ValueError(f"names: must be one per track, got {len(names)} for {len(raw)}")
     if isinstance(lags, str):
         check_choice("lags", lags, ["synchronous"])
         return _observed(raw, rig, clock, np.zeros(len(raw)), names, synchronous=True)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
 from ..arrays import Bools, Floats
-from ..checks import check_positive, check_tracks, check_vector, shown
+from ..checks import check_items, check_positive, check_tracks, check_vector, shown
 
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
@@ -257,10 +257,11 @@ def check_clocks(given: Sequence[ArrayLike] | None, tracks: Sequence[Floats]) ->
     """When each frame of each track was taken, the first one at zero."""
     if given is None:
         return tuple(np.arange(len(track), dtype=float) for track in tracks)
-    if len(given) != len(tracks):
-        raise ValueError(f"clocks: must be one per track, got {len(given)} for {len(tracks)}")
+    each = check_items("clocks", given)
+    if len(each) != len(tracks):
+        raise ValueError(f"clocks: must be one per track, got {len(each)} for {len(tracks)}")
     clocks = []
-    for i, (clock, track) in enumerate(zip(given, tracks, strict=True)):
+    for i, (clock, track) in enumerate(zip(each, tracks, strict=True)):
         checked = check_vector(f"clocks[{i}]", clock, len(track))
         if (np.diff(checked) <= 0).any():
             raise ValueError(f"clocks[{i}]: must increase, got {shown(checked)}")

@@ -11,7 +11,6 @@ how far the first is from the second.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -24,6 +23,7 @@ from ..checks import (
     check_image_size,
     check_instance,
     check_integer,
+    check_items,
     check_number,
     check_output,
     check_positive,
@@ -96,8 +96,9 @@ class Rig:
     distance: float | None = None
 
     def __post_init__(self) -> None:
-        cameras = tuple(self.cameras) if isinstance(self.cameras, Iterable) else (self.cameras,)
+        cameras = check_items("cameras", self.cameras)
         object.__setattr__(self, "cameras", cameras)
+        object.__setattr__(self, "warnings", check_items("warnings", self.warnings))
         for i, camera in enumerate(cameras):
             check_instance(f"cameras[{i}]", camera, Camera)
         if len(cameras) < 2:
@@ -127,7 +128,7 @@ class Rig:
             if self.is_measured:
                 raise ValueError(
                     "distance: must not be given with positions, which tell the unit of length, "
-                    f"got {self.distance}"
+                    f"got {shown(self.distance)}"
                 )
             object.__setattr__(self, "distance", check_positive("distance", self.distance))
 

@@ -8,7 +8,7 @@ searched.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -20,6 +20,7 @@ from ..checks import (
     check_array,
     check_instance,
     check_integer,
+    check_items,
     check_number,
     check_times,
     check_vector,
@@ -257,7 +258,7 @@ class PolynomialSystem:
     functions: tuple[Function, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
-        names = tuple(self.names) if isinstance(self.names, Iterable) else ()
+        names = check_items("names", self.names)
         named = all(isinstance(name, str) and name.isidentifier() for name in names)
         if not names or not named or len(set(names)) != len(names):
             raise ValueError(
@@ -266,7 +267,7 @@ class PolynomialSystem:
             )
         powers = check_array("exponents", self.exponents)
         coefficients = check_array("coefficients", self.coefficients).copy()
-        functions = tuple(self.functions) if isinstance(self.functions, Iterable) else (None,)
+        functions = check_items("functions", self.functions)
         # A law that is read from a file has the names of its functions at first.
         if not all(isinstance(function, Function | str) for function in functions):
             raise ValueError(f"functions: must be of a Library, got {shown(self.functions)}")

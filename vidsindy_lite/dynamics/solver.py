@@ -23,7 +23,7 @@ from threadpoolctl import OpenBLASController, threadpool_limits
 from tqdm import tqdm
 
 from ..arrays import Floats
-from ..checks import check_array, check_choice, check_integer, check_number, check_positive
+from ..checks import check_array, check_choice, check_integer, check_number, check_positive, shown
 from .bspline import DEGREE, WIDTH
 from .collocation import Fit
 from .data import (
@@ -351,7 +351,7 @@ DENSITY = 10
 def check_order(order: object, origin: str, library: Library) -> None:
     """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
     if isinstance(order, bool | float) or order not in (1, 2, "auto"):
-        raise ValueError(f"order: must be 1, 2 or 'auto', got {order!r}")
+        raise ValueError(f"order: must be 1, 2 or 'auto', got {shown(order)}")
     check_choice("origin", origin, ("learn", "data"))
 
 

@@ -96,7 +96,9 @@ def find_stills(path: Path) -> Stills | None:
         named = re.compile(_expression(path.name))
         files = [file for file in folder.iterdir() if named.fullmatch(file.name)]
     if not files and not path.is_dir():
-        raise FileNotFoundError(f"path: no such video file, nor images of that name, got '{path}'")
+        raise FileNotFoundError(
+            f"path: no such video file, nor images of that name, got {str(path)!r}"
+        )
     if not files:
         raise ValueError(
             f"path: must be a video file, or a folder of images, got '{path}' without any"

@@ -384,7 +384,7 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[InputContainer, VideoStre
 
     path = check_path("path", path)
     if not path.is_file():
-        raise FileNotFoundError(f"path: no such video file, got '{path}'")
+        raise FileNotFoundError(f"path: no such video file, got {str(path)!r}")
     if path.stat().st_size == 0:
         raise ValueError(f"path: must be a video file, got the empty file '{path}'")
     try:
