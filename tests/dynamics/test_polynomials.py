@@ -85,7 +85,7 @@ def test_bad_terms_are_refused(equations, message):
         ((("x", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct"),
         ((("", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
         ((("1", "x"), [[1, 0]], [[1, 1]]), "names: must be distinct names such as x or x1"),
-        ((None, [[1]], [[1]]), "names: must be distinct names such as x or x1"),
+        ((None, [[1]], [[1]]), "names: must be a list, got None"),
         ((("x",), [[1]], [[1, 2]]), "coefficients: must have shape"),
     ],
 )
