@@ -1,15 +1,19 @@
 """A trajectory goes in, its law comes out: `discover` in `solver` reads as the method does.
 
-prepare: `data` (checked trajectories, units), `smoothing`, `problem` (standard units, prices),
-    `noise` (variance components: errors that last, precision, process noise)
-path: `collocation` (splines and a law, fitted by banded Gauss-Newton steps), `l0` (which terms a
-    quadratic model needs), `frames` (the origin in which a law is sparsest), `path` (a first law at
-    a large tolerated error, its support path, the law that persists, the refit)
-infer: `inference` (error bars, the law in the frame of the data), `result` (`Discovery`)
-diagnose: `diagnostics` (each warning in words)
-below: `library` (candidate terms), `model` (systems, their integration, what a law may look like),
-    `bspline`
-beside: `orientation` (axes in which a law is sparsest), `mechanics` (what a law says of a body)
+::
+
+    prepare   `data` (checked trajectories, units), `smoothing`, `problem` (standard units, prices),
+              `noise` (variance components: errors that last, precision, process noise)
+    path      `collocation` (splines and a law, fitted by banded Gauss-Newton steps), `l0` (which
+              terms a quadratic model needs), `frames` (the origin in which a law is sparsest),
+              `path` (a first law at a large tolerated error, its support path, the law that
+              persists, the refit)
+    infer     `inference` (error bars, the law in the frame of the data), `result` (`Discovery`)
+    diagnose  `diagnostics` (each warning in words)
+    below     `library` (candidate terms), `model` (systems, their integration, what a law may look
+              like), `bspline`
+    beside    `orientation` (axes in which a law is sparsest), `mechanics` (what a law says of a
+              body)
 """
 
 from .library import Library, check_library
