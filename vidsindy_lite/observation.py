@@ -249,15 +249,14 @@ def _observed(
     synchronous: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    begun = np.zeros(len(raw)) if lags is None else lags
     if not rig.is_measured:
         with refusing("cameras", raw, names):
-            begun = np.zeros(len(raw)) if lags is None else lags
             rig = posed(align(raw, begun, clock.rates, clock.uneven), rig, lags is not None)
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
     start = lags
-    if rig.is_measured and not synchronous:
-        begun = np.zeros(len(raw)) if lags is None else lags
+    if not synchronous:
         mistake = find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
         if mistake is not None:  # and is put right, as nothing can be learned with it
             first, raw = [mistake.text], mistake.tracks

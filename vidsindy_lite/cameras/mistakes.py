@@ -64,12 +64,11 @@ class Mistake:
     def paired(self, unknowns: Unknowns) -> tuple[float, Floats]:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
         curves = tuple(map(Curve, self.tracks, self.clocks))
-        known = next(i for i, camera in enumerate(unknowns.cameras) if camera.is_calibrated)
         least, lags = [], []
         for tried, misses in lag_misses(curves, self.rates, unknowns, _INSTANTS, (False,)):
             least.append(misses[0].min())
             lags.append(tried[misses[0].argmin()])
-        behind = np.insert(lags, known, 0.0)
+        behind = np.insert(lags, unknowns.known, 0.0)
         return float(np.linalg.norm(least)), behind - behind[0]
 
     def left(self, rig: Rig, lags: Floats) -> float:
@@ -94,23 +93,16 @@ def find_mistake(
     names : sequence of str
         What the videos are called.
     """
+    even = [np.arange(len(track), dtype=float) for track in tracks]
+    none = Mistake("", tuple(tracks), rates, tuple(even if clocks is None else clocks))
     try:
-        return _found(tracks, rig, rates, clocks, start, names)
+        return _found(none, rig, start, names)
     except ValueError:  # what cannot be compared at all is told where cameras and lags are learned
         return None
 
 
-def _found(
-    tracks: Sequence[Floats],
-    rig: Rig,
-    rates: Floats,
-    clocks: Sequence[Floats] | None,
-    start: Floats,
-    names: Sequence[str],
-) -> Mistake | None:
+def _found(none: Mistake, rig: Rig, start: Floats, names: Sequence[str]) -> Mistake | None:
     """The same, where the tracks can be compared."""
-    even = [np.arange(len(track), dtype=float) for track in tracks]
-    none = Mistake("", tuple(tracks), rates, tuple(even if clocks is None else clocks))
     if none.left(rig, start) <= 2 * DISAGREEMENT:
         return None
     unknowns = Unknowns.of(rig)

@@ -71,7 +71,7 @@ def _turned(views: Views, cameras: Sequence[Camera], i: int) -> complex:
 
 def promising_lags(curves: Sequence[Curve], rates: Floats, unknowns: Unknowns) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    known = next(i for i, camera in enumerate(unknowns.cameras) if camera.is_calibrated)
+    known = unknowns.known
     found = []
     for lags, missed in lag_misses(curves, rates, unknowns):
         choices = [_dips(lags, part)[:_PROMISING] for part in missed]
@@ -90,7 +90,7 @@ def lag_misses(
 
     The misses are those without and with a shift, at so many instants at most.
     """
-    known = next(i for i, camera in enumerate(unknowns.cameras) if camera.is_calibrated)
+    known = unknowns.known
     frames = curves[known].clock
     frames = frames[:: max(1, len(frames) // most)]
     ends = np.array([curve.clock[-1] + 1 for curve in curves]) / rates  # on the first one's clock

@@ -56,6 +56,11 @@ class Unknowns:
         )
 
     @property
+    def known(self) -> int:
+        """The first calibrated camera."""
+        return next(i for i, camera in enumerate(self.cameras) if camera.is_calibrated)
+
+    @property
     def any(self) -> bool:
         """Whether anything is unknown."""
         return bool(self.uncalibrated.size or self.unplaced.size)
