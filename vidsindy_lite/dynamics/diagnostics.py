@@ -33,7 +33,7 @@ from .l0 import (
 from .library import monomial_exponents, monomials, shift_generators, shift_matrix, velocity_names
 from .mechanics import Round, on_circle, on_sphere
 from .model import PolynomialSystem, State, place, spoken
-from .noise import passing, residual_noise
+from .noise import GROSS, passing, residual_noise
 from .path import RESOLVED, Path
 from .problem import COARSE, SURE, Problem, term_penalties
 
@@ -821,7 +821,7 @@ def diagnose(
     """
     wider = widened(problem, fit)
     return (
-        *outliers(problem.measured),
+        *outliers(problem.measured, _met(problem, fit)),
         *_shape(problem, fit),
         *_misfit(problem, fit, wider),
         *_doubtful_sigma(problem, fit),
@@ -834,16 +834,32 @@ def diagnose(
     )
 
 
-def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
+def _met(problem: Problem, fit: Fit) -> list[Bools]:
+    """Through which samples of each trajectory the curve of a law passes, as far as noise tells."""
+    grid = fit.collocation.grid
+    apart = np.abs(fit.collocation.curve(fit.state.control_points) - grid.x)
+    near = ~(apart > GROSS * residual_noise(fit)).any(axis=1)
+    found = [np.zeros(len(t), dtype=bool) for t, _ in problem.trajectories]
+    ends = np.cumsum([len(segment.t) for segment in grid.segments])[:-1]
+    for segment, rows in zip(grid.segments, np.split(near, ends), strict=True):
+        times = problem.trajectories[segment.trajectory][0]
+        found[segment.trajectory][np.searchsorted(times, segment.t)] = rows
+    return found
+
+
+def outliers(trajectories: Sequence[Trajectory], met: Sequence[Bools] | None = None) -> list[str]:
     """Samples so far from those around them that they must be errors.
 
     Parameters
     ----------
     trajectories : sequence of Trajectory
         The data in the user's units.
+    met : sequence of ndarray of bool, shape (n,), optional
+        Which samples of each a law passes through: what it explains is no error.
     """
     found = []
-    for t, x in trajectories:
+    met = [np.zeros(len(t), dtype=bool) for t, _ in trajectories] if met is None else met
+    for (t, x), explained in zip(trajectories, met, strict=True):
         far: set[int] = set()
         for column in x.T[np.isfinite(x).any(axis=0)]:
             seen = np.flatnonzero(np.isfinite(column))
@@ -852,6 +868,7 @@ def outliers(trajectories: Sequence[Trajectory]) -> list[str]:
             spread = np.quantile(away, 0.9)
             rows = np.flatnonzero((away > OUTLIER * spread) & (spread > 0)).tolist()
             far |= {int(seen[row]) for row in rows if _leaps(values, row)}
+        far -= set(np.flatnonzero(explained).tolist())
         found += [
             f"t = {t[row]:g}, x = ({', '.join(f'{v:g}' for v in x[row])})" for row in sorted(far)
         ]

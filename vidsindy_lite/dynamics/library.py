@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,11 +15,19 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, interp1d
 from scipy.special import comb as binomial
 
 from ..arrays import Bools, Floats, Ints
-from ..checks import check_array, check_instance, check_integer, check_number, check_times, shown
+from ..checks import (
+    check_array,
+    check_choice,
+    check_instance,
+    check_integer,
+    check_number,
+    check_times,
+    shown,
+)
 
 # --------------------------------------------------------------------------------------------------
 # The library: monomials of the state, and what a shift of the origin does to them (paper: Eq. 10).
@@ -257,22 +266,27 @@ def shift_generators(exponents: Ints) -> Floats:
 
 BEYOND = 1e-6
 """How far beyond its samples an input is known, over their length: further than rounding."""
+WAYWARD = 0.1
+"""Distance of a cubic through samples from a line, midway between two, over their standard
+deviation, beyond which it is a guess: a sine makes so much at six samples a period."""
+HALVINGS, ROUNDING = 30, 1e-9
+"""Of an interval, after which what still changes jumps, and changes that are none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Input:
-    """A function of the time by its samples: a cubic spline through those of each trajectory.
+    """A function of the time by its samples, with a curve through those of each trajectory.
 
     Parameters
     ----------
-    pieces : tuple of CubicSpline
+    pieces : tuple of CubicSpline or interp1d
         One a trajectory.
     """
 
-    pieces: tuple[CubicSpline, ...]
+    pieces: tuple[CubicSpline | interp1d, ...]
 
     @classmethod
-    def of(cls, name: str, t: ArrayLike, values: ArrayLike) -> Input:
+    def of(cls, name: str, t: ArrayLike, values: ArrayLike, hold: str | None = None) -> Input:
         """An input from times and values (n,), or lists of such.
 
         Raises
@@ -289,7 +303,7 @@ class Input:
             raise ValueError(
                 f"inputs: {name} must be one per trajectory ({len(times)}), got {len(runs)}"
             )
-        pieces = [_spline(name, part, run) for part, run in zip(times, runs, strict=True)]
+        pieces = [_curve(name, part, run, hold) for part, run in zip(times, runs, strict=True)]
         ends = sorted((spline.x[0], spline.x[-1]) for spline in pieces)
         for (_, last), (first, _) in zip(ends[:-1], ends[1:], strict=True):
             if not last < first:
@@ -307,12 +321,12 @@ class Input:
             low, high = spline.x[0], spline.x[-1]
             slack = BEYOND * (high - low)
             inside = (t >= low - slack) & (t <= high + slack)
-            values[inside] = spline(t[inside])
+            values[inside] = spline(np.clip(t[inside], low, high))
         return values
 
 
-def _spline(name: str, t: Floats, values: Floats) -> CubicSpline:
-    """The spline through samples, which are checked."""
+def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> CubicSpline | interp1d:
+    """The curve through samples, which are checked."""
     t, values = check_times(t), check_array("inputs", values)
     if values.shape != t.shape:
         raise ValueError(f"inputs: {name} must have shape {t.shape}, as t has, got {values.shape}")
@@ -321,7 +335,39 @@ def _spline(name: str, t: Floats, values: Floats) -> CubicSpline:
     if not np.isfinite(values).all():
         first = t[np.argmin(np.isfinite(values))]
         raise ValueError(f"inputs: {name} must be finite, got NaN or infinity at t = {first:g}")
-    return CubicSpline(t, values)
+    curve, line = CubicSpline(t, values), interp1d(t, values)
+    if hold is None:
+        middles = (t[1:] + t[:-1]) / 2
+        apart = np.abs(curve(middles) - line(middles))
+        hold = "zero" if apart.max() > WAYWARD * values.std() else "cubic"
+        if hold == "zero":
+            warnings.warn(
+                f"inputs: {name} jumps at t = {middles[apart.argmax()]:g}, where a cubic through "
+                "its samples is a guess: each holds until the next. Say so by hold='zero', or what "
+                "is true by 'linear' or 'cubic'",
+                stacklevel=2,
+            )
+    return {"zero": interp1d(t, values, "previous"), "linear": line, "cubic": curve}[hold]
+
+
+def jumps(value: Callable[[Floats], Floats], t: Floats) -> Floats:
+    """Where a function of the time jumps between given times, (n,).
+
+    Of each interval the half in which it changes more, again and again: what is continuous changes
+    less and less.
+    """
+    low, high = t[:-1], t[1:]
+    below, above = value(low), value(high)
+    changes = []
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        here = value(middle)
+        left = np.abs(here - below) > np.abs(above - here)
+        high, above = np.where(left, middle, high), np.where(left, here, above)
+        low, below = np.where(left, low, middle), np.where(left, below, here)
+        changes.append(np.abs(above - below))
+    least = ROUNDING * np.ptp(value(t))
+    return high[(changes[-1] > changes[HALVINGS // 2] / 2) & (changes[-1] > least)]
 
 
 # --------------------------------------------------------------------------------------------------
@@ -426,12 +472,14 @@ class Library:
         return cls(functions=tuple(functions.items()))
 
     @classmethod
-    def inputs(cls, t: ArrayLike, values: Mapping[str, ArrayLike]) -> Library:
+    def inputs(
+        cls, t: ArrayLike, values: Mapping[str, ArrayLike], hold: str | None = None
+    ) -> Library:
         """Measured inputs as terms: functions of the time that are known, whatever the state is.
 
-        Between the samples each is a cubic spline. A law with inputs is one of the state and the
-        time, as with `terms` of ``t``. Functions in `terms` may have inputs as arguments, as in
-        ``{"ux": lambda u, x: u * x}``.
+        A law with inputs is one of the state and the time, as with `terms` of ``t``. Functions in
+        `terms` may have inputs as arguments, as in ``{"ux": lambda u, x: u * x}``. Where an input
+        jumps, the slope of the path may.
 
         Parameters
         ----------
@@ -441,11 +489,20 @@ class Library:
             apart from each other: add a number to those of the second.
         values : mapping of str to array_like, shape (n,), or list of such
             Names and values; for several trajectories lists.
+        hold : {"zero", "linear", "cubic"}, optional
+            What an input is between its samples: the value of the last one (a relay, a controller),
+            a line, or a cubic spline; by default the spline, or, where it jumps, the value of the
+            last one, with a warning.
 
         Raises
         ------
         ValueError
             If a name is none, times or values are not such, or times of trajectories overlap.
+
+        Warns
+        -----
+        UserWarning
+            If an input jumps, and ``hold`` does not say what is between its samples.
 
         Examples
         --------
@@ -454,7 +511,9 @@ class Library:
         """
         if not isinstance(values, Mapping) or not values:
             raise ValueError(f"inputs: must map names to values at t, got {shown(values)}")
-        return cls.terms({name: Input.of(name, t, given) for name, given in values.items()})
+        if hold is not None:
+            check_choice("hold", hold, ("zero", "linear", "cubic"))
+        return cls.terms({name: Input.of(name, t, given, hold) for name, given in values.items()})
 
     def where(self, equations: Mapping[str, Mapping[str, float | None]]) -> Library:
         """The same terms, of which some are known, forbidden or alone allowed in an equation.

@@ -308,7 +308,8 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
         For the probes of traces.
     """
     segments = [
-        Segment.even(s.t, s.x, problem.spacing, s.trajectory) for s in fit.collocation.segments
+        Segment.even(s.t, s.x, problem.spacing, s.trajectory, s.kinks)
+        for s in fit.collocation.segments
     ]
     start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
     every = replace(_on_knots(start, fit), active=problem.form.candidates)

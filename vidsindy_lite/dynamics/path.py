@@ -174,15 +174,11 @@ def follow(problem: Problem, fit: Fit) -> Path:
     paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
     lows, highs = levels[:-1].tolist(), levels[1:].tolist()
     shares = [(own / low) ** 2 for low in lows]
-    if problem.shared:
-        searched = []
-        for share in shares:
-            here = model.tolerating(share)
-            quadratic = here.information, here.gradient, present, prices
-            [support] = subset_path(*quadratic, support, [share])
-            searched.append(support)
-    else:
-        searched = subset_path(model.information, model.gradient, present, prices, support, shares)
+    tolerating = [model.tolerating(share) for share in shares]
+    functions = [
+        (m.information, m.gradient, share) for m, share in zip(tolerating, shares, strict=True)
+    ]
+    searched = subset_path(functions, present, prices, support)
     for low, high, support in zip(lows, highs, searched, strict=True):
         active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
         active.flat[problem.form.searched] = support[:terms_end]
@@ -551,8 +547,9 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
     law = problem.law(fit.state).shift(fit.state.offset)
     splines = fit.collocation.grid.splines(fit.state.control_points)
     joined, curves = join(
-        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing
-    )
+        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing,
+        problem.jumps,
+    )  # fmt: skip
     bridged = problem.collocation(joined)
     start = replace(fit.state, control_points=fit_curves(bridged, curves))
     trial = tightened(problem, bridged, start)
@@ -579,7 +576,10 @@ FLAT = 0.9
 
 
 def views(pose: Callable[..., Problem]) -> list[Problem]:
-    """A problem with the noise that its curves leave, and, if far less, with what terms leave.
+    """A problem with the noise that its curves leave, and others where that may be wrong.
+
+    Where the curves drop measurements, one with all of them; where terms leave far less than the
+    curves, one with what these leave.
 
     Parameters
     ----------
@@ -587,13 +587,16 @@ def views(pose: Callable[..., Problem]) -> list[Problem]:
         Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
         the samples, which serve where smoothed ones leave out a part of the motion.
     """
-    problem = smoother_weights(pose())
+    whole = pose()
+    problem = smoother_weights(whole)
+    # What no smooth curve explains may still be the law's: a transient that a sample or two show.
+    found = [problem] if (problem.counts == whole.counts).all() else [problem, whole]
     # A curve that has given up has no turns.
     enough = problem.samples_a_turn > COARSE and problem.noise.max() < FLAT
-    if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():
-        return [problem]
-    told = _by_terms(problem) or _by_terms(pose(True))
-    return [problem] if told is None else [problem, told]
+    if not (enough or problem.measured_errors or (problem.noise <= TOLERATED).all()):
+        told = _by_terms(problem) or _by_terms(pose(True))
+        found += [] if told is None else [told]
+    return found
 
 
 def _by_terms(problem: Problem) -> Problem | None:
@@ -614,7 +617,8 @@ def _by_terms(problem: Problem) -> Problem | None:
 def evidence(problem: Problem, fit: Fit) -> float:
     """What a law costs whose noise is its own: n log variance, and the price of its terms.
 
-    The lower, the better (Bayesian information criterion); of laws of the same data.
+    The lower, the better (Bayesian information criterion); of laws of the same data. Measurements
+    that are dropped are as likely anywhere in the spread of the data.
     """
     counts = fit.collocation.counts
     seen = counts > 0
@@ -709,6 +713,7 @@ def join(
     trajectories: Sequence[Trajectory],
     law: PolynomialSystem,
     spacing: float,
+    jumps: Sequence[Floats] | None = None,
 ) -> tuple[list[Segment], list[BSpline | Joined]]:
     """Join segments across the named gaps.
 
@@ -724,6 +729,8 @@ def join(
         The law, in the frame of the trajectories.
     spacing : float
         Length of a knot span.
+    jumps : sequence of ndarray, optional
+        Times of each trajectory at which a slope may jump.
 
     Returns
     -------
@@ -747,7 +754,8 @@ def join(
             continue
         t, x = trajectories[first.trajectory]
         inside = (t >= first.t[0]) & (t <= last.t[-1])
-        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory))
+        kinks = None if jumps is None else jumps[first.trajectory]
+        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory, kinks))
         curves.append(Joined([splines[i] for i in group], law))
     return joined, curves
 

@@ -17,11 +17,11 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.stats import chi2
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, Segment, basis, clamped_knots, normal_band
+from .bspline import DEGREE, WIDTH, Segment, basis, normal_band
 from .collocation import CLEANEST, Collocation, Fit, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
-from .library import Function, extended, law_variables, monomials
+from .library import Function, extended, jumps, law_variables, monomials
 from .model import Form, PolynomialSystem, State
 from .smoothing import PENALTIES, smooth
 
@@ -184,6 +184,11 @@ class Problem:
         return float(OFFSET_PENALTY * self.penalties[0])
 
     @property
+    def counts(self) -> Ints:
+        """How many measurements of each coordinate count, (d,)."""
+        return sum(np.count_nonzero(precision, axis=0) for precision in self.precision)
+
+    @property
     def turns(self) -> float:
         """Turns of the motion that the data cover."""
         return float(sum(t[-1] - t[0] for t, _ in self.trajectories) / (2 * np.pi))
@@ -201,7 +206,17 @@ class Problem:
 
     def segments(self) -> list[Segment]:
         """The stretches with their first knots."""
-        return [Segment.even(t, x, self.spacing, i) for i, (t, x) in self.stretches]
+        return [Segment.even(t, x, self.spacing, i, self.jumps[i]) for i, (t, x) in self.stretches]
+
+    @cached_property
+    def jumps(self) -> list[Floats]:
+        """Times at which an input of the law jumps, of each trajectory: there its slope does."""
+        at = np.eye(self.d)[-1]  # the time is the last state
+        inputs = [lambda t, f=f: f.value(t[:, None] * at) for f in self.functions if f.of_time]
+        return [
+            np.unique(np.concatenate([np.zeros(0), *(jumps(one, t) for one in inputs)]))
+            for t, _ in self.trajectories
+        ]
 
     def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
         """Data and physics loss on segments; by default for the noise of the smoothing."""
@@ -263,7 +278,7 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
     for segment, curve in zip(collocation.segments, curves, strict=True):
         b = segment.breakpoints
         dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
-        rows = basis([clamped_knots(b)], np.array([0, len(b) + 2]), [dense])
+        rows = basis([segment.knots], np.array([0, len(segment.knots) - WIDTH]), [dense])
         factor = cholesky_banded(normal_band(rows), lower=True)
         control.append(cho_solve_banded((factor, True), rows.T @ curve(dense)))
     return np.concatenate(control)

@@ -10,10 +10,12 @@ by hand per system.
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from multiprocessing import current_process
 from threading import Lock
 from typing import cast
 
@@ -66,6 +68,12 @@ MOST_LAWS = 3
 """Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
 
 
+def watched() -> bool:
+    """Whether a person sees a progress bar: in a terminal or a notebook, not in a worker."""
+    seen = sys.stderr.isatty() or "ipykernel" in sys.modules
+    return seen and current_process().name == "MainProcess"
+
+
 _lock = Lock()
 _at_work: list[threadpool_limits] = []  # one for each discovery, the first of which counts
 
@@ -96,14 +104,14 @@ def discover(
     x: Floats | None = None,
     degree: int | None = None,
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
     systematic: Floats | Sequence[Floats] | None = None,
     order: int | str = "auto",
     library: Library | None = None,
     sigma: float | Floats | Sequence[float | Floats] | None = None,
     origin: str = "learn",
     orientation: str = "data",
-    time_limit: float | None = None,
+    time_limit: float | None = 60.0,
 ) -> Discovery:
     """Discover the law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -120,8 +128,9 @@ def discover(
         by default.
     seed : int
         For the random probes of the noise estimate.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Whether a progress bar is shown; by default after two seconds, if a person watches (a
+        terminal, a notebook).
     systematic : array_like, shape (k, n, d), optional
         Errors that all samples share, such as those of a scale: what k independent causes, each
         off by one standard error, add to ``x``; smooth like the path, and below its noise. One
@@ -149,7 +158,7 @@ def discover(
         which a coordinate was not seen do not count.
     time_limit : float, optional
         Seconds after which no further round begins: then the best law so far comes back, and a
-        warning says so. One fit may last longer.
+        warning says so. One fit may last longer. Without a limit if None.
 
     Returns
     -------
@@ -198,7 +207,7 @@ class _Task:
     library: Library
     origin: str
     seed: int
-    progress: bool
+    progress: bool | None
     end: float
     turned: bool = False
     """Whether the axes are a guess: a wrong one looks like an origin that is a little off."""
@@ -275,7 +284,11 @@ def _solved(task: _Task, form: Form) -> Solved:
     probes = np.random.default_rng(task.seed)
     problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
     rounds = MOST_LAWS * (1 + ROUNDS) * len(problems)
-    with tqdm(total=rounds, disable=not task.progress, desc="discover", leave=False) as bar:
+    unasked = task.progress is None
+    hidden = not (watched() if unasked else task.progress)
+    with tqdm(
+        total=rounds, disable=hidden, desc="discover", leave=False, delay=2 if unasked else 0
+    ) as bar:
         history = History(end=task.end, bar=bar)
         laws = [_law(problem, probes, history, not task.turned) for problem in problems]
         bar.update(rounds - bar.n)
