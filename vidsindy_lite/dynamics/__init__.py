@@ -18,7 +18,6 @@
 
 from .library import Library, check_library
 from .collocation import Collocation, Status
-from .inference import cramer_rao
 from .result import Discovery
 from .model import Form
 from .model import runge_kutta_4

@@ -13,7 +13,7 @@
   tables, the paper's own optimiser.
 * `asking`: where the law is asked for, and what that does to it.
 * `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
-* `metrics`, `tables`: how good a law is, and many of them side by side.
+* `metrics`, `cramer_rao`, `tables`: how good a law is, could be, and many of them side by side.
 * `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
 * `ablation`: our solver without each of its mechanisms.
 * `published`, `audit`: the paper's numbers, and whether they agree with each other.
@@ -28,6 +28,7 @@ The names below are at hand at once. Modules that need large libraries are impor
 from .ablation import ablation_table, ablations, run_ablation
 from .asking import Asked, law_error
 from .corruption import add_noise, drop_blocks, drop_fibers
+from .cramer_rao import cramer_rao
 from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
 from .metrics import Score, pulls, score, term_errors, trajectory_error
 from .odebench import ODEBENCH

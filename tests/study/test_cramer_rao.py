@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.inference import cramer_rao
 from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise
+from vidsindy_lite.study.cramer_rao import cramer_rao
 
 
 def test_constant_drift_is_a_straight_line_fit():
