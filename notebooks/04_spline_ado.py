@@ -920,7 +920,7 @@ assert found.native.support.sum() < found.system.support.sum()
 draws, part, noise = (24, 500, 0.05) if full else (3, 300, 0.05)
 axes_moved = np.array([True, True, False])
 sigma = noise * clean[:part].std(axis=0)
-bound = cramer_rao(native, t[:part], native.x0, sigma, moving=axes_moved)
+bound = cramer_rao.bound(native, t[:part], native.x0, sigma, moving=axes_moved)
 
 
 def repeat(stream):

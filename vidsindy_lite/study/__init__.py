@@ -28,7 +28,6 @@ The names below are at hand at once. Modules that need large libraries are impor
 from .ablation import ablation_table, ablations, run_ablation
 from .asking import Asked, law_error
 from .corruption import add_noise, drop_blocks, drop_fibers
-from .cramer_rao import cramer_rao
 from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
 from .metrics import Score, pulls, score, term_errors, trajectory_error
 from .odebench import ODEBENCH

@@ -32,7 +32,7 @@ class Bound:
     offset: Floats
 
 
-def cramer_rao(
+def bound(
     system: PolynomialSystem, t: Floats, x0: Floats, sigma: Floats, moving: Bools | None = None
 ) -> Bound:
     """Cramer-Rao bound of the coefficients, with unknown initial condition and offset.
