@@ -567,11 +567,11 @@ class PolynomialSystem:
     def _right(self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str) -> str:
         """The right-hand side of an equation, given terms without slopes and how it is written."""
         column = self.coefficients[:, j]
-        above = _sum_text(np.where(self.implicit, 0.0, column), terms, digits, times)
+        above = sum_text(np.where(self.implicit, 0.0, column), terms, digits, times)
         below = np.where(self.implicit, -column, 0.0)
         if not below.any():
             return above
-        return fraction.format(above, _sum_text(below, terms, digits, times, "1"))
+        return fraction.format(above, sum_text(below, terms, digits, times, "1"))
 
     def latex(self, digits: int = 4) -> str:
         """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
@@ -631,7 +631,7 @@ def _term_text(exponents: Ints, names: tuple[str, ...], power: str, letters: int
     return text or "1"
 
 
-def _sum_text(
+def sum_text(
     coefficients: Floats, terms: Sequence[str], digits: int, times: str, text: str = ""
 ) -> str:
     """A sum of terms as text, after what comes before it."""
