@@ -108,7 +108,7 @@ def is_on_circle(x: Floats, noise: Floats, fewest: int = 5) -> bool:
         return False
     x, noise = x[:, moves], noise[moves]
     where = _round(x, noise, _across(x, noise)[1])
-    return where is not None and len(where.axes) == 2
+    return where is not None and where.shape == "circle"
 
 
 def _across(x: Floats, noise: Floats) -> tuple[Floats, int]:
@@ -168,11 +168,9 @@ def _round(x: Floats, noise: Floats, flat: int) -> Round | None:
 
 
 def _told(where: Round) -> str:
-    shape, free = (
-        ("circle", "its angle is free: on_circle finds it")
-        if len(where.axes) == 2
-        else ("sphere", "its angles are free: on_sphere finds them")
-    )
+    free = "angle is free: on_circle finds it"
+    if where.shape == "sphere":
+        free = "angles are free: on_sphere finds them"
     # A number without the digits that its error, one of them excepted, leaves no meaning.
     digits = 1 - np.floor(np.log10(np.maximum(where.centre_errors, LEAST))).astype(int)
     centre = ", ".join(
@@ -180,9 +178,9 @@ def _told(where: Round) -> str:
         for value, n, error in zip(where.centre, digits.tolist(), where.centre_errors, strict=True)
     )
     return (
-        f"the motion stays on a {shape} (centre {centre}; radius {where.radius:.5g} +- "
+        f"the motion stays on a {where.shape} (centre {centre}; radius {where.radius:.5g} +- "
         f"{where.radius_error:.1g}): there its coordinates depend on each other and many laws fit "
-        f"alike; {free}, and order=2 a law"
+        f"alike; its {free}, and order=2 a law"
     )
 
 
