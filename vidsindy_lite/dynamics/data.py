@@ -19,8 +19,6 @@ CHANCE = 4.0
 """Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent."""
 Trajectory = tuple[Floats, Floats]
 """Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was."""
-CLOCKS = ("t", "time", "times", "seconds", "timestamp")
-"""What a column of times is called."""
 
 
 def check_trajectory(t: Floats, x: Floats) -> Trajectory:
@@ -130,7 +128,8 @@ def coordinate_names(
         raise ValueError(f"x: columns must be named alike in all trajectories, got {columns}")
     for times, frame in [(t, x)] if x is not None else t:
         for name in columns[0]:
-            if str(name).lower() in CLOCKS and np.array_equal(frame[name], times):
+            clock = str(name).lower() in ("t", "time", "times", "seconds", "timestamp")
+            if clock and np.array_equal(frame[name], times):
                 raise ValueError(f"x: must hold states alone, got the times as column {name!r}")
     if columns[0] and all(isinstance(name, str) and name.isidentifier() for name in columns[0]):
         return tuple(columns[0])

@@ -255,9 +255,6 @@ def shift_generators(exponents: Ints) -> Floats:
 # --------------------------------------------------------------------------------------------------
 # Measured inputs: known functions of the time, such as a force that somebody applies.
 
-BEYOND = 1e-6
-"""How far beyond its samples an input is known, over their length: further than rounding."""
-
 
 @dataclass(frozen=True, eq=False)
 class Input:
@@ -300,12 +297,12 @@ class Input:
         return cls(tuple(pieces))
 
     def __call__(self, t: Floats) -> Floats:
-        """The values at times (n,); NaN where it was not measured."""
+        """The values at times (n,); NaN where it was not measured, but for rounding at the ends."""
         t = np.asarray(t, dtype=float)
         values = np.full(t.shape, np.nan)
         for spline in self.pieces:
             low, high = spline.x[0], spline.x[-1]
-            slack = BEYOND * (high - low)
+            slack = 1e-6 * (high - low)
             inside = (t >= low - slack) & (t <= high + slack)
             values[inside] = spline(t[inside])
         return values
@@ -331,14 +328,8 @@ def _spline(name: str, t: Floats, values: Floats) -> CubicSpline:
 # own. For given variables it becomes what `library` works with: functions of the state, and the
 # exponents of products of coordinates and functions.
 
-MOST_TERMS = 1000
-"""Most monomials of a law, of its denominators, or waves: a search among more would not end."""
-FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
-"""What can be written as text."""
 OTHERS = "..."
 """All terms of an equation that are not named."""
-STEP = 1e-3
-"""Step of a difference, relative to the size of the coordinate."""
 
 
 @dataclass(frozen=True)
@@ -512,7 +503,10 @@ class Library:
         for part in families.split("+"):
             match = re.fullmatch(r"\s*(polynomial|fourier|rational)\s*\(\s*(\d+)\s*\)\s*", part)
             if match is None:
-                raise ValueError(f"library: must be a sum of {FAMILIES}, got {part.strip()!r}")
+                raise ValueError(
+                    f"library: must be a sum of polynomial(degree), "
+                    f"fourier(harmonics) and rational(degree), got {part.strip()!r}"
+                )
             total += getattr(cls, match[1])(int(match[2]))
         for equation in equations:
             name, _, listed = equation.partition(":")
@@ -616,19 +610,20 @@ class Library:
                 exponents = np.concatenate([exponents, rows])
         return exponents, tuple(functions)
 
-    def _check_size(self, states: int, measured: int) -> None:
-        """Refuse more terms than a search can try, before they are listed."""
+    def _check_size(self, states: int, measured: int, most: int = 1000) -> None:
+        """Refuse more terms than a search can try to an end, before they are listed."""
         counts = [
             ("monomials", comb(states + degree, states), f"of degree {degree}")
             for degree in (self.degree or 0, self.denominators)
         ]
         waves = 2 * self.harmonics * measured
-        counts += [("sines and cosines", waves, f"of {self.harmonics} multiples")]
-        for what, count, which in counts:
-            if count > MOST_TERMS:
+        for what, count, which in [
+            *counts, ("sines and cosines", waves, f"of {self.harmonics} multiples")
+        ]:  # fmt: skip
+            if count > most:
                 raise ValueError(
-                    f"library: must have at most {MOST_TERMS} {what}, got {count} {which} in "
-                    f"{states} variables"
+                    f"library: must have at most {most} {what}, got {count} {which} in {states} "
+                    "variables"
                 )
 
 
@@ -742,7 +737,7 @@ def _differences(value: Callable[[Floats], Floats], x: Floats, axes: Sequence[in
     result = np.zeros_like(x)
     for axis in axes:
         step = np.zeros(x.shape[1])
-        step[axis] = STEP * (np.abs(x[:, axis]).mean() or 1.0)
+        step[axis] = 1e-3 * (np.abs(x[:, axis]).mean() or 1.0)
         near = value(x + step) - value(x - step)
         far = value(x + 2 * step) - value(x - 2 * step)
         result[:, axis] = (8 * near - far) / (12 * step[axis])
