@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import beta, chi2
 
 from ..arrays import Bools, Floats, Ints
-from .collocation import CLEANEST, Collocation, Fit, Linearisation, Status
+from .collocation import CLEANEST, Fit, Linearisation, Status
 from .data import Trajectory, autocovariances, typical_step
 from .frames import away, freed
 from .l0 import (
@@ -402,46 +402,40 @@ class Wider:
 
     Parameters
     ----------
-    law : PolynomialSystem
-        In the wider library, of which it has the old terms alone.
-    state : State
-        The same.
-    collocation : Collocation
-        The same.
-    searched, further : ndarray of int
-        Places in the coefficients, equation by equation: of the old candidates, and of the terms
-        that the library has not, not even as a function of another name.
+    problem : Problem
+        With all of these as candidates; it has no prices.
+    fit : Fit
+        With the old terms alone.
+    further : ndarray of int
+        Places in the coefficients, equation by equation, of the terms that the library has not, not
+        even as a function of another name.
     """
 
-    law: PolynomialSystem
-    state: State
-    collocation: Collocation
-    searched: Ints
+    problem: Problem
+    fit: Fit
     further: Ints
 
     @cached_property
     def model(self) -> Linearisation:
         """The quadratic model around the fit, in all candidates and moving axes."""
-        axes = self.law.coefficients.size + np.flatnonzero(self.state.moving)
-        columns = np.sort(np.concatenate([self.searched, self.further]))
-        return self.collocation.linearise(self.state, np.concatenate([columns, axes]))
+        return self.problem.model(self.fit)
 
     @cached_property
     def beyond(self) -> Beyond:
         """The score test of the terms that the law has not."""
-        own = np.flatnonzero(self.state.free())
-        others = np.concatenate([self.further, np.setdiff1d(self.searched, own)])
-        model = self.model.of(np.concatenate([own, others]))
+        own, searched = np.flatnonzero(self.fit.state.free()), self.problem.form.searched
+        others = np.append(self.further, np.setdiff1d(searched, np.append(own, self.further)))
+        model = self.model.of(np.append(own, others))
         estimate, variance = newcomers(model.information, model.gradient, len(own))
         single = estimate**2 / variance
-        model = self.model.of(np.concatenate([own, self.further]))
+        model, law = self.model.of(np.append(own, self.further)), self.problem.law(self.fit.state)
         return Beyond(
             gain=float(model.newton()[1] - model.fall),
             count=len(self.further),
             best=float(single.max(initial=0.0)),
             tried=len(others),
-            left=float(self.collocation.objective(self.state)),
-            term=place(self.law, int(others[single.argmax()])) if len(others) else "",
+            left=float(self.fit.collocation.objective(self.fit.state)),
+            term=place(law, int(others[single.argmax()])) if len(others) else "",
         )
 
 
@@ -450,38 +444,42 @@ def widened(problem: Problem, fit: Fit, budget: float = 2e7) -> Wider:
 
     The budget is of entries of the derivatives of the data, or the curve, in the further terms.
     """
-    form, size, d = problem.form, len(problem.exponents), problem.d
-    equations = np.flatnonzero(form.candidates.any(axis=0))
-    grid = fit.collocation.grid
+    form, state, (size, d) = problem.form, fit.state, problem.form.known.shape
+    equations, grid = np.flatnonzero(form.candidates.any(axis=0)), fit.collocation.grid
     entries = max(grid.x.size, grid.r * d) * len(equations)
     exponents = _higher(problem.exponents, form.states, budget / entries)
-    l, law = len(exponents), problem.law(fit.state)
+    l = len(exponents)
 
     def padded(array: NDArray[Any]) -> NDArray[Any]:
         return np.pad(array, ((0, l - size), (0, 0)))
 
     places = np.arange(d * l).reshape(d, l)
-    own, shared = places[:, :size].ravel(), places.copy()
-    shared[:, :size] = own[form.shared].reshape(d, size)
-    wider = Wider(
-        law=replace(law, exponents=exponents, coefficients=padded(law.coefficients)),
-        state=replace(
-            fit.state,
-            coefficients=padded(fit.state.coefficients),
-            active=padded(fit.state.active),
-            shared=shared.ravel(),
-        ),
-        # With a known part of its own shape: a collocation is made for its library.
-        collocation=replace(
-            fit.collocation, exponents=exponents, known=padded(fit.collocation.known)
-        ),
-        searched=own[form.searched],
-        further=places[equations, size:].ravel(),
+    further, shared = places[equations, size:].ravel(), places.copy()
+    shared[:, :size] = places[:, :size].ravel()[form.shared].reshape(d, size)
+    state = replace(
+        state, coefficients=padded(state.coefficients), active=padded(state.active),
+        shared=shared.ravel(),
+    )  # fmt: skip
+    # With a known part of its own shape: a collocation is made for its library.
+    known = padded(fit.collocation.known)
+    fit = replace(
+        fit, state=state, collocation=replace(fit.collocation, exponents=exponents, known=known)
     )
+
+    def among(further: Ints) -> Wider:
+        candidates = padded(form.candidates) | np.isin(places.T, further)
+        wide = replace(
+            form, exponents=exponents, candidates=candidates, known=padded(form.known),
+            shared=shared.ravel(),
+        )  # fmt: skip
+        return Wider(replace(problem, form=wide, penalties=np.full(l, np.nan)), fit, further)
+
+    wider = among(further)
     if form.functions:  # a function may be a monomial, and then it is no further term
-        model = wider.model.of(np.concatenate([wider.searched, wider.further]))
-        _, variance = newcomers(model.information, model.gradient, len(wider.searched))
-        wider = replace(wider, further=wider.further[np.isfinite(variance)])
+        old = np.setdiff1d(wider.problem.form.searched, further)
+        model = wider.model.of(np.append(old, further))
+        _, variance = newcomers(model.information, model.gradient, len(old))
+        wider = among(further[np.isfinite(variance)])
     return wider
 
 
@@ -752,7 +750,7 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     misses = ~(ratio < MISFIT)
     # A curve without a law follows errors that last, too: they are no misfit.
     if misses.any() and wider.beyond.count and not wider.beyond.significant:
-        misses &= ~passing(fit, len(wider.law.terms))
+        misses &= ~passing(fit, len(wider.problem.exponents))
     if misses.any():
         j = int(np.where(misses, ratio, 0.0).argmax())
         told = "sigma" if problem.measured_errors else "the noise estimated beforehand"
@@ -866,9 +864,8 @@ def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.02) -> It
 
     The axes stay as they are: the same law in another frame would count.
     """
-    law, state = wider.law, wider.state
-    columns = np.sort(np.concatenate([wider.searched, wider.further]))
-    support, present = state.free()[columns], state.flat()[columns]
+    law, columns = wider.problem.law(wider.fit.state), wider.problem.form.searched
+    support, present = wider.fit.state.free()[columns], wider.fit.state.flat()[columns]
     if not support.any():
         return
     model, prices = wider.model.of(columns), np.tile(prior_prices(law.exponents), law.d)[columns]
