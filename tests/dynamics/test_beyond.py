@@ -8,9 +8,8 @@ from helpers import posed
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, discover, monomial_exponents
-from vidsindy_lite.dynamics.collocation import Fit, Status
+from vidsindy_lite.dynamics.collocation import Fit, State, Status
 from vidsindy_lite.dynamics.diagnostics import Beyond, _higher, newcomers, widened
-from vidsindy_lite.dynamics.model import State
 from vidsindy_lite.study.scoreboard import OdeContest
 
 TIMES = np.linspace(0, 20, 600)

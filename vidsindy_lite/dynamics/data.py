@@ -10,7 +10,6 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..checks import FARTHEST, check_array, check_times, shown
-from .library import variable_names
 
 # --------------------------------------------------------------------------------------------------
 # Measured trajectories: checked input, and its cut into stretches without gaps.
@@ -110,6 +109,11 @@ def check_trajectories(
             f"without a number in trajectory {int(seen[:, column].argmin())}"
         )
     return trajectories
+
+
+def variable_names(d: int) -> tuple[str, ...]:
+    """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
+    return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
 
 
 def coordinate_names(

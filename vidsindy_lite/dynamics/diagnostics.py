@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import beta, chi2
 
 from ..arrays import Bools, Floats, Ints
-from .collocation import CLEANEST, Fit, Linearisation, Status
+from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, autocovariances, typical_step
 from .frames import away, freed
 from .l0 import (
@@ -32,7 +32,7 @@ from .l0 import (
 )
 from .library import monomial_exponents, monomials, shift_generators, shift_matrix, velocity_names
 from .mechanics import Complexes, Round, on_circle, on_sphere
-from .model import PolynomialSystem, State, place, spoken, sum_text
+from .model import PolynomialSystem, place, spoken, sum_text
 from .noise import passing, residual_noise
 from .path import RESOLVED, Path
 from .problem import COARSE, Problem

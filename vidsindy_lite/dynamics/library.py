@@ -28,11 +28,6 @@ from ..checks import check_array, check_instance, check_integer, check_number, c
 # these the slopes; such variables stay as they are when the origin is shifted.
 
 
-def variable_names(d: int) -> tuple[str, ...]:
-    """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
-    return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
-
-
 def velocity_names(names: Sequence[str]) -> tuple[str, ...]:
     """Names of the velocities of variables: vx, vy, ..."""
     return tuple(f"v{name}" for name in names)

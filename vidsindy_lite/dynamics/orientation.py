@@ -22,12 +22,12 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import Bools, Floats, Ints
 from ..checks import check_choice
-from .collocation import Fit, Linearisation
-from .data import Trajectory
+from .collocation import Fit, Linearisation, State
+from .data import Trajectory, variable_names
 from .inference import with_errors
 from .l0 import inverse
-from .library import Library, monomial_gradients, monomials, variable_names
-from .model import Form, State
+from .library import Library, monomial_gradients, monomials
+from .model import Form
 from .path import FIRST_WEIGHTS, History, leaves_something_over, tightened, unpruned
 from .problem import Problem, fit_curves
 from .result import Discovery
