@@ -668,24 +668,15 @@ def diagnose(
         if clean
         else "cleaner samples or a longer trajectory"
     )
-    # A body without a force moves evenly.
-    idle = [] if law.order == 2 else np.flatnonzero(~law.support.any(axis=0)).tolist()
     return (
         *outliers(problem.measured),
         *_shape(problem, fit),
         *_misfit(problem, fit, wider),
         *_unmet(problem, fit, law, remedy),
         *_contested(problem, fit.state, path, remedy),
-        # What is left of clean data is the error of the splines, not noise: it settles nothing.
-        *(() if clean and not problem.kicked else _rivals(
-            problem, fit.state, model, wider, path, law, remedy, clean
-        )),
-        *_sampling(problem),
-        *(
-            f"no term was found for d{law.names[j]}/dt although {law.names[j]} moves: use {remedy}"
-            for j in idle
-        ),
-    )  # fmt: skip
+        *_rivals(problem, fit.state, model, wider, path, law, remedy, clean),
+        *_sampling(problem, law, remedy),
+    )
 
 
 def outliers(trajectories: Sequence[Trajectory], limit: float = 30.0) -> list[str]:
@@ -841,6 +832,8 @@ def _rivals(
     law: PolynomialSystem, remedy: str, clean: bool,
 ) -> Iterator[str]:  # fmt: skip
     """Do other terms or another origin explain the data as well?"""
+    if clean and not problem.kicked:
+        return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(state.active)) > path.lowest
     found = wider.beyond
     # Errors that last may follow the state, too; they are no reason to doubt, unless a single term,
@@ -883,8 +876,8 @@ def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.02) -> It
         )
 
 
-def _sampling(problem: Problem) -> Iterator[str]:
-    """Are samples too few or too far apart, also to tell kicks from a wrong law?
+def _sampling(problem: Problem, law: PolynomialSystem, remedy: str) -> Iterator[str]:
+    """Are samples too few or too far apart for a law, or to tell kicks from a wrong one?
 
     A wrong law misses the same whenever the motion comes by.
     """
@@ -906,3 +899,7 @@ def _sampling(problem: Problem) -> Iterator[str]:
             f"the motion is taken for kicked at random, which {few} cannot tell from a drive or a "
             f"force that nobody named: {'sample faster' if coarse else 'record longer'}, or name it"
         )
+    # A body without a force moves evenly.
+    for j in np.flatnonzero(~law.support.any(axis=0) & (law.order == 1)).tolist():
+        name = law.names[j]
+        yield f"no term was found for d{name}/dt although {name} moves: use {remedy}"

@@ -1,4 +1,4 @@
-"""A law as a model: its system of equations, its integration, the unknowns of a fit, and its form.
+"""A law as a model: its system of equations, its integration, and its form before a search.
 
 `PolynomialSystem` is a law, of the truth as well as of a discovery; `runge_kutta_4` follows it;
 `Form` is what a law may look like before it is

@@ -24,7 +24,6 @@ from ..arrays import Bools, Floats, Ints
 from ..checks import check_choice
 from .collocation import Fit, Linearisation, State
 from .data import Trajectory, variable_names
-from .inference import with_errors
 from .l0 import inverse
 from .library import Library, monomial_gradients, monomials
 from .model import Form
@@ -306,8 +305,8 @@ def in_sparsest_axes(
     pose: Callable[[Floats], Problem],
     solve: Callable[[Floats], Solved],
     rng: np.random.Generator,
-) -> Discovery:
-    """The law in the axes in which it has fewest terms: its own if no others have fewer.
+) -> Solved | None:
+    """The law in the axes in which it has fewest terms; none if in no others it has fewer.
 
     Parameters
     ----------
@@ -319,31 +318,27 @@ def in_sparsest_axes(
         For the starts of the search.
     """
     starts = rough_orientations(pose(np.eye(own.system.states // own.system.order)), rng)
-    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=own)
-    if _terms(best) < _terms(own):
-        return replace(best, note=own.note)
-    said = "orientation: the data's own axes, as the law has no fewer terms in any others"
-    return replace(own, note="; ".join(filter(None, (own.note, said))))
+    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=None)
+    return best if best and _terms(best[0]) < _terms(own) else None
 
 
-def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Discovery:
+def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Solved:
     """The law in the best axes near some; of laws alike, the one in the axes that were refined."""
-    found, problem, fit = solve(turn)
-    best = replace(found, orientation=turn), problem, fit
+    solved = best = solve(turn)
+    best = replace(best[0], orientation=turn), *best[1:]
     for _ in range(3):  # each law tells the axes better, in which the next is made
-        turn, before = refined(problem, fit) @ turn, _rank(found)
-        found, problem, fit = solve(turn)
-        if _rank(found) <= _rank(best[0]):
-            best = replace(found, orientation=turn), problem, fit
-        if _rank(found) >= before:
+        turn, before = refined(*solved[1:]) @ turn, _rank(solved)
+        solved = solve(turn)
+        if _rank(solved) <= _rank(best):
+            best = replace(solved[0], orientation=turn), *solved[1:]
+        if _rank(solved) >= before:
             break
-    found, problem, fit = best
-    return with_errors(found, problem, fit, with_turns(problem, fit))
+    return best
 
 
-def _rank(found: Discovery) -> tuple[bool, int]:
+def _rank(solved: Solved) -> tuple[bool, int]:
     """What is to be smallest: no warnings, then few terms."""
-    return bool(found.warnings), _terms(found)
+    return bool(solved[0].warnings), _terms(solved[0])
 
 
 def _terms(found: Discovery) -> int:
