@@ -9,8 +9,9 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics import path as paths
 from vidsindy_lite.dynamics.bspline import Segment
+from vidsindy_lite.dynamics.collocation import State
 from vidsindy_lite.dynamics.library import Library, monomial_exponents
-from vidsindy_lite.dynamics.model import Form, PolynomialSystem, State
+from vidsindy_lite.dynamics.model import Form, PolynomialSystem
 from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, polish
 from vidsindy_lite.dynamics.problem import fit_curves, pose, term_penalties
 from vidsindy_lite.dynamics.solver import discover

@@ -21,7 +21,7 @@ from .collocation import Collocation, Status
 from .result import Discovery
 from .model import Form
 from .model import runge_kutta_4
-from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
+from .library import Function, monomial_exponents, monomial_gradients, monomials
 from .solver import check_order
 from .frames import ShiftedLaw
 from .result import Plateau, Swing
@@ -33,7 +33,7 @@ from .solver import SplineSINDy
 from .smoothing import smooth
 from .solver import discover
 from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis
-from .model import State
-from .data import Trajectory, check_trajectory, cut, typical_step
+from .collocation import State
+from .data import Trajectory, check_trajectory, cut, typical_step, variable_names
 from .orientation import check_orientation
 from .data import Units

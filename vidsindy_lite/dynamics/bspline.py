@@ -188,12 +188,9 @@ class Grid:
         """The grid of these segments."""
         knots = tuple(segment.knots for segment in segments)
         starts = np.cumsum([0] + [len(k) - WIDTH for k in knots])
-        nodes, width = [], []
-        for segment in segments:
-            pieces = [_nodes(b, segment.kinks) for b in segment.pieces]
-            nodes.append(np.concatenate([times for times, _ in pieces]))
-            width += [shares for _, shares in pieces]
-        width = np.concatenate(width)
+        pieces = [[_nodes(b, s.kinks) for b in s.pieces] for s in segments]
+        nodes = [np.concatenate([times for times, _ in parts]) for parts in pieces]
+        width = np.concatenate([shares for parts in pieces for _, shares in parts])
         x = np.concatenate([segment.x for segment in segments])
         return cls(
             segments=tuple(segments),
@@ -301,11 +298,6 @@ def rows_from(first: Ints, values: Floats, size: int) -> sparse.csr_array:
 # A point of a curve touches few control points, so its normal matrix is a narrow band, and so is
 # the Cholesky factor of that.
 
-BLOCK = 48
-"""Rows that `solve_factored` takes at once, at least."""
-UNROLLED = 400
-"""Blocks of which the triangles are held at once."""
-
 
 def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: int = 1) -> Floats:
     """Lower banded storage of ``rows' W rows``, for rows as `splines.rows_from` makes them.
@@ -325,21 +317,22 @@ def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: in
     return band
 
 
-def solve_factored(factor: Floats, right: Floats) -> None:
+def solve_factored(factor: Floats, right: Floats, block: int = 48, held: int = 400) -> None:
     """Solve ``L L' x = right`` for many right-hand sides, (n, m), in their place.
 
     ``L`` is in lower banded storage. LAPACK takes one right-hand side after the other; block by
-    block, all of them at once are three times as fast.
+    block, of so many rows at least, all of them at once are three times as fast. The triangles of
+    so many blocks are held at once.
     """
     reach, n = len(factor) - 1, len(right)
-    size = max(BLOCK, 2 * reach)
+    size = max(block, 2 * reach)
     blocks = [right[start : start + size] for start in range(0, n, size)]
-    last, parts = len(blocks) - 1, range(0, len(blocks), UNROLLED)
+    last, parts = len(blocks) - 1, range(0, len(blocks), held)
 
     def unrolled(part: int) -> list[tuple[int, Floats, Floats, Floats]]:
         """Blocks of a part: number, triangle, what reaches on to the next, and right-hand side."""
-        rows = _unrolled(factor[:, part * size : (part + UNROLLED) * size], size)
-        numbered = enumerate(zip(rows, blocks[part : part + UNROLLED], strict=True), part)
+        rows = _unrolled(factor[:, part * size : (part + held) * size], size)
+        numbered = enumerate(zip(rows, blocks[part : part + held], strict=True), part)
         return [
             (k, row[: len(here), : len(here)].T, row[size + 1 - reach :, :reach], here)
             for k, (row, here) in numbered

@@ -16,10 +16,9 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .collocation import Fit, Linearisation
+from .collocation import Fit, Linearisation, State
 from .l0 import newcomers, subset_search
 from .library import closure_mask, divides, shift_generators, shift_matrix
-from .model import State
 from .problem import Problem
 
 ROUNDING = 1e-9

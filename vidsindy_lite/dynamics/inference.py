@@ -12,11 +12,10 @@ from scipy.interpolate import BSpline
 
 from ..arrays import Floats, Ints
 from .bspline import DEGREE
-from .collocation import Fit, Linearisation
+from .collocation import Fit, Linearisation, State
 from .data import Units
 from .l0 import inverse, newcomers
 from .library import divides, shift_generators, shift_matrix
-from .model import State
 from .noise import residual_noise
 from .path import History, Path
 from .problem import Problem

@@ -235,7 +235,7 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
 
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """A lower value reached by forcing one entry in, which may let several others go."""
-    for entry in np.flatnonzero(~best.support & ~np.isposinf(model.penalty)):
+    for entry in np.flatnonzero(~best.support & ~np.isposinf(model.penalty)).tolist():
         penalty = model.penalty.copy()
         penalty[entry] = -np.inf
         trial = _descend(replace(model, penalty=penalty), _changed(best.support, NONE, entry))

@@ -37,11 +37,6 @@ from ..checks import (
 # these the slopes; such variables stay as they are when the origin is shifted.
 
 
-def variable_names(d: int) -> tuple[str, ...]:
-    """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
-    return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
-
-
 def velocity_names(names: Sequence[str]) -> tuple[str, ...]:
     """Names of the velocities of variables: vx, vy, ..."""
     return tuple(f"v{name}" for name in names)
@@ -264,13 +259,9 @@ def shift_generators(exponents: Ints) -> Floats:
 # --------------------------------------------------------------------------------------------------
 # Measured inputs: known functions of the time, such as a force that somebody applies.
 
-BEYOND = 1e-6
-"""How far beyond its samples an input is known, over their length: further than rounding."""
 WAYWARD = 0.1
 """Distance of a cubic through samples from a line, midway between two, over their standard
 deviation, beyond which it is a guess: a sine makes so much at six samples a period."""
-HALVINGS, ROUNDING = 30, 1e-9
-"""Of an interval, after which what still changes jumps, and changes that are none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,12 +305,12 @@ class Input:
         return cls(tuple(pieces))
 
     def __call__(self, t: Floats) -> Floats:
-        """The values at times (n,); NaN where it was not measured."""
+        """The values at times (n,); NaN where it was not measured, but for rounding at the ends."""
         t = np.asarray(t, dtype=float)
         values = np.full(t.shape, np.nan)
         for spline in self.pieces:
             low, high = spline.x[0], spline.x[-1]
-            slack = BEYOND * (high - low)
+            slack = 1e-6 * (high - low)
             inside = (t >= low - slack) & (t <= high + slack)
             values[inside] = spline(np.clip(t[inside], low, high))
         return values
@@ -350,7 +341,7 @@ def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> CubicSplin
     return {"zero": interp1d(t, values, "previous"), "linear": line, "cubic": curve}[hold]
 
 
-def jumps(value: Callable[[Floats], Floats], t: Floats) -> Floats:
+def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> Floats:
     """Where a function of the time jumps between given times, (n,).
 
     Of each interval the half in which it changes more, again and again: what is continuous changes
@@ -359,15 +350,15 @@ def jumps(value: Callable[[Floats], Floats], t: Floats) -> Floats:
     low, high = t[:-1], t[1:]
     below, above = value(low), value(high)
     changes = []
-    for _ in range(HALVINGS):
+    for _ in range(halvings):
         middle = (low + high) / 2
         here = value(middle)
         left = np.abs(here - below) > np.abs(above - here)
         high, above = np.where(left, middle, high), np.where(left, here, above)
         low, below = np.where(left, low, middle), np.where(left, below, here)
         changes.append(np.abs(above - below))
-    least = ROUNDING * np.ptp(value(t))
-    return high[(changes[-1] > changes[HALVINGS // 2] / 2) & (changes[-1] > least)]
+    least = 1e-9 * np.ptp(value(t))  # more than rounding
+    return high[(changes[-1] > changes[halvings // 2] / 2) & (changes[-1] > least)]
 
 
 # --------------------------------------------------------------------------------------------------
@@ -377,14 +368,8 @@ def jumps(value: Callable[[Floats], Floats], t: Floats) -> Floats:
 # own. For given variables it becomes what `library` works with: functions of the state, and the
 # exponents of products of coordinates and functions.
 
-MOST_TERMS = 1000
-"""Most monomials of a law, of its denominators, or waves: a search among more would not end."""
-FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
-"""What can be written as text."""
 OTHERS = "..."
 """All terms of an equation that are not named."""
-STEP = 1e-3
-"""Step of a difference, relative to the size of the coordinate."""
 
 
 @dataclass(frozen=True)
@@ -571,7 +556,10 @@ class Library:
         for part in families.split("+"):
             match = re.fullmatch(r"\s*(polynomial|fourier|rational)\s*\(\s*(\d+)\s*\)\s*", part)
             if match is None:
-                raise ValueError(f"library: must be a sum of {FAMILIES}, got {part.strip()!r}")
+                raise ValueError(
+                    f"library: must be a sum of polynomial(degree), "
+                    f"fourier(harmonics) and rational(degree), got {part.strip()!r}"
+                )
             total += getattr(cls, match[1])(int(match[2]))
         for equation in equations:
             name, _, listed = equation.partition(":")
@@ -675,19 +663,20 @@ class Library:
                 exponents = np.concatenate([exponents, rows])
         return exponents, tuple(functions)
 
-    def _check_size(self, states: int, measured: int) -> None:
-        """Refuse more terms than a search can try, before they are listed."""
+    def _check_size(self, states: int, measured: int, most: int = 1000) -> None:
+        """Refuse more terms than a search can try to an end, before they are listed."""
         counts = [
             ("monomials", comb(states + degree, states), f"of degree {degree}")
             for degree in (self.degree or 0, self.denominators)
         ]
         waves = 2 * self.harmonics * measured
-        counts += [("sines and cosines", waves, f"of {self.harmonics} multiples")]
-        for what, count, which in counts:
-            if count > MOST_TERMS:
+        for what, count, which in [
+            *counts, ("sines and cosines", waves, f"of {self.harmonics} multiples")
+        ]:  # fmt: skip
+            if count > most:
                 raise ValueError(
-                    f"library: must have at most {MOST_TERMS} {what}, got {count} {which} in "
-                    f"{states} variables"
+                    f"library: must have at most {most} {what}, got {count} {which} in {states} "
+                    "variables"
                 )
 
 
@@ -801,7 +790,7 @@ def _differences(value: Callable[[Floats], Floats], x: Floats, axes: Sequence[in
     result = np.zeros_like(x)
     for axis in axes:
         step = np.zeros(x.shape[1])
-        step[axis] = STEP * (np.abs(x[:, axis]).mean() or 1.0)
+        step[axis] = 1e-3 * (np.abs(x[:, axis]).mean() or 1.0)
         near = value(x + step) - value(x - step)
         far = value(x + 2 * step) - value(x - 2 * step)
         result[:, axis] = (8 * near - far) / (12 * step[axis])

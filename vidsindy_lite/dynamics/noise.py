@@ -15,10 +15,9 @@ from scipy.linalg import cho_solve_banded
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
-from .collocation import CLEANEST, Collocation, Fit
+from .collocation import CLEANEST, Collocation, Fit, State
 from .data import CHANCE, autocovariances, inflation
 from .l0 import LEAST
-from .model import State
 from .problem import Problem, fit_curves, spread_to_unseen
 
 # --------------------------------------------------------------------------------------------------

@@ -30,11 +30,11 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
-from .collocation import Collocation, Fit, Status, WithCurve
+from .collocation import Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory
 from .frames import Origin, as_shifted, at_home, cheapest_at, closed, off_home, one_by_one, together
 from .l0 import PLATEAU, inverse, minimiser, subset_path, subset_search
-from .model import PolynomialSystem, State, runge_kutta_4
+from .model import PolynomialSystem, runge_kutta_4
 from .noise import effective_noise, errors_left, residual_noise, smoother_weights, time_inflation
 from .problem import COARSE, Problem, fit_curves
 from .result import Plateau, Step

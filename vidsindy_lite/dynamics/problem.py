@@ -18,11 +18,11 @@ from scipy.stats import chi2
 
 from ..arrays import Bools, Floats, Ints
 from .bspline import DEGREE, WIDTH, Segment, basis, normal_band
-from .collocation import CLEANEST, Collocation, Fit, WithCurve
+from .collocation import CLEANEST, Collocation, Fit, State, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
 from .library import Function, extended, jumps, law_variables, monomials
-from .model import Form, PolynomialSystem, State
+from .model import Form, PolynomialSystem
 from .smoothing import PENALTIES, smooth
 
 # --------------------------------------------------------------------------------------------------

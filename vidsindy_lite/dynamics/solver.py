@@ -37,7 +37,7 @@ from .data import (
     coordinate_names,
 )
 from .diagnostics import diagnose, is_on_circle
-from .inference import infer
+from .inference import infer, with_errors
 from .library import (
     Library,
     check_library,
@@ -46,7 +46,14 @@ from .library import (
 )
 from .model import Form, PolynomialSystem
 from .noise import rebalanced, smoother_weights, with_process_noise
-from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes
+from .orientation import (
+    Measured,
+    Solved,
+    check_orientation,
+    in_axes,
+    in_sparsest_axes,
+    with_turns,
+)
 from .path import (
     ROUNDS,
     TOLERATED,
@@ -229,7 +236,12 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
     def solved(turn: Floats) -> Solved:
         return _solved(replace(task, measured=in_axes(task.measured, turn), turned=True), form)
 
-    return in_sparsest_axes(found, posed, solved, np.random.default_rng(task.seed))
+    best = in_sparsest_axes(found, posed, solved, np.random.default_rng(task.seed))
+    if best is None:
+        said = "orientation: the data's own axes, as the law has no fewer terms in any others"
+        return replace(found, note="; ".join(filter(None, (found.note, said))))
+    law, problem, fit = best
+    return with_errors(replace(law, note=found.note), problem, fit, with_turns(problem, fit))
 
 
 def _of_order(task: _Task, order: int | str) -> Discovery:
