@@ -216,7 +216,8 @@ def check_systematic(
         return [np.empty((*x.shape, 0)) for _, x in trajectories]
     if not isinstance(systematic, np.ndarray | list | tuple):
         raise ValueError(f"systematic: must have shape (k, n, d), got {shown(systematic)}")
-    parts = [systematic] if len(trajectories) == 1 and np.ndim(systematic) == 3 else systematic
+    alone = len(trajectories) == 1 and not (len(systematic) == 1 and np.ndim(systematic[0]) == 3)
+    parts = [systematic] if alone else systematic
     if len(parts) != len(trajectories):
         raise ValueError(
             f"systematic: must be one array per trajectory ({len(trajectories)}), got {len(parts)}"
