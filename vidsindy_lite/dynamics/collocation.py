@@ -38,8 +38,6 @@ AT_ONCE = 10_000
 ROUNDING = 1e-14
 """What rounding does to a banded factor, relative to its largest entry: less could leave it without
 a root, more would hold the curve back."""
-STRONGEST_DAMPING = 1e2
-"""Relative Levenberg-Marquardt damping at which a fit that still finds no lower point stops."""
 
 
 @dataclass(frozen=True)
@@ -512,7 +510,7 @@ class Collocation:
                     break
             else:
                 damping = max(10 * damping, 1e-6)
-                if damping > STRONGEST_DAMPING:
+                if damping > 1e2:
                     return Fit(state, self, Status.STALLED)
                 continue
             miss = abs(value - trial_value - promise)

@@ -26,9 +26,6 @@ from .result import Discovery
 #
 # No term in a law means no evidence for it, which is little where the data can hardly tell.
 
-HALF_WIDTH = 1.96
-"""Of a 95 % interval, in standard errors."""
-
 
 def intervals(problem: Problem, state: State, model: Linearisation, tolerated: Floats) -> Floats:
     """Between which values each absent candidate term would be if it alone joined the law.
@@ -59,7 +56,7 @@ def intervals(problem: Problem, state: State, model: Linearisation, tolerated: F
     others = np.setdiff1d(problem.form.searched, own)
     model = model.of(np.concatenate([own, others]))
     estimate, variance = newcomers(model.information, model.gradient, len(own))
-    spread = HALF_WIDTH * np.sqrt(variance) * tolerated[others // l]
+    spread = 1.96 * np.sqrt(variance) * tolerated[others // l]
     flat = np.full((l * d, 2), np.nan)
     flat[others] = np.column_stack([estimate - spread, estimate + spread])
     flat = flat[problem.form.shared]  # directions of a vector have the interval of the first
@@ -72,8 +69,6 @@ def intervals(problem: Problem, state: State, model: Linearisation, tolerated: F
 
 KEPT = 1e-12
 """Price of a term that stays whatever its error."""
-HOLDS = 3
-"""Steps to the likeliest law of which a term is zero."""
 
 
 def infer(
@@ -243,7 +238,7 @@ def _pruned(
         k = live[weakest]
         dead[k] = True
         point = native
-        for _ in range(HOLDS):  # the shift is linear around where it is held alone
+        for _ in range(3):  # the shift is linear around where it is held alone
             value, slope = _entry(exponents, point[:size].reshape(shape).T, point[size:], int(k))
             pull = covariance @ slope
             point = native - pull * ((value + slope @ (native - point)) / (slope @ pull))

@@ -24,10 +24,6 @@ PLATEAU = 1e-6
 """Changes of the function below this are taken for rounding."""
 MOST_CHANGES = 4
 """Most changes of a support on its way down, for each entry that there is."""
-NOTHING = 1e-250
-"""Least information; its inverse, even over the ridge, is still a number."""
-DEPENDENT = 1e-9
-"""Share of a term that those of the law leave, below which they have it already."""
 FAR = 4.0
 """Standard errors of a coefficient beyond which another law has another coefficient."""
 LEAST = 1e-300
@@ -339,7 +335,8 @@ def equilibrated(information: Floats, ridge: float = RIDGE) -> tuple[Floats, Flo
         ``scale[:, None] * information * scale``, plus the ridge.
     scale : ndarray, shape (m,)
     """
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), NOTHING))
+    # The inverse of so little information, even over the ridge, is still a number.
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-250))
     matrix = information * scale[:, None] * scale
     matrix[np.diag_indices_from(matrix)] += ridge
     return matrix, scale
@@ -360,7 +357,7 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
     left = gradient[own:] - gradient[:own] @ response
     whole = np.diag(information)[own:]
     apart = whole - (information[:own, own:] * response).sum(axis=0)
-    new = apart > DEPENDENT * whole
+    new = apart > 1e-9 * whole  # else the law has it already, but for rounding
     room = np.where(new, apart, 1.0)
     return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)
 

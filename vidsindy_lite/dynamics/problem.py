@@ -41,8 +41,6 @@ OFFSET_PENALTY = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 COARSE = 20
 """Samples a turn from which on a curve tells the noise to a tenth, and kicks from a drive."""
-NOISY, WIDE, NARROW = 0.02, 1 / 5, 1 / 16
-"""Knot spacing in time scales: wide where the noise is above this, narrow elsewhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,8 +199,8 @@ class Problem:
 
     @property
     def spacing(self) -> float:
-        """Length of a knot span."""
-        return WIDE if self.noise.max() > NOISY else NARROW
+        """Length of a knot span, in time scales: wide where the noise is."""
+        return 1 / 5 if self.noise.max() > 0.02 else 1 / 16
 
     def segments(self) -> list[Segment]:
         """The stretches with their first knots."""
@@ -447,10 +445,6 @@ def _with_states(
 
 GAP = 0.4
 """A pause longer than this fraction of the time scale of the motion is a gap."""
-SHORTEST_STRETCH = 4
-"""Stretches of fewer samples tell less than their initial conditions cost."""
-DEPENDENT, INVOLVED = 1e-10, 1e-3
-"""Least singular value over the largest at which terms depend on each other, and least share."""
 
 
 def pose(
@@ -612,11 +606,11 @@ def _check_independent(form: Form, terms: Floats) -> None:
         flat = columns.reshape(-1, len(unknowns))
         flat /= np.maximum(np.linalg.norm(flat, axis=0), LEAST)
         _, sizes, shares = np.linalg.svd(flat, full_matrices=False)
-        if len(terms) >= len(sizes) and sizes[-1] < DEPENDENT * sizes[0]:
+        if len(terms) >= len(sizes) and sizes[-1] < 1e-10 * sizes[0]:  # as far as rounding tells
             names = np.array(form.law(form.known).terms)[unknowns % l]
             raise ValueError(
                 "library: its terms must not depend on each other, got "
-                + ", ".join(dict.fromkeys(names[np.abs(shares[-1]) > INVOLVED]))
+                + ", ".join(dict.fromkeys(names[np.abs(shares[-1]) > 1e-3]))
             )
 
 
@@ -648,7 +642,8 @@ def _stretches(
     longest = max(len(t) for _, (t, _) in pieces)
     if longest < 2:
         raise ValueError("x: must hold all coordinates at about the same times, got none")
-    return [piece for piece in pieces if len(piece[1][0]) >= min(SHORTEST_STRETCH, longest)]
+    # Fewer than four samples tell less than their initial conditions cost.
+    return [piece for piece in pieces if len(piece[1][0]) >= min(4, longest)]
 
 
 def _rms_speed(splines: Sequence[BSpline]) -> float:

@@ -69,8 +69,6 @@ from .problem import Problem, pose
 from .result import LIBRARY, NAME, Discovery, Swing, swinging
 from .smoothing import smooth
 
-DROWNED = 0.5
-"""Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
 MOST_LAWS = 3
 """Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
 
@@ -252,7 +250,7 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     if order == 1 or task.library.given or not found.warnings:
         return found
     swing = _swing(task, problem)
-    drowned = problem.noise.max() > DROWNED
+    drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
     # With inputs a place is passed with several velocities, whatever the order is.
@@ -358,20 +356,6 @@ def _kicked(
 # no law of first order holds; but its acceleration is nearly a linear function of where it is and
 # how it moves. In the flows that people write down as x' = f(x) it is not.
 
-LINEAR = 0.15
-"""Share of the accelerations' squares that no linear law explains, below which they may be those of
-a body. Clean flows of first order leave .26 to .64, springs and throws up to .06."""
-AMBIGUOUS = 0.5
-"""Share of the slopes' squares that no cubic law of first order explains, above which a place is
-passed with several velocities. Flows of first order leave up to .15, with noise of 40 %."""
-PASSED = 0.005
-"""The same share, below which every place is passed with one velocity, so that nothing speaks for
-a second order. Flows of first order outside the library leave up to .002, throws .02."""
-MISFIT = 1.5
-"""Errors that one law leaves over those of another, from which on it misses the data."""
-DENSITY = 10
-"""Points per time scale of the motion at which accelerations are looked at."""
-
 
 def check_order(order: object, origin: str, library: Library) -> None:
     """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
@@ -384,12 +368,14 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     """Whether smoothed curves look like those of a law of second order.
 
     The slope is no function of the place; or hardly one, and the second derivative is nearly linear
-    in both.
+    in both. Flows of first order leave up to .15 of the slopes' squares to no cubic law, with noise
+    of 40 %, outside the library up to .002; throws .02. Of the accelerations' squares clean flows
+    leave .26 to .64 to no linear law, springs and throws up to .06.
     """
     places, slopes, bends = [], [], []
     for curve in curves:
         low, high = curve.t[DEGREE + 1], curve.t[-DEGREE - 2]  # the outermost spans bend by chance
-        t = np.arange(low, high, 1 / DENSITY)
+        t = np.arange(low, high, 1 / 10)
         places.append(curve(t))
         slopes.append(curve(t, 1))
         bends.append(curve(t, 2))
@@ -397,7 +383,7 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     linear = np.hstack([np.ones((len(x), 1)), x, v])
     cubic = monomials(x, monomial_exponents(x.shape[1], 3))
     several = unexplained(cubic, v)
-    return several > AMBIGUOUS or (several > PASSED and unexplained(linear, a) < LINEAR)
+    return several > 0.5 or (several > 0.005 and unexplained(linear, a) < 0.15)
 
 
 def unexplained(terms: Floats, values: Floats) -> float:
@@ -422,7 +408,7 @@ def better(first: Discovery, second: Discovery) -> Discovery:
         int(native.support[:, begin : begin + m].sum())
         for native, begin in ((first.native, 0), (second.native, m))
     )
-    if (first.noise[:m] > MISFIT * second.noise[:m]).any():
+    if (first.noise[:m] > 1.5 * second.noise[:m]).any():
         return replace(second, note="order 2: the law of order 1 misses the data")
     if not second.warnings and others <= terms:
         cause = f"the law of order 1 is doubtful and has {terms} terms, not {others}"
