@@ -154,6 +154,20 @@ def test_the_closest_rival_is_priced_as_it_is():
     assert cost > 9
 
 
+def test_the_closest_rival_may_have_no_term_in_common():
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((200, 3))
+    columns[:, 2] = columns[:, 0] - columns[:, 1] + 1e-3 * rng.standard_normal(200)
+    y = 5 * columns[:, 0] + rng.standard_normal(200)
+    information, pull = columns.T @ columns, columns.T @ y
+    penalty, support = np.array([20.0, 10.0, 10.0]), np.array([True, False, False])
+    cost, dropped, added = closest_rival(information, pull, 0 * pull, penalty, support)
+    assert (dropped.tolist(), added.tolist()) == ([0], [1, 2])
+    swapped = objective(information, pull, penalty, ~support)
+    own = objective(information, pull, penalty, support)
+    assert cost == pytest.approx(swapped - own, abs=1e-6)
+
+
 @given(st.integers(0, 2**32 - 1), st.integers(2, 8), st.floats(0.1, 100))
 def test_a_path_is_a_search_of_each_share_that_begins_where_the_last_ended(seed, m, price):
     information, pull, rng = random_problem(seed, m)

@@ -101,7 +101,10 @@ def subset_path(
 def closest_rival(
     information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
 ) -> Change:
-    """The single drop, add or swap of a support that costs least.
+    """The other support that costs least, of those next to a support.
+
+    Every entry has to leave or to join, in turn, and the others then leave and join as they like:
+    laws that share little may fit alike where the motion is short or slow.
 
     Parameters
     ----------
@@ -118,7 +121,12 @@ def closest_rival(
         The entries that leave and enter.
     """
     model = _Quadratic.of(information, gradient, present, penalty)
-    return _best_change(model, model.tableau(model.fit(support)))
+    rivals = [_forced(model, support, k) for k in np.flatnonzero(np.isfinite(penalty)).tolist()]
+    if not rivals:
+        return np.inf, NONE, NONE
+    rival = min(rivals, key=lambda rival: rival.value)
+    dropped, added = support & ~rival.support, rival.support & ~support
+    return rival.value - model.fit(support).value, np.flatnonzero(dropped), np.flatnonzero(added)
 
 
 def minimiser(information: Floats, gradient: Floats, present: Floats, support: Bools) -> Floats:
@@ -230,14 +238,30 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
 
 
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
-    """A lower value reached by forcing one entry in, which may let several others go."""
-    for entry in np.flatnonzero(~best.support & ~np.isposinf(model.penalty)).tolist():
-        penalty = model.penalty.copy()
-        penalty[entry] = -np.inf
-        trial = _descend(replace(model, penalty=penalty), _changed(best.support, NONE, entry))
-        if trial.value + model.penalty[entry] < best.value - PLATEAU:
+    """A lower value reached by forcing one entry in, which may let others go.
+
+    Of those with which one of the others is not worth its price any more, as an update of rank one
+    tells.
+    """
+    tableau = model.tableau(best)
+    room, response = np.maximum(tableau.room, COLLINEAR)[:, None], tableau.response
+    fitted = tableau.fitted - response * (tableau.left[:, None] / room)
+    lost = model.share * fitted**2 / (tableau.spread + response**2 / room)
+    lets_go = (lost < model.penalty[tableau.inside]).any(axis=1)
+    for entry in tableau.outside[lets_go & ~np.isposinf(model.penalty[tableau.outside])].tolist():
+        trial = _forced(model, best.support, entry)
+        if trial.value < best.value - PLATEAU:
             return _descend(model, trial.support)
     return None
+
+
+def _forced(model: _Quadratic, support: Bools, entry: int) -> _Fit:
+    """The fit that a descent reaches with an entry of a support forced out, or another one in."""
+    inside, penalty = support[entry], model.penalty.copy()
+    penalty[entry] = np.inf if inside else -np.inf
+    changed = _changed(support, entry, NONE) if inside else _changed(support, NONE, entry)
+    trial = _descend(replace(model, penalty=penalty), changed)
+    return trial if inside else replace(trial, value=trial.value + model.penalty[entry])
 
 
 def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
