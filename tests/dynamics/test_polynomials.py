@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vidsindy_lite.dynamics.data import variable_names
 from vidsindy_lite.dynamics.library import (
     closure,
     closure_mask,
@@ -13,7 +14,6 @@ from vidsindy_lite.dynamics.library import (
     monomials,
     shift_generators,
     shift_matrix,
-    variable_names,
 )
 from vidsindy_lite.dynamics.model import PolynomialSystem, power_of_ten
 
