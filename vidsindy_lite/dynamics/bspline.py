@@ -300,7 +300,7 @@ def rows_from(first: Ints, values: Floats, size: int) -> sparse.csr_array:
 
 
 def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: int = 1) -> Floats:
-    """Lower banded storage of ``rows' W rows``, for rows as `splines.rows_from` makes them.
+    """Lower banded storage of ``rows' W rows``, for rows as `rows_from` makes them.
 
     ``W`` is diagonal, with weights (n,) of the rows; by default the identity. So many rows one
     after the other as are ``alike`` have the same columns.

@@ -630,9 +630,7 @@ def _cheapest_two(
 
 
 # --------------------------------------------------------------------------------------------------
-# Whether a discovered law should be trusted: each warning in words, with advice.
-#
-# A warning is a necessary sign of trouble, not a sufficient one: a law without one may be wrong.
+# All that is to be said of a law.
 
 MISFIT = 1.5
 """Residual over estimated noise beyond which the law does not fit."""

@@ -365,8 +365,8 @@ def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> F
 # Libraries as values: which candidate terms a law may have, before any data are seen.
 #
 # A library is a sum of families: polynomials, harmonics of the coordinates, functions of one's
-# own. For given variables it becomes what `library` works with: functions of the state, and the
-# exponents of products of coordinates and functions.
+# own. For given variables it becomes functions of the state, and the exponents of products of
+# coordinates and functions.
 
 OTHERS = "..."
 """All terms of an equation that are not named."""

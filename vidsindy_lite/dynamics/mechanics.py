@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_simpson
 from scipy.interpolate import BSpline
 from scipy.optimize import least_squares
 
-from ..arrays import Bools, Floats
+from ..arrays import Floats
 from ..checks import check_array, check_vector, shown
 from .data import inflation
 from .l0 import LEAST
@@ -501,30 +501,7 @@ def on_circle(
     >>> swing = vl.on_circle(seen.x, zero=(0, 0, -1), systematic=seen.systematic)
     >>> print(swing.radius, swing.radius_error)
     """
-    return _fit(_circle, x, (2, 3), zero, systematic)
-
-
-def _circle(x: Floats, seen: Bools, zero: ArrayLike | None) -> Round:
-    """The circle of checked positions, in the plane of their principal directions."""
-    middle = x[seen].mean(axis=0)
-    spread, directions = np.linalg.eigh(np.cov((x[seen] - middle).T))
-    if not spread[-2] > 1e-18 * spread[-1]:
-        raise ValueError("x: must not lie on a line: a line has no centre")
-    main = directions.T[::-1]
-    flat = (x[seen] - middle) @ main[:2].T
-    planar, covariance = _fitted(flat)
-    centre = middle + planar[:2] @ main[:2]
-    errors = main[:2].T @ covariance[:2, :2] @ main[:2]
-    off = np.linalg.norm(flat - planar[:2], axis=1)[:, None] - planar[2]
-    if x.shape[1] == 3:
-        height = (x[seen] - middle) @ main[2:].T
-        errors += _height_error(flat, height, planar[:2]) * main[2:].T * main[2:]
-        off = np.hstack([off, height])
-    axes = _axes(x[seen] - centre, zero, main[:2])[:2]
-    angle = np.full(len(x), np.nan)
-    right, up = axes @ (x[seen] - centre).T
-    angle[seen] = np.unwrap(np.arctan2(up, right))
-    return _round(centre, planar[2], errors, covariance, off, axes, angle)
+    return _with_shared(_checked(x, (2, 3)), zero, systematic, False)
 
 
 def on_sphere(
@@ -553,44 +530,31 @@ def on_sphere(
     ValueError
         If ``x`` or ``systematic`` has another shape or too few rows, or lies in a plane.
     """
-    return _fit(_sphere, x, (3,), zero, systematic)
+    return _with_shared(_checked(x, (3,)), zero, systematic, True)
 
 
-def _sphere(x: Floats, seen: Bools, zero: ArrayLike | None) -> Round:
-    """The sphere of checked positions."""
-    ball, covariance = _fitted(x[seen])
-    away = x[seen] - ball[:3]
-    off = np.linalg.norm(away, axis=1)[:, None] - ball[3]
-    axes = _axes(away, zero, np.eye(3))
-    a, b, c = axes @ away.T
-    angle = np.full((len(x), 2), np.nan)
-    angle[seen, 0] = np.unwrap(np.arctan2(b, a))
-    angle[seen, 1] = np.arctan2(c, np.hypot(a, b))
-    return _round(ball[:3], ball[3], covariance[:3, :3], covariance, off, axes, angle)
-
-
-def _fit(
-    fit: Callable[[Floats, Bools, ArrayLike | None], Round],
-    positions: ArrayLike,
-    dimensions: tuple[int, ...],
-    zero: ArrayLike | None,
-    systematic: ArrayLike | None,
-) -> Round:
-    """What is fitted to positions, and what each error that they share makes of it."""
+def _checked(positions: ArrayLike, dimensions: tuple[int, ...]) -> Floats:
     x = check_array("x", positions)
     if x.ndim != 2 or x.shape[1] not in dimensions:
         wanted = " or ".join(f"(n, {d})" for d in dimensions)
         raise ValueError(f"x: must have shape {wanted}, got {x.shape}")
-    (n, d), seen = x.shape, np.asarray(np.isfinite(x).all(axis=1))
-    if seen.sum() < d + 3:
-        raise ValueError(f"x: must hold at least {d + 3} positions, got {seen.sum()}")
-    found = fit(x, seen, zero)
+    seen, fewest = np.isfinite(x).all(axis=1).sum(), x.shape[1] + 3
+    if seen < fewest:
+        raise ValueError(f"x: must hold at least {fewest} positions, got {seen}")
+    return x
+
+
+def _with_shared(
+    x: Floats, zero: ArrayLike | None, systematic: ArrayLike | None, sphere: bool
+) -> Round:
+    """What is fitted to positions, and what each error that they share makes of it."""
+    found, (n, d), seen = _round(x, zero, sphere), x.shape, np.isfinite(x).all(axis=1)
     if systematic is None:
         return found
     errors = check_array("systematic", systematic)
     if errors.ndim != 3 or errors.shape[1:] != x.shape or not np.isfinite(errors[:, seen]).all():
         raise ValueError(f"systematic: must be finite, of shape (k, {n}, {d}), got {errors.shape}")
-    moved = [fit(x + error, seen, found.axes[0] if zero is None else zero) for error in errors]
+    moved = [_round(x + error, found.axes[0] if zero is None else zero, sphere) for error in errors]
     shape = (len(moved), n, found.angle.size // n)
     turned = np.array([other.angle - found.angle for other in moved]).reshape(shape)
     centres = np.array([other.centre - found.centre for other in moved]).reshape(-1, d)
@@ -603,15 +567,33 @@ def _fit(
     )
 
 
-def _round(
-    centre: Floats, radius: float, errors: Floats, covariance: Floats, off: Floats,
-    axes: Floats, angle: Floats,
-) -> Round:  # fmt: skip
-    """A fit with its doubts: too far off, the way that neighbours share, or hardly bent."""
-    distance = float(np.sqrt((off**2).sum(axis=1).mean()))
+def _round(x: Floats, zero: ArrayLike | None, sphere: bool) -> Round:
+    """The sphere of checked positions, or the circle in the plane of their main directions.
+
+    Doubted if it is a tenth of its radius off, or neighbours share a hundredth, or hardly bent.
+    """
+    seen = np.isfinite(x).all(axis=1)
+    middle = x[seen].mean(axis=0)
+    place, span, across = x[seen] - middle, np.eye(x.shape[1]), np.empty((0, x.shape[1]))
+    if not sphere:
+        spread, directions = np.linalg.eigh(np.cov(place.T))
+        if not spread[-2] > 1e-18 * spread[-1]:
+            raise ValueError("x: must not lie on a line: a line has no centre")
+        span, across = np.split(directions.T[::-1], [2])
+    flat, height = place @ span.T, place @ across.T
+    (*at, radius), covariance = _fitted(flat)
+    centre, errors = at @ span, span.T @ covariance[:-1, :-1] @ span
+    off = np.hstack([np.linalg.norm(flat - at, axis=1)[:, None] - radius, height])
+    if height.size:
+        errors += _height_error(flat, height, np.array(at)) * across.T * across
+    axes = _axes(place - centre, zero, span)
+    right, up, *above = axes @ (place - centre).T
+    angle = np.full((len(x), len(axes) - 1), np.nan)
+    angle[seen, 0] = np.unwrap(np.arctan2(up, right))
+    if sphere:
+        angle[seen, 1] = np.arctan2(above[0], np.hypot(right, up))
+    error, distance = (float(np.sqrt(e)) for e in (covariance[-1, -1], (off**2).sum(axis=1).mean()))
     shared = float(np.sqrt(max((off[1:] * off[:-1]).sum(axis=1).mean(), 0.0)))
-    error = float(np.sqrt(covariance[-1, -1]))
-    found = Round(centre, float(radius), errors, error, distance, axes, angle, ())
     doubts = []
     if distance > 0.1 * radius or shared > 0.01 * radius:
         doubts.append(
@@ -621,8 +603,17 @@ def _round(
     if error > 0.3 * radius:
         known = f"the radius is known to {100 * error / radius:.0f} % alone"
         doubts.append(f"it hardly bends, so that {known}")
-    told = (f"the motion may be on no {found.shape}: {doubt}" for doubt in doubts)
-    return replace(found, warnings=tuple(told))
+    shape = "sphere" if sphere else "circle"
+    return Round(
+        centre=middle + centre,
+        radius=float(radius),
+        centre_covariance=errors,
+        radius_error=error,
+        distance=distance,
+        axes=axes,
+        angle=angle if sphere else angle[:, 0],
+        warnings=tuple(f"the motion may be on no {shape}: {doubt}" for doubt in doubts),
+    )
 
 
 def _fitted(x: Floats) -> tuple[Floats, Floats]:

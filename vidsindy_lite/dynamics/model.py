@@ -215,15 +215,14 @@ def _step(
 # be a polynomial in functions of the state, too: then its frame is that of the data.
 
 
-def power_of_ten(largest: float) -> int:
-    """What numbers up to one are divided by where they are printed; 0 for those of few digits."""
-    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
-    return 0 if -5 <= power < 6 else power
-
-
 def with_error(values: Floats, error: float, known: str = "g") -> tuple[str, int]:
-    """Numbers with two digits of their error, over a power of ten; known ones in a format."""
-    power = power_of_ten(max(float(np.abs(values).max()), error))
+    """Numbers with two digits of their error, over a power of ten; known ones in a format.
+
+    The power is 0 for numbers of few digits.
+    """
+    largest = max(float(np.abs(values).max()), error)
+    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
+    power = 0 if -5 <= power < 6 else power
     digits = int(np.clip(1 - np.floor(np.log10(error / 10.0**power)), 0, 12)) if error > 0 else 0
     form = f".{digits}f" if error > 0 else known
     text = ", ".join(f"{value / 10.0**power + 0.0:{form}}" for value in np.ravel(values))

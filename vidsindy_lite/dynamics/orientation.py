@@ -2,8 +2,8 @@
 
 A rotation of the axes, like a shift of their origin, maps polynomials of one degree onto each
 other, exactly. So all terms are fitted once, and the estimate, with its covariance, is looked at
-in other axes, where the number of terms that differ from zero is minimised; see `origin`, which
-does the same for shifts.
+in other axes, where the number of terms that differ from zero is minimised, as `frames`
+does for shifts.
 """
 
 from __future__ import annotations

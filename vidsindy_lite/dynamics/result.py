@@ -30,10 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# --------------------------------------------------------------------------------------------------
-# The result of a discovery: the law in two frames, its uncertainty, and whether to trust it.
-
-
 @dataclass(frozen=True, eq=False)
 class Plateau:
     """A range of tolerated errors over which the law of one equation has the same terms.
@@ -145,7 +141,7 @@ class Discovery:
     absent : ndarray, shape (l, d, 2)
         Of each candidate term of ``native`` that the law has not, the 95 % interval of what it
         would be if it alone were added, all else fitted again; NaN for what is in the law or no
-        candidate. See `intervals` of the module ``absent`` for the formula.
+        candidate. See `intervals` of the module ``inference`` for the formula.
     note : str
         Which order the law has and why, where both were looked for.
     orientation : ndarray, shape (m, m), optional
