@@ -18,6 +18,7 @@ law: polynomials, on a library of monomials, also of functions of the state; can
 libraries that a user asks for, inputs what is known of the time; integrate solves a law
 sindy: the same for code that is written for pysindy
 order: first or second, where that is left open
+homogeneous: of one flight, the law that is the same at every place, if there is one
 turning: the same in the axes in which the law is sparsest (orientation), where these are unknown
 beside the way: cramer_rao, the least errors that any estimate could have
 """
@@ -27,6 +28,7 @@ from .collocation import Collocation, Status
 from .cramer_rao import cramer_rao
 from .discovery import Discovery
 from .form import Form
+from .homogeneous import homogeneous
 from .integrate import runge_kutta_4
 from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
 from .order import check_order
