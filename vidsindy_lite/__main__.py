@@ -74,6 +74,11 @@ def _discover(options: argparse.Namespace) -> int:
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml --lag 0,7,0 --degree 2
       python -m vidsindy_lite discover "a/%04d.png" "b/%04d.png" c/ --rig rig.toml --fps 240
       python -m vidsindy_lite discover --tracks a.csv b.csv c.csv --rig rig.toml --fps 30
+      python -m vidsindy_lite discover swing.mp4 --length 120,80,125,410,0.45
+
+    Of a motion in a plane that faces the camera, one video and no rig file are enough: --length
+    gives the scale (without it, places are in pixels), --up the vertical, --fps the frames in a
+    second of slow motion, --hint the target; --corners marks out a plane that is seen askew.
 
     The folder then holds report.html (one page, images included), result.json (the same as data),
     tracks.csv and rig.toml (the learned cameras). If tracks were found but no law, it holds a
@@ -94,6 +99,8 @@ def _discover(options: argparse.Namespace) -> int:
         raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
     check_folder_is_free(options.out)
+    if options.rig is None:
+        return _discover_in_plane(options)
     rig, videos = Rig.load(options.rig), options.videos or None
     library = check_library(options.degree, options.library)
     told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
@@ -117,6 +124,38 @@ def _discover(options: argparse.Namespace) -> int:
     print(f"{found}\nstatus: {found.status}; lags of the videos: {lags} frames", flush=True)
     write_report(found, videos, options.out, told, progress=True)
     print(f"report: {Path(options.out) / PAGE}")
+    return 0 if found.status == "ok" else 1
+
+
+def _discover_in_plane(options: argparse.Namespace) -> int:
+    """The law of a motion in a plane, in the film of one camera."""
+    from .companion.plane_report import write_plane_report
+    from .plane import discover_from_video
+    from .vision import Hint
+
+    if options.tracks or len(options.videos) != 1:
+        raise ValueError("rig: must be given, unless there is one video of a motion in a plane")
+    (path,), corners, hint = options.videos, options.corners, None
+    if corners is not None:
+        if len(corners) != 10:
+            raise ValueError(f"corners: must be four marks and two sides, got {corners}")
+        corners = [corners[k : k + 2] for k in range(0, 8, 2)], corners[8:]
+    if options.hint is not None:
+        frame, *box = options.hint
+        hint = Hint(frame=int(frame), box=tuple(box))
+    told = {
+        name: value
+        for name in ("length", "length_error", "up", "corners", "fps", "hint", "degree", "order")
+        if (value := getattr(options, name)) is not None
+    }
+    found = discover_from_video(
+        path, options.length, options.up, options.fps, corners=corners, hint=hint,
+        length_error=options.length_error, detector=options.detector, degree=options.degree,
+        order="auto" if options.order == "auto" else int(options.order), seed=options.seed,
+        progress=True,
+    )  # fmt: skip
+    print(f"{found}\nstatus: {found.status}", flush=True)
+    print(f"report: {write_plane_report(found, path, options.out, told)}")
     return 0 if found.status == "ok" else 1
 
 
@@ -309,7 +348,28 @@ COMMANDS = {
             "FILE", "text files of tracks, one per camera of the rig or one of all, in place of "
             "videos", nargs="+"
         ),
-        "--rig": words("FILE", "where the cameras stand", required=True),
+        "--rig": words("FILE", "where the cameras stand; not for one video of a motion in a plane"),
+        "--length": words(
+            "U1,V1,U2,V2,METRES", "of one video: two marks in its first frame, pixels, and how far "
+            "they are apart in the plane of the motion", type=as_numbers
+        ),
+        "--length-error": words(
+            "SHARE", "standard error of that length, as a share of it (default: 0.01)",
+            type=as_number(float, "a number"), default=0.01
+        ),
+        "--up": words(
+            "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "
+            "lower one first (default: 0,-1)", type=as_numbers
+        ),
+        "--corners": words(
+            "U1,V1,...,WIDTH,HEIGHT", "of one video, in place of --length: four marks on a "
+            "rectangle in the plane of the motion, from its lower left to its lower right and "
+            "round, and its sides in metres", type=as_numbers
+        ),
+        "--hint": words(
+            "FRAME,U,V,WIDTH,HEIGHT", "of one video: a frame and a box around the target in it",
+            type=as_numbers
+        ),
         "--out": words("DIR", "folder of the report (default: report)", default="report"),
         "--lag": words(
             "0,L2,L3", "by how many frames of the first video each one starts later; the default "

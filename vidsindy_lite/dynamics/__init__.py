@@ -34,16 +34,19 @@ from .library import Function, monomial_exponents, monomial_gradients, monomials
 from .order import check_order
 from .origin import ShiftedLaw
 from .persistence import Plateau
+from .physics import Quantity
 from .polynomials import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
 from .rounds import Round, on_circle, on_sphere
 from .selection import closest_rival, subset_search
 from .sindy import SplineSINDy
+from .shape import is_on_circle
 from .smoothing import smooth
 from .solver import discover
 from .splines import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .state import State
-from .swing import Swing
+from .swing import LIBRARY as SWINGS
+from .swing import Swing, swinging
 from .trajectories import Trajectory, check_trajectory, cut, typical_step
 from .turning import check_orientation
 from .units import Units

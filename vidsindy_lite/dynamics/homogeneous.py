@@ -151,6 +151,8 @@ def homogeneous(t: Floats, x: Floats, names: tuple[str, ...]) -> Discovery | Non
     best = 1 + int(np.argmax(bounds[:-1] - bounds[1:]))
     if best == len(classes):  # all other laws
         return None
+    if classes[best].k > 0:  # no drag: it comes nearer, which the constant force is doubted for
+        best -= 1
     flight, richer = classes[best], classes[min(best + 1, len(classes) - 1)]
     covariance = flight.covariance()
     departure = _departure(flight, richer)
@@ -220,6 +222,6 @@ def _told(
         noise=np.append(error, np.full(m, np.nan)), model_error=np.zeros(d), warnings=doubts,
         path=((),) * d, history=(), curves=(make_interp_spline(shown + middle, states, k=3),),
         absent=np.full((l, d, 2), np.nan),
-        note="order 2: of laws that one flight cannot tell apart, the one that is the same at every "
-        "place",
+        note="order 2: of laws that one flight cannot tell apart, the one that is the same "
+        "everywhere",
     )  # fmt: skip
