@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite import plane
@@ -202,6 +203,7 @@ def test_the_command_writes_g_with_its_error(monkeypatch, tmp_path, capsys):
     assert main(given) == 0  # an earlier report is replaced
 
 
+@pytest.mark.slow
 def test_what_moves_along_a_line_has_one_coordinate(monkeypatch):
     t = np.arange(90) / 30
     up = 0.3 * np.exp(-0.1 * t) * np.cos(6 * t)
@@ -211,6 +213,20 @@ def test_what_moves_along_a_line_has_one_coordinate(monkeypatch):
     assert found.discovery.system.states == 2
     assert float(found.period.value) == pytest.approx(2 * np.pi / 6, abs=1e-3)
     np.testing.assert_allclose(found.fitted, found.x, atol=1)
+
+
+@pytest.mark.slow
+def test_a_swing_on_its_circle(monkeypatch):
+    t, y = np.arange(90) / 30, np.array([0.6, 0.0])
+    pull = lambda t, y: [y[1], -9.81 / 0.6 * np.sin(y[0]) - 0.05 * y[1]]  # noqa: E731
+    angle = solve_ivp(pull, (0, 3), y, t_eval=t, rtol=1e-9, atol=1e-9).y[0]
+    x = 0.6 * np.column_stack([np.sin(angle), -np.cos(angle)])
+    filmed(monkeypatch, pixels_of(noisy(x, 0)))
+    found = vl.discover_from_video("swing.mp4", STICK)
+    assert found.swing is not None
+    assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.7
+    assert float(found.period.value) == pytest.approx(2 * np.pi * np.sqrt(0.6 / 9.81), rel=0.01)
+    np.testing.assert_allclose(found.fitted, found.x, atol=0.01)
 
 
 # --------------------------------------------------------------------------------------- real clips

@@ -69,7 +69,7 @@ class PlaneDiscovery:
         the plane, x and y; or the one line along which the target moves, x.
     discovery : Discovery
         The law; the errors of its terms hold that of the scale. Where the target swings on a
-        circle, that of the angle, ``x``.
+        circle, that of the angle.
     swing : Swing, optional
         The circle, if the target swings on one.
     warnings : tuple of str
@@ -330,9 +330,9 @@ def _law(
         return plane, found if found.swing is None else found.swing.law, found.swing
     if (flight := homogeneous(t, x, NAMES)) is not None:
         return plane, flight, None
-    if (swing := _swing(t, x, seed)) is not None:
-        return plane, swing.law, swing
     origin, axes = _moving(t, x)
+    if len(axes) == 2 and (swing := _swing(t, x, seed)) is not None:
+        return plane, swing.law, swing
     way = (x - origin) @ axes.T
     return (origin, axes), discover(t, way, 1, seed, progress, order=2), None
 
@@ -344,17 +344,19 @@ def _swing(t: Floats, x: Floats, seed: int) -> Swing | None:
     noise = smooth([(t, x)], np.random.default_rng(seed)).noise
     if not is_on_circle(x, noise):
         return None
-    return swinging(
-        [(t, x)],
-        [np.zeros((*x.shape, 0))],
-        lambda runs, shared: discover(
-            runs,
-            seed=seed,
-            systematic=[np.moveaxis(errors, -1, 0) for errors in shared],
-            order=2,
-            library=SWINGS,
-        ),
-    )
+
+    def solved(runs: list[tuple[Floats, Floats]], shared: list[Floats]) -> Discovery:
+        named = [(times, angle.view(_Angle)) for times, angle in runs]
+        modes = [np.moveaxis(errors, -1, 0) for errors in shared]
+        return discover(named, seed=seed, systematic=modes, order=2, library=SWINGS)
+
+    return swinging([(t, x)], [np.zeros((*x.shape, 0))], solved)
+
+
+class _Angle(np.ndarray):
+    """An array whose column has a name, as those of a data frame."""
+
+    columns = ("angle",)
 
 
 def _moving(t: Floats, x: Floats) -> tuple[Floats, Floats]:
