@@ -141,7 +141,9 @@ class PlaneDiscovery:
         scale = f"places in {self.unit}"
         scale += f", their scale known to {100 * self.scale_error:.2g} %" * (self.unit == "m")
         warnings = (f"warning: {text}" for text in self.warnings)
-        law = self.discovery.statement() if self.swing is None else str(self.swing)
+        # The doubts below the law of a swing are among the warnings.
+        law = self.discovery.statement()
+        law = law if self.swing is None else str(self.swing).partition("\n")[0]
         return "\n".join([law, *said, scale, *warnings])
 
 
