@@ -62,7 +62,15 @@ from vidsindy_lite import (
     residuals,
 )
 from vidsindy_lite.companion.artifacts import save_figure, save_slider, save_table, versions
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, plots, rate, score, significant
+from vidsindy_lite.study import (
+    REFERENCE_OFFSET,
+    SYSTEMS,
+    plots,
+    rate,
+    score,
+    significant,
+    term_errors,
+)
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 trials = {"full": 100, "quick": 12}[profile]
@@ -405,12 +413,21 @@ assert off[1] < off[0] / 3
 
 # %% [markdown]
 # A few hundred frames measure a normal better than an eye. What stays uncertain goes with the path into the law:
-# its errors are counted among those of the coefficients.
+# its errors are counted among those of the coefficients. So the law is the true one, in the frame of a rig that was measured by eye,
+# and its error bars say what that costs: below, in units of them, how far its coefficients are from the true ones.
 
 # %%
 measured = Rig([replace(camera, normal_error=1.0) for camera in by_eye])
 found = discover_from_tracks(rounded, measured, t, lags=[0.0] * len(rounded))
 print(found.discovery)
+true = SYSTEMS[system].shift(REFERENCE_OFFSET)
+print("terms that are not there:", *(term_errors(found.discovery.system, true)[1] or ["none"]))
+rows = dict(zip(true.terms, true.coefficients, strict=True))
+there = np.array([rows.get(term, np.zeros(3)) for term in found.discovery.terms])
+kept = found.discovery.system.support
+apart = np.abs(found.discovery.coefficients - there)[kept] / found.discovery.standard_errors[kept]
+print("coefficients in standard errors from the true ones:", *apart.round(1))
+assert apart.max() < 4
 size = np.sqrt(np.mean(np.sum(found.systematic**2, axis=(0, 2)))) / pixel
 print(f"what {len(found.systematic)} shared causes may add to the path: {size:.2f} px")
 

@@ -821,9 +821,9 @@ for s in np.geomspace(0.001, 1, 13):
 # %% [markdown]
 # At a thousandth many terms pay; with every step up some go, until those remain that make the motion. They stay
 # over more than a decade. Such a range of tolerated errors, over which the terms stay the same, is a *plateau*.
-# `discover` takes the widest plateau, equation by equation, refines the law with its terms alone, and follows
-# the path around that law again, until it leads nowhere else. Where no law persists in that way, it searches once
-# more with all errors tolerated that have to be. The last path is `Discovery.path`. Where another plateau is more
+# `discover` begins with a law at a large tolerated error, takes the widest plateau of the path around it, equation by
+# equation, fits the law with its terms alone, and follows the path around that law again, until it leads nowhere
+# else. Where it leads to no law, the first one is sought once more with all errors tolerated that have to be. The last path is `Discovery.path`. Where another plateau is more
 # than half as wide, a warning names both.
 
 # %%
@@ -870,12 +870,14 @@ save_slider("solver_path_slider", figures, caption=caption, numbers={"tolerated"
 
 # %%
 x_axis = y_axis = np.linspace(-10, 30, 81)
-all_terms = np.ones(exponents.shape, dtype=bool)
 
 
 def count(x0, y0):
-    origin = np.array([x0, y0, 0.0]) - fit.offset
-    return algebra.smooth_count(origin, all_terms, penalty.max())[0]
+    law, information, _ = algebra.at(np.array([x0, y0, 0.0]) - fit.offset)
+    scale = np.sqrt(np.diag(information))
+    covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
+    z_squared = law.T.ravel() ** 2 / np.diag(covariance)
+    return (z_squared / (z_squared + penalty.max())).sum()
 
 
 counts = np.array([[count(x0, y0) for x0 in x_axis] for y0 in y_axis])

@@ -228,8 +228,22 @@ both = pd.concat((results, bound))
 counts = both.groupby(["source", "method"], sort=False).exact.agg(rate).unstack(sort=False)
 print(counts.to_string())
 right = both.groupby(["source", "method"], sort=False).exact.mean()
+middle = results.groupby("method").l2.median()
+both_optimisers = ("Gauss-Newton", "spline-ADO")
+ado = table_1[table_1.method == "spline-ADO"].set_index("system")
+plain = table_1[table_1.method == "PySINDy"].set_index("system")["l2 (e-2)"]
 assert right["sub-pixel", "Gauss-Newton"] == 1
-assert right["sub-pixel", "spline-ADO"] == 1 or not full
+
+# %%
+if full:
+    assert right["sub-pixel", "spline-ADO"] == 1
+    assert right["detector", "Gauss-Newton"] >= 0.9
+    assert right["detector", "spline-ADO"] >= 0.75
+    assert middle[list(both_optimisers)].max() < 2e-3
+    assert middle["spline-ADO"] < 3 * middle["Gauss-Newton"]
+    assert middle["PySINDy"] > 5 * middle["spline-ADO"]
+    assert (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all()
+    assert (plain[["NoseHoover", "WangSun"]] < 20).all()
 
 # %% [markdown]
 # **The paper's method works.** From sub-pixel tracks both optimisers of its model find every law in every trial. From whole
@@ -265,6 +279,8 @@ for name, mine in ours.groupby("system", sort=False):
         "background model (px)": significant(np.median([film.pixel_error for film in shots])),
         "seconds": shots[0].seconds + mine.seconds.iloc[0],
     })  # fmt: skip
+
+# %%
 caption = f"Gauss-Newton from the detector's whole pixels, and errors (rms) of both trackers; medians of {len(trials)} trials."
 loose = dict.fromkeys(["l2 (e-2)", "worst coefficient (%)", "detector (px)", "background model (px)"], 0.2)
 save_table("table_systems", rows, caption=caption, tolerance=loose)
@@ -310,7 +326,8 @@ for name, law in found.items():
 pulled = {n: np.concatenate(list(group)) for n, group in ours.groupby("system", sort=False).pulls}
 every = np.concatenate(list(pulled.values()))
 print(f"{len(every)} coefficients, {np.mean(np.abs(every) < 2):.0%} within two standard errors")
-assert np.mean(np.abs(every) < 2) > (0.9 if full else 0.7)
+if full:
+    assert 0.7 < np.mean(np.abs(every) < 2) < 0.95
 
 # %%
 fig = plots.plot_pulls(pulled)
@@ -332,6 +349,7 @@ def by_term(law):
     }
 
 
+# %%
 rows = []
 for name, law in found.items():
     true, newton, ado = map(by_term, (first[name].truth, law.system, by_gradients[name]))
@@ -389,8 +407,9 @@ rows = [
     }
     for name, (truth, _) in forecasts.items()
 ]  # fmt: skip
-assert all(row["forecast good for (periods)"] > 4 for row in rows)
-assert all(row["from three other starts, least (at most 10)"] > (2 if full else 1) for row in rows)
+if full:
+    assert all(row["forecast good for (periods)"] > 1 for row in rows)
+    assert all(row["from three other starts, least (at most 10)"] > 0.5 for row in rows)
 
 # %%
 caption = f"Forecast from the first frame and from other points, at most {horizon} periods; the videos last {frames / 100:g}."
@@ -411,27 +430,27 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # ## What we learned
 #
-# * Seven systems, one call, nothing chosen by hand: all true terms, no false one, from three videos
-#   with one calibrated camera. From whole pixels the relative error is of the order of $10^{-4}$, from the sub-pixel tracks of
-#   lossless videos below $10^{-5}$. A learned detector's tracks give an error of the order of $10^{-3}$, and now and then a false term.
-#   <!-- by: ours.exact.all(); ours.groupby("system").l2.median().max() < LEAST; mine.exact.mean() >= share; figure table_1 -->
+# * **The paper's method works.** From whole pixels of a detector, nothing chosen by system, both optimisers of its model find
+#   the terms of most laws, with errors of the order of $10^{-3}$; from the sub-pixel tracks of lossless videos they find all of them.
+#   <!-- by: right["detector", "Gauss-Newton"] >= 0.9; right["detector", "spline-ADO"] >= 0.75; right["sub-pixel", "spline-ADO"] == 1; middle[list(both_optimisers)].max() < 2e-3 -->
 # * The offset of the reference frame was not given and is found with the law.
 #   <!-- by: np.allclose(law.offset, REFERENCE_OFFSET -->
-# * The standard errors are not too small: more than nine of ten coefficients lie within two of them.
-#   <!-- by: np.mean(np.abs(every) < 2) -->
-# * With paths as exact as these, other methods find most laws as well. What sets them apart is
-#   noise, of which whole pixels are a first taste.
-#   <!-- by: figure table_S3; error[method] > 2 * error["Gauss-Newton"]; 06: error.loc[level, others] > 1.5 -->
+# * The standard errors are a little too small here, for the errors of a detector are not all told by the tracks: fewer than 95 % of
+#   the coefficients lie within two of them, more than 70 %.
+#   <!-- by: 0.7 < np.mean(np.abs(every) < 2) < 0.95 -->
+# * On such tracks the two optimisers are alike, and Model-A errs little more in the median. PySINDy and E-SINDy err by per cents, which
+#   is what their finite differences cost. What sets the optimisers apart is noise.
+#   <!-- by: middle["spline-ADO"] < 3 * middle["Gauss-Newton"]; middle["PySINDy"] > 5 * middle["spline-ADO"]; 06: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2 -->
 #
 # **What the paper says and what we found.**
 #
-# * The paper's errors are 0.15 to 6.22 (in $10^{-2}$) with four false positives in seven systems;
-#   here they are below 0.03 from whole pixels, with none, and below 0.2 from the detector's tracks, with a false
-#   one in a few of the trials. Five trials differ in nothing but their scenes, so their spread is that of the tracker.
-#   <!-- by: figure table_1 -->
+# * The paper's errors are 0.15 to 6.22 (in $10^{-2}$) with four false positives in seven systems. From whole pixels the median of
+#   spline-ADO is below the paper's error in every system, with a false term in some trials, of Tsucs2 in most. Trials differ in
+#   nothing but their scenes, so their spread is that of the tracker.
+#   <!-- by: (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all(); figure table_1 -->
 # * PySINDy's 824 % (NoseHoover) and 856 % (WangSun) are coefficients ten times too large
-#   throughout: a time step wrong by that factor. With the right step they are 1 to 15 % here.
-#   <!-- by: 10: 9 < medians[name] < 11; figure table_1 -->
+#   throughout: a time step wrong by that factor. With the right step the medians are below 20 % here.
+#   <!-- by: 10: 9 < medians[name] < 11; (plain[["NoseHoover", "WangSun"]] < 20).all(); figure table_1 -->
 # * "Nine datasets" are seven, and the paper's frame of reference has to be guessed from its own
 #   ground truths.
 #   <!-- by: 10: len(SYSTEMS_S1) != DATASETS_CLAIMED; 10: all(scored.exact for scored in ground.values()) -->
@@ -469,18 +488,17 @@ assert round(scored.max_coefficient_error, 2) == 0.37
 # %% tags=["hide-cell"]
 from vidsindy_lite.study import Trial
 
-under = {m: run_trial(Trial(names[0], "noise", noise, seed, m, frames=frames)).score for m in METHODS}
+under = {m: run_trial(Trial(names[0], "noise", noise, seed, m, "path", frames)).score for m in METHODS}
 print(*(f"{method}: {scored}" for method, scored in under.items()), sep="\n")
 assert under["Gauss-Newton"].exact
-assert under["Gauss-Newton"].max_coefficient_error <= min(scored.max_coefficient_error for scored in under.values())
 if full:  # with few frames all methods may be exact
     assert not all(scored.exact for scored in under.values())
 
 # %% [markdown]
 # <details><summary>Solution</summary>
 #
-# A twentieth of the spread is enough to tell the methods apart: ours keeps exactly the true terms, and its
-# worst coefficient is the closest; some of the others find a false term or lose a true one.
+# A twentieth of the spread is enough to tell the methods apart: Gauss-Newton keeps exactly the true terms, some of the
+# others find a false one or lose a true one.
 # </details>
 #
 # **3.** (Prove.) Which terms does a shift of the origin add to Lorenz' law, axis by axis?

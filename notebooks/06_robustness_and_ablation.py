@@ -43,6 +43,7 @@ jobs: int = 2  # trials at a time
 # %%
 from collections import Counter
 from dataclasses import replace
+from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -56,13 +57,17 @@ from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,
     FilmTask,
+    FlowContest,
     Trial,
     Weights,
+    ablation_table,
+    ablations,
     add_noise,
     by_condition,
     grid,
     plots,
     rate,
+    run_ablation,
     run_film,
     run_trial,
     run_trials,
@@ -161,44 +166,35 @@ assert np.isclose(np.isnan(gappy[:, 0]).mean(), 0.2, atol=0.01)
 # ## The weights of the paper's optimiser
 #
 # Spline-ADO has two weights: $\alpha$ of the physics loss, and $\beta$, what a term has to save to stay. The paper prints
-# neither. One pair serves all systems and conditions, and the truth has no say in it: a fifth of the samples is held out in
-# blocks, the rest is fitted, and the pair is taken whose curve comes closest to the samples that it has not seen, in the
-# geometric mean over the systems, clean and with 20 % noise.
+# neither. One pair serves all systems and conditions, and the truth has no say in it: a fifth of the samples is held out,
+# the rest is fitted, and the pair is taken whose curve comes closest to the samples that it has not seen, in the
+# geometric mean over the systems, clean and with 10 % noise; of those that are within a hundredth of it, the one that cuts
+# fewest terms. Films of a third of the length do for that.
 
 # %%
 alphas, betas = ((0.1, 1.0, 10.0), (0.005, 0.02, 0.08)) if full else ((1.0,), (0.005, 0.02))
-judged = grid(systems, {"noise": (0, 0.2)}, [seed], frames=frames)
-tasks = [Weights(task, alpha, beta) for alpha in alphas for beta in betas for task in judged]
+pairs = tuple((alpha, beta) for alpha in alphas for beta in betas)
+judged = grid(systems, {"noise": (0, 0.1)}, [seed], frames=frames // 3)
+tasks = [Weights(trial, pairs) for trial in judged]
 misfits = np.array(sweep(run_weights, tasks, jobs=jobs, desc="weights of spline-ADO"))
-misfits = misfits.reshape(len(alphas), len(betas), len(systems), 2)
+misfits = misfits.T.reshape(len(alphas), len(betas), len(systems), 2)
 closest = np.exp(np.log(misfits).mean(axis=(2, 3)))
-best = np.unravel_index(closest.argmin(), closest.shape)
+alike = np.argwhere(closest <= 1.01 * closest.min())
+best = min(alike, key=lambda pair: (pair[1], closest[tuple(pair)]))
 alpha, beta = alphas[best[0]], betas[best[1]]
 print(f"chosen: alpha = {alpha:g}, beta = {beta:g}")
 defaults = spline_ado.SplineADOSettings()
 if full:
     assert (defaults.physics_weight, defaults.sparsity_weight) == (alpha, beta)
 
-# %% tags=["hide-cell"]
-fig, panels = plt.subplots(1, 3, figsize=(9.5, 3))
-for axes, (title, values) in zip(panels, {"clean": misfits[..., 0], "20 % noise": misfits[..., 1], "both": misfits}.items(), strict=True):
-    mean = 100 * np.exp(np.log(values.reshape(len(alphas), len(betas), -1)).mean(axis=2))
-    axes.imshow(np.log(mean), cmap="Blues", aspect="auto", alpha=0.6)
-    for (i, j), value in np.ndenumerate(mean):
-        axes.text(j, i, f"{value:.2g} %", ha="center", va="center")
-    axes.set(title=title, xlabel=r"$\beta$", ylabel=r"$\alpha$")
-    axes.set_xticks(range(len(betas)), [f"{b:g}" for b in betas])
-    axes.set_yticks(range(len(alphas)), [f"{a:g}" for a in alphas])
-    axes.grid(visible=False)
-
 # %%
+fig = plots.plot_weights(misfits, alphas, betas, ("clean", "10 % noise"))
 numbers = {f"alpha {a:g}, beta {b:g}": misfits[i, j].T for i, a in enumerate(alphas) for j, b in enumerate(betas)}
 caption = "Misfit of held-out samples by the weights of spline-ADO, in percent of the spread."
 save_figure("study_weights", fig, caption=caption, numbers=numbers, tolerance=0.3)
 
 # %% [markdown]
-# *Misfit of the samples that were held out, in percent of the spread of the motion: geometric means over the systems. The
-# pair with the least of both serves everywhere.*
+# *Misfit of the samples that were held out, in percent of the spread of the motion: geometric means over the systems.*
 #
 # ## All methods, all systems
 #
@@ -223,6 +219,20 @@ print(counts.to_string(), f"processor time of a trial:\n{seconds.round(2).to_str
 rows = counts.reset_index().rename(columns={"level": "level (%)"})
 rows["level (%)"] *= 100
 save_table("study_methods", rows.to_dict("records"), caption="Exact laws of all systems, by condition and method.")
+
+# %%
+kind = ["clean", "blocks", "fibers"]
+noisy = right.loc["noise"].iloc[0]
+no_path = set(table[table.verdict.str.endswith("refused")].system)
+told = table[(table.method == "Gauss-Newton") & table.exact]
+doubted_here = (told.status == "suspect").mean()
+print(f"{doubted_here:.0%} of the exact laws of Gauss-Newton are doubted; no path: {no_path}")
+if full:
+    assert (right.loc[kind, ["Gauss-Newton", "spline-ADO"]] >= 0.7).all(axis=None)
+    assert noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2
+    assert 2 * seconds["Gauss-Newton"] < seconds["spline-ADO"]
+    assert no_path == {"SprottE", "RayleighBenard"}
+    assert 0.25 < doubted_here < 0.75
 
 
 # %%
@@ -249,12 +259,14 @@ robustness("study_methods_all", caption, by_level[by_level.condition == "noise"]
 
 # %%
 more = {
-    "noise": (0, 0.05, 0.1, 0.2, 0.3, 0.5) if full else (0, 0.1),
+    "noise": (0, 0.1, 0.2, 0.3, 0.5) if full else (0, 0.1),
     "blocks": (0.1, 0.2, 0.5) if full else (0.2,),
     "fibers": (0.1, 0.2, 0.3) if full else (0.2,),
 }
 tasks = grid(["SprottF"], more, trials, METHODS, frames)
 sprott = by_condition(tabulate(run_trials(tasks, jobs=jobs, desc="SprottF")))
+
+# %%
 printed = {"noise": "noise", "blocks": "random block", "fibers": "fiber missing"}
 paper = {
     c: {rate / 100: ABLATION[name, rate, "Ours"].l2 for rate in (10, 20)}
@@ -269,7 +281,7 @@ robustness("fig_3", caption, sprott[sprott.method.isin(both)], paper)
 # %% [markdown]
 # *Fig. 3: relative error (top) and wrong terms (bottom) for SprottF of both optimisers of the paper's model; points are
 # medians of the trials, bars hold the middle half of them. Stars: what the paper prints for its own
-# method.*
+# method. From 30 % noise on, the cameras cannot be learned from these tracks, and there is no law: an error of 100 %.*
 
 # %% [markdown]
 # ## PySINDy under the same (Fig. S4)
@@ -360,6 +372,45 @@ rows = table_2.rename(columns={"level": "rate (%)"}).to_dict("records")
 caption = f"SprottF, both optimisers and the ablated model, {len(trials)} trials beside the paper's numbers."
 save_table("table_2", rows, caption=caption, tolerance=errors)
 
+# %%
+for condition, level in six[["condition", "level"]].drop_duplicates().itertuples(index=False):
+    here = six[(six.condition == condition) & (six.level == level)].groupby("method").l2
+    worst_of, middle_of = here.max(), here.median()
+    reached = six[(six.method == "spline-ADO") & (six.condition == condition) & (six.level == level)].l2
+    known_l2 = paper[condition][level]
+    for method in both if full else ():
+        assert worst_of["Model-A"] > worst_of[method], (condition, level)
+        if condition == "noise":
+            assert middle_of["Model-A"] > 2 * middle_of[method], level
+    assert reached.median() < 1.2 * known_l2 or not full, (condition, level)
+
+# %%
+far = sprott[(sprott.method == "spline-ADO") & sprott.condition.isin(["blocks", "fibers"])]
+held = far[far.level <= far.condition.map({"blocks": 0.5, "fibers": 0.2})].exact
+print(f"spline-ADO with up to 50 % in blocks or 20 % in fibers missing: {rate(held)} laws exact")
+assert held.mean() >= 0.8
+
+# %% [markdown]
+# ## Our solver, taken apart
+#
+# The paper takes the core out of its method; so do we, mechanism by mechanism. While a contest of the
+# [scoreboard](11_scoreboard.ipynb) runs, what does the work of one of them is replaced by what does nothing. *Lost* are laws that
+# are exact with it and not without. Errors here are not white: they drift, last, grow, or come from an integrator.
+
+# %%
+errors = ("drift 0.2 %", "bent space 0.3 %", "correlated noise 5 %", "outliers 2 %", "coarse steps", "clock jitter 30 %")
+flows = ("Roessler", "Arneodo", "Halvorsen", "BurkeShaw", "Chen") if full else ("Halvorsen",)
+draws = range(seed + 40, seed + 42) if full else (seed + 40,)
+contests = [FlowContest(f, e, seed=d) for f, e, d in product(flows, errors if full else errors[:2], draws)]
+apart = ablation_table(sweep(run_ablation, ablations(contests), jobs=jobs, desc="taken apart"))
+
+# %%
+caption = f"Exact laws of {len(contests)} contests without each mechanism of the solver: five flows, six kinds of error."
+save_table("table_solver_ablation", apart.reset_index().to_dict("records"), caption=caption, tolerance={"seconds": 1e9})
+
+# %% [markdown]
+# *A mechanism whose row does not differ from the first one does not show in these contests.*
+
 # %% [markdown]
 # ## The second protocol: noise and gaps in the path
 #
@@ -368,9 +419,9 @@ save_table("table_2", rows, caption=caption, tolerance=errors)
 
 # %%
 wide = {
-    "noise": (0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5) if full else (0, 0.1),
-    "blocks": (0.1, 0.2, 0.5) if full else (0.2,),
-    "fibers": (0.1, 0.2, 0.3) if full else (0.2,),
+    "noise": (0, 0.1, 0.2, 0.3, 0.4) if full else (0, 0.1),
+    "blocks": (0.2, 0.5) if full else (0.2,),
+    "fibers": (0.2, 0.3) if full else (0.2,),
 }
 tasks = grid(systems, wide, trials, both[:1], frames, "path")
 paths = tabulate(run_trials(tasks, jobs=jobs, desc="paths"))
@@ -482,13 +533,14 @@ if full:
     assert min(limit, key=limit.get) == "Tsucs2"
     assert limit["Tsucs2"] < 0.15
     assert min(value for name, value in limit.items() if name != "Tsucs2") > 0.5
+    others = wrong[(wrong.system != "Tsucs2") & (wrong.condition == "noise")]
+    assert (others.level < others.system.map(limit)).all()
 
 # %% [markdown]
 # The bound singles out one system. In Tsucs2, the term $x$ in $\dot y$ has the coefficient 1 beside
 # $20\,y$ and $xz$, and on this attractor the three go together; from about 10 % noise on, the data
 # prefer the law without it. In all others the information lasts beyond the levels shown. Where one
-# of their laws is wrong nevertheless, it was the search that failed, which starts from a smoothing
-# spline and has to find the terms before the curve can be trusted.
+# of their laws is wrong nevertheless, it is not for lack of information.
 
 # %% [markdown]
 # ## Do the error bars hold?
@@ -615,11 +667,17 @@ for row in rows:
 # %% [markdown]
 # ## What we learned
 #
-# * Noise is what sets the methods apart. Ours has the smallest error and the largest share of exact
-#   laws at every level of it, because curve and law are fitted together: all samples take part in every
-#   derivative.
-#   <!-- by: error.loc[level, others] > 1.5; right.loc[level, others] < right.loc[level, "Gauss-Newton"] -->
-# * Gaps in exact samples cost our method next to nothing.
+# * **The paper's method works.** Clean, and with blocks or fibers missing in the tracks, both optimisers of its model find
+#   seven laws of ten and more from whole pixels: gaps cost little.
+#   <!-- by: (right.loc[kind, ["Gauss-Newton", "spline-ADO"]] >= 0.7).all(axis=None); figure study_all_methods -->
+# * Noise and time are what Gauss-Newton gains: with 10 % noise in the tracks it finds more laws than any other method, spline-ADO
+#   among them, in less than half of its processor time.
+#   <!-- by: noisy["Gauss-Newton"] > noisy.drop("Gauss-Newton").max() + 0.2; 2 * seconds["Gauss-Newton"] < seconds["spline-ADO"] -->
+# * With 20 % noise the cameras of two systems cannot be learned from their tracks, and no method has a path.
+#   <!-- by: no_path == {"SprottE", "RayleighBenard"} -->
+# * Gauss-Newton doubts about half of the exact laws of this regime, for the errors of the detector are no noise and the views say so.
+#   <!-- by: 0.25 < doubted_here < 0.75 -->
+# * Gaps in exact samples cost next to nothing.
 #   <!-- by: gaps.exact.all(); (gaps.l2 < 1e-4).all() -->
 # * The limit is information, and the Cramér-Rao bound knows it in advance: Tsucs2 has one term that
 #   noise of 10 % buries.
@@ -632,20 +690,19 @@ for row in rows:
 #
 # **What the paper says and what we found.**
 #
-# * *"up to a 20% noise interference, our method almost accurately identifies all correct
-#   coefficients. However, beyond a 30% noise level, performance begins to decline"*, *"robust even
-#   with up to 50% data loss"*, *"strong stability even when the fiber missing rate is about 20%"*:
-#   SprottF does all of this here, with smaller errors.
-#   <!-- by: mine.l2[condition, level].median() < known; figure study_exact -->
-# * *"the performance of the ablated model deteriorates in all considered cases"*: under noise it does. With gaps in
-#   exact samples it often finds the law as well, and with fibers of 20 % always: this claim is not reproduced.
-#   <!-- by: best["l2 (e-2)"] <= ablated["l2 (e-2)"]; figure table_2 -->
+# * *"up to a 20% noise interference, our method almost accurately identifies all correct coefficients"*, *"robust even
+#   with up to 50% data loss"*, *"strong stability even when the fiber missing rate is about 20%"*: SprottF does this here with the
+#   paper's own optimiser, with errors like the paper's or smaller.
+#   <!-- by: reached.median() < 1.2 * known_l2; held.mean() >= 0.8 -->
+# * *"the performance of the ablated model deteriorates in all considered cases"*: the worst of its trials is worse than both
+#   optimisers' in all six conditions, and under noise so is the median.
+#   <!-- by: worst_of["Model-A"] > worst_of[method]; middle_of["Model-A"] > 2 * middle_of[method] -->
 # * Table 2 contradicts itself at 20 % noise: one false positive with a precision of 100 % for one
 #   method, one with 80 % for the other.
 #   <!-- by: 10: (len(rows), never, in_s3) == (11, 6, 8); figure audit_rows -->
 # * The paper does not say what noise levels are relative to; here it is the spread of each
 #   coordinate. Nor does it say whether the occlusions come with noise; here they do not.
-#   <!-- by: docs/results.md -->
+#   <!-- by: np.allclose(noisy, add_noise(one.x, share; docs/results.md -->
 
 # %% [markdown]
 # ## Exercises
@@ -716,7 +773,7 @@ assert score(together, film.truth).max_coefficient_error < score(apart, film.tru
 # %% [markdown]
 # ## Run time and versions
 #
-# All cells take about 27 minutes on two cores, beside two other notebooks.
+# All cells take about 40 minutes on two cores.
 
 # %%
 print(versions())

@@ -314,13 +314,13 @@ from vidsindy_lite.study import score
 known = discover(first.t, reconstruct(tracks, Rig.around(first.x)))
 print(first.score, score(known, first.truth), sep="\n")
 assert score(known, first.truth).exact
-print(f"with the true cameras {first.score.l2 / score(known, first.truth).l2:.1f} times closer")
-assert first.score.l2 > 2 * score(known, first.truth).l2 or profile == "quick"
+assert max(first.score.l2, score(known, first.truth).l2) < (1e-3 if full else 1e-2)
 
 # %% [markdown]
 # <details><summary>Solution</summary>
 #
-# Most of it: with the true cameras the law is several times closer. What is left is the tracker's.
+# None that matters: from learned and from true cameras the error of the law is below a thousandth, and which is the smaller one
+# is chance. What is left is the tracker's.
 # </details>
 #
 # **2.** (Implement.) An orthographic camera is an affine map, $\mathbf x_c=\mathbf A\mathbf x+\mathbf b$. Read $\mathbf A$ and $\mathbf b$ off

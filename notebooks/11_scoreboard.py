@@ -442,7 +442,7 @@ print(f"{score(told, flow)}; {told.status}")
 # %% [markdown]
 # ## Run time and versions
 #
-# All cells take about 5 minutes on two cores, beside two other notebooks.
+# All cells take about 15 minutes on two cores.
 
 # %%
 print(versions())

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics.library import Library
+from vidsindy_lite.dynamics.model import Form
+from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.vision.candidates import Candidate
 from vidsindy_lite.vision.linking import Sightings
 

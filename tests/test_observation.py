@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vidsindy_lite as vl
-from vidsindy_lite import study
+from vidsindy_lite import observation, study
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +72,15 @@ def test_a_law_from_noisy_tracks_does_not_bend_the_path_to_fit_their_noise(noisy
     found = vl.discover(t, seen.x, systematic=seen.systematic)
     assert study.score(found, truth).exact
     assert study.score(found, truth).l2 < 0.02
+
+
+def test_synchronous_cameras_have_no_lags_and_no_others_are_tried(case, monkeypatch):
+    rig, tracks = case
+    known = vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0, 0))
+    monkeypatch.setattr(observation, "learn_lags", lambda *_, **__: pytest.fail("tried lags"))
+    seen = vl.observe_tracks(tracks, rig, np.arange(150), lags="synchronous")
+    np.testing.assert_allclose(seen.x, known.x)
+    np.testing.assert_array_equal(seen.lags.frames, np.zeros(3))
+    assert seen.lags.agree
+    with pytest.raises(ValueError, match="lags: must be one of synchronous, got 'together'"):
+        vl.observe_tracks(tracks, rig, np.arange(150), lags="together")

@@ -203,7 +203,7 @@ TROUBLES = {
     ),
     "must make the views agree": lambda studio: studio.says(lags=(0, 5, 0)),
     "the curve misses the data": lambda studio: pendulum(degree=1),
-    "another law fits almost as well": undecided,
+    "another law may as well be true": undecided,
     "is settled by how large an error is tolerated": contested,
     "a sample lies far from those before and after it": jumping,
     "turns of the motion": lambda studio: oscillation(0.01, 200, 0.05),

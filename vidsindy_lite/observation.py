@@ -36,7 +36,7 @@ from .cameras import (
     systematic_errors,
     trailing_errors,
 )
-from .checks import check_integer, check_tracks
+from .checks import check_choice, check_integer, check_tracks
 from .dynamics import smooth as smooth_curves
 from .refusal import Refused, refusing
 from .vision import (
@@ -188,7 +188,7 @@ def observe_tracks(
     rig: Rig,
     t: ArrayLike | Sequence[ArrayLike],
     *,
-    lags: Sequence[float] | None = None,
+    lags: Sequence[float] | str | None = None,
     names: Sequence[str] | None = None,
     progress: bool = False,
 ) -> Observation:
@@ -199,8 +199,11 @@ def observe_tracks(
     tracks : sequence of array_like, shape (n_i, 2)
         Pixels of the target, one track per camera of the rig, each from its own first frame. NaN
         where it was not seen.
-    rig, lags
+    rig
         See `observe`.
+    lags : sequence of float or "synchronous", optional
+        See `observe`. Synchronous are cameras that share a trigger: no other lags are tried, which
+        takes most of the time where tracks are noisy.
     t : array_like, shape (n_0,), or a sequence of such
         Time of each frame of the first track, increasing; all cameras then have its frame rate. Or
         the times of each track by its own clock, if rates differ or frames are missing.
@@ -224,6 +227,9 @@ def observe_tracks(
         raise ValueError(f"tracks: must have two frames or more, got {[*map(len, raw)]}")
     clock = Clock.of_tracks(t, raw)
     names = names or [f"tracks[{i}]" for i in range(len(raw))]
+    if isinstance(lags, str):
+        check_choice("lags", lags, ["synchronous"])
+        return _observed(raw, rig, clock, np.zeros(len(raw)), names, synchronous=True)
     given = check_lags(lags, clock, names)
     return _observed(raw, rig, clock, given, names, progress=progress)
 
@@ -236,6 +242,7 @@ def _observed(
     names: Sequence[str],
     doubts: Sequence[str] = (),
     progress: bool = False,
+    synchronous: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     if not rig.is_measured:
@@ -244,7 +251,12 @@ def _observed(
             rig = posed(align(raw, begun, clock.rates, clock.uneven), rig, lags is not None)
             doubts = (*rig.warnings, *doubts)
     with refusing("lags", raw, names):
-        best = learn_lags(raw, rig, clock.rates, start=lags, clocks=clock.uneven, progress=progress)
+        if synchronous:
+            nothing = np.zeros(len(raw))
+            best = Lags(nothing, clock.rates, nothing, 0.0, clocks=tuple(clock.uneven or ()))
+        else:
+            start, uneven = lags, clock.uneven
+            best = learn_lags(raw, rig, clock.rates, start=start, clocks=uneven, progress=progress)
         if lags is not None:
             _refuse_wrong(lags, best)
     used = best.frames if lags is None else lags
@@ -257,14 +269,15 @@ def _observed(
         told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
     x = reconstruct(tracks, learned)
     learning = systematic_errors(raw, rig, learned, told)
-    learning[:, np.isnan(x).any(axis=1)] = np.nan
+    motion = [_smoothed(clock.times, track) for track in tracks]
+    trails = trailing_errors(tracks, learned, motion)
     return Observation(
         tracks=tracks,
         rig=learned,
         lags=told,
         t=clock.times,
         x=x,
-        systematic=_shared_errors(learning, tracks, learned, clock.times),
+        systematic=np.concatenate((learning, trails)),
         warnings=(
             *_rig_warnings(missed, tracks, rig, learned, names, used, best),
             *learned.warnings,
@@ -315,21 +328,6 @@ def _smoothed(t: Floats, values: Floats) -> Floats:
             curve = smooth_curves([(t[stretch], values[stretch])], rng).splines[0]
             clean[stretch] = curve(t[stretch])
     return clean
-
-
-def _shared_errors(learning: Floats, tracks: Sequence[Floats], learned: Rig, t: Floats) -> Floats:
-    """Errors of the path that all frames share, (k, n, 3), as those of the motion alone.
-
-    Those of learning, (l, n, 3), are NaN where there is no path. A mode that holds the noise of
-    each frame would explain that very noise: in a fit, its size would grow beyond all measure, and
-    bend the path with it.
-    """
-    trails = trailing_errors(tracks, learned, [_smoothed(t, track) for track in tracks])
-    if not len(learning):
-        return trails
-    flat = np.moveaxis(learning, 1, 0).reshape(len(t), -1)
-    steady = np.nan_to_num(_smoothed(t, flat)).reshape(len(t), len(learning), 3)
-    return np.concatenate((np.moveaxis(steady, 0, 1), trails))
 
 
 def _track_one(

@@ -18,8 +18,7 @@ from tempfile import gettempdir
 TARGETS = {
     "vidsindy_lite.vision.tracking": ["track"],
     "vidsindy_lite.cameras.triangulate": ["reconstruct"],
-    "vidsindy_lite.dynamics.polynomials": ["PolynomialSystem.simulate"],
-    "vidsindy_lite.dynamics.integrate": ["runge_kutta_4"],
+    "vidsindy_lite.dynamics.model": ["PolynomialSystem.simulate", "runge_kutta_4"],
     "vidsindy_lite.study.lab": ["paths"],
 }
 

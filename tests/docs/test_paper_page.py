@@ -45,50 +45,54 @@ def table(name):
     return json.loads((ROOT / "figures" / f"{name}.json").read_text("utf-8"))["rows"]
 
 
-def ours_is_nearer(name):
-    """Whether our method's error is below the paper's in every row of a table."""
-    mine = [row for row in table(name) if row["method"] == "Gauss-Newton"]
+OPTIMISERS = ("spline-ADO", "Gauss-Newton")
+
+
+def both_are_nearer(name):
+    """Whether the median error of both optimisers is below the paper's in every row of a table."""
+    mine = [row for row in table(name) if row["method"] in OPTIMISERS]
     return all(row["l2 (e-2)"] < row["paper: l2 (e-2)"] for row in mine)
 
 
-def beats_pysindy():
-    whole = [row for row in table("table_1") if row["pixels"] != "sub"]
-    error = {(row["pixels"], row["system"], row["method"]): row["l2 (e-2)"] for row in whole}
-    cases = {key[:2] for key in error}
-    return all(error[*case, "Gauss-Newton"] < error[*case, "PySINDy"] for case in cases)
+def both_beat_pysindy():
+    error = {(row["system"], row["method"]): row["l2 (e-2)"] for row in table("table_1")}
+    systems = {system for system, _ in error}
+    return all(error[s, m] < error[s, "PySINDy"] for s in systems for m in OPTIMISERS)
 
 
-def always_worse_without_the_law():
-    """Whether the ablated model is wrong in some trial of every condition, as the paper says."""
-    ablated = [row for row in table("table_2") if row["method"] == "Model-A"]
-    return all(len(set(row["exact"].split(" of "))) > 1 for row in ablated)
+def worse_without_the_law():
+    """Whether the worst trial of the ablated model is worse than both in every condition."""
+    most = {(r["condition"], r["rate (%)"], r["method"]): r["most"] for r in table("table_2")}
+    cases = {key[:2] for key in most}
+    return all(most[*c, "Model-A"] > most[*c, m] for c in cases for m in OPTIMISERS)
 
 
-def all_exact(condition, level):
-    """Whether every trial of SprottF is exact."""
-    shares = {(row["condition"], row["level (%)"]): row["SprottF"] for row in table("study_exact")}
-    return shares[condition, level] == "100%"
+def holds(condition, level, method="spline-ADO"):
+    """Whether most trials of SprottF have all terms right, from the detector's tracks."""
+    numbers = json.loads((ROOT / "figures" / "fig_3.json").read_text("utf-8"))["numbers"]
+    _, wrong_terms = numbers[f"{condition}, {method}, {level:g}"]
+    return wrong_terms == 0
 
 
 VERDICT_OF = {row[0]: row[-1] for row in rows(PAGE)}
 MEASURED = [
-    ("Table 1 clean videos", "stronger", lambda: ours_is_nearer("table_1")),
-    ("Table 2 the ablation", "stronger", lambda: ours_is_nearer("table_2")),
-    ("Table S3 other methods", "stronger", lambda: ours_is_nearer("table_S3")),
-    ('"outperforms PySINDy on each dataset"', "same", beats_pysindy),
-    ("Fig. 3 SprottF, noise and gaps", "stronger", lambda: ours_is_nearer("table_2")),
+    ("Table 1 clean videos", "stronger", lambda: both_are_nearer("table_1")),
+    ("Table 2 the ablation", "stronger", lambda: both_are_nearer("table_2")),
+    ("Table S3 other methods", "stronger", lambda: both_are_nearer("table_S3")),
+    ('"outperforms PySINDy on each dataset"', "same", both_beat_pysindy),
+    ("Fig. 3 SprottF, noise and gaps", "stronger", lambda: both_are_nearer("table_2")),
     (
-        '"performance of the ablated model deteriorates in all considered cases"', "weaker",
-        lambda: not always_worse_without_the_law(),
+        '"performance of the ablated model deteriorates in all considered cases"', "same",
+        worse_without_the_law,
     ),
     (
-        '"beyond a 30% noise level, our method\'s performance begins to decline"', "stronger",
-        lambda: all_exact("noise", 40),
+        '"up to a 20% noise interference, our method almost accurately identifies all correct '
+        'coefficients"', "same", lambda: holds("noise", 0.2),
     ),
-    ('"highly robust even with up to 50% data loss"', "same", lambda: all_exact("blocks", 50)),
+    ('"highly robust even with up to 50% data loss"', "same", lambda: holds("blocks", 0.5)),
     (
         '"strong stability even when the fiber missing rate is about 20%"', "same",
-        lambda: all_exact("fibers", 20),
+        lambda: holds("fibers", 0.2),
     ),
 ]  # fmt: skip
 

@@ -8,8 +8,8 @@ from scipy.interpolate import BSpline
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.absent import unseen
-from vidsindy_lite.dynamics.beyond import newcomers
+from vidsindy_lite.dynamics.l0 import newcomers
+from vidsindy_lite.dynamics.result import unseen
 
 T = np.linspace(0, 20, 200)
 ALLOWED = {"x": {"y": None, "x^2": None, "...": 0}}

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import cholesky_banded
 
-from vidsindy_lite.dynamics import banded
-from vidsindy_lite.dynamics.banded import BLOCK, normal_band, solve_factored
-from vidsindy_lite.dynamics.splines import rows_from
+from vidsindy_lite.dynamics import bspline as banded
+from vidsindy_lite.dynamics.bspline import BLOCK, normal_band, rows_from, solve_factored
 
 
 @pytest.mark.parametrize("alike", [1, 2])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics.coarse import views
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics.model import Form
+from vidsindy_lite.dynamics.path import views
+from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.study import FLOWS
 
 CIRCLING = {"x": {"vx": 1.0}, "vx": {"x": -1.0, "vx": 0.5, "x^2 vx": -0.5}}
@@ -55,10 +55,15 @@ def test_what_is_noise_stays_noise():
     assert (views(partial(posed, np.arange(200.0), x))[-1].noise > 0.7).all()
 
 
-@pytest.mark.parametrize(("step", "seed"), [(1.0, 0), (1.0, 2), (2.0, 1), (2.0, 3)])
-def test_van_der_pol_from_fifty_samples(step, seed):
-    rng = np.random.default_rng(seed)
-    t = step * np.arange(50)
-    x = VAN_DER_POL.simulate(t, rng.uniform(-2, 2, 2))[:, :1]
-    found = vl.discover(t, x + 0.1 * rng.standard_normal(x.shape), order=2)
-    assert (found.system.support == VAN_DER_POL.support).all()
+@pytest.mark.parametrize(("step", "least"), [(1.0, 4), (2.0, 2)])
+def test_van_der_pol_from_fifty_samples(step, least):
+    """Most draws tell the law, and none of the others says that it does."""
+    t, exact = step * np.arange(50), 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        x = VAN_DER_POL.simulate(t, rng.uniform(-2, 2, 2))[:, :1]
+        found = vl.discover(t, x + 0.1 * rng.standard_normal(x.shape), order=2)
+        right = (found.system.support == VAN_DER_POL.support).all()
+        assert right or found.status == "suspect"
+        exact += right
+    assert exact >= least

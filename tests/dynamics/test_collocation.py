@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
+from vidsindy_lite.dynamics.bspline import Segment
 from vidsindy_lite.dynamics.collocation import Collocation, Status, _without_systematic
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.splines import Segment
-from vidsindy_lite.dynamics.state import State
+from vidsindy_lite.dynamics.model import State
 
 
 @pytest.fixture

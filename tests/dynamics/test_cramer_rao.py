@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.cramer_rao import cramer_rao
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.inference import cramer_rao
+from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, add_noise
 

@@ -5,11 +5,11 @@ import time
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.discovery import Discovery, _with_error
+from vidsindy_lite.dynamics.data import Units
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.model import PolynomialSystem
+from vidsindy_lite.dynamics.result import Discovery, _with_error
 from vidsindy_lite.dynamics.solver import discover
-from vidsindy_lite.dynamics.units import Units
 from vidsindy_lite.study import add_noise
 
 

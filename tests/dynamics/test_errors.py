@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
-from vidsindy_lite.dynamics.errors import (
+from vidsindy_lite.dynamics.noise import (
     independent,
     inflation,
     passing,

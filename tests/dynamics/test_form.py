@@ -5,8 +5,8 @@ import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics.model import Form
+from vidsindy_lite.dynamics.problem import pose
 
 SPRING = PolynomialSystem.from_terms({"x": {"y": 2}, "y": {"x": -1, "y": -0.1}}, degree=2)
 T = np.linspace(0, 20, 200)

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from vidsindy_lite.dynamics.gaps import gaps, join
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem
-from vidsindy_lite.dynamics.splines import Segment
+from vidsindy_lite.dynamics.bspline import Segment
+from vidsindy_lite.dynamics.model import PolynomialSystem
+from vidsindy_lite.dynamics.path import gaps, join
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
 

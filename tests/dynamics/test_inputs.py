@@ -7,8 +7,8 @@ from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.discovery import Discovery
-from vidsindy_lite.dynamics.inputs import Input
+from vidsindy_lite.dynamics.library import Input
+from vidsindy_lite.dynamics.result import Discovery
 
 T = np.linspace(0, 40, 800)
 CUBIC = Library.polynomial(3)

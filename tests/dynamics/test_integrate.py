@@ -11,8 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite
-from vidsindy_lite.dynamics.integrate import integrate, runge_kutta_4
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem
+from vidsindy_lite.dynamics.model import PolynomialSystem, integrate, runge_kutta_4
 
 LORENZ = PolynomialSystem.from_terms(
     {

@@ -5,13 +5,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics import solver, turning
-from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.orientation import TurnedLaw, _turns, apart, nearest, turned, with_turns
-from vidsindy_lite.dynamics.selection import inverse
+from vidsindy_lite.dynamics import orientation, solver
+from vidsindy_lite.dynamics.l0 import inverse
+from vidsindy_lite.dynamics.library import Library, monomial_exponents
+from vidsindy_lite.dynamics.orientation import (
+    TurnedLaw,
+    _turns,
+    apart,
+    in_axes,
+    nearest,
+    turned,
+    with_turns,
+)
 from vidsindy_lite.dynamics.solver import _solved, _Task
-from vidsindy_lite.dynamics.turning import in_axes
 from vidsindy_lite.study import SYSTEMS
 
 
@@ -90,7 +96,7 @@ def solved(terms, degree, start, span=20.0, noise=0.01):
     x = law.simulate(t, start)
     x += noise * x.std() * np.random.default_rng(0).normal(size=x.shape)
     measured = [(t, x)], [np.zeros((*x.shape, 0))], None
-    task = _Task(measured, law.names, Library.polynomial(degree), "learn", 0, False)
+    task = _Task(measured, law.names, Library.polynomial(degree), "learn", 0, False, np.inf)
     return _solved(task, task.form(1))
 
 
@@ -155,11 +161,13 @@ def test_axes_are_refined_only_for_a_law_that_is_then_sought(monkeypatch):
         used = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given: calls.append(name) or used(*given))
 
-    starts = turning.rough_orientations
+    starts = orientation.rough_orientations
     monkeypatch.setattr(
-        turning, "rough_orientations", lambda *given: calls.append("start") or starts(*given)[:1]
+        orientation,
+        "rough_orientations",
+        lambda *given: calls.append("start") or starts(*given)[:1],
     )
-    counted(turning, "refined")
+    counted(orientation, "refined")
     counted(solver, "_solved")
     law, t = vl.PolynomialSystem.from_terms(DUFFING), np.linspace(0, 20, 300)
     x = law.simulate(t, [1.5, 0.4]) @ turned(np.array([0.5]), 2)

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.physics import Quantity, _diagonal, physics_of
+from vidsindy_lite.dynamics.mechanics import Quantity, _diagonal, physics_of
 
 TIMES = np.linspace(0, 6, 300)
 DRAG = Library.terms({"|v|v": lambda vx, vy: np.hypot(vx, vy) * np.array([vx, vy])})

@@ -15,7 +15,7 @@ from vidsindy_lite.dynamics.library import (
     shift_matrix,
     variable_names,
 )
-from vidsindy_lite.dynamics.polynomials import PolynomialSystem, power_of_ten
+from vidsindy_lite.dynamics.model import PolynomialSystem, power_of_ten
 
 LORENZ = {
     "x": {"x": -10, "y": 10},

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers import posed
 
-from vidsindy_lite.dynamics.posing import GAP
+from vidsindy_lite.dynamics.problem import GAP
 
 
 def test_data_are_in_standard_units():

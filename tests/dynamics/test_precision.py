@@ -6,10 +6,10 @@ import pytest
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.dynamics import PolynomialSystem
-from vidsindy_lite.dynamics import precision as weighing
-from vidsindy_lite.dynamics.candidates import Library
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.posing import pose
+from vidsindy_lite.dynamics import noise as weighing
+from vidsindy_lite.dynamics.library import Library
+from vidsindy_lite.dynamics.model import Form
+from vidsindy_lite.dynamics.problem import pose
 
 LAW = PolynomialSystem.from_terms(
     {"x": {"y": 1.0}, "y": {"x": -1.0, "y": 1.0, "x^2 y": -1.0}}, degree=3
@@ -131,7 +131,7 @@ def posed(x):
 
 def test_precision_is_foreseen_before_any_law_is_known():
     x, size = uneven("for a while", np.random.default_rng(5))
-    known = weighing.foreseen(posed(x)).precision[0][:, 0]
+    known = weighing.smoother_weights(posed(x)).precision[0][:, 0]
     late = TIMES > 28
     ratio = np.median(known[~late]) / np.median(known[late])
     assert ratio == pytest.approx((0.2 / 0.02) ** 2, rel=0.4)
@@ -141,21 +141,20 @@ def test_the_noise_is_that_of_the_errors_where_they_are_as_usual():
     """By how much weighted errors are smaller than all, so much the noise shrinks."""
     x, _ = uneven("growing", np.random.default_rng(2))
     problem = posed(x)
-    (t, _), units = problem.trajectories[0], problem.units
-    residual, speed = (x - PATH) / units.scale, LAW(PATH) / units.scale * units.time
-    path = [np.stack([(PATH - units.centre) / units.scale, speed])]
-    found = weighing._weighed(problem, [(0, t)], path, residual, np.ones_like(residual))
+    found = weighing.smoother_weights(problem)
     factors = found.precision[0] / problem.precision[0]
     assert np.ptp(factors, axis=0).min() > 0.5
-    smaller = np.mean(factors * residual**2, axis=0) / np.mean(residual**2, axis=0)
+    ((_, (t, data)),) = problem.stretches
+    squares = (problem.curves[0](t) - data) ** 2
+    smaller = np.mean(factors * squares, axis=0) / np.mean(squares, axis=0)
     np.testing.assert_allclose(found.noise, problem.noise * np.sqrt(smaller))
 
 
 def test_noise_that_looks_even_before_a_law_is_known_stays_even():
     even = posed(PATH + 0.05 * np.random.default_rng(6).standard_normal(PATH.shape))
-    assert weighing.foreseen(even) is even
+    assert weighing.smoother_weights(even) is even
     exact = posed(PATH)
-    assert weighing.foreseen(exact) is exact
+    assert weighing.smoother_weights(exact) is exact
 
 
 @pytest.mark.filterwarnings("error")

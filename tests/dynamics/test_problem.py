@@ -2,19 +2,18 @@
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from helpers import posed
 
-from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Fit, Status
-from vidsindy_lite.dynamics.errors import residual_noise
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.posing import pose
-from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, term_penalties
-from vidsindy_lite.dynamics.search import _as_shifted, _candidate, _closed, _variants
-from vidsindy_lite.dynamics.state import State
+from vidsindy_lite.dynamics.frames import as_shifted, cheapest_at, closed, nearer_home
+from vidsindy_lite.dynamics.library import Library
+from vidsindy_lite.dynamics.model import Form, State
+from vidsindy_lite.dynamics.noise import residual_noise
+from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, pose, term_penalties
 from vidsindy_lite.study import SYSTEMS
 
 
@@ -62,7 +61,7 @@ def test_the_noise_of_a_residual_counts_the_freedom_that_was_used():
 
 def test_an_origin_comes_with_all_ways_of_putting_axes_home():
     home, origin = np.array([0.0, 1.0, 2.0]), np.array([5.0, 1.0, 7.0])
-    variants = {(tuple(o), tuple(m)) for o, m in _variants(origin, home)}
+    variants = {(tuple(o), tuple(m)) for o, m in nearer_home(SimpleNamespace(home=home), origin)}
     assert variants == {
         ((5, 1, 7), (True, False, True)),
         ((5, 1, 2), (True, False, False)),
@@ -77,10 +76,10 @@ def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
     fit = fit_of(problem, (False, False))
     linear = np.repeat(problem.exponents.sum(axis=1) <= 1, 2).reshape(-1, 2)
     state = replace(fit.state, active=linear, coefficients=0.1 * linear, offset=np.zeros(2))
-    closed = _closed(problem, replace(fit, state=state), 1e2)
-    law = _as_shifted(problem, closed)
+    whole = closed(problem, replace(fit, state=state), 1e2)
+    law = as_shifted(problem, whole)
     origin = np.where(moving, (0.3, -0.2), problem.home)
-    candidate = _candidate(problem, closed, law, origin, np.array(moving))
+    candidate = cheapest_at(problem, whole, law, (origin, np.array(moving)))
 
     coefficients, information, gradient = law.at(origin)
     step, penalties = np.linalg.solve(information, gradient), np.tile(problem.penalties, 2)
@@ -96,7 +95,7 @@ def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
     out = np.array(min(costs, key=costs.__getitem__))
     assert (candidate.state.active.T.ravel() == linear.T.ravel() & ~out).all()
     price = sum(moving) * OFFSET_PENALTY * problem.penalties[0]
-    fitted = closed.collocation.objective(closed.state) - gradient @ step
+    fitted = whole.collocation.objective(whole.state) - gradient @ step
     expected = fitted + costs[tuple(out)] + price
     assert candidate.criterion == pytest.approx(expected, rel=1e-9)
     assert (candidate.state.moving == moving).all()

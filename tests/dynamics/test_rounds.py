@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics.rounds import _height_error
+from vidsindy_lite.dynamics.mechanics import _height_error
 
 TIMES = np.linspace(0, 10, 400)
 SWING = 0.8 * np.cos(3 * TIMES) * np.exp(-0.05 * TIMES)

@@ -7,17 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
-from vidsindy_lite.dynamics.candidates import Library
 from vidsindy_lite.dynamics.collocation import Status
-from vidsindy_lite.dynamics.form import Form
-from vidsindy_lite.dynamics.history import History
-from vidsindy_lite.dynamics.library import shift_matrix
-from vidsindy_lite.dynamics.order import accelerated, better, unexplained
-from vidsindy_lite.dynamics.posing import pose
-from vidsindy_lite.dynamics.problem import fit_curves
-from vidsindy_lite.dynamics.search import FINAL_WEIGHT, away, leave_home, select
+from vidsindy_lite.dynamics.frames import away
+from vidsindy_lite.dynamics.library import Library, shift_matrix
+from vidsindy_lite.dynamics.model import Form
+from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, framed, select
+from vidsindy_lite.dynamics.problem import fit_curves, pose
 from vidsindy_lite.dynamics.smoothing import smooth
-from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.dynamics.solver import accelerated, better, discover, unexplained
 from vidsindy_lite.study import SYSTEMS
 
 
@@ -224,7 +221,7 @@ def test_a_law_is_shortest_around_its_own_origin():
     assert away(problem, replace(state, coefficients=far, active=far != 0)) == []
 
 
-def test_all_axes_leave_home_one_after_the_other():
+def test_axes_leave_home():
     t, rest = np.linspace(0, 12, 300), np.array([0.7, -0.5])
     x = moving(lambda x, v: -9 * x - 0.1 * v - 4 * x**3, [1, 0.5], [0, 1], t) + rest
     library, rng = Library.polynomial(3), np.random.default_rng(0)
@@ -240,8 +237,8 @@ def test_all_axes_leave_home_one_after_the_other():
     state = State(control, 0.0 * active, active, problem.home, np.zeros(4, dtype=bool))
     at_home = select(problem, collocation.solve(state), FINAL_WEIGHT, "at home", History())
     unfinished = replace(at_home, status=Status.MAX_STEPS)
-    assert leave_home(problem, unfinished, History()) is unfinished  # its terms tell nothing
-    fit = leave_home(problem, at_home, History())
+    assert framed(problem, unfinished, History()) is unfinished  # its terms tell nothing
+    fit = framed(problem, at_home, History())
     assert at_home.state.active.sum() == 10
     assert fit.state.active.sum() == 6
     assert problem.units.point(fit.state.offset)[:2] == pytest.approx(rest, abs=1e-4)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from vidsindy_lite.dynamics import selection
-from vidsindy_lite.dynamics.selection import (
+from vidsindy_lite.dynamics import l0 as selection
+from vidsindy_lite.dynamics.l0 import (
     _descend,
     _moved_by_newcomers,
     _Quadratic,
@@ -288,3 +288,16 @@ def test_no_information_is_a_huge_variance_not_an_overflow():
         variance = np.diag(inverse(np.diag([4.0, 0.0])))
     assert variance[0] == pytest.approx(0.25)
     assert 1e200 < variance[1] < np.inf
+
+
+def test_a_search_ends_after_so_many_changes(monkeypatch):
+    rng = np.random.default_rng(0)
+    factor, truth = rng.normal(size=(40, 8)), np.array([3.0, -2, 4, 0, 1, 0, 5, -3])
+    information, penalty = factor.T @ factor, np.full(8, 0.1)
+    gradient, nothing = information @ truth, np.zeros(8, dtype=bool)
+    whole, *_ = subset_search(information, gradient, 0 * truth, penalty, nothing)
+    assert (whole == (truth != 0)).all()
+    monkeypatch.setattr(selection, "MOST_CHANGES", 0)
+    early, solution, _ = subset_search(information, gradient, 0 * truth, penalty, nothing)
+    assert not early.any()
+    assert not solution.any()

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem, discover
-from vidsindy_lite.dynamics.shape import LAPS, _Orbit, _periods, cancelling, shapes, tied
+from vidsindy_lite.dynamics.diagnostics import LAPS, _Orbit, _periods, cancelling, shapes, tied
 from vidsindy_lite.study import SYSTEMS
 
 TIMES = np.linspace(0, 12, 600)

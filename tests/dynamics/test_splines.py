@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from vidsindy_lite.dynamics.splines import (
+from vidsindy_lite.dynamics.bspline import (
     Grid,
     Segment,
     clamped_knots,

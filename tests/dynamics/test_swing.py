@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import vidsindy_lite as vl
-from vidsindy_lite.dynamics.swing import LIBRARY, NAME, swinging
+from vidsindy_lite.dynamics.result import LIBRARY, NAME, swinging
 
 LENGTH, G, FRICTION = 1.2, 9.81, 0.1
 SINES = vl.Library.polynomial(1) + vl.Library.fourier(1)

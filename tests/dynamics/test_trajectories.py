@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.dynamics.trajectories import (
+from vidsindy_lite.dynamics.data import (
     check_trajectories,
     check_trajectory,
     cut,

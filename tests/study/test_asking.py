@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.dynamics import Segment
-from vidsindy_lite.dynamics.splines import Grid
+from vidsindy_lite.dynamics.bspline import Grid
 from vidsindy_lite.study import Asked, law_error
 
 HERE = Asked("Lorenz", 0.1, 400, "middles", 1, 1e-3, 0)

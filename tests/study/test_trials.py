@@ -10,6 +10,7 @@ import pytest
 
 from vidsindy_lite import discover
 from vidsindy_lite.observation import Observation
+from vidsindy_lite.refusal import Refused
 from vidsindy_lite.study import baselines, score, spline_ado
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.baselines import BASELINES
@@ -151,6 +152,20 @@ def test_tracks_are_corrupted_each_by_its_own_draw_before_the_cameras_are_learne
     assert abs(np.corrcoef(off[0][:, 0], off[1][:, 0])[0, 1]) < 0.3
     whole = all((track == np.round(track)).all() for track in given)
     assert whole == (source == "detector")
+
+
+def test_where_cameras_cannot_be_learned_no_method_has_a_law(this_film, monkeypatch):
+    def refuse(tracks, *_, **__):
+        raise Refused("tracks: the motion must determine the cameras", "cameras", tracks)
+
+    monkeypatch.setattr(experiments, "observe_tracks", refuse)
+    trials = grid(["SprottE"], {"clean": (0,)}, [1], experiments.METHODS, 200)
+    results = run_comparison(Comparison(tuple(trials)))
+    assert {result.verdict for result in results} == {"wrong, refused"}
+    assert {result.score.missing for result in results} == {8}
+    assert results[0].warnings == ("tracks: the motion must determine the cameras",)
+    row = summary(tabulate(results), "system").iloc[0]
+    assert (row["exact"], row["no path"], row["wrong, ok"]) == ("0 of 6", 6, None)
 
 
 def test_doubts_of_the_observation_are_doubts_of_the_trial(this_film, monkeypatch):

@@ -29,10 +29,8 @@ from .triangulate import (
     check_views,
     points_of_views,
     residuals_of_views,
-    views_of,
 )
 
-_SMALLEST = 1e-4  # of the largest mode
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 
 
@@ -52,9 +50,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     -------
     ndarray, shape (k, n, 3)
         Scene units; what k independent causes, each off by one standard error, add to the path.
-        Zero where nothing can be reconstructed. If something of the rig was measured with an error,
-        without what moves or stretches the whole path: no law's terms depend on the origin and the
-        unit of length, which are as uncertain as the measurements leave them.
+        Zero where nothing can be reconstructed.
     """
     errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = (lags.errors > 0) & np.isfinite(lags.errors)
@@ -64,26 +60,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     footage = Footage(curves, clocks[0], lags.frames, lags.rates)
     near = linearised(footage, learned.cameras, errors)
     factor = fitted_factor(*near.weighed, near.prior, near.noise)
-    modes = np.einsum("ik,nji->knj", factor, near.path_slopes)
-    if not near.prior.any():
-        return modes
-    still = views_of(footage.aligned, learned.cameras)
-    return _of_shape(modes, points_of_views(still, learned.cameras))
-
-
-def _of_shape(modes: Floats, x: Floats) -> Floats:
-    """Modes, (k, n, 3), without moves and stretches of the whole path x, (n, 3), largest first.
-
-    What is smaller than `_SMALLEST` of the largest is left out.
-    """
-    seen = np.asarray(np.isfinite(x).all(axis=1))
-    centred = np.where(seen[:, None], x - x[seen].mean(axis=0), 0.0)
-    moves = [seen[:, None] * axis for axis in np.eye(3)]
-    frame, _ = np.linalg.qr(np.reshape([*moves, centred], (4, -1)).T)
-    flat = modes.reshape(len(modes), -1)
-    _, sizes, ways = np.linalg.svd(flat - flat @ frame @ frame.T, full_matrices=False)
-    kept = sizes > _SMALLEST * sizes[:1]
-    return (sizes[kept, None] * ways[kept]).reshape(-1, *x.shape)
+    return np.einsum("ik,nji->knj", factor, near.path_slopes)
 
 
 def trailing_errors(

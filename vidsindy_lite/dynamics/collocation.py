@@ -19,11 +19,10 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cholesky_banded
 
 from ..arrays import Floats, Ints
-from .banded import normal_band, solve_factored
+from .bspline import WIDTH, Grid, Segment, normal_band, solve_factored
+from .l0 import RIDGE, equilibrated
 from .library import Function, along_state, law_variables, monomials, shift_generators
-from .selection import RIDGE, equilibrated
-from .splines import WIDTH, Grid, Segment
-from .state import State
+from .model import State
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
@@ -32,7 +31,9 @@ NEARLY = 1e-2
 converged all the same: a tenth of a standard error, squared."""
 FAITHFUL = 1e-2
 """A step whose fall missed what it promised by so little was the last: of a miss ``m`` of a promise
-``p``, third order in the step, the next step would promise some ``9 m^2 / p``."""
+``p``, third order in the step, the next step would promise some ``9 m^2 / p``. Where the law holds
+so firmly that a step leaves nothing of its residual but what is second order, that is the miss, and
+the next step would promise all of it: so the miss has to be below the tolerance, too."""
 AT_ONCE = 10_000
 """Rows that are multiplied at once where their product would be as large as what it is added to."""
 STRONGEST_DAMPING = 1e2
@@ -436,7 +437,8 @@ class Collocation:
                 continue
             miss = abs(value - trial_value - promise)
             state, value = trial, trial_value
-            faithful = miss * miss < FAITHFUL * tolerance * promise  # a power may overflow
+            limit = FAITHFUL * tolerance * promise
+            faithful = miss < 10 * tolerance and miss * miss < limit  # a power may overflow
             if fraction == 1.0 and damping == 0.0 and faithful:
                 return Fit(state, self, Status.CONVERGED)
             damping = damping / 10 if damping > 1e-8 else 0.0

@@ -6,7 +6,7 @@ by what they are invariant under, each class holding those before it: rest, a st
 constant force, drag along the velocity, and all other laws. Each leaves the less error the richer
 it is; a class is the right one from the errors that it leaves up to those that the class before it
 leaves, and of all classes the one that is so over the widest range of errors is taken, as
-`persistence` takes one of the laws of a path.
+`path` takes one of the laws of a path.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
 from ..arrays import Bools, Floats
-from .discovery import Discovery
-from .errors import inflation
+from .data import inflation
 from .library import monomial_exponents, velocity_names
-from .polynomials import PolynomialSystem
+from .model import PolynomialSystem
 from .problem import FALSE_ALARM
+from .result import Discovery
 from .smoothing import smooth
 
 FEWEST = 6

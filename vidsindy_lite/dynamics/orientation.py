@@ -1,16 +1,17 @@
 """The axes in which a polynomial law is sparsest, for paths of which nobody knows how they lie.
 
 A rotation of the axes, like a shift of their origin, maps polynomials of one degree onto each
-other, exactly. So all terms are fitted once, and the estimate, with its covariance, is looked at in
-other axes, where the number of terms that differ from zero is minimised; see `origin`, which does
-the same for shifts.
+other, exactly. So all terms are fitted once, and the estimate, with its covariance, is looked at
+in other axes, where the number of terms that differ from zero is minimised; see `origin`, which
+does the same for shifts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
+from math import comb
 
 import numpy as np
 from scipy.linalg import block_diag, eigh
@@ -18,13 +19,29 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Bools, Floats, Ints
+from ..checks import check_choice
 from .collocation import Fit, Linearisation
-from .history import History
-from .library import monomial_gradients, monomials
+from .data import (
+    Trajectory,
+)
+from .inference import with_errors
+from .l0 import inverse
+from .library import (
+    Library,
+    monomial_gradients,
+    monomials,
+    variable_names,
+)
+from .model import Form, State
+from .path import (
+    FIRST_WEIGHTS,
+    History,
+    leaves_something_over,
+    tightened,
+    unpruned,
+)
 from .problem import Problem, fit_curves
-from .search import FIRST_WEIGHTS, leaves_something_over, tightened, unpruned
-from .selection import inverse
-from .state import State
+from .result import Discovery
 
 STARTS = 20
 """Random orientations from which the sparsest is sought."""
@@ -38,7 +55,7 @@ ALIKE = np.deg2rad(2.0)
 """Orientations that differ by less are one."""
 MODES = 40
 """Most directions of uncertainty that are looked at: the largest."""
-LEAST = 1e-10
+SLIGHTEST = 1e-10
 """Least variance over the largest, in units of their own, that is no rounding."""
 POINTS = 3
 """Points at which two polynomials are compared, over the number of their terms."""
@@ -133,7 +150,7 @@ class TurnedLaw:
         directions = law.estimates[1:][:, others]
         sizes = np.maximum(np.linalg.norm(directions, axis=0), np.finfo(float).tiny)
         values, axes = np.linalg.eigh((directions / sizes).T @ (directions / sizes))
-        whiten = axes / np.sqrt(np.maximum(values, LEAST * values[-1]))
+        whiten = axes / np.sqrt(np.maximum(values, SLIGHTEST * values[-1]))
 
         def scores(step: Floats) -> Floats:
             estimate, _ = self.seen(turned(step[:-m], m), home + step[-m:])
@@ -150,8 +167,7 @@ def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Float
     degrees = problem.exponents.sum(axis=1)
     found: list[Floats] = []
     for degree in range(1, problem.form.degree + 1):
-        stage = f"unpruned, degree {degree}"
-        fit, weight = unpruned(problem, collocation, control, degrees <= degree, stage, history)
+        fit, weight = unpruned(problem, collocation, control, degrees <= degree, history)
         if weight < FIRST_WEIGHTS[-1]:  # too many terms for these data
             continue
         for turn in sparse_orientations(TurnedLaw.of(problem, fit), found, rng):
@@ -283,3 +299,95 @@ def nearest(turn: Floats) -> Floats:
         for signs in product([1.0, -1.0], repeat=m)
     )
     return max((axes for axes in rows if np.linalg.det(axes) > 0), key=np.trace)
+
+
+MOST_TURNS = 3
+"""Most times that a discovery tells the axes better, in which the next is made."""
+
+Solved = tuple[Discovery, Problem, Fit]
+Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
+"""Trajectories, their systematic errors, and their standard errors if they are known."""
+
+
+def check_orientation(orientation: str, library: Library, d: int, origin: str) -> None:
+    """Refuse what is no orientation, or to learn one of data or candidates that have none."""
+    check_choice("orientation", orientation, ("data", "learn"))
+    if orientation == "data":
+        return
+    if d not in (2, 3):
+        raise ValueError(f"orientation: can be learned of two or three coordinates, got {d}")
+    form = Form.of(variable_names(d), library)
+    whole = len(form.exponents) == comb(d + form.degree, d) and form.candidates.all()
+    if not whole or form.functions or library.given or library.timed(form.names):
+        raise ValueError(
+            "orientation: can be learned only among all polynomials up to a degree, got "
+            f"library={library}"
+        )
+    if origin != "learn":
+        raise ValueError(f"orientation: can be learned only with origin='learn', got {origin!r}")
+
+
+def in_sparsest_axes(
+    own: Discovery,
+    pose: Callable[[Floats], Problem],
+    solve: Callable[[Floats], Solved],
+    rng: np.random.Generator,
+) -> Discovery:
+    """The law in the axes in which it has fewest terms: its own if no others have fewer.
+
+    Parameters
+    ----------
+    own : Discovery
+        In the axes of the data.
+    pose, solve : callable
+        The problem, and its solution, in axes that are the rows of (m, m).
+    rng : numpy.random.Generator
+        For the starts of the search.
+    """
+    starts = rough_orientations(pose(np.eye(own.system.states // own.system.order)), rng)
+    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=own)
+    if _terms(best) < _terms(own):
+        return replace(best, note=own.note)
+    said = "orientation: the data's own axes, as the law has no fewer terms in any others"
+    return replace(own, note="; ".join(filter(None, (own.note, said))))
+
+
+def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Discovery:
+    """The law in the best axes near some; of laws alike, the one in the axes that were refined."""
+    found, problem, fit = solve(turn)
+    best = replace(found, orientation=turn), problem, fit
+    for _ in range(MOST_TURNS):
+        turn, before = refined(problem, fit) @ turn, _rank(found)
+        found, problem, fit = solve(turn)
+        if _rank(found) <= _rank(best[0]):
+            best = replace(found, orientation=turn), problem, fit
+        if _rank(found) >= before:
+            break
+    found, problem, fit = best
+    return with_errors(found, problem, fit, with_turns(problem, fit))
+
+
+def _rank(found: Discovery) -> tuple[bool, int]:
+    """What is to be smallest: no warnings, then few terms."""
+    return bool(found.warnings), _terms(found)
+
+
+def _terms(found: Discovery) -> int:
+    """Terms of a law, and axes along which its origin is moved."""
+    return int(found.native.support.sum() + (found.offset != 0).sum())
+
+
+def in_axes(measured: Measured, turn: Floats) -> Measured:
+    """What was measured, in axes that are the rows of ``turn``, (m, m).
+
+    A place of which a coordinate was not seen is none. The errors of two coordinates of known ones
+    are taken to be independent in all axes.
+    """
+    trajectories, shared, sigma = measured
+    whole = [np.isfinite(x).all(axis=1) for _, x in trajectories]
+    paths = [(t[rows], x[rows] @ turn.T) for (t, x), rows in zip(trajectories, whole, strict=True)]
+    modes = [np.einsum("ij,njk->nik", turn, s[rows]) for s, rows in zip(shared, whole, strict=True)]
+    if sigma is None:
+        return paths, modes, None
+    pairs = zip(sigma, whole, strict=True)
+    return paths, modes, [np.sqrt(errors[rows] ** 2 @ (turn**2).T) for errors, rows in pairs]

@@ -1,7 +1,8 @@
 """The problem that a discovery solves: the data in standard units, and what is known before a law.
 
 In standard units every coordinate has mean 0 and variance 1, and time runs so that the
-root-mean-square speed is 1. `posing` makes it from data.
+root-mean-square speed is 1. `pose` makes it from data: units, gaps, the noise, prices, and first
+guesses of the states that nobody has measured.
 """
 
 from __future__ import annotations
@@ -11,20 +12,24 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.stats import chi2
 
-from ..arrays import Floats, Ints
-from .banded import normal_band
-from .collocation import Collocation, Fit, WithCurve
-from .errors import effective_noise, residual_noise
-from .form import Form
-from .library import Function, law_variables, monomials
-from .polynomials import PolynomialSystem
-from .splines import Segment, basis, clamped_knots
-from .state import State
-from .trajectories import Trajectory
-from .units import Units
+from ..arrays import Bools, Floats, Ints
+from .bspline import DEGREE, Segment, basis, clamped_knots, normal_band
+from .collocation import CLEANEST, Collocation, Fit, WithCurve
+from .data import Trajectory, Units, cut, typical_step, typical_steps
+from .l0 import LEAST
+from .library import Function, extended, law_variables, monomials
+from .model import Form, PolynomialSystem, State
+from .smoothing import PENALTIES, smooth
+
+# --------------------------------------------------------------------------------------------------
+# The problem that a discovery solves: the data in standard units, and what is known before a law.
+#
+# In standard units every coordinate has mean 0 and variance 1, and time runs so that the root-
+# mean-square speed is 1. `posing` makes it from data.
 
 FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where laws of the zoo have
@@ -51,7 +56,11 @@ class Problem:
     trajectories : list of Trajectory
         The same in standard units.
     systematic : list of ndarray, shape (n, d, k)
-        Errors that all samples share, for each trajectory.
+        Errors that all samples share, for each trajectory, where the motion is at ``smoothed``.
+    smoothed : list of ndarray, shape (n, d)
+        Each trajectory without its noise, as its curves have it.
+    pulls : ndarray, shape (d, d, k)
+        By how much the shared errors grow with the place.
     precision : list of ndarray, shape (n, d)
         Weight of each measurement relative to ``noise ** -2``, for each trajectory; 0 where it was
         not observed.
@@ -78,6 +87,8 @@ class Problem:
     measured: list[Trajectory]
     trajectories: list[Trajectory]
     systematic: list[Floats]
+    smoothed: list[Floats]
+    pulls: Floats
     precision: list[Floats]
     stretches: list[tuple[int, Trajectory]]
     curves: Sequence[Callable[[Floats], Floats]]
@@ -150,14 +161,22 @@ class Problem:
 
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
-        """Corners of the box of data and home, in which a law has its origin, each (d,)."""
+        """Corners of the box in which a law has its origin, each (d,).
+
+        It holds the data and home, and a spread more: a motion need not pass its centre.
+        """
         x = np.concatenate([values for _, (_, values) in self.stretches])
         movable, home = self.form.movable, self.home
         low, high = (
-            np.where(movable, extreme(extreme.reduce(x), home), home)
-            for extreme in (np.fmin, np.fmax)
+            np.where(movable, extreme(extreme.reduce(x), home) + more, home)
+            for extreme, more in ((np.fmin, -1.0), (np.fmax, 1.0))
         )
         return low, high
+
+    def holds_origin(self, origin: Floats) -> bool:
+        """Whether an origin is in the box of data and home."""
+        low, high = self.box
+        return bool(((low <= origin) & (origin <= high)).all())
 
     @property
     def axis_penalty(self) -> float:
@@ -196,6 +215,19 @@ class Problem:
             self.functions,
         )  # fmt: skip
 
+    def along(self, fit: Fit) -> Fit:
+        """A fit whose shared errors are as its curve has them: where that is, and no noise."""
+        if not self.shared:
+            return fit
+        parts = [
+            [self._at(segment, values) for segment in fit.collocation.segments]
+            for values in (self.systematic, self.smoothed)
+        ]
+        modes, smoothed = map(np.concatenate, parts)
+        moved = fit.collocation.curve(fit.state.control_points) - smoothed
+        modes = modes + np.einsum("ni,ijk->njk", np.nan_to_num(moved), self.pulls)
+        return replace(fit, collocation=replace(fit.collocation, systematic=modes))
+
     def _at(self, segment: Segment, values: Sequence[Floats]) -> Floats:
         """What is given for all samples of each trajectory, at those of a segment."""
         t, _ = self.trajectories[segment.trajectory]
@@ -210,17 +242,6 @@ class Problem:
     def kicked(self) -> bool:
         """Whether the law holds but for random kicks."""
         return bool(self.process_noise.any())
-
-    def errors(self, fit: Fit) -> Floats:
-        """How large the errors of the data are by a fit, (d,), were they independent.
-
-        A curve that may leave its law follows the errors, too: then they are as estimated. Of
-        errors that are given only how long they last is estimated.
-        """
-        if self.kicked:
-            return self.noise
-        errors = effective_noise(fit)
-        return self.noise * errors / residual_noise(fit) if self.measured_errors else errors
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
@@ -264,3 +285,381 @@ def term_penalties(
     equations = exponents.shape[1] if equations is None else equations
     rivals = equations * np.bincount(degrees)[degrees] * 2.0 ** (degrees + 1)
     return chi2.isf(false_alarm / rivals, df=1)
+
+
+def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
+    """The errors of the coordinates that were observed, their geometric mean for the others."""
+    filled = np.full(len(seen), np.exp(np.log(np.maximum(noise, CLEANEST)).mean()))
+    filled[seen] = noise
+    return filled
+
+
+# --------------------------------------------------------------------------------------------------
+# States that nobody has measured: velocities, the time, and what a known equation tells.
+#
+# They are tied to the others by equations that are known, so that a fit finds them; here they are
+# given a curve to begin with.
+
+
+def with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
+    """The same with velocities as further states: a velocity of zero stays what it is."""
+    units = problem.units
+    slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in positions]
+    rms = np.sqrt((np.concatenate(slopes) ** 2).mean(axis=0))
+
+    def with_velocity(position: BSpline) -> Callable[[Floats], Floats]:
+        velocity = position.derivative()
+        return lambda t: np.hstack([position(t), velocity(t) / rms])
+
+    curves = [with_velocity(spline) for spline in positions]
+    seen = np.repeat([True, False], len(rms))
+    found = _with_states(problem, curves, rms * units.scale / units.time, seen)
+    both = np.tile(units.scale_errors, 2)
+    return replace(found, units=replace(found.units, scale_errors=both))
+
+
+def with_time(problem: Problem) -> Problem:
+    """The same with the time as a last state, in time units."""
+
+    def with_clock(curve: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+        return lambda t: np.column_stack([curve(t), t])
+
+    curves = [with_clock(curve) for curve in problem.curves]
+    seen = np.append(np.ones(len(problem.noise), dtype=bool), False)
+    return _with_states(problem, curves, np.array([problem.units.time]), seen)
+
+
+def with_hidden(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Problem:
+    """The same with coordinates that were never seen, each told by an equation that is known.
+
+    Of a seen coordinate y with ``y' = g + b u``, with b and g known, it is ``u = (y' - g) / b``.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the coordinates that were seen.
+    curves : sequence of BSpline
+        These, smoothed.
+    seen : ndarray of bool, shape (m,)
+        Which of all coordinates they are.
+
+    Raises
+    ------
+    ValueError
+        If no equation tells a coordinate, or the law is of second order.
+    """
+    form, units, m = problem.form, problem.units, len(seen)
+    if form.states > m:
+        name = form.names[int(np.argmin(seen))]
+        raise ValueError(f"x: of a law of order 2 every position must be seen, got none of {name}")
+    telling = [_telling(form, seen, u) for u in np.flatnonzero(~seen).tolist()]
+
+    def with_told(curve: BSpline) -> Callable[[Floats], Floats]:
+        slope = curve.derivative()
+
+        def states(t: Floats) -> Floats:
+            x, slopes = np.zeros((len(t), m)), np.zeros((len(t), m))
+            x[:, seen] = units.point(curve(t))
+            slopes[:, seen] = slope(t) * units.scale / units.time
+            for u, (j, term) in zip(np.flatnonzero(~seen), telling, strict=True):
+                rest = form.known[:, j].copy()
+                rest[term] = 0.0
+                known = monomials(x, form.exponents[:, :m]) @ rest
+                x[:, u] = (slopes[:, j] - known) / form.known[term, j]
+            return x
+
+        return states
+
+    told = [with_told(curve) for curve in curves]
+    values = [states(c.t[DEGREE:-DEGREE])[:, ~seen] for states, c in zip(told, curves, strict=True)]
+    scale = np.sqrt((np.concatenate(values) ** 2).mean(axis=0))
+    whole = np.ones(m)
+    whole[seen], whole[~seen] = units.scale, scale
+
+    def standard(states: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+        return lambda t: states(t) / whole
+
+    return _with_states(problem, [standard(states) for states in told], scale, seen)
+
+
+def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
+    """Which equation tells a coordinate that was never seen, and by which term."""
+    m, powers = len(seen), form.exponents
+    alone = powers.sum(axis=1) == 1
+    for j in np.flatnonzero(seen).tolist():
+        given = (form.known[:, j] != 0) & ~form.candidates[:, j].any()
+        plain = ~powers[given][:, m:].any() and not powers[given & ~alone][:, :m][:, ~seen].any()
+        of_hidden = np.flatnonzero(given & powers[:, :m][:, ~seen].any(axis=1))
+        if plain and len(of_hidden) == 1 and powers[of_hidden[0], u] == 1:
+            return j, int(of_hidden[0])
+    name = form.names[u]
+    raise ValueError(
+        f"x: a coordinate that was never seen must be told by an equation that is known, as in "
+        f"library.where({{{form.names[int(np.argmax(seen))]!r}: {{{name!r}: 1, '...': 0}}}}), "
+        f"got none for {name}"
+    )
+
+
+def _with_states(
+    problem: Problem, curves: Sequence[Callable[[Floats], Floats]], scale: Floats, seen: Bools
+) -> Problem:
+    """The same with further states, of curves and scales (k,), which nobody has measured.
+
+    ``seen``, (m + k,), says where the others stand among all; the standard units of the new ones
+    have mean 0.
+    """
+    units = problem.units
+
+    def among(values: Floats, filling: float) -> Floats:
+        whole = np.full((len(values), len(seen), *values.shape[2:]), filling)
+        whole[:, seen] = values
+        return whole
+
+    centres, scales = np.zeros(len(seen)), np.empty(len(seen))
+    centres[seen], scales[seen], scales[~seen] = units.centre, units.scale, scale
+    scale_errors = among(units.scale_errors, 0.0)
+    return replace(
+        problem,
+        trajectories=[(t, among(x, np.nan)) for t, x in problem.trajectories],
+        systematic=[among(modes, 0.0) for modes in problem.systematic],
+        smoothed=[among(x, np.nan) for x in problem.smoothed],
+        pulls=np.moveaxis(among(np.moveaxis(among(problem.pulls, 0.0), 1, 0), 0.0), 0, 1),
+        precision=[among(precision, 0.0) for precision in problem.precision],
+        stretches=[(i, (t, among(x, np.nan))) for i, (t, x) in problem.stretches],
+        curves=curves,
+        units=Units(centres, scales, units.time, scale_errors=scale_errors),
+        noise=spread_to_unseen(problem.noise, seen),
+    )
+
+
+# --------------------------------------------------------------------------------------------------
+# Poses the problem of a discovery: standard units, gaps, the noise, and the library's units.
+
+GAP = 0.4
+"""A pause longer than this fraction of the time scale of the motion is a gap."""
+SHORTEST_STRETCH = 4
+"""Stretches of fewer samples tell less than their initial conditions cost."""
+DEPENDENT, INVOLVED = 1e-10, 1e-3
+"""Least singular value over the largest at which terms depend on each other, and least share."""
+
+
+def pose(
+    measured: list[Trajectory],
+    systematic: list[Floats],
+    form: Form,
+    rng: np.random.Generator,
+    sigma: list[Floats] | None = None,
+    through: bool = False,
+) -> Problem:
+    """Pose the problem of a discovery: standard units, gaps, noise, prices.
+
+    The noise is as given by ``sigma``, (n, d) for each trajectory, or as the smoothing estimates;
+    the curves are smoothed, or go ``through`` the samples.
+
+    Raises
+    ------
+    ValueError
+        If a coordinate does not move, or there are fewer samples than unknowns; if one was never
+        seen, and no equation that is known tells it; if a function of the library is not finite on
+        the data, or its terms depend on each other.
+    """
+    x = np.concatenate([values for _, values in measured])
+    seen = np.isfinite(x).any(axis=0)
+    x = x.compress(seen, axis=1)
+    unknowns, samples = len(form.exponents) + 1, int(np.isfinite(x).sum(axis=0).min())
+    if samples < unknowns:
+        raise ValueError(
+            f"x: must hold at least as many samples as unknowns per equation ({unknowns} for this "
+            f"library and d = {len(seen)}), got {samples} samples"
+        )
+    centre, scale = np.nanmean(x, axis=0), np.nanstd(x, axis=0)
+    if not (scale > 1e-12 * np.abs(centre)).all():
+        still = int(np.flatnonzero(seen)[np.argmin(scale)])
+        raise ValueError(f"x: every coordinate must move, got a constant column {still}")
+    if not form.movable.any():  # terms are what they are in the frame of the data
+        centre = np.zeros_like(centre)
+    step = typical_step(measured)
+    trajectories = [
+        (t / step, (values.compress(seen, axis=1) - centre) / scale) for t, values in measured
+    ]
+    stretches, curves, noise = _smoothed(trajectories, rng, PENALTIES[:1] if through else PENALTIES)
+    speed = _rms_speed(curves)
+    curves = [BSpline(s.t * speed, s.c, DEGREE, extrapolate=True) for s in curves]
+    noise = np.maximum(noise, CLEANEST)
+    precision = [np.isfinite(values).astype(float) for _, values in trajectories]
+    if sigma is not None:
+        errors = [np.maximum(part.compress(seen, axis=1) / scale, CLEANEST) for part in sigma]
+        noise = np.nanmedian(np.concatenate(errors), axis=0)
+        precision = [np.nan_to_num((noise / part) ** 2) for part in errors]
+    smoothed = [np.full(values.shape, np.nan) for _, values in trajectories]
+    for (i, (t, _)), curve in zip(stretches, curves, strict=True):
+        smoothed[i][np.searchsorted(trajectories[i][0], t)] = curve(t * speed)
+    modes = [part.compress(seen, axis=1) / scale[:, None] for part in systematic]
+    pulls, rest = _shared(trajectories, stretches, modes)
+    scale_errors = np.empty((0, len(scale)))
+    if not form.functions:  # else the unit of a coordinate is part of the law
+        # In other units a law has the same terms: no data tell of an error of the scale.
+        scale_errors = np.einsum("jjk->kj", pulls).copy()
+        pulls -= np.eye(len(scale))[:, :, None] * pulls
+        rest = [part - (centre / scale)[:, None] * scale_errors.T for part in rest]
+    problem = Problem(
+        measured=measured,
+        trajectories=[(t * speed, values) for t, values in trajectories],
+        systematic=[
+            part + np.einsum("ni,ijk->njk", np.nan_to_num(x), pulls)
+            for part, x in zip(rest, smoothed, strict=True)
+        ],
+        smoothed=smoothed,
+        pulls=pulls,
+        precision=precision,
+        stretches=[(i, (t * speed, values)) for i, (t, values) in stretches],
+        curves=curves,
+        units=Units(centre, scale, step / speed, scale_errors=scale_errors),
+        noise=noise,
+        form=form,
+        penalties=term_penalties(form.exponents, len(seen)),
+        slack=np.ones(len(form.names)),
+        process_noise=np.zeros(len(form.names)),
+        measured_errors=sigma is not None,
+    )
+    if problem.shared:
+        problem = problem.cautious
+    if not seen.all():
+        problem = with_hidden(problem, curves, seen)
+    elif form.states > len(seen):
+        problem = with_velocities(problem, curves)
+    if form.states < len(form.names):
+        problem = with_time(problem)
+    if form.exponents.shape[1] > len(form.names):
+        problem = _with_functions(problem, rng)
+    return replace(problem, slack=_slack(problem))
+
+
+def _shared(
+    trajectories: Sequence[Trajectory],
+    stretches: Sequence[tuple[int, Trajectory]],
+    systematic: Sequence[Floats],
+) -> tuple[Floats, list[Floats]]:
+    """By how much shared errors, (n, d, k), grow with the place, (d, d, k), and smooth remainders.
+
+    Errors of a place are those of a noisy place where they are told at the samples. In a fit such
+    errors would explain that very noise, and their sizes grow beyond all measure.
+    """
+    x, modes = np.concatenate([x for _, x in trajectories]), np.concatenate(list(systematic))
+    _, d, k = modes.shape
+    rows = np.isfinite(x).all(axis=1)
+    places, values = np.insert(x[rows], 0, 1.0, axis=1), modes[rows].reshape(-1, d * max(k, 1))
+    if not k or not len(values):
+        return np.zeros((d, d, k)), [np.nan_to_num(part) for part in systematic]
+    pulls = np.asarray(np.linalg.lstsq(places, values)[0][1:], dtype=float).reshape(d, d, k)
+    rest = [
+        part - np.einsum("ni,ijk->njk", x, pulls)
+        for part, (_, x) in zip(systematic, trajectories, strict=True)
+    ]
+    for i, (t, _) in stretches:
+        rows = np.searchsorted(trajectories[i][0], t)
+        left = rest[i][rows].reshape(len(t), -1)
+        curve = smooth([(t, left)], np.random.default_rng(0)).splines[0]
+        rest[i][rows] = curve(t).reshape(-1, d, k)
+    return pulls, [np.nan_to_num(part) for part in rest]
+
+
+def _with_functions(problem: Problem, rng: np.random.Generator) -> Problem:
+    """The same with the functions of the library in units of their own, and checked."""
+    pieces = zip(problem.curves, problem.stretches, strict=True)
+    x = problem.units.point(np.concatenate([curve(t) for curve, (_, (t, _)) in pieces]))
+    functions = problem.form.functions
+    values = extended(x, functions)[:, problem.d :]
+    for function, column in zip(functions, values.T, strict=True):
+        if not np.isfinite(column).all():
+            *place, last = (f"{v:g}" for v in x[np.argmin(np.isfinite(column))])
+            where = f"t = {last}" if function.of_time else f"({', '.join([*place, last])})"
+            raise ValueError(
+                f"library: {function.name} must be finite on the data, got no such value at {where}"
+            )
+    sizes = np.sqrt((values**2).mean(axis=0))
+    for k, function in enumerate(problem.form.functions):
+        if function.direction == 0:  # of a vector, in the units of the equations
+            scale = problem.units.scale[-len(problem.measured[0][1].T) :]
+            common = np.sqrt(((sizes[k : k + len(scale)] / scale) ** 2).mean())
+            sizes[k : k + len(scale)] = common * scale
+    sizes = np.where(sizes > 0, sizes, 1.0)
+    if problem.form.implicit.any():
+        sizes = np.append(sizes, problem.units.scale / problem.units.time)
+    sized = replace(problem, units=replace(problem.units, sizes=sizes))
+    # Each coordinate in an order of its own: what depends on each other there does so everywhere.
+    apart = rng.permuted(problem.units.standard(x), axis=0)
+    _check_independent(problem.form, sized.terms(apart))
+    return sized
+
+
+def _check_independent(form: Form, terms: Floats) -> None:
+    """Refuse candidates that depend on each other at any points, given as terms (n, l).
+
+    Those of an equation; where vectors tie some of several, those of all equations at once.
+    """
+    terms, l = terms[np.isfinite(terms).all(axis=1)], terms.shape[1]
+    explicit = form.candidates & ~form.implicit[:, None]
+    searched = np.flatnonzero(explicit.any(axis=0))
+    tied = (form.shared != np.arange(len(form.shared))).any()
+    _, unlike = np.unique(explicit[:, searched].T, axis=0, return_index=True)
+    for equations in [searched] if tied else searched[unlike, None]:
+        row, term = np.nonzero(explicit[:, equations].T)
+        unknowns, column = np.unique(form.shared[equations[row] * l + term], return_inverse=True)
+        columns = np.zeros((len(equations), len(terms), len(unknowns)))
+        columns[row, :, column] = terms[:, term].T
+        flat = columns.reshape(-1, len(unknowns))
+        flat /= np.maximum(np.linalg.norm(flat, axis=0), LEAST)
+        _, sizes, shares = np.linalg.svd(flat, full_matrices=False)
+        if len(terms) >= len(sizes) and sizes[-1] < DEPENDENT * sizes[0]:
+            names = np.array(form.law(form.known).terms)[unknowns % l]
+            raise ValueError(
+                "library: its terms must not depend on each other, got "
+                + ", ".join(dict.fromkeys(names[np.abs(shares[-1]) > INVOLVED]))
+            )
+
+
+def _smoothed(
+    trajectories: Sequence[Trajectory], rng: np.random.Generator, penalties: Floats
+) -> tuple[list[tuple[int, Trajectory]], Sequence[BSpline], Floats]:
+    """Stretches between gaps, their smoothing splines and the noise; time in typical steps.
+
+    Where the data pause is a gap or not depending on how fast the target moves, which a first
+    smoothing tells; if there are other gaps, a second one respects them. A coordinate that is
+    seen less often than others pauses later.
+    """
+    steps = typical_steps(trajectories)
+    first = _stretches(trajectories, 5.0 * steps)
+    smoothed = smooth([piece for _, piece in first], rng, penalties)
+    longest = np.maximum(2.5 * steps, GAP / _rms_speed(smoothed.splines))
+    stretches = _stretches(trajectories, longest)
+    if [len(t) for _, (t, _) in stretches] != [len(t) for _, (t, _) in first]:
+        smoothed = smooth([piece for _, piece in stretches], rng, penalties)
+    return stretches, smoothed.splines, smoothed.noise
+
+
+def _stretches(
+    trajectories: Sequence[Trajectory], longest_step: Floats
+) -> list[tuple[int, Trajectory]]:
+    pieces = [
+        (i, piece) for i, whole in enumerate(trajectories) for piece in cut(whole, longest_step)
+    ]
+    longest = max(len(t) for _, (t, _) in pieces)
+    if longest < 2:
+        raise ValueError("x: must hold all coordinates at about the same times, got none")
+    return [piece for piece in pieces if len(piece[1][0]) >= min(SHORTEST_STRETCH, longest)]
+
+
+def _rms_speed(splines: Sequence[BSpline]) -> float:
+    slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in splines]
+    return float(np.sqrt((np.concatenate(slopes) ** 2).mean()))
+
+
+def _slack(problem: Problem) -> Floats:
+    collocation = problem.collocation(problem.segments())
+    x, slope = collocation.node_states(fit_curves(collocation, problem.curves))
+    terms = problem.terms(x)
+    misfit = slope - terms @ np.linalg.lstsq(terms, slope, rcond=None)[0]
+    slack = np.maximum(np.sqrt((misfit**2).mean(axis=0)), 1e-4)
+    searched = problem.form.candidates.any(axis=0)
+    return np.where(searched, slack, slack[searched].min())

@@ -15,9 +15,8 @@ from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..arrays import Floats
-from .banded import normal_band
-from .splines import WIDTH, Grid, Segment, basis
-from .trajectories import Trajectory
+from .bspline import WIDTH, Grid, Segment, basis, normal_band
+from .data import Trajectory
 
 PROBES = 24
 """Random vectors with which the trace of the influence matrix is estimated."""

@@ -3,62 +3,65 @@
 The objective is the paper's (Eqs. 8-9): data loss of a cubic B-spline, physics loss at collocation
 points, a price per term. What differs is how it is minimised: banded Gauss-Newton steps with the
 curve eliminated (`collocation`), a search over supports in the small algebra that remains
-(`selection`), the offset as the origin in which the law is sparsest (`origin`), and a physics
-weight that is raised until the law holds exactly. Nothing is set by hand per system.
-
-The stages, in order: `pose` (`posing`), twice where samples are few (`coarse`), `search` at a
-tolerated error, `polish` at the errors that are left, `settle` on the law that persists
-(`settling`); where none persists, also from a search that tolerates all that has to be.
+(`selection`), the offset as the origin in which the law is sparsest (`frames`), a physics weight
+that is raised until the law holds exactly, and an error that is tolerated (`path`). Nothing is set
+by hand per system.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
+from scipy.interpolate import BSpline
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from ..arrays import Floats
-from ..checks import check_integer
-from .candidates import Library, check_library
-from .coarse import evidence, views
-from .collocation import Fit, Status
-from .conclusion import conclude
-from .discovery import Discovery
-from .elsewhere import off_home
-from .form import Form
-from .history import History
-from .order import accelerated, better, check_order
-from .persistence import Path
-from .posing import pose
-from .precision import foreseen, with_precision
-from .problem import Problem, fit_curves
-from .process_noise import rebalanced, with_process_noise
-from .search import CONSISTENT, FINAL_WEIGHT, climb, consistent, search
-from .selection import inverse
-from .settling import EXACT, persists, settle
-from .shape import is_on_circle
-from .swing import LIBRARY, NAME, Swing, swinging
-from .trajectories import (
+from ..checks import check_array, check_choice, check_integer, check_number, check_positive
+from .bspline import DEGREE, WIDTH
+from .collocation import Fit
+from .data import (
     Trajectory,
     check_sigma,
     check_systematic,
     check_trajectories,
+    check_trajectory,
     coordinate_names,
 )
-from .turning import Measured, Solved, check_orientation, in_axes, in_sparsest_axes
+from .diagnostics import diagnose, is_on_circle
+from .inference import infer
+from .library import (
+    Library,
+    check_library,
+    monomial_exponents,
+    monomials,
+)
+from .model import Form, PolynomialSystem
+from .noise import rebalanced, smoother_weights, with_process_noise
+from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes
+from .path import (
+    ROUNDS,
+    TOLERATED,
+    History,
+    Path,
+    evidence,
+    first_law,
+    near,
+    persistent,
+    views,
+)
+from .problem import Problem, pose
+from .result import LIBRARY, NAME, Discovery, Swing, swinging
+from .smoothing import smooth
 
-SPLINE_ERROR = 3e-7
-"""Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
 DROWNED = 0.5
 """Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
-MOST_HALVINGS, MOST_CREEPING = 4, 2
-"""Most halvings of the knot spans, and those until a law must converge: a sharp turn that the first
-knots cannot follow takes two."""
-MOST_WEIGHINGS = 2
-"""Most laws of which the precision of the measurements is learned."""
+MOST_LAWS = 3
+"""Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
 
 
 def discover(
@@ -73,6 +76,7 @@ def discover(
     sigma: float | Floats | Sequence[float | Floats] | None = None,
     origin: str = "learn",
     orientation: str = "data",
+    time_limit: float | None = None,
 ) -> Discovery:
     """Discover the law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -88,7 +92,7 @@ def discover(
         Highest degree of the candidate terms: short for ``library=Library.polynomial(degree)``; 3
         by default.
     seed : int
-        For the random probes of the noise estimate and the starts of the offset search.
+        For the random probes of the noise estimate.
     progress : bool
         Show a progress bar.
     systematic : array_like, shape (k, n, d), optional
@@ -116,6 +120,9 @@ def discover(
         nobody knows how two or three coordinates of a place lie. Then all of the result is in the
         axes that `Discovery.orientation` holds: a state of it is ``x @ orientation.T``. Rows in
         which a coordinate was not seen do not count.
+    time_limit : float, optional
+        Seconds after which no further round begins: then the best law so far comes back, and a
+        warning says so. One fit may last longer.
 
     Returns
     -------
@@ -143,7 +150,12 @@ def discover(
     times = [np.asarray(pair[0]) for pair in (t if x is None else [(t, x)])]
     shared = check_systematic(systematic, times, trajectories)
     measured = trajectories, shared, check_sigma(sigma, times, trajectories)
-    task = _Task(measured, names, library, origin, seed, progress)
+    end = (
+        np.inf
+        if time_limit is None
+        else time.perf_counter() + check_positive("time_limit", time_limit)
+    )
+    task = _Task(measured, names, library, origin, seed, progress, end)
     # Matrices this small gain nothing by threads, which wait for each other on a busy machine.
     with threadpool_limits(limits=1, user_api="blas"):
         found = _of_order(task, order)
@@ -160,6 +172,7 @@ class _Task:
     origin: str
     seed: int
     progress: bool
+    end: float
     turned: bool = False
     """Whether the axes are a guess: a wrong one looks like an origin that is a little off."""
 
@@ -175,7 +188,7 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
     def posed(turn: Floats) -> Problem:
         probes = np.random.default_rng(task.seed)
         paths, modes, errors = in_axes(task.measured, turn)
-        return foreseen(pose(paths, modes, form, probes, errors))
+        return smoother_weights(pose(paths, modes, form, probes, errors))
 
     def solved(turn: Floats) -> Solved:
         return _solved(replace(task, measured=in_axes(task.measured, turn), turned=True), form)
@@ -227,88 +240,51 @@ def _swing(task: _Task, problem: Problem) -> Swing | None:
 
 
 def _solved(task: _Task, form: Form) -> Solved:
-    """The law of a form, the problem that it solves, and the last fit."""
+    """The law of a form, the problem that it solves, and the last fit.
+
+    Prepare, path, infer, diagnose: the sections of the paper's method.
+    """
     trajectories, shared, sigma = task.measured
-    starts, probes = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(task.seed).spawn(2)
-    )
-    history = History()
-    with tqdm(total=0, disable=not task.progress, desc="discover", leave=False) as bar:
-        outcomes = [
-            _law(problem, starts, probes, history, bar)
-            for problem in views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
-        ]
-    problem, fit, path = min(outcomes, key=lambda outcome: evidence(*outcome[:2]))
-    if not task.turned:
-        fit = _off_home(problem, fit, path)
-    return conclude(problem, fit, path, history), problem, fit
+    probes = np.random.default_rng(task.seed)
+    problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
+    rounds = MOST_LAWS * (1 + ROUNDS) * len(problems)
+    with tqdm(total=rounds, disable=not task.progress, desc="discover", leave=False) as bar:
+        history = History(end=task.end, bar=bar)
+        laws = [_law(problem, probes, history, not task.turned) for problem in problems]
+        bar.update(rounds - bar.n)
+    problem, fit, path = min(laws, key=lambda law: evidence(*law[:2]))
+    model = path.model if path.fit is fit else problem.model(fit)
+    found = infer(problem, fit, model, path, history)
+    doubts = diagnose(problem, fit, model, path, found.system)
+    return replace(found, warnings=(*doubts, *history.warnings)), problem, fit
 
 
 def _law(
-    problem: Problem,
-    starts: np.random.Generator,
-    probes: np.random.Generator,
-    history: History,
-    bar: tqdm,
+    problem: Problem, probes: np.random.Generator, history: History, free: bool
 ) -> tuple[Problem, Fit, Path]:
-    """The law of a problem: the problem as that tells it, the last fit, and the path of laws."""
-    bar.total += 2
-    fit = search(problem, starts, history)
-    # No search at larger errors would find an exact law of a motion that is kicked.
-    asked = not consistent(problem, fit)
+    """The law that persists: the problem as that tells it, the last fit, and the path of laws.
+
+    Where a first law does not fit, the motion may be kicked; where no path leads to a law, errors
+    that last may have made terms of the first, and one that tolerates them is the start.
+    """
+    fit = first_law(problem, history)
+    asked = not near(problem, fit, TOLERATED)
     if asked:
-        problem, fit = _kicked(problem, fit, starts, probes, history)
-    if not problem.kicked:
-        fit = polish(problem, climb(problem, fit, starts, history), history)
-        bar.update()
-    for _ in range(0 if problem.kicked else MOST_WEIGHINGS):
-        weighed = with_precision(problem, fit)
-        if weighed is problem:
-            break
-        problem = weighed
-        bar.total += 1
-        fit = climb(problem, search(problem, starts, history), starts, history)
-        fit = polish(problem, fit, history)
-        bar.update()
-    if not asked and (problem.errors(fit) > CONSISTENT * problem.noise).any():
-        problem = with_process_noise(problem, fit, probes)
-        fit = search(problem, starts, history) if problem.kicked else fit
-    if problem.kicked:
-        bar.total += 1
-        problem = rebalanced(problem, fit, probes)
-        fit = polish(problem, fit, history)
-        bar.update()
-    fit, path = settle(problem, fit, history)
-    bar.update()
-    if not (problem.kicked or persists(fit, path)):
-        # Errors that last may have made terms from which no path leads to the law that persists.
-        bar.total += 1
-        found = polish(problem, search(problem, starts, history, path.level), history)
-        if found.status is Status.CONVERGED:  # around what has not, nothing is told
-            other = settle(problem, found, history)
-            fit, path = other if persists(*other) else (fit, path)
-        bar.update()
+        problem, fit = _kicked(problem, fit, probes, history)
+    fit, path, persists = persistent(problem, fit, history, free)
+    if not asked and not near(problem, fit, 0.0):
+        kicked, law = _kicked(problem, fit, probes, history)
+        if kicked.kicked:
+            return kicked, *persistent(kicked, law, history, free)[:2]
+    if not (persists or problem.kicked or history.over):
+        law = first_law(problem, history, path.level)
+        other, around, found = persistent(problem, law, history, free)
+        fit, path = (other, around) if found else (fit, path)
     return problem, fit, path
 
 
-def _off_home(problem: Problem, fit: Fit, path: Path) -> Fit:
-    """The fit with those axes off home that the errors which are left tell from there."""
-    if not (problem.form.movable & ~fit.state.moving).any():
-        return fit
-    model = path.model if path.fit is fit else problem.model(fit)
-    state = off_home(problem.cautious, fit.state, model, path.tolerated)
-    if state is fit.state:
-        return fit
-    moved = fit.collocation.solve(state, EXACT)
-    return _off_home(problem, moved, path) if moved.status is Status.CONVERGED else fit
-
-
 def _kicked(
-    problem: Problem,
-    fit: Fit,
-    starts: np.random.Generator,
-    probes: np.random.Generator,
-    history: History,
+    problem: Problem, fit: Fit, probes: np.random.Generator, history: History
 ) -> tuple[Problem, Fit]:
     """The problem with the kicks that its data show, and the law under them; else both as given.
 
@@ -317,31 +293,261 @@ def _kicked(
     kicked = with_process_noise(problem, fit, probes)
     if kicked is problem:
         return problem, fit
-    law = search(kicked, starts, history)
-    exact = with_process_noise(problem, law, probes) is problem
-    return (problem, fit) if exact else (kicked, law)
+    law = first_law(kicked, history)
+    if with_process_noise(problem, law, probes) is problem:
+        return problem, fit
+    return rebalanced(kicked, law, probes), law
 
 
-def polish(problem: Problem, fit: Fit, history: History) -> Fit:
-    """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
-    fit = first = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
-    columns, creeps = np.flatnonzero(fit.state.free()), first.status is Status.MAX_STEPS
-    for halving in range(MOST_HALVINGS):
-        if creeps and halving == MOST_CREEPING:
-            fit = first
-            break
-        before = fit.state.flat()[columns]
-        segments = [segment.refined() for segment in fit.collocation.segments]
-        finer = problem.collocation(segments, problem.errors(fit))
-        splines = fit.collocation.grid.splines(fit.state.control_points)
-        state = replace(fit.state, control_points=fit_curves(finer, splines))
-        fit = problem.weighted(finer, FINAL_WEIGHT).solve(state, EXACT)
-        creeps = creeps and fit.status is Status.MAX_STEPS
-        information = fit.collocation.linearise(fit.state, columns).information
-        spread = np.sqrt(np.diag(inverse(information)))
-        # Half the spacing, a sixteenth of the error: so much is left of what it just was.
-        error = np.abs(fit.state.flat()[columns] - before) / 15
-        if (error < np.maximum(0.1 * spread, SPLINE_ERROR)).all():
-            break
-    history.add("polish", problem, fit, FINAL_WEIGHT)
-    return fit
+# --------------------------------------------------------------------------------------------------
+# First or second order: whether a law of motion, x'' = f(x, x'), is a better guess than x' = f(x).
+#
+# A body that is thrown, or hangs on a spring, passes the same place with other velocities, so that
+# no law of first order holds; but its acceleration is nearly a linear function of where it is and
+# how it moves. In the flows that people write down as x' = f(x) it is not.
+
+LINEAR = 0.15
+"""Share of the accelerations' squares that no linear law explains, below which they may be those of
+a body. Clean flows of first order leave .26 to .64, springs and throws up to .06."""
+AMBIGUOUS = 0.5
+"""Share of the slopes' squares that no cubic law of first order explains, above which a place is
+passed with several velocities. Flows of first order leave up to .15, with noise of 40 %."""
+PASSED = 0.005
+"""The same share, below which every place is passed with one velocity, so that nothing speaks for
+a second order. Flows of first order outside the library leave up to .002, throws .02."""
+MISFIT = 1.5
+"""Errors that one law leaves over those of another, from which on it misses the data."""
+DENSITY = 10
+"""Points per time scale of the motion at which accelerations are looked at."""
+
+
+def check_order(order: object, origin: str, library: Library) -> None:
+    """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
+    if isinstance(order, bool | float) or order not in (1, 2, "auto"):
+        raise ValueError(f"order: must be 1, 2 or 'auto', got {order!r}")
+    check_choice("origin", origin, ("learn", "data"))
+
+
+def accelerated(curves: Sequence[BSpline]) -> bool:
+    """Whether smoothed curves look like those of a law of second order.
+
+    The slope is no function of the place; or hardly one, and the second derivative is nearly linear
+    in both.
+    """
+    places, slopes, bends = [], [], []
+    for curve in curves:
+        low, high = curve.t[DEGREE + 1], curve.t[-DEGREE - 2]  # the outermost spans bend by chance
+        t = np.arange(low, high, 1 / DENSITY)
+        places.append(curve(t))
+        slopes.append(curve(t, 1))
+        bends.append(curve(t, 2))
+    x, v, a = (np.concatenate(parts) for parts in (places, slopes, bends))
+    linear = np.hstack([np.ones((len(x), 1)), x, v])
+    cubic = monomials(x, monomial_exponents(x.shape[1], 3))
+    several = unexplained(cubic, v)
+    return several > AMBIGUOUS or (several > PASSED and unexplained(linear, a) < LINEAR)
+
+
+def unexplained(terms: Floats, values: Floats) -> float:
+    """Share of the squares of values (n, d) that no combination of terms (n, l) explains.
+
+    NaN if there are hardly more values than terms.
+    """
+    if len(terms) <= 2 * terms.shape[1]:
+        return np.nan
+    left = values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0]
+    return float((left**2).sum() / (values**2).sum())
+
+
+def better(first: Discovery, second: Discovery) -> Discovery:
+    """The one of two laws of the same positions that is to be trusted, where the first is doubtful.
+
+    The second order, if the first misses the data; or if the second is beyond doubt and has no more
+    terms.
+    """
+    m = first.system.states
+    terms, others = (
+        int(native.support[:, begin : begin + m].sum())
+        for native, begin in ((first.native, 0), (second.native, m))
+    )
+    if (first.noise[:m] > MISFIT * second.noise[:m]).any():
+        return replace(second, note="order 2: the law of order 1 misses the data")
+    if not second.warnings and others <= terms:
+        cause = f"the law of order 1 is doubtful and has {terms} terms, not {others}"
+        return replace(second, note=f"order 2: {cause}")
+    doubt = "is doubtful, too" if second.warnings else f"has {others} terms, not {terms}"
+    return replace(first, note=f"order 1: the law of order 2 {doubt}")
+
+
+# --------------------------------------------------------------------------------------------------
+# `discover` behind the interface of `pysindy.SINDy`, for code that is written for that.
+
+
+class SplineSINDy:
+    """A model that is fitted as `pysindy.SINDy` is, by `discover`.
+
+    There is nothing to choose but the degree: no threshold, no differentiation method. Rows of NaN
+    are missing samples.
+
+    Parameters
+    ----------
+    degree : int
+        Highest degree of the candidate terms.
+    seed : int
+        See `discover`.
+
+    Attributes
+    ----------
+    discovery : Discovery
+        After `fit`: the law with error bars, status and warnings.
+    """
+
+    def __init__(self, degree: int = 3, seed: int = 0) -> None:
+        self.degree = check_integer("degree", degree, 1)
+        self.seed = check_integer("seed", seed)
+        self._law: PolynomialSystem | None = None
+
+    def __repr__(self) -> str:
+        return f"SplineSINDy(degree={self.degree}, seed={self.seed})"
+
+    def fit(
+        self,
+        x: Floats | Sequence[Floats],
+        t: float | Floats | Sequence[Floats] = 1.0,
+        feature_names: Sequence[str] | None = None,
+    ) -> SplineSINDy:
+        """Discover the law of one trajectory or of several.
+
+        Parameters
+        ----------
+        x : array_like, shape (n, d), or list of such
+            States.
+        t : float, array_like, shape (n,), or list of such
+            Time step, or times.
+        feature_names : sequence of str, optional
+            Of the state variables; x0, x1, ... by default.
+
+        Raises
+        ------
+        ValueError
+            As `discover`, or if there are not as many names as variables.
+        """
+        runs = _runs(x, t)
+        d = runs[0][1].shape[-1]
+        names = tuple(f"x{i}" for i in range(d)) if feature_names is None else tuple(feature_names)
+        if len(names) != d:
+            raise ValueError(f"feature_names: must name {d} variables, got {names}")
+        found = discover(runs, degree=self.degree, seed=self.seed, order=1)
+        self._law = PolynomialSystem(names, found.system.exponents, found.coefficients)
+        self.discovery: Discovery = found
+        return self
+
+    @property
+    def law(self) -> PolynomialSystem:
+        """The law in the model's own names."""
+        if self._law is None:
+            raise ValueError("model: must be fitted first: call fit(x, t)")
+        return self._law
+
+    def predict(self, x: Floats | Sequence[Floats]) -> Floats | list[Floats]:
+        """Time derivative at states, shape (n, d), or a list of such."""
+        if _are_several(x):
+            return [self.law(check_array("x", run)) for run in x]
+        return self.law(check_array("x", x))
+
+    def simulate(self, x0: Floats, t: Floats) -> Floats:
+        """The path from ``x0``, shape (n, d); NaN after a blow-up."""
+        return self.law.simulate(t, x0)
+
+    def score(
+        self, x: Floats | Sequence[Floats], t: float | Floats | Sequence[Floats] = 1.0
+    ) -> float:
+        """Coefficient of determination of the slopes of smoothed data, mean over the variables.
+
+        NaN if a variable stands still.
+        """
+        measured, slopes, predicted = [], [], []
+        for times, states in _runs(x, t):
+            seen, values = check_trajectory(times, states)
+            if len(seen) < WIDTH:
+                raise ValueError(f"x: must hold at least {WIDTH} samples, got {len(seen)}")
+            (spline,) = smooth([(seen, values)], np.random.default_rng(self.seed)).splines
+            measured.append(values)
+            slopes.append(spline.derivative()(seen))
+            predicted.append(self.law(spline(seen)))
+        truth, guess = np.concatenate(slopes), np.concatenate(predicted)
+        left, total = (
+            ((truth - middle) ** 2).sum(axis=0) for middle in (guess, truth.mean(axis=0))
+        )
+        moves = np.ptp(np.concatenate(measured), axis=0) > 0
+        return float((1 - left / np.where(moves, total, np.nan)).mean())
+
+    def coefficients(self) -> Floats:
+        """One row an equation, one column a feature, shape (d, l)."""
+        return self.law.coefficients.T.copy()
+
+    def get_feature_names(self) -> list[str]:
+        """Names of the features, e.g. ``["1", "x0", "x1", "x0^2", "x0 x1", "x1^2"]``."""
+        return [
+            " ".join(
+                name if power == 1 else f"{name}^{power}"
+                for name, power in zip(self.law.names, powers, strict=True)
+                if power
+            )
+            or "1"
+            for powers in self.law.exponents.tolist()
+        ]
+
+    def equations(self, precision: int = 3) -> list[str]:
+        """The right-hand sides as text, with so many decimals, or digits where these were zeros."""
+        features = self.get_feature_names()
+        return [
+            " + ".join(
+                f"{_number(value, precision)} {feature}"
+                for value, feature in zip(row, features, strict=True)
+                if value
+            )
+            or f"{0:.{precision}f}"
+            for row in self.coefficients()
+        ]
+
+    def print(self, lhs: Sequence[str] | None = None, precision: int = 3) -> None:
+        """Print the equations, and warnings if any."""
+        left = [f"({name})'" for name in self.law.names] if lhs is None else lhs
+        for name, right in zip(left, self.equations(precision), strict=True):
+            print(f"{name} = {right}")
+        for warning in self.discovery.warnings:
+            print(f"warning: {warning}")
+
+
+def _number(value: float, precision: int) -> str:
+    text = f"{value:.{precision}f}"
+    return text if float(text) else f"{value:.{precision}g}"
+
+
+def _are_several(x: Floats | Sequence[Floats]) -> bool:
+    """Whether states are those of several trajectories."""
+    return isinstance(x, list | tuple) and all(np.ndim(run) == 2 for run in x)
+
+
+def _runs(
+    x: Floats | Sequence[Floats], t: float | Floats | Sequence[Floats]
+) -> list[tuple[Floats, Floats]]:
+    """Times and states of each trajectory."""
+    several = _are_several(x)
+    states = [check_array("x", run) for run in (x if several else [x])]
+    if not states or any(run.ndim != 2 for run in states):
+        shapes = [run.shape for run in states]
+        raise ValueError(f"x: must have shape (n, d), or be a list of such, got shapes {shapes}")
+    if several and isinstance(t, list | tuple) and all(np.ndim(times) == 1 for times in t):
+        times = list(t)
+    elif np.ndim(t) == 0:
+        step = check_number("t", np.asarray(t).item())
+        if not step > 0:
+            raise ValueError(f"t: must be a positive time step or increasing times, got {step:g}")
+        times = [np.arange(len(run), dtype=float) * step for run in states]
+    else:
+        times = [cast(Floats, t)] * len(states)
+    if len(times) != len(states):
+        raise ValueError(f"t: must hold times for {len(states)} trajectories, got {len(times)}")
+    return list(zip(times, states, strict=True))

@@ -15,6 +15,7 @@
 * `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
 * `metrics`, `tables`: how good a law is, and many of them side by side.
 * `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
+* `ablation`: our solver without each of its mechanisms.
 * `published`, `audit`: the paper's numbers, and whether they agree with each other.
 * `sweeps`: many tasks in parallel, each computed once.
 * `plots`: a figure a function.
@@ -24,6 +25,7 @@ The names below are at hand at once. Modules that need large libraries are impor
 `plots` matplotlib and seaborn.
 """
 
+from .ablation import ablation_table, ablations, run_ablation
 from .asking import Asked, law_error
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film

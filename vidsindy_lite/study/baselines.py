@@ -173,7 +173,7 @@ BASELINES: dict[str, Callable[..., PolynomialSystem]] = {
 
 
 def candidates(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> list[PolynomialSystem]:
-    """The laws of PySINDy and of Model-A with every threshold, on the whole record.
+    """The laws of PySINDy and of Model-A with every threshold, on the whole record, each once.
 
     From these an oracle can choose, which no user has: see `scoreboard`.
 
@@ -185,13 +185,14 @@ def candidates(t: Floats, x: Floats, degree: int = 3, seed: int = 0) -> list[Pol
     t, x = check_trajectory(t, x)
     library = pysindy.PolynomialLibrary(degree=degree).fit(x)
     segments = _segments((t, x), LONGEST_STEP * typical_step([(t, x)]))
-    return [
-        PolynomialSystem(
-            variable_names(x.shape[1]), library.powers_, _fit(_least_squares(threshold), rows)
-        )
+    found = [
+        _fit(_least_squares(threshold), rows)
         for rows in (_difference_rows(segments, library), _spline_rows(segments, library, seed))
         for threshold in THRESHOLDS
     ]
+    distinct = {coefficients.tobytes(): coefficients for coefficients in found}
+    names = variable_names(x.shape[1])
+    return [PolynomialSystem(names, library.powers_, one) for one in distinct.values()]
 
 
 def _discover(

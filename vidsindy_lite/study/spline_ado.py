@@ -7,12 +7,14 @@ collocation times (Eq. 9b), STRidge with an adaptive hard threshold for the coef
 (P, surviving coefficients, offset), an affine elimination of the offset (Eq. 10), and a small
 value below which coefficients are cut at the end.
 
-Three things the paper leaves open and what is done here:
+Four things the paper leaves open and what is done here:
 
 * The curve is ``G P + offset`` in the data loss and ``G P`` in the library. With the offset in
   both, as one reading of the text has it, it changes nothing, for B-splines sum to one.
 * Data are standardised (coordinates and time divided by their scale, undone at the end): one
   learning rate and one physics weight then serve all systems. The offset starts at the mean.
+* The law is asked for where samples are, or in the next knot span: within a gap the first curve is
+  a guess, to which physics would fit the law.
 * Hyperparameters: see `spline_ado`. "PiSL" there is the public code of the same model by the
   same group (F. Sun, Y. Liu, H. Sun, "Physics-informed Spline Learning for Nonlinear Dynamics
   Discovery", IJCAI 2021), in its Lorenz example.
@@ -25,6 +27,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -44,7 +47,8 @@ from ..dynamics import (
     monomials,
     variable_names,
 )
-from .corruption import drop_blocks
+
+_CURVE = ("control_points", "offset")  # of `_Fit`, what is learned beside the coefficients
 
 ROUGHNESS = 1e-4
 """Weight of the second differences in the first curve: enough to carry it across gaps."""
@@ -122,7 +126,7 @@ class SplineADOSettings:
     knots_per_sample: float = 1.0
     collocation_per_knot: int = 5
     physics_weight: float = 1.0
-    sparsity_weight: float = 0.02
+    sparsity_weight: float = 0.005
     pretraining: int = 2000
     alternations: int = 5
     epochs: int = 1000
@@ -130,9 +134,14 @@ class SplineADOSettings:
     prune: float = 0.1
 
     def __post_init__(self) -> None:
-        least = {"knots_per_sample": 0.1, "collocation_per_knot": 1, "pretraining": 1, "epochs": 1}
+        least = {
+            "knots_per_sample": 0.1, "collocation_per_knot": 1, "physics_weight": 0,
+            "sparsity_weight": 0, "pretraining": 1, "alternations": 0, "epochs": 1,
+            "learning_rate": 1e-12, "prune": 0,
+        }  # fmt: skip
         for name, bound in least.items():
-            if not getattr(self, name) >= bound:
+            value = np.asarray(getattr(self, name))
+            if not ((value >= bound) & np.isfinite(value)).all():
                 raise ValueError(f"{name}: must be at least {bound}, got {getattr(self, name)}")
 
 
@@ -147,7 +156,7 @@ def spline_ado(
     t : array_like, shape (n,)
         Increasing times.
     x : array_like, shape (n, d)
-        States; a row with a NaN is missing. The spline runs on through a gap, held by physics.
+        States; a row with a NaN is missing. No law is asked for within a gap.
     degree : int
         Highest degree of the candidate terms. Paper: 3.
     seed : int
@@ -172,7 +181,7 @@ def spline_ado(
 
 def spline_ado_batch(
     t: Floats, records: Sequence[Floats], degree: int = 3, seeds: Sequence[int] = (),
-    device: str | None = None, **settings: float,
+    device: str | None = None, **settings: Any,
 ) -> list[SplineADOLaw]:  # fmt: skip
     """Discover the laws of several records at the same times, as one computation.
 
@@ -185,15 +194,27 @@ def spline_ado_batch(
     records : sequence of array_like, shape (n, d) each
         States; rows may be missing (NaN) in one record and not in another.
     degree, device, **settings
-        See `spline_ado`.
+        See `spline_ado`; the two weights may be sequences, one a record.
     seeds : sequence of int
         One a record; by default the number of the record.
 
     Returns
     -------
     list of SplineADOLaw
+
+    Raises
+    ------
+    ValueError
+        As `spline_ado` does, if there is no record, records have different shapes, or there is
+        not one seed and weight a record.
     """
-    chosen = SplineADOSettings(**settings)  # type: ignore[arg-type]
+    chosen = SplineADOSettings(**settings)
+    if not len(records) or len({np.shape(x) for x in records}) > 1:
+        shapes = ", ".join(str(np.shape(x)) for x in records) or "none"
+        raise ValueError(f"records: must be at least one, all of one shape, got {shapes}")
+    for name in ("physics_weight", "sparsity_weight"):
+        if np.shape(value := getattr(chosen, name)) not in ((), (len(records),)):
+            raise ValueError(f"{name}: must be one number or one a record, got {value}")
     seeds = list(seeds) or list(range(len(records)))
     if len(seeds) != len(records):
         raise ValueError(f"seeds: must be one a record, {len(records)}, got {len(seeds)}")
@@ -206,7 +227,11 @@ def spline_ado_batch(
         if not (np.ptp(seen, axis=0) > 0).all():
             raise ValueError(f"x: every coordinate must move, got ranges {np.ptp(seen, axis=0)}")
     generators = [np.random.default_rng(check_integer("seed", seed)) for seed in seeds]
-    where = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
+    prices = np.broadcast_to(chosen.sparsity_weight, len(records))
+    try:
+        where = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
+    except RuntimeError as error:
+        raise ValueError(f"device: must be one that PyTorch knows, got {device!r}") from error
     states = np.array([np.asarray(x, dtype=float) for x in records])
     fit = _Fit(check_times(t), states, exponents, chosen, generators, where)
     fit.descend(chosen.pretraining, chosen.learning_rate)
@@ -216,7 +241,7 @@ def spline_ado_batch(
             if fit.open[one]:
                 curve, slope = fit.collocation(one)
                 terms = monomials(curve, exponents)
-                sparse[one] = stridge(terms, slope, rng, chosen.sparsity_weight)
+                sparse[one] = stridge(terms, slope, rng, prices[one])
         changed = ((sparse != 0) != fit.active).any(axis=(1, 2)) & fit.open
         # Where the support is that of before, a last descent from the new coefficients ends it.
         fit.restart(sparse)
@@ -227,31 +252,36 @@ def spline_ado_batch(
     return [fit.result(one, chosen.prune) for one in range(len(records))]
 
 
-def held_out_misfit(
-    t: Floats, x: Floats, seed: int = 0, rate: float = 0.2, **settings: float
-) -> float:
-    """How far the curve of `spline_ado` is from samples that it was not given.
+def held_out_misfits(
+    t: Floats, records: Sequence[Floats], seeds: Sequence[int], rate: float = 0.2, **settings: Any
+) -> list[float]:
+    """How far the curves of `spline_ado` are from samples that they were not given.
 
     Parameters
     ----------
-    t, x, **settings
-        See `spline_ado`.
-    seed : int
-        Also of the blocks that are held out, see `corruption.drop_blocks`.
+    t, records, **settings
+        See `spline_ado_batch`.
+    seeds : sequence of int
+        One a record; also of the samples that are held out.
     rate : float
-        Fraction of the samples that is held out.
+        Fraction of the samples that is held out, each by itself.
 
     Returns
     -------
-    float
-        Root mean square over the spread of each coordinate.
+    list of float
+        Root mean square over the spread of each coordinate, one a record.
     """
-    x = np.asarray(x, dtype=float)
-    given = drop_blocks(x, rate, np.random.default_rng(seed))
-    curve = spline_ado(t, given, 3, seed, None, **settings).curve
-    hidden = np.isnan(given).any(axis=1) & ~np.isnan(x).any(axis=1)
-    off = (curve - x)[hidden] / np.nanstd(x, axis=0)
-    return float(np.sqrt((off**2).mean()))
+    states = [np.asarray(x, dtype=float) for x in records]
+    given = []
+    for x, seed in zip(states, seeds, strict=True):
+        out = np.random.default_rng(seed).random(len(x)) < rate
+        given.append(np.where(out[:, None], np.nan, x))
+    misfits = []
+    laws = spline_ado_batch(t, given, 3, seeds, None, **settings)
+    for x, seen, law in zip(states, given, laws, strict=True):
+        off = (law.curve - x)[np.isnan(seen[:, 0]) & ~np.isnan(x[:, 0])] / np.nanstd(x, axis=0)
+        misfits.append(float(np.sqrt((off**2).mean())))
+    return misfits
 
 
 class _Fit:
@@ -269,7 +299,7 @@ class _Fit:
         self.began = time.perf_counter()
         self.device = device
         self.exponents = exponents
-        self.physics_weight = settings.physics_weight
+        alpha = np.broadcast_to(settings.physics_weight, len(states))
         self.open = np.ones(len(states), dtype=bool)
         self.history: list[list[dict[str, float]]] = [[] for _ in states]
         self.iteration = 0
@@ -280,7 +310,11 @@ class _Fit:
         seen = np.asarray(~np.isnan(states).any(axis=2))
         shape = (settings.collocation_per_knot, spans)
         self.units, data, controls, bases = [], [], [], []
-        for x, rows, rng in zip(states, seen, generators, strict=True):
+        # Spans that hold samples, and their neighbours: there the law is asked for.
+        self.held = np.zeros((len(states), spans), dtype=bool)
+        for x, rows, held, rng in zip(states, seen, self.held, generators, strict=True):
+            held[first[rows]] = True
+            held |= np.append(held[1:], False) | np.append(False, held[:-1])
             centre, scale = x[rows].mean(axis=0), x[rows].std(axis=0)
             standard = np.where(rows[:, None], (x - centre) / scale, 0.0)
             control = _first_curve(first[rows], values[rows], standard[rows], spans + DEGREE)
@@ -292,13 +326,17 @@ class _Fit:
                 for order in (0, 1)
             )
             slope = _curve(torch.tensor(slopes)[None], torch.tensor(control.T)[None])
-            units = Units(centre, scale, time=float(1 / slope.std(dim=(2, 3), correction=0).mean()))
+            spread = slope[..., torch.tensor(held)].std(dim=(2, 3), correction=0)
+            units = Units(centre, scale, time=float(1 / spread.mean()))
             self.units.append(units)
             data.append(standard.T)
             controls.append(control.T)
             bases.append(np.concatenate([basis, slopes * units.time], axis=1))
         self.data = self._tensor(data)
         self.weights = self._tensor((seen / seen.sum(axis=1, keepdims=True))[:, None])
+        every = np.tile(self.held, shape[0])  # collocation time by collocation time
+        self.shares = self._tensor((every / every.sum(axis=1, keepdims=True))[:, None])
+        self.physics_weight = self._tensor(np.array(alpha))[:, None, None]
         # The spline at the samples, as a matrix with four entries a row.
         rows, columns = np.repeat(np.arange(len(t)), DEGREE + 1), first[:, None] + np.arange(4)
         sampling = csr_array((values.ravel(), (rows, columns.ravel())), (len(t), spans + DEGREE))
@@ -338,7 +376,7 @@ class _Fit:
     def collocation(self, one: int) -> tuple[Floats, Floats]:
         """Curve without offset and slope of a record at its collocation times, each (k, d)."""
         both = _curve(self.basis[one : one + 1], self.control_points[one : one + 1])[0]
-        halves = both.numpy(force=True).reshape(len(both), 2, -1)
+        halves = both.numpy(force=True)[..., self.held[one]].reshape(len(both), 2, -1)
         return halves[:, 0].T, halves[:, 1].T
 
     def losses(self) -> tuple[torch.Tensor, torch.Tensor]:
@@ -359,17 +397,17 @@ class _Fit:
         coefficients = (self.coefficients * self.mask)[:, rows]
         law = torch.bmm(coefficients.transpose(1, 2), products)
         residual = slopes.reshape(law.shape) - law
-        per_time = 2 * self.physics_weight / residual.shape[2]
-        physics_loss = (residual**2).sum(dim=(1, 2)) / residual.shape[2]
+        pull = self.shares * residual
+        physics_loss = (pull * residual).sum(dim=(1, 2))
 
-        by_coefficient = -per_time * torch.bmm(products, residual.transpose(1, 2))
+        pull *= 2 * self.physics_weight
         gradient = torch.zeros_like(self.coefficients)
-        gradient[:, rows] = by_coefficient
+        gradient[:, rows] = -torch.bmm(products, pull.transpose(1, 2))
         self.coefficients.grad = gradient * self.mask
         pulled = torch.empty_like(both)
-        by_point = self.terms.jacobian(coefficients, products).mul_(residual[:, None]).sum(dim=2)
-        pulled[:, :, :half] = (-per_time * by_point).view_as(points)
-        pulled[:, :, half:] = (per_time * residual).view_as(slopes)
+        by_point = self.terms.jacobian(coefficients, products).mul_(pull[:, None]).sum(dim=2)
+        pulled[:, :, :half] = by_point.neg_().view_as(points)
+        pulled[:, :, half:] = pull.view_as(slopes)
         gradient = torch.zeros_like(self.control_points)
         spans = self.basis.shape[3]
         for a in range(DEGREE + 1):
@@ -401,7 +439,7 @@ class _Fit:
                 self._report(np.flatnonzero(going), *losses)
         if kept is not self:
             at = torch.tensor(going, device=self.device)
-            for name in ("control_points", "coefficients", "offset"):
+            for name in ("coefficients", *_CURVE):
                 getattr(self, name)[at] = getattr(kept, name)
 
     def _part(self, which: np.ndarray) -> "_Fit":
@@ -409,7 +447,7 @@ class _Fit:
         part = object.__new__(_Fit)
         part.__dict__.update(self.__dict__)
         at = torch.tensor(which, device=self.device)
-        for name in ("data", "weights", "basis", "control_points", "offset"):
+        for name in ("physics_weight", "data", "weights", "shares", "basis", *_CURVE):
             setattr(part, name, getattr(self, name)[at])
         part.restart(self.coefficients.numpy(force=True)[which])
         return part

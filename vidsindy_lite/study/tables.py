@@ -89,7 +89,8 @@ def summary(trials: DataFrame, by: str | list[str]) -> DataFrame:
         One row a group, in the order of their first trials: in how many trials the terms are the
         true ones and no others; wrong terms, missing or false, trial by trial; median and range of
         the relative l2 error, medians of precision and recall; exact laws that are doubted and
-        wrong ones that are not, None for methods without a status; processor time of a trial.
+        wrong ones that are not, None for methods without a status; trials whose cameras could not
+        be learned; processor time of a trial.
         Errors have two significant digits, and one below `LEAST` is given as that: the rest is
         rounding noise.
     """
@@ -98,7 +99,8 @@ def summary(trials: DataFrame, by: str | list[str]) -> DataFrame:
         return significant(100 * max(value, LEAST))
 
     def count(verdict: str) -> Callable[[Series], int | None]:
-        return lambda v: None if v.str.endswith("None").all() else int((v == verdict).sum())
+        silent = ("None", "refused")
+        return lambda v: None if v.str.endswith(silent).all() else int((v == verdict).sum())
 
     rows = trials.groupby(by, sort=False).agg(
         **{
@@ -111,6 +113,7 @@ def summary(trials: DataFrame, by: str | list[str]) -> DataFrame:
             "recall (%)": ("recall", lambda values: round(100 * values.median(), 2)),
             "exact, doubted": ("verdict", count("exact, suspect")),
             "wrong, ok": ("verdict", count("wrong, ok")),
+            "no path": ("verdict", lambda v: int(v.str.endswith("refused").sum())),
             "seconds": ("seconds", "median"),
         }
     )

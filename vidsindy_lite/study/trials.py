@@ -18,13 +18,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from ..cameras import learn_cameras_eq4, reconstruct
 from ..checks import check_choice
 from ..dynamics import Discovery, PolynomialSystem, discover
 from ..observation import observe_tracks
 from ..refusal import Refused
 from .corruption import add_noise, drop_blocks, drop_fibers
-from .films import TOGETHER, FilmTask, film_result
+from .films import FilmTask, film_result
 from .metrics import Score, pulls, score
 from .sweeps import sweep
 from .systems import REFERENCE_OFFSET, SYSTEMS
@@ -38,8 +37,8 @@ CORRUPTIONS: dict[str, Callable[[Floats, float, np.random.Generator], Floats]] =
 CONDITIONS = ("clean", *CORRUPTIONS)
 METHODS = ("Gauss-Newton", "spline-ADO", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
 """`dynamics.discover`, the paper's own optimiser (`spline_ado`), and `baselines.BASELINES`."""
-RANDOM_METHODS = ("spline-ADO", "E-SINDy", "WeakSINDy", "Model-A")
-"""Those that draw random numbers: the number of the trial is their seed."""
+RANDOM_METHODS = ("E-SINDy", "WeakSINDy", "Model-A")
+"""The baselines that draw random numbers: the number of the trial is their seed."""
 SOURCES = ("detector", "sub-pixel", "path", "truth")
 """Where a path comes from, and what a condition is done to: tracks of the learned detector in
 whole pixels (the paper's regime), and tracks of the background model, before cameras are learned
@@ -129,7 +128,7 @@ class TrialResult:
         Of processor time from path to law, the mean of the draws that were run together.
     status : str or None
         ``"ok"`` or ``"suspect"``, as `discover_from_tracks` says; None for the methods that do not
-        say.
+        say; ``"refused"`` for all of them where the cameras could not be learned.
     warnings : tuple of str
         Of the observation and of the law.
     promised_l2 : float or None
@@ -219,14 +218,20 @@ def run_comparison(comparison: Comparison) -> list[TrialResult]:
         One a trial. All draws of spline-ADO are one computation, whose time they share.
     """
     data = {trial.trial: trial_path(trial) for trial in comparison.trials}
-    results = {}
+    results: dict[Trial, TrialResult] = {}
     for method in dict.fromkeys(trial.method for trial in comparison.trials):
         mine = [trial for trial in comparison.trials if trial.method == method]
-        draws = [data[trial.trial] for trial in mine]
+        able = [trial for trial in mine if np.isfinite(data[trial.trial].x).any()]
+        results |= {
+            trial: _refused(trial, data[trial.trial].warnings)
+            for trial in mine
+            if trial not in able
+        }
+        draws = [data[trial.trial] for trial in able]
         began = time.process_time()
-        laws = _laws(method, draws, [trial.trial for trial in mine])
-        seconds = (time.process_time() - began) / len(mine)
-        for trial, draw, law in zip(mine, draws, laws, strict=True):
+        laws = _laws(method, draws, [trial.trial for trial in able])
+        seconds = (time.process_time() - began) / max(len(able), 1)
+        for trial, draw, law in zip(able, draws, laws, strict=True):
             results[trial] = _result(trial, law, seconds, draw.warnings)
     return [results[trial] for trial in comparison.trials]
 
@@ -251,7 +256,8 @@ def trial_path(trial: Trial) -> TrialPath:
     -------
     TrialPath
         In the reference frame; the systematic errors are known where cameras were learned. Where
-        `observe_tracks` refuses, the cameras are those of Eq. (4), and the refusal is a warning.
+        the cameras cannot be learned from the tracks, all rows are missing and the warning says
+        why.
     """
     filmed = film_result(trial.film)
     if trial.source == "truth":
@@ -263,13 +269,18 @@ def trial_path(trial: Trial) -> TrialPath:
     whole = trial.source == "detector"
     tracks = trial.corrupt_each(filmed.detected if whole else filmed.tracks)
     tracks = [np.round(track) if whole else track for track in tracks]
-    start = filmed.rig.uncalibrated(keep=0)
     try:
-        seen = observe_tracks(tracks, start, filmed.t, lags=TOGETHER)
-    except Refused as refusal:  # a user ends here; the paper has no such check, so Eq. (4) goes on
-        path = reconstruct(tracks, learn_cameras_eq4(tracks, start))
-        return TrialPath(filmed.t, path, None, (str(refusal),))
+        seen = observe_tracks(tracks, filmed.rig.uncalibrated(keep=0), filmed.t, lags="synchronous")
+    except Refused as refusal:
+        return TrialPath(filmed.t, np.full(filmed.x.shape, np.nan), None, (str(refusal),))
     return TrialPath(seen.t, seen.x, seen.systematic, seen.warnings)
+
+
+def _refused(trial: Trial, warnings: tuple[str, ...]) -> TrialResult:
+    """Without cameras there is no path, and no method has a law: one without any term."""
+    truth = SYSTEMS[trial.system].shift(REFERENCE_OFFSET)
+    nothing = replace(truth, coefficients=np.zeros_like(truth.coefficients))
+    return TrialResult(trial, nothing, score(nothing, truth), 0.0, "refused", warnings)
 
 
 def _result(
@@ -301,6 +312,8 @@ def _laws(
             find_law(method, t, x, systematic, seed)
             for (t, x, systematic, _), seed in zip(draws, seeds, strict=True)
         ]
+    if not draws:
+        return []
     from .spline_ado import spline_ado_batch  # torch takes seconds to import
 
     found = spline_ado_batch(draws[0].t, [draw.x for draw in draws], seeds=seeds)
@@ -316,17 +329,13 @@ def find_law(
     degree: int = 3,
     origin: str = "learn",
 ) -> Discovery | PolynomialSystem:
-    """What one of the `METHODS` finds.
+    """What Gauss-Newton or one of the baselines finds in one record.
 
-    Only Gauss-Newton can use what is known of systematic errors. It and spline-ADO look for the
-    law's origin, which the former can be told.
+    Only Gauss-Newton can use what is known of systematic errors, and looks for the law's origin,
+    which it can be told.
     """
     if method == "Gauss-Newton":
         return discover(t, x, degree=degree, systematic=systematic, order=1, origin=origin)
-    if method == "spline-ADO":
-        from .spline_ado import spline_ado
-
-        return spline_ado(t, x, degree, seed).system
     from .baselines import BASELINES  # pysindy takes seconds to import
 
     options = {"seed": seed} if method in RANDOM_METHODS else {}
@@ -335,27 +344,29 @@ def find_law(
 
 @dataclass(frozen=True)
 class Weights:
-    """A pair of weights of spline-ADO to be judged on the data of a trial.
+    """Pairs of weights of spline-ADO to be judged on the data of a trial.
 
     Parameters
     ----------
     trial : Trial
-    physics_weight, sparsity_weight : float
-        See `spline_ado.SplineADOSettings`.
+    pairs : tuple of tuple of float
+        ``physics_weight`` and ``sparsity_weight`` of each, see `spline_ado.SplineADOSettings`.
     """
 
     trial: Trial
-    physics_weight: float
-    sparsity_weight: float
+    pairs: tuple[tuple[float, float], ...]
 
 
-def run_weights(weights: Weights) -> float:
-    """The misfit of held-out samples with these weights, see `spline_ado.held_out_misfit`."""
-    from .spline_ado import held_out_misfit
+def run_weights(weights: Weights) -> list[float]:
+    """The misfit of held-out samples with each pair, see `spline_ado.held_out_misfits`."""
+    from .spline_ado import held_out_misfits
 
-    path = trial_path(weights.trial)
-    chosen = {"physics_weight": weights.physics_weight, "sparsity_weight": weights.sparsity_weight}
-    return held_out_misfit(path.t, path.x, weights.trial.trial, **chosen)
+    path, number = trial_path(weights.trial), len(weights.pairs)
+    alphas, betas = zip(*weights.pairs, strict=True)
+    seeds = [weights.trial.trial] * number
+    return held_out_misfits(
+        path.t, [path.x] * number, seeds, physics_weight=alphas, sparsity_weight=betas
+    )
 
 
 def grid(

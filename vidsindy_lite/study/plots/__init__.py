@@ -12,7 +12,7 @@ from .paths import plot_attractors, plot_coefficients, plot_divergence, plot_gap
 from .paths import plot_forecast, plot_path, plot_sampling
 from .robustness import plot_methods, plot_pull_distribution, plot_pulls, plot_ratios
 from .robustness import plot_recomputed, plot_robustness, plot_shares, plot_verdicts
-from .robustness import plot_what_l2_sees
+from .robustness import plot_weights, plot_what_l2_sees
 from .scoreboard import plot_lorenz_grids, plot_standings
 from .solver import plot_asked, plot_basis, plot_collocation, plot_errors_and_bound
 from .solver import plot_histories, plot_normal_matrix, plot_origin_map, plot_price, plot_ranks

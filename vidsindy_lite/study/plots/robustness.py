@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # pandas and seaborn are imported where they draw
 _STYLES = {
     "Gauss-Newton": ("C0", "o"), "spline-ADO": ("C5", "P"), "PySINDy": ("C1", "s"),
     "E-SINDy": ("C2", "^"), "WeakSINDy": ("C3", "v"), "Model-A": ("C4", "D"),
+    "SINDy, oracle": ("0.5", "*"),
 }  # fmt: skip
 COLOURS = {name: colour for name, (colour, _) in _STYLES.items()}
 MARKERS = {name: marker for name, (_, marker) in _STYLES.items()}
@@ -73,7 +74,8 @@ def plot_robustness(
     grid[1, 0].set(ylabel="wrong terms", ylim=(-0.5, max(3.5, grid[1, 0].get_ylim()[1])))
     grid[1, 0].locator_params(axis="y", integer=True)
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    columns = len(labels) if len(conditions) > 1 else 3
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(labels)))
     return figure
 
 
@@ -83,6 +85,35 @@ def _beside(trials: DataFrame) -> DataFrame:
     level = 100 * trials.level
     shift = 0.006 * np.ptp(level) * (rank - rank.max() / 2)
     return trials.assign(**{"l2 (%)": 100 * trials.l2, "place": level + shift})
+
+
+def plot_weights(
+    misfits: Floats, alphas: Sequence[float], betas: Sequence[float], conditions: Sequence[str]
+) -> Figure:
+    """Misfit of held-out samples by the two weights of spline-ADO, geometric means over systems.
+
+    Parameters
+    ----------
+    misfits : ndarray, shape (a, b, systems, conditions)
+        Over the spread of the motion.
+    alphas, betas : sequence of float
+        Weights of the physics loss (rows) and of the terms (columns).
+    conditions : sequence of str
+        One panel each, and one for all.
+    """
+    figure, panels = plt.subplots(1, len(conditions) + 1, figsize=(9.5, 3))
+    parts = [misfits[..., k] for k in range(len(conditions))]
+    for axes, title, values in zip(panels, (*conditions, "all"), (*parts, misfits), strict=True):
+        logarithms = np.log(values).reshape(len(alphas), len(betas), -1).mean(axis=2)
+        axes.imshow(logarithms, cmap="Blues", aspect="auto", alpha=0.6)
+        for (i, j), value in np.ndenumerate(100 * np.exp(logarithms)):
+            axes.text(j, i, f"{value:.3g} %", ha="center", va="center")
+        axes.set(title=title, xlabel=r"$\beta$")
+        axes.set_xticks(range(len(betas)), [f"{b:g}" for b in betas])
+        axes.set_yticks(range(len(alphas)), [f"{a:g}" for a in alphas])
+        axes.grid(visible=False)
+    panels[0].set_ylabel(r"$\alpha$")
+    return figure
 
 
 def plot_shares(shares: DataFrame) -> Figure:

@@ -32,7 +32,7 @@ def plot_standings(panels: Mapping[str, DataFrame]) -> Figure:
     )  # fmt: skip
     for axes, (title, shares) in zip(grid[:, 0], panels.items(), strict=True):
         rows = np.arange(len(shares))[::-1]
-        # Later ones lie on top: ours is drawn last, and the others a little apart.
+        # Later ones lie on top: Gauss-Newton is drawn last, and the others a little apart.
         for k, method in reversed(list(enumerate(map(str, shares)))):
             style = {"color": COLOURS[method], "marker": MARKERS[method], "label": method}
             place = rows + 0.11 * (k - (shares.shape[1] - 1) / 2)
@@ -41,7 +41,7 @@ def plot_standings(panels: Mapping[str, DataFrame]) -> Figure:
         axes.set(xlim=(0, 100), ylim=(-0.6, len(shares) - 0.4), title=title)
     grid[-1, 0].set_xlabel("exact laws (%)")
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles[::-1], labels[::-1], loc="outside upper center", ncols=len(labels))
+    figure.legend(handles[::-1], labels[::-1], loc="outside upper center", ncols=3)
     return figure
 
 

@@ -24,8 +24,16 @@ BATCH = 1_000_000
 """Most numbers of an array over newcomers, those outside and those inside."""
 PLATEAU = 1e-6
 """Changes of the function below this are taken for rounding."""
+MOST_CHANGES = 4
+"""Most changes of a support on its way down, for each entry that there is."""
 NOTHING = 1e-250
 """Least information; its inverse, even over the ridge, is still a number."""
+DEPENDENT = 1e-9
+"""Share of a term that those of the law leave, below which they have it already."""
+FAR = 4.0
+"""Standard errors of a coefficient beyond which another law has another coefficient."""
+LEAST = 1e-300
+"""Keeps a quotient or a logarithm finite where there is nothing."""
 RIDGE = 1e-12
 """Keeps a matrix with dependent columns solvable; what it cannot tell gets a huge variance."""
 
@@ -245,7 +253,10 @@ def _search(model: _Quadratic, start: Bools) -> _Fit:
     """The lowest value from a support and from nothing, and through newcomers from there."""
     starts = (start, np.isneginf(model.penalty))
     best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
-    while (deeper := _through_newcomer(model, best)) is not None:
+    for _ in range(MOST_CHANGES * len(start)):
+        deeper = _through_newcomer(model, best)
+        if deeper is None:
+            break
         best = deeper
     return best
 
@@ -256,7 +267,7 @@ def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
     Or until as many changes like the best as there are entries would still not reach the goal.
     """
     best = model.fit(start)
-    while True:
+    for _ in range(MOST_CHANGES * len(start)):
         changes = _single_changes(model, model.tableau(best))
         change, dropped, added = min(changes, key=lambda item: item[0])
         if not change < -PLATEAU or best.value + len(best.inside) * change > goal:
@@ -266,6 +277,7 @@ def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
         if not fit.value < best.value - PLATEAU:
             return best
         best = fit
+    return best
 
 
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
@@ -448,3 +460,96 @@ def inverse(information: Floats) -> Floats:
     """The covariance that belongs to an information matrix, shape (m, m)."""
     matrix, scale = equilibrated(information)
     return np.linalg.inv(matrix) * scale[:, None] * scale
+
+
+def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, Floats]:
+    """What each further column would be, (k,), if it alone joined the first ``own``, fitted anew.
+
+    Its estimate and its variance: 0 and infinity where it is a combination of the first.
+    """
+    response = inverse(information[:own, :own]) @ information[:own, own:]
+    left = gradient[own:] - gradient[:own] @ response
+    whole = np.diag(information)[own:]
+    apart = whole - (information[:own, own:] * response).sum(axis=0)
+    new = apart > DEPENDENT * whole
+    room = np.where(new, apart, 1.0)
+    return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)
+
+
+# --------------------------------------------------------------------------------------------------
+# How likely a law is next to which a law's coefficients are elsewhere than their errors say.
+#
+# The standard errors of a law hold if its terms are the right ones. A law with one term more, one
+# less or one in place of another may fit a little worse, or better by less than the price of a
+# term, and have other coefficients: where a motion tells the sum of two dampings alone, the law
+# that gives all of it to one of them has an error that is ten times too small. So the laws next to
+# a law are weighed by their evidence (Laplace's approximation; Madigan and Raftery 1994), and those
+# count that are far away in units of the errors that are told.
+
+
+def prior_prices(exponents: Ints) -> Floats:
+    """Twice the log odds that an equation lacks a term of each kind, shape (l,).
+
+    An equation has one linear term by expectation, half a quadratic one and so on, and a constant
+    as likely as not; a coefficient is as large as 1 in standard units.
+    """
+    degrees = exponents.sum(axis=1)
+    chance = 2.0 ** (1 - degrees) / np.bincount(degrees)[degrees]
+    return 2 * np.log(1 / np.minimum(chance, 0.5) - 1)
+
+
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of columns that are combinations
+def far_neighbours(
+    information: Floats, gradient: Floats, present: Floats, price: Floats, support: Bools
+) -> tuple[float, Ints, Ints, int, float]:
+    """The odds of the neighbours of a support that have other entries, and the likeliest of them.
+
+    Parameters
+    ----------
+    information, gradient, present : ndarray
+        See `subset_search`; in units in which an entry is as large as 1.
+    price : ndarray, shape (m,)
+        Twice the log odds that an entry is zero.
+    support : ndarray of bool, shape (m,)
+        Of which a neighbour has one entry more, one less or one in place of another.
+
+    Returns
+    -------
+    odds : float
+        Probability of all that have an entry more than `FAR` errors away, if the law is the support
+        or one of its neighbours.
+    dropped, added : ndarray of int
+        The entries that the likeliest of them drops and adds.
+    entry : int
+        Which of the support it has farthest away, ...
+    value : float
+        ... and what that is there.
+    """
+    matrix, scale = equilibrated(information)
+    own, others = np.flatnonzero(support), np.flatnonzero(~support)
+    shared = matrix[np.ix_(others, own)]
+    inverse = np.linalg.inv(matrix[np.ix_(own, own)])
+    pull, spread = matrix @ (present / scale) + gradient * scale, np.diag(inverse)
+    fitted, response = inverse @ pull[own], shared @ inverse
+    # First axis: the entry that leaves, last of all none; second: the one that joins, likewise.
+    leaves, none = np.eye(len(own) + 1, len(own), dtype=bool)[:, None], np.zeros((1, len(own)))
+    out, gone = np.vstack([inverse / spread[:, None], none]), np.append(fitted, 0.0)[:, None]
+    lost = fitted**2 / spread + np.log(spread * scale[own] ** 2) - price[own]
+    along = np.vstack([(response / spread).T, np.zeros((1, len(others)))])
+    freed = along * np.append(spread, 0.0)[:, None]
+    left = pull[others] - response @ pull[own] + along * gone
+    room = 1 - (response * shared).sum(axis=1) + along * freed
+    new = room > COLLINEAR
+    step = np.where(new, left / room, 0.0)
+    joined = np.where(new, np.log(room / scale[others] ** 2) + price[others] - left * step, np.inf)
+    cost = np.append(lost, 0.0)[:, None] + np.hstack([joined, np.zeros((len(own) + 1, 1))])
+    gives = np.concatenate([response - freed[:, :, None] * out[:, None], 0.0 * leaves], axis=1)
+    values = (fitted - out * gone)[:, None] - gives * np.hstack([step, 0.0 * gone])[:, :, None]
+    values = np.where(leaves, 0.0, values)
+    away = np.abs(values - fitted) / np.sqrt(spread)
+    weight = np.exp((cost.min() - cost) / 2)
+    weight = np.where((away > FAR).any(axis=2), weight / weight.sum(), 0.0)
+    drop, add = np.unravel_index(weight.argmax(), weight.shape)
+    entry = int(away[drop, add].argmax())
+    value = float(values[drop, add, entry] * scale[own[entry]])
+    return float(weight.sum()), own[drop : drop + 1], others[add : add + 1], int(own[entry]), value

@@ -1,16 +1,22 @@
-"""Measured trajectories: checked input, and its cut into stretches without gaps."""
+"""Trajectories as they are measured: checks, gaps, typical steps, and their standard units."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..checks import FARTHEST, check_array, check_times
 from .library import variable_names
 
+# --------------------------------------------------------------------------------------------------
+# Measured trajectories: checked input, and its cut into stretches without gaps.
+
+CHANCE = 4.0
+"""Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent."""
 Trajectory = tuple[Floats, Floats]
 """Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was."""
 
@@ -243,3 +249,75 @@ def typical_steps(trajectories: Sequence[Trajectory]) -> Floats:
             own = [(t[rows], x[rows]) for (t, x), rows in zip(trajectories, seen, strict=True)]
             steps[j] = typical_step(own) / whole
     return steps
+
+
+# --------------------------------------------------------------------------------------------------
+# Standard units, in which a fit is made, and those of the data.
+
+
+@dataclass(frozen=True)
+class Units:
+    """Standard units of a fit: every coordinate with mean 0 and variance 1, time in time scales.
+
+    Parameters
+    ----------
+    centre, scale : ndarray, shape (d,)
+        Mean and standard deviation of the data.
+    time : float
+        Length of a standard time unit.
+    sizes : ndarray, shape (k,) or (k + d,)
+        Root mean squares of the functions of the state in the library; of an implicit law also
+        the units of the slopes.
+    scale_errors : ndarray, shape (m, d)
+        By what share each of m independent causes, off by one standard error, scales a coordinate.
+    """
+
+    centre: Floats
+    scale: Floats
+    time: float
+    sizes: Floats = field(default_factory=lambda: np.empty(0))
+    scale_errors: Floats = field(default_factory=lambda: np.empty((0, 0)))
+
+    def standard(self, point: Floats) -> Floats:
+        """A point of the data's frame in standard units."""
+        return (point - self.centre) / self.scale
+
+    def point(self, standard: Floats) -> Floats:
+        """A standard point in the data's frame and units."""
+        return standard * self.scale + self.centre
+
+    def factors(self, exponents: Ints) -> Floats:
+        """What turns standard coefficients into those of the data's units, shape (l, d)."""
+        scales = np.append(self.scale, self.sizes)
+        return self.scale / np.prod(scales**exponents, axis=1)[:, None] / self.time
+
+
+def inflation(pieces: Sequence[Floats]) -> Floats:
+    """Variance of a mean of errors over what it were if they were independent, at least 1, (d,).
+
+    The sum of the autocorrelations over all lags, as long as those of neighbouring lags together
+    are positive (Geyer 1992, initial positive sequence); 1 where the first lag is no more than
+    chance.
+
+    Parameters
+    ----------
+    pieces : sequence of ndarray, shape (n_i, d)
+        Errors of successive samples, of mean zero.
+    """
+    covariances = autocovariances(pieces)
+    result = np.ones(covariances.shape[1])
+    limit = CHANCE / np.sqrt(max(sum(map(len, pieces)), 1))
+    for j, covariance in enumerate(covariances.T):
+        if covariance[1:].any() and covariance[1] > limit * covariance[0]:
+            even = len(covariance) // 2 * 2
+            pairs = covariance[:even].reshape(-1, 2).sum(axis=1) / covariance[0]
+            positive = len(pairs) if (pairs > 0).all() else int((pairs <= 0).argmax())
+            result[j] = max(2 * pairs[:positive].sum() - 1, 1.0)
+    return result
+
+
+def autocovariances(pieces: Sequence[Floats]) -> Floats:
+    """Sums of the products of errors so many samples apart, over all pieces, (lags, d)."""
+    size = 2 * max(max(len(piece) for piece in pieces), 1)
+    powers = [np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces]
+    return np.fft.irfft(np.sum(powers, axis=0), size, axis=0)[: size // 2]

@@ -1,0 +1,343 @@
+"""The path of laws: a first law, smooth errors, plateaus that compete, and which law persists."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from vidsindy_lite.dynamics import path as paths
+from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
+from vidsindy_lite.dynamics.data import check_trajectory
+from vidsindy_lite.dynamics.library import Library
+from vidsindy_lite.dynamics.model import Form, PolynomialSystem, State
+from vidsindy_lite.dynamics.path import LARGEST, History, Path, Plateau
+from vidsindy_lite.dynamics.problem import fit_curves, pose
+from vidsindy_lite.dynamics.solver import discover
+from vidsindy_lite.study import (
+    REFERENCE_OFFSET,
+    SYSTEMS,
+    FlowContest,
+    OdeContest,
+    add_noise,
+    corruption,
+    score,
+)
+
+DUFFING = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5}}, degree=3)
+
+
+@pytest.fixture(scope="module")
+def swing():
+    t = np.linspace(0, 30, 600)
+    return t, DUFFING.simulate(t, (1.5, 0))
+
+
+def bent(x, share):
+    """Every coordinate is off by a smooth function of the next."""
+    place = (x - x.mean(axis=0)) / np.ptp(x, axis=0)
+    return x + share * np.ptp(x, axis=0) * np.sin(4 * np.roll(place, 1, axis=1))
+
+
+def drifting(t, x, share):
+    """A slow wander, less than one period over all the record."""
+    wander = np.stack([np.sin(2 * np.pi * (0.7 * t / t[-1] + phase)) for phase in (0.1, 0.6)], 1)
+    return x + share * x.std(axis=0) * wander
+
+
+def test_a_plateau_is_measured_in_decades():
+    assert Plateau(0, 0.01, 1.0, np.ones(3, dtype=bool)).decades == pytest.approx(2)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.2])
+def test_a_path_leads_from_the_errors_left_to_no_law_without_a_break(swing, noise):
+    t, x = swing
+    found = discover(t, add_noise(x, noise, np.random.default_rng(0)))
+    for j, path in enumerate(found.path):
+        assert path[-1].high == pytest.approx(LARGEST)
+        assert path[0].low == pytest.approx(max(noise, 1e-5), rel=0.3)
+        assert all(p.equation == j and p.low < p.high for p in path)
+        for lower, higher in zip(path, path[1:], strict=False):
+            assert lower.high == pytest.approx(higher.low)
+            assert (lower.terms != higher.terms).any()
+
+
+def test_the_law_of_exact_data_is_the_same_over_four_decades(swing):
+    found = discover(*swing)
+    for j, path in enumerate(found.path):
+        widest = max(path, key=lambda plateau: plateau.decades)
+        assert widest.decades > 3.5
+        assert (widest.terms == found.native.support[:, j]).all()
+    assert found.status == "ok"
+
+
+@pytest.mark.parametrize("share", [0.0001, 0.001])
+def test_a_bent_space_does_not_become_terms(swing, share):
+    t, x = swing
+    found = discover(t, bent(x, share))
+    assert score(found, DUFFING).exact
+
+
+def test_a_drift_does_not_become_terms(swing):
+    t, x = swing
+    assert score(discover(t, drifting(t, x, 0.002)), DUFFING).exact
+
+
+def test_a_coarse_integration_does_not_become_terms():
+    truth = SYSTEMS["SprottE"].shift(REFERENCE_OFFSET)
+    t, exact = truth.trajectory(600)
+    path = solve_ivp(lambda _, x: truth(x), (0, t[-1]), exact[0], t_eval=t, rtol=1e-4)
+    assert score(discover(t, path.y.T), truth).exact
+
+
+def test_without_tolerated_errors_smooth_ones_do_become_terms(swing, monkeypatch):
+    """The gate of the tests above: they fail where the path is not followed."""
+    t, x = swing
+    monkeypatch.setattr(paths, "TOLERATED", 0.0)
+    monkeypatch.setattr(paths, "SMOOTH", 0.0)
+    assert not score(discover(t, bent(x, 0.001)), DUFFING).exact
+
+
+def test_a_small_term_is_found_where_the_errors_allow_it():
+    law = PolynomialSystem.from_terms(
+        {"x": {"y": 1}, "y": {"x": -1, "y": -0.05, "x^3": -0.02}}, degree=3
+    )
+    t = np.linspace(0, 40, 800)
+    x = law.simulate(t, (1.5, 0))
+    assert score(discover(t, x), law).exact
+    assert score(discover(t, add_noise(x, 0.005, np.random.default_rng(0))), law).exact
+
+
+def test_a_law_that_hangs_on_the_tolerated_error_is_told(swing):
+    t, x = swing
+    tiny = PolynomialSystem.from_terms(
+        {"x": {"y": 1}, "y": {"x": -0.5, "x^3": -0.5, "y": -0.0001}}, degree=3
+    )
+    found = discover(t, tiny.simulate(t, (1.5, 0)))
+    assert found.status == "suspect"
+    (warning,) = found.warnings
+    assert warning.startswith("dy/dt is settled by how large an error is tolerated")
+    assert "and without y from 0.01 to" in warning
+
+
+def test_errors_that_last_widen_the_error_bars(swing):
+    t, x = swing
+    rng = np.random.default_rng(3)
+    white = 0.02 * x.std(axis=0) * rng.standard_normal(x.shape)
+    smooth = np.apply_along_axis(np.convolve, 0, white, np.ones(9) / 3, "same")
+    one, nine = discover(t, x + white), discover(t, x + smooth)
+    assert score(nine, DUFFING).exact
+    live = one.system.support
+    assert (nine.standard_errors[live] > 2 * one.standard_errors[live]).all()
+
+
+@pytest.mark.parametrize(("flow", "seed"), [("RayleighBenard", 0), ("SprottF", 3)])
+def test_times_that_are_not_exact_do_not_become_terms(flow, seed, monkeypatch):
+    truth = SYSTEMS[flow].shift(REFERENCE_OFFSET)
+    t, x = truth.trajectory(600)
+    x = corruption.jitter(x, 0.3, np.random.default_rng(seed))
+    found = discover(t, x)
+    assert score(found, truth).exact
+    assert found.status == "ok", found.warnings
+    monkeypatch.setattr(paths, "time_inflation", lambda fit: 1.0)
+    assert not score(discover(t, x), truth).exact
+
+
+def test_data_are_nearly_exact_if_their_coordinates_are_on_the_average():
+    """One coordinate is off by 1.1e-4 of its spread, the other by 4e-5: an integrator's errors."""
+    data = OdeContest(41, 1).data()
+    assert score(discover(data.t, data.x, order=1), data.truth).exact
+
+
+CIRCLE = PolynomialSystem.from_terms({"x": {"y": -1}, "y": {"x": 1}}, degree=2)
+
+
+def posed(times, degree=2):
+    runs = [check_trajectory(t, CIRCLE.simulate(t, (1, 0.5))) for t in times]
+    shared = [np.empty((*x.shape, 0)) for _, x in runs]
+    form = Form.of(("x", "y"), Library.polynomial(degree))
+    return pose(runs, shared, form, np.random.default_rng(0))
+
+
+def test_short_data_are_searched_as_they_are():
+    problem = posed([np.linspace(0, 20, 400)])
+    assert paths.enough(problem) is problem.stretches
+
+
+def test_of_long_data_each_stretch_gives_its_share(monkeypatch):
+    monkeypatch.setattr(paths, "ENOUGH_SAMPLES", 300)
+    monkeypatch.setattr(paths, "ENOUGH_TURNS", 3)
+    problem = posed([np.linspace(0, 80, 2000), np.linspace(0, 40, 1000)])
+    part = paths.enough(problem)
+    assert [i for i, _ in part] == [0, 1]
+    samples = sum(len(t) for _, (t, _) in part)
+    assert 300 <= samples <= 0.5 * 3000
+    for (_, (t, x)), (_, (whole, _)) in zip(part, problem.stretches, strict=True):
+        np.testing.assert_array_equal(t, whole[: len(t)])
+        assert len(x) == len(t)
+        assert t[-1] - t[0] >= 0.99 * 2 * np.pi
+
+
+def test_all_data_decide_on_the_terms_of_a_part(monkeypatch):
+    monkeypatch.setattr(paths, "ENOUGH_SAMPLES", 150)
+    monkeypatch.setattr(paths, "ENOUGH_TURNS", 2)
+    problem, history = posed([np.linspace(0, 60, 1500)]), History()
+    fit = paths.first_law(problem, history)
+    assert sum(len(s.t) for s in fit.collocation.segments) == 1500
+    assert "subset search, all data" in [step.stage for step in history.steps]
+    assert fit.state.active.sum() == 2
+
+
+def test_axes_that_moved_for_nothing_come_home_if_the_fit_has_converged():
+    problem, history = posed([np.linspace(0, 20, 400)]), History()
+    collocation = problem.weighted(problem.collocation(problem.segments()), paths.FINAL_WEIGHT)
+    control = fit_curves(collocation, problem.curves)
+    active = CIRCLE.support
+    state = State(control, 0.0 * active, active, problem.home, np.ones(2, dtype=bool))
+    start = collocation.solve(state)
+    moved = paths.select(problem, start, paths.FINAL_WEIGHT, "moved", history)
+    assert moved.state.moving.all()
+    assert not paths.framed(problem, moved, history).state.moving.any()
+    unfinished = replace(moved, status=Status.MAX_STEPS)
+    assert paths.framed(problem, unfinished, history) is unfinished
+
+
+@pytest.mark.parametrize("fails_at", [None, 1, 3])
+def test_terms_that_cannot_be_told_apart_are_searched_from_the_first_fit(monkeypatch, fails_at):
+    problem = posed([np.linspace(0, 20, 400)])
+    collocation = problem.collocation(problem.segments())
+    control = fit_curves(collocation, problem.curves)
+    solve, calls = Collocation.solve, []
+
+    def solved(self, state, **options):
+        fit = solve(self, state, **options)
+        calls.append(fit)
+        status = Status.MAX_STEPS if len(calls) - 1 == fails_at else Status.CONVERGED
+        return replace(fit, status=status)
+
+    monkeypatch.setattr(Collocation, "solve", solved)
+    every = np.ones(len(problem.exponents), dtype=bool)
+    _, weight = paths.unpruned(problem, collocation, control, every, History())
+    expected = paths.FIRST_WEIGHTS[-1 if fails_at is None else 0]
+    assert weight == expected
+    assert len(calls) == (4 if fails_at is None else fails_at + 1)
+
+
+def test_of_long_data_a_search_has_enough_turns_and_samples():
+    """A turn takes 2 pi in standard units."""
+    problem = posed([np.linspace(0, 20, 400)])
+    for time, count in ((4e3, 10**5), (1e5, 10**4)):
+        t = np.linspace(0, time, count)
+        long = replace(problem, stretches=[(0, (t, np.ones((count, 2))))])
+        ((_, (part, _)),) = paths.enough(long)
+        wanted = max(paths.ENOUGH_TURNS * 2 * np.pi, paths.ENOUGH_SAMPLES / count * time)
+        assert part[-1] == pytest.approx(wanted, abs=2 * time / count)
+
+
+@pytest.mark.slow
+def test_four_species_are_found_among_terms_of_high_degree():
+    # Chaotic competition (Vano et al. 2006); where the law hardly binds, cubic terms fit as well.
+    growth = {"x": 1, "y": 0.72, "z": 1.53, "w": 1.27}
+    harm = {
+        "x": {"x^2": 1, "xy": 1.09, "xz": 1.52},
+        "y": {"y^2": 1, "yz": 0.44, "yw": 1.36},
+        "z": {"xz": 2.33, "z^2": 1, "zw": 0.47},
+        "w": {"xw": 1.21, "yw": 0.51, "zw": 0.35, "w^2": 1},
+    }
+    equations = {
+        name: {name: rate} | {term: -rate * value for term, value in harm[name].items()}
+        for name, rate in growth.items()
+    }
+    truth = PolynomialSystem.from_terms(equations, degree=3)
+    t = 0.5 * np.arange(1500)
+    x = truth.simulate(t, np.array([0.3013, 0.4586, 0.1307, 0.3557]))
+    rng = np.random.default_rng([9, 3])
+    found = discover(t, x + 0.05 * x.std(axis=0) * rng.standard_normal(x.shape), order=1)
+    assert score(found.system, truth).exact
+
+
+@pytest.mark.slow
+def test_an_origin_that_moves_brings_no_terms_but_those_of_the_shift(monkeypatch):
+    """The path of a bent motion leads to the law at home; its origin is told at its own errors."""
+    data = FlowContest("NoseHoover", "bent space 0.3 %", seed=3).data()
+    found = discover(data.t, data.x, degree=data.degree)
+    assert score(found, data.truth).exact
+    assert found.offset.all()
+    monkeypatch.setattr(paths, "closure_mask", lambda exponents, active, _: active | True)
+    assert not score(discover(data.t, data.x, degree=data.degree), data.truth).exact
+
+
+def test_a_law_is_found_where_the_path_around_it_leads_nowhere_else(monkeypatch):
+    """A first path, around terms that a bend of space made, leads past the law."""
+    data = FlowContest("SprottE", "bent space 0.3 %", seed=7).data()
+    around, follow = [], paths.follow
+
+    def noted(problem, fit):
+        around.append(follow(problem, fit))
+        return around[-1]
+
+    monkeypatch.setattr(paths, "follow", noted)
+    found = discover(data.t, data.x, degree=data.degree)
+    assert score(found, data.truth).exact
+    assert paths.has_terms(around[-1].fit, around[-1].widest())
+    assert not paths.has_terms(around[0].fit, around[0].widest())
+
+
+def test_no_path_is_followed_around_a_richer_law_that_did_not_converge(monkeypatch):
+    around, follow, at_own_errors = [], paths.follow, paths.at_own_errors
+
+    def noted(problem, fit):
+        around.append(fit)
+        return follow(problem, fit)
+
+    def unfinished(problem, fit):
+        return replace(at_own_errors(problem, fit), status=Status.MAX_STEPS)
+
+    problem = posed([np.linspace(0, 20, 400)])
+    fit = paths.first_law(problem, History())
+    path = follow(problem, fit)
+    monkeypatch.setattr(paths, "near", lambda *_: False)
+    monkeypatch.setattr(paths, "CONSISTENT", 1e-9)  # whatever it leaves, it has explained a lot
+    monkeypatch.setattr(paths, "follow", noted)
+    paths.deepest(problem, path, History())
+    assert around  # a richer law is followed
+    around.clear()
+    monkeypatch.setattr(paths, "at_own_errors", unfinished)
+    assert paths.deepest(problem, path, History()) is path
+    assert not around
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over(seed):
+    """A fall against drag, integrated coarsely: a constant slope promises what it cannot keep."""
+    fall = PolynomialSystem.from_terms({"x": {"1": 9.81, "x^2": -0.0021175}})
+    t = np.linspace(0, 10, 150)
+    seen = np.sort(np.random.default_rng(seed).permutation(150)[:75])
+    x = corruption.coarse_path(fall, t, [73.0])
+    found = discover(t[seen], x[seen], order=1)
+    assert found.terms[np.flatnonzero(found.system.support[:, 0])[-1]] == "x^2"
+    assert found.noise < 1e-3 * x.std()
+
+
+@pytest.mark.parametrize("high", [0.5, 0.05])
+def test_a_law_persists_if_no_other_plateau_is_wider(high):
+    terms = np.eye(2, dtype=bool)
+    rivals = Plateau(0, 0.01, high, terms[0]), Plateau(0, high, 1.0, terms[1])
+    path = Path(None, None, 0.01, 0.1, (rivals,))
+    fit = Fit(SimpleNamespace(active=terms[:1].T), None, Status.CONVERGED)
+    assert paths.has_terms(fit, path.widest()) is (high == 0.5)
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_every_loop_ends_where_no_path_leads_to_its_law(monkeypatch, rounds):
+    """A path that leads elsewhere each time: as many rounds as allowed, and the last law."""
+    problem = posed([np.linspace(0, 20, 400)])
+    fit, refits, refit = paths.first_law(problem, History()), [], paths.refit
+    monkeypatch.setattr(paths, "ROUNDS", rounds)
+    monkeypatch.setattr(paths, "has_terms", lambda fit, goal: False)
+    monkeypatch.setattr(paths, "deepest", lambda problem, path, history: path)
+    monkeypatch.setattr(paths, "refit", lambda *a: refits.append(a) or refit(*a))
+    *_, persists = paths.persistent(problem, fit, History())
+    assert len(refits) == rounds
+    assert not persists

@@ -1,0 +1,253 @@
+"""The frame of a law: the origin in which it is sparsest, the meaning of the offset (Eq. 10).
+
+B-splines sum to one, so an offset added to the curve is redundant. It matters when the library is
+evaluated at ``x - offset``: then it is the origin of the law's own frame. What a move of the origin
+does to a polynomial law and to its information is exact, so that frames are compared by algebra: an
+axis off the data's origin is one more column of the L0 search, with a price of its own.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from .collocation import Fit, Linearisation
+from .l0 import newcomers, subset_search
+from .library import closure_mask, divides, shift_generators, shift_matrix
+from .model import State
+from .problem import Problem
+
+ROUNDING = 1e-9
+"""Moves of an origin, in units of the spread of the data, that are none."""
+
+Origin = tuple[Floats, Bools]
+"""An origin, and which of its axes are not where the data have theirs."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftedLaw:
+    """Coefficients and information of an estimated law in shifted frames, exactly.
+
+    Parameters
+    ----------
+    exponents : ndarray of int, shape (l, d + k)
+        A library that holds all divisors of its monomials.
+    coefficients : ndarray, shape (l, d)
+        Estimate in the present frame.
+    information : ndarray, shape (l d, l d)
+        Its information matrix, equation by equation.
+    movable : ndarray of bool, shape (d,), optional
+        Along which axes its origin is sought; all by default.
+    gradient : ndarray, shape (l d,), optional
+        What still pulls at the coefficients (see `subset_search`); nothing by default.
+    """
+
+    exponents: Ints
+    coefficients: Floats
+    information: Floats
+    movable: Bools | None = None
+    gradient: Floats | None = None
+
+    @property
+    def d(self) -> int:
+        """Dimension of the state."""
+        return self.coefficients.shape[1]
+
+    @cached_property
+    def axes(self) -> Ints:
+        """The movable axes."""
+        return np.arange(self.d) if self.movable is None else np.flatnonzero(self.movable)
+
+    @cached_property
+    def _generators(self) -> Floats:
+        return shift_generators(self.exponents)
+
+    @cached_property
+    def _with_rates(self) -> Floats:
+        """The coefficients and their rates along the movable axes, which shifts carry alike."""
+        return np.stack([self.coefficients, *(self._generators[self.axes] @ self.coefficients)])
+
+    def at(self, origin: Floats) -> tuple[Floats, Floats, Floats]:
+        """Coefficients (l, d), information and gradient in monomials of ``x - origin``."""
+        forth = shift_matrix(self.exponents, -origin)
+        back = np.kron(np.eye(self.d), shift_matrix(self.exponents, origin))
+        pull = np.zeros(len(back)) if self.gradient is None else back.T @ self.gradient
+        return forth @ self.coefficients, back.T @ self.information @ back, pull
+
+    def vanish(self, origins: Floats, entries: Ints) -> Floats:
+        """Move each origin as little as possible so that the given coefficients vanish.
+
+        Parameters
+        ----------
+        origins : ndarray, shape (n, d)
+            Where to start.
+        entries : ndarray of int, shape (n, k, 2)
+            Equation and term of each coefficient.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+            NaN where no origin was found.
+        """
+        equations, terms = np.moveaxis(entries, -1, 0)
+        here, origins = self._with_rates[:, :, equations], origins.copy()
+        moving = np.arange(len(origins))
+        for _ in range(6):
+            shift = shift_matrix(self.exponents, -origins[moving], terms[moving])
+            values = np.einsum("nkl,alnk->nka", shift, here[:, :, moving])
+            back = np.linalg.pinv(values[:, :, 1:], rcond=1e-6)
+            step = -(back @ values[:, :, :1])[:, :, 0]
+            origins[np.ix_(moving, self.axes)] += step
+            lost = ~(np.abs(origins[moving]) < 1e6).all(axis=1)
+            origins[moving[lost]] = np.nan
+            moving = moving[~lost & (np.abs(step) >= 1e-9).any(axis=1)]
+        return origins
+
+
+def together(problem: Problem, state: State) -> list[Origin]:
+    """Origins at which a term of a law vanishes, where motion is, and those with axes back home.
+
+    Terms that a move brings in are the data's to decide on, while the origin moves.
+    """
+    return [*_vanishing(problem, state, problem.form.movable), *nearer_home(problem, state.offset)]
+
+
+def one_by_one(problem: Problem, state: State) -> Iterator[Origin]:
+    """Origins at which a term of a law vanishes, one more axis off home."""
+    for axis in np.eye(problem.d, dtype=bool)[problem.form.movable]:
+        yield from _vanishing(problem, state, axis)
+
+
+def away(problem: Problem, state: State) -> list[Origin]:
+    """Origins at which a term of a law vanishes, and the axes that are then off home."""
+    return _vanishing(problem, state, problem.form.movable)
+
+
+def _vanishing(problem: Problem, state: State, movable: Bools) -> list[Origin]:
+    """Origins at which a term vanishes, moved along some of the axes that are at home."""
+    exponents, home = problem.exponents, movable & ~state.moving
+    frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), home)
+    below = divides(exponents, home) & ~np.eye(len(exponents), dtype=bool)
+    low, high = problem.box
+    found: list[Origin] = []
+    entries = np.argwhere((state.active & (below @ state.active)).T)
+    for step in frames.vanish(np.zeros((len(entries), problem.d)), entries[:, None]):
+        origin, moved = state.offset + step, np.abs(step) > ROUNDING
+        known = any(np.allclose(origin, other) for other, _ in found)
+        inside = ((low <= origin) & (origin <= high))[moved].all()  # not if it is infinite
+        if inside and moved.any() and not known:
+            found.append((origin, state.moving | moved))
+    return found
+
+
+def nearer_home(problem: Problem, origin: Floats) -> list[Origin]:
+    """An origin, and the same with some of its axes at home, where they cost nothing."""
+    home = problem.home
+    masks = itertools.product(*((True, False) if away else (False,) for away in origin != home))
+    return [(np.where(mask, origin, home), np.array(mask)) for mask in masks]
+
+
+def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
+    """The law in the centred frame, with all terms of its shift closure: these are 0 as yet."""
+    d, exponents = problem.d, problem.exponents
+    state = replace(
+        fit.state,
+        coefficients=shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
+        active=closure_mask(exponents, fit.state.active, problem.form.movable),
+        offset=np.zeros(d),
+        moving=np.zeros(d, dtype=bool),
+    )
+    return replace(fit, state=state, collocation=problem.weighted(fit.collocation, weight))
+
+
+def as_shifted(problem: Problem, fit: Fit) -> ShiftedLaw:
+    """The law of a fit, whose terms are closed under shifts, with its information."""
+    state, columns = fit.state, np.flatnonzero(fit.state.free())
+    information = np.diag(np.where(state.free()[: -problem.d], 0.0, 1e30))
+    model, gradient = fit.collocation.linearise(state, columns), np.zeros(len(information))
+    information[np.ix_(columns, columns)], gradient[columns] = model.information, model.gradient
+    movable = problem.form.movable
+    return ShiftedLaw(problem.exponents, state.coefficients, information, movable, gradient)
+
+
+def cheapest_at(problem: Problem, whole: Fit, law: ShiftedLaw, origin: Origin) -> Fit:
+    """The cheapest support at an origin, by the quadratic model around a law with all its terms."""
+    place, moving = origin
+    coefficients, information, gradient = law.at(place)
+    columns = np.flatnonzero(whole.state.free())
+    _, solution, value = subset_search(
+        information[np.ix_(columns, columns)],
+        gradient[columns],
+        coefficients.T.ravel()[columns],
+        problem.prices[columns],
+        np.ones(len(columns), dtype=bool),
+    )
+    flat = np.append(np.zeros(whole.state.coefficients.size), place)
+    flat[columns] = solution
+    state = whole.state.moved(whole.state.control_points, flat)
+    state = replace(state, active=state.coefficients != 0, moving=moving)
+    objective = whole.collocation.objective(whole.state)
+    cost = objective + value + problem.axis_penalty * moving.sum()
+    return replace(whole, state=state, criterion=cost)
+
+
+def at_home(problem: Problem, fit: Fit) -> Fit:
+    """The cheapest support where the data have their origin, from all terms of a fit."""
+    origin = problem.home, np.zeros(problem.d, dtype=bool)
+    return cheapest_at(problem, fit, as_shifted(problem, fit), origin)
+
+
+def off_home(problem: Problem, state: State, model: Linearisation, tolerated: float) -> State:
+    """The state with the axis off home by which its law gains most, if that is worth it.
+
+    Its terms were chosen at larger errors, at which it may have been too near home to tell. What it
+    gains has to be worth the price of an axis, and more than its place would be a coincidence.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its prices.
+    state : State
+        Of the last fit.
+    model : Linearisation
+        Around it, of all candidates and moving axes.
+    tolerated : float
+        Errors that have to be tolerated, over those that the law leaves.
+    """
+    axes = freed(problem, state, model, tolerated)
+    gains = [(gain - max(room, problem.axis_penalty), axis) for axis, gain, room, _ in axes]
+    gain, axis = max(gains, default=(0.0, 0))
+    if not gain > 0:
+        return state
+    return replace(state, moving=state.moving | (np.arange(problem.d) == axis))
+
+
+def freed(
+    problem: Problem, state: State, model: Linearisation, tolerated: float
+) -> Iterator[tuple[int, float, float, Floats]]:
+    """Axes at home, what the law would gain if each alone left, and what a place is worth.
+
+    That is twice the logarithm of how much wider the box of the data is than the origin is
+    uncertain. And what the move does to the law in the frame of the data, (l, d). Without those
+    whose move the terms of the law make up for.
+    """
+    low, high = problem.box
+    own = np.flatnonzero(state.free()[model.columns])
+    generators = shift_generators(problem.exponents)
+    forth = shift_matrix(problem.exponents, state.offset - problem.home)
+    for axis in np.flatnonzero(problem.form.movable & ~state.moving).tolist():
+        rate = -generators[axis] @ state.coefficients
+        rows = np.eye(len(model.columns))[own]
+        rows = np.vstack([rows, np.append(rate.T.ravel(), np.zeros(problem.d))[model.columns]])
+        (place,), (variance,) = newcomers(
+            rows @ model.information @ rows.T, rows @ model.gradient, len(own)
+        )
+        if np.isfinite(variance):
+            variance *= tolerated**2
+            room = np.log((high - low)[axis] ** 2 / (2 * np.pi * variance))
+            yield axis, float(place**2 / variance), float(room), forth @ rate

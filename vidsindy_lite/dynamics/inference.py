@@ -1,0 +1,386 @@
+"""From the last fit to what is told of it: a law in the frame and the units of the data.
+
+Its standard errors, too, the intervals of absent terms, and the least errors of any estimate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from ..arrays import Bools, Floats, Ints
+from .bspline import DEGREE
+from .collocation import Fit, Linearisation
+from .data import Units
+from .l0 import inverse, newcomers
+from .library import divides, shift_generators, shift_matrix
+from .model import PolynomialSystem, State
+from .noise import residual_noise
+from .path import History, Path
+from .problem import Problem
+from .result import Discovery
+
+# --------------------------------------------------------------------------------------------------
+# Terms that a law has not: between which values each could be, and which the data could not see.
+#
+# No term in a law means no evidence for it, which is little where the data can hardly tell.
+
+HALF_WIDTH = 1.96
+"""Of a 95 % interval, in standard errors."""
+
+
+def intervals(problem: Problem, state: State, model: Linearisation, tolerated: Floats) -> Floats:
+    """Between which values each absent candidate term would be if it alone joined the law.
+
+    With the information ``S`` and the gradient ``g`` of the last fit, of which the curve is
+    eliminated, and the terms ``A`` of the law (and its moving axes), a candidate k is estimated as
+    ``(g_k - S_kA inv(S_AA) g_A) v`` with the variance ``v = 1 / (S_kk - S_kA inv(S_AA) S_Ak)``:
+    all that the law has is fitted again.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : State
+        Of the last fit.
+    model : Linearisation
+        Around it, of all candidates.
+    tolerated : ndarray, shape (d,)
+        Errors at which the terms of each equation were chosen, over those of the fit.
+
+    Returns
+    -------
+    ndarray, shape (l, d, 2)
+        95 % intervals in the law's own frame and the units of the data; NaN for what is in the law
+        or no candidate, infinite where the data cannot tell a term from those of the law.
+    """
+    l, d = state.coefficients.shape
+    own = np.flatnonzero(state.free())
+    others = np.setdiff1d(problem.form.searched, own)
+    model = model.of(np.concatenate([own, others]))
+    estimate, variance = newcomers(model.information, model.gradient, len(own))
+    spread = HALF_WIDTH * np.sqrt(variance) * tolerated[others // l]
+    flat = np.full((l * d, 2), np.nan)
+    flat[others] = np.column_stack([estimate - spread, estimate + spread])
+    flat = flat[problem.form.shared]  # directions of a vector have the interval of the first
+    factors = problem.units.factors(problem.exponents)
+    return flat.reshape(d, l, 2).swapaxes(0, 1) * factors[:, :, None]
+
+
+# --------------------------------------------------------------------------------------------------
+# The Cramer-Rao bound: how well the coefficients of a law can be known from a noisy trajectory.
+
+SUBSTEPS = 8
+"""Runge-Kutta steps between two measurements."""
+VAGUE = 1e4
+"""Prior standard deviation, relative to the size of what is unknown: as good as none."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Least standard errors of any unbiased estimate that knows the true terms.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (l, d)
+        Of the true terms; zero elsewhere.
+    offset : ndarray, shape (d,)
+        Of the origin of the law; zero along axes that are known.
+    """
+
+    coefficients: Floats
+    offset: Floats
+
+
+def cramer_rao(
+    system: PolynomialSystem, t: Floats, x0: Floats, sigma: Floats, moving: Bools | None = None
+) -> Bound:
+    """Cramer-Rao bound of the coefficients, with unknown initial condition and offset.
+
+    A square-root Kalman filter along the true trajectory, without process noise: between two
+    measurements the covariance of state and coefficients is carried over by the sensitivities of
+    one time step, at a measurement it shrinks. Sensitivities over the whole time would not do:
+    in a chaotic flow they grow beyond the digits that a computer has.
+
+    Parameters
+    ----------
+    system : PolynomialSystem
+        The true law in its own frame.
+    t : ndarray, shape (n,)
+        Times of the measurements; the first is that of the initial condition.
+    x0 : array_like, shape (d,)
+        True initial condition.
+    sigma : array_like, shape (d,)
+        Standard deviation of the Gaussian noise of each coordinate.
+    moving : array_like of bool, shape (d,), optional
+        Axes along which the origin is unknown; none by default.
+
+    Returns
+    -------
+    Bound
+    """
+    d = system.d
+    moving = np.zeros(d, dtype=bool) if moving is None else np.asarray(moving, dtype=bool)
+    equations, terms = np.nonzero(system.support.T)
+    count, free = len(terms), d + len(terms) + int(moving.sum())
+    x = system.simulate(t, x0)
+    steps, responses = _sensitivities(system, t, x, equations, terms)
+    observe = np.zeros((d, free))
+    observe[:, :d] = np.eye(d)
+    observe[:, d + count :] = np.eye(d)[:, moving]
+    spread = np.ptp(x, axis=0).max() + np.abs(x).max()
+    known = np.abs(system.coefficients[terms, equations])
+    root = VAGUE * np.diag(
+        np.concatenate([np.full(d, spread), known, np.full(moving.sum(), spread)])
+    )
+    root = _measured(root, observe, sigma)
+    carry = np.eye(free)
+    for step, response in zip(steps, responses, strict=True):
+        carry[:d, :d], carry[:d, d : d + count] = step, response
+        root = _measured(carry @ root, observe, sigma)
+    errors = np.linalg.norm(root, axis=1)
+    coefficients, offset = np.zeros(system.coefficients.shape), np.zeros(d)
+    coefficients[terms, equations] = errors[d : d + count]
+    offset[moving] = errors[d + count :]
+    return Bound(coefficients, offset)
+
+
+def _measured(root: Floats, observe: Floats, sigma: Floats) -> Floats:
+    """Square root of the covariance after a measurement (the array form of the Kalman update)."""
+    m, free = observe.shape
+    array = np.zeros((m + free, m + free))
+    array[:m, :m] = np.diag(sigma)
+    array[:m, m:] = observe @ root
+    array[m:, m:] = root
+    lower = np.asarray(np.linalg.qr(array.T, mode="r")).T
+    return lower[m:, m:]
+
+
+def _sensitivities(
+    system: PolynomialSystem, t: Floats, x: Floats, equations: Ints, terms: Ints
+) -> tuple[Floats, Floats]:
+    """Derivatives of each next state with respect to the state (d, d) and coefficients (d, p)."""
+    d, count = system.d, len(terms)
+    state = x[:-1]
+    sensitivity = np.zeros((len(state), d, d + count))
+    sensitivity[:, :, :d] = np.eye(d)
+    width = np.diff(t)[:, None] / SUBSTEPS
+
+    def rates(state: Floats, sensitivity: Floats) -> tuple[Floats, Floats]:
+        growth = system.gradient(state) @ sensitivity
+        growth[:, equations, d + np.arange(count)] += system.library(state)[:, terms]
+        return system(state), growth
+
+    def moved(rate: Sequence[Floats], share: float) -> tuple[Floats, Floats]:
+        return state + share * width * rate[0], sensitivity + share * width[:, :, None] * rate[1]
+
+    for _ in range(SUBSTEPS):
+        k1 = rates(state, sensitivity)
+        k2 = rates(*moved(k1, 0.5))
+        k3 = rates(*moved(k2, 0.5))
+        k4 = rates(*moved(k3, 1.0))
+        mean = [(a + 2 * b + 2 * c + e) / 6 for a, b, c, e in zip(k1, k2, k3, k4, strict=True)]
+        state, sensitivity = moved(mean, 1.0)
+    return sensitivity[:, :, :d], sensitivity[:, :, d:]
+
+
+# --------------------------------------------------------------------------------------------------
+# From the last fit to what is told of it: the law in the units and the frame of the data.
+
+KEPT = 1e-12
+"""Price of a term that stays whatever its error."""
+HOLDS = 3
+"""Steps to the likeliest law of which a term is zero."""
+
+
+def infer(
+    problem: Problem, fit: Fit, model: Linearisation, path: Path, history: History
+) -> Discovery:
+    """Turn the last fit into a `Discovery` in the units of the data, without warnings as yet.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data and the prices: a coefficient whose squared score is lower than its price cannot
+        be told from zero.
+    fit : Fit
+        At a physics weight at which the law holds exactly.
+    model : Linearisation
+        Around it, of all candidates and moving axes.
+    path : Path
+        On which the law was chosen.
+    history : History
+        Passed on.
+    """
+    units, state, collocation = problem.units, fit.state, fit.collocation
+    form, exponents, (l, d) = problem.form, problem.exponents, state.coefficients.shape
+    covariance = _covariance(units, fit, model)
+    coefficients = state.coefficients * units.factors(exponents)
+    offset = np.where(state.moving, units.point(state.offset), 0.0)
+    # What the frame of the data needs is decided at the errors at which the terms were chosen.
+    tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
+    # To what the shift adds nothing, that the fit has weighed.
+    weighed = _shifted(exponents, coefficients, offset) == coefficients.T.ravel()
+    prices = np.where(weighed, KEPT, problem.prices * np.repeat(tolerated, l) ** 2)
+    native = exponents, coefficients, offset, covariance
+    moved, moved_covariance = _pruned(*native, prices)
+    law = form.law(moved + form.known)
+    seen = collocation.counts > 0
+    found = Discovery(
+        system=law,
+        native=form.law(coefficients + form.known),
+        offset=offset,
+        covariance=moved_covariance,
+        native_covariance=covariance[: l * d, : l * d],
+        offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
+        noise=np.where(
+            seen, (problem.noise if problem.kicked else residual_noise(fit)) * units.scale, np.nan
+        ),
+        model_error=_kicks(problem, fit),
+        warnings=(),
+        path=path.plateaus,
+        history=tuple(history.steps),
+        absent=intervals(problem, fit.state, model, tolerated),
+        curves=tuple(
+            BSpline(s.t * units.time, s.c * units.scale + units.centre, DEGREE)
+            for s in collocation.grid.splines(state.control_points)
+        ),
+    )
+    return found
+
+
+def with_errors(found: Discovery, problem: Problem, fit: Fit, model: Linearisation) -> Discovery:
+    """The same law, its error bars those of another quadratic model around its fit."""
+    state, form = fit.state, problem.form
+    covariance, size = _covariance(problem.units, fit, model), state.coefficients.size
+    coefficients = state.coefficients * problem.units.factors(problem.exponents)
+    kept = (found.system.support & ~(form.known != 0)).T.ravel()
+    native = problem.exponents, coefficients, found.offset, covariance
+    moved, moved_covariance = _pruned(*native, np.where(kept, KEPT, np.inf))
+    return replace(
+        found,
+        system=form.law(moved + form.known),
+        covariance=moved_covariance,
+        native_covariance=covariance[:size, :size],
+        offset_errors=np.sqrt(np.diag(covariance)[size:]),
+    )
+
+
+def _kicks(problem: Problem, fit: Fit) -> Floats:
+    """Standard deviation of what the kicks of a unit of time add, in units of the data, (d,)."""
+    grid, units = fit.collocation.grid, problem.units
+    span = sum(s.breakpoints[-1] - s.breakpoints[0] for s in grid.segments) / len(grid.x)
+    return problem.process_noise * units.scale * np.sqrt(span / units.time)
+
+
+def _covariance(units: Units, fit: Fit, model: Linearisation) -> Floats:
+    """Covariance of coefficients and offset in units of the data; zero where nothing is free."""
+    columns = np.flatnonzero(fit.state.free())
+    size = len(fit.state.flat())
+    covariance = np.zeros((size, size))
+    covariance[np.ix_(columns, columns)] = inverse(model.of(columns).information)
+    factors = units.factors(fit.collocation.exponents)
+    unit = np.concatenate([factors.T.ravel(), units.scale])
+    if units.scale_errors.size:
+        scaled = _scaled(units, fit)
+        covariance += scaled.T @ scaled
+    for entry, first in fit.state.followers():
+        covariance[entry] = covariance[first]
+    for entry, first in fit.state.followers():
+        covariance[:, entry] = covariance[:, first]
+    return covariance * (unit[:, None] * unit)
+
+
+def _scaled(units: Units, fit: Fit) -> Floats:
+    """What the errors of scale add to a state in standard units, (m, l d + d)."""
+    state, exponents, errors = fit.state, fit.collocation.exponents, units.scale_errors
+    power = errors[:, :, None] - (errors @ exponents.T)[:, None]
+    away = np.where(state.moving, state.offset + units.centre / units.scale, 0.0)
+    return np.hstack([(power * state.coefficients.T).reshape(len(errors), -1), errors * away])
+
+
+def _shifted(exponents: Ints, coefficients: Floats, offset: Floats) -> Floats:
+    """The coefficients of a law in the data's frame, equation by equation, (l d,)."""
+    return (shift_matrix(exponents, offset) @ coefficients).T.ravel()
+
+
+def _entry(exponents: Ints, coefficients: Floats, offset: Floats, k: int) -> tuple[float, Floats]:
+    """One of them, and its derivatives in coefficients and offset, (l d + d,)."""
+    (l, d), (j, row) = coefficients.shape, divmod(k, len(exponents))
+    matrix = shift_matrix(exponents, offset)
+    slope, moved = np.zeros(l * d + d), matrix @ coefficients[:, j]
+    slope[j * l : (j + 1) * l] = matrix[row]
+    slope[l * d :] = -shift_generators(exponents)[:d, row] @ moved
+    return float(moved[row]), slope
+
+
+def _carried(exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats) -> Floats:
+    """Their covariance, (l d, l d), from that of coefficients and offset."""
+    (l, d), size = coefficients.shape, coefficients.size
+    matrix = shift_matrix(exponents, offset)
+    along = -shift_generators(exponents)[:d] @ (matrix @ coefficients)
+    rates = along.swapaxes(1, 2).reshape(d, size).T
+
+    def moved(rows: Floats) -> Floats:
+        own = matrix @ rows[:size].reshape(d, l, -1)
+        return np.asarray(own.reshape(size, -1) + rates @ rows[size:])
+
+    return moved(moved(covariance).T)
+
+
+def _powers(exponents: Ints, coefficients: Floats, offset: Floats) -> Ints:
+    """The lowest power of the offset in each term of the law in the data's frame, (l d,).
+
+    1 for terms of the law itself.
+    """
+    lowered = exponents.sum(axis=1) - exponents.sum(axis=1)[:, None]
+    left = np.where(divides(exponents, offset != 0), lowered, len(exponents))
+    powers = [left[:, column != 0].min(axis=1, initial=len(exponents)) for column in coefficients.T]
+    return np.maximum(np.concatenate(powers), 1)
+
+
+def _pruned(
+    exponents: Ints, coefficients: Floats, offset: Floats, covariance: Floats, penalties: Floats
+) -> tuple[Floats, Floats]:
+    """A law in the data's frame without what cannot be told from zero, and its covariance.
+
+    Shifting a law by an estimated offset leaves remainders where the exact shift cancels. One by
+    one, the least significant is taken out by conditioning the Gaussian estimate of coefficients
+    and offset on its being zero. A power of an offset is as far from zero as the offset: in its own
+    standard errors so many times less.
+    """
+    shape, size = coefficients.shape[::-1], coefficients.size
+    native = np.concatenate([coefficients.T.ravel(), offset])
+    flat = _shifted(exponents, coefficients, offset)
+    powers = _powers(exponents, coefficients, offset)
+    moved = _carried(exponents, coefficients, offset, covariance)
+    original, dead = np.diag(moved).copy(), flat == 0
+    for _ in range(size + 1):
+        variance = np.diag(moved)
+        # After conditioning, a dependent entry has neither value nor variance left.
+        known = variance <= 1e-12 * original
+        dead |= known & (flat**2 < 1e-6 * original)
+        live = np.flatnonzero(~dead)
+        sigma = np.where(known, 1.0, variance)[live]
+        score = np.where(known[live], np.inf, (powers * flat)[live] ** 2 / sigma)
+        weakness = score / penalties[live]
+        if not len(live) or weakness.min() >= 1:
+            break
+        # Of the powers of one offset the lowest: the others vanish with it.
+        weakest = np.lexsort([weakness, np.where(weakness < 1, powers[live], size)])[0]
+        k = live[weakest]
+        dead[k] = True
+        point = native
+        for _ in range(HOLDS):  # the shift is linear around where it is held alone
+            value, slope = _entry(exponents, point[:size].reshape(shape).T, point[size:], int(k))
+            pull = covariance @ slope
+            point = native - pull * ((value + slope @ (native - point)) / (slope @ pull))
+        covariance = covariance - np.outer(pull, pull / (slope @ pull))
+        native, law = point, (point[:size].reshape(shape).T, point[size:])
+        flat = _shifted(exponents, *law)
+        moved = _carried(exponents, *law, covariance)
+    flat = np.where(dead, 0.0, flat)
+    moved[dead] = moved[:, dead] = 0.0
+    return flat.reshape(shape).T, moved

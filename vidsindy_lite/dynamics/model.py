@@ -1,0 +1,911 @@
+"""A law as a model: its system of equations, its integration, the unknowns of a fit, and its form.
+
+`PolynomialSystem` is a law, of the truth as well as of a discovery; `runge_kutta_4` follows it;
+`State` is a law and a curve that a fit moves; `Form` is what a law may look like before it is
+searched.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import comb
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from ..arrays import Bools, Floats, Ints
+from ..checks import check_array, check_integer, check_number, check_times, check_vector
+from .library import (
+    CLOCK,
+    OTHERS,
+    Function,
+    Library,
+    along_state,
+    closure,
+    extended,
+    law_variables,
+    monomial_gradients,
+    monomials,
+    name_latex,
+    shift_matrix,
+    velocity_names,
+)
+
+# --------------------------------------------------------------------------------------------------
+# Solutions of differential equations, the same to the last digit on every machine.
+#
+# A chaotic motion multiplies a rounding error until nothing of the first digits is left: a path of
+# Sprott's F over 15 periods depends on whether the processor adds two products in one instruction.
+# So the integrators here use nothing whose rounding is left to a library of linear algebra.
+
+STAGES = DOP853.n_stages
+STAGE_WEIGHTS = [row[:stage, None] for stage, row in enumerate(DOP853.A[:STAGES])]
+WEIGHTS, THIRD, FIFTH = (row[:STAGES, None] for row in (DOP853.B, DOP853.E3, DOP853.E5))
+"""Coefficients of the step, and of its errors against steps of order 3 and 5."""
+MUCH_BETTER = 2.0**-9
+"""Error over tolerance below which a step of order 8 may be twice as long."""
+MOST_STEPS = 50_000
+"""Steps of a whole motion; one that needs more is stiff, or as good as lost."""
+SHORTEST_STEP = 1e-13
+"""Least step over the length of the whole motion."""
+
+
+def runge_kutta_4(
+    rate: Callable[[Floats], Floats], t: Floats, x0: Floats, substeps: int = 10
+) -> Floats:
+    """Integrate with the classical 4th-order Runge-Kutta method, as the paper does.
+
+    Parameters
+    ----------
+    rate : callable
+        The law: time derivative of a state, or of several at once; a `PolynomialSystem` is one.
+    t : ndarray, shape (n,)
+        Increasing times of the returned rows.
+    x0 : array_like, shape (d,) or (m, d)
+        State, or states of several motions, at ``t[0]``.
+    substeps : int
+        Equal steps between two times.
+
+    Returns
+    -------
+    ndarray, shape (n, d) or (n, m, d)
+    """
+    states = [check_array("x0", x0)]
+    d = getattr(rate, "d", None)
+    if d is not None and states[0].shape[-1:] != (d,):
+        raise ValueError(f"x0: must have shape ({d},) or (m, {d}), got {states[0].shape}")
+    if not np.isfinite(states[0]).all():
+        raise ValueError(f"x0: must be finite, got {x0!r:.60}")
+    for step in np.diff(check_times(t)) / check_integer("substeps", substeps, 1):
+        x = states[-1]
+        for _ in range(substeps):
+            k1 = rate(x)
+            k2 = rate(x + step / 2 * k1)
+            k3 = rate(x + step / 2 * k2)
+            k4 = rate(x + step * k3)
+            x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states.append(x)
+    return np.array(states)
+
+
+def one_by_one(exponents: Ints, coefficients: Floats) -> Callable[[Sequence[float]], list[float]]:
+    """Sums of monomials at a point, (d,), as a function of its coordinates.
+
+    No digit is left to a BLAS; and for the few numbers of a law it is faster than arrays.
+    """
+    terms = [
+        ([(i, e) for i, e in enumerate(powers) if e], [(j, c) for j, c in enumerate(parts) if c])
+        for powers, parts in zip(exponents.tolist(), coefficients.tolist(), strict=True)
+        if any(parts)
+    ]
+
+    def value(z: Sequence[float]) -> list[float]:
+        sums = [0.0] * coefficients.shape[1]
+        for powers, parts in terms:
+            product = 1.0
+            for i, exponent in powers:
+                power = z[i]
+                for _ in range(exponent - 1):
+                    power *= z[i]
+                product *= power
+            for j, coefficient in parts:
+                sums[j] += product * coefficient
+        return sums
+
+    return value
+
+
+def integrate(
+    rate: Callable[[Floats], Floats],
+    t: Floats,
+    x0: Floats,
+    tolerance: float = 1e-11,
+    farthest: float = np.inf,
+) -> Floats:
+    """Integrate with the Dormand-Prince method of order 8, its steps halved and doubled as needed.
+
+    Parameters
+    ----------
+    rate : callable
+        The law: time derivative (d,) of a state (d,).
+    t : ndarray, shape (n,)
+        Increasing times of the returned rows; a step ends at each.
+    x0 : ndarray, shape (d,)
+        State at ``t[0]``.
+    tolerance : float
+        Error of a step, absolute and relative.
+    farthest : float
+        Largest coordinate; beyond it the motion is taken to blow up.
+
+    Returns
+    -------
+    ndarray, shape (n, d)
+        Rows after a blow-up are NaN, or after so many steps that the motion is too stiff to follow.
+
+    References
+    ----------
+    E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, sec. II.10.
+    """
+    path = np.full((len(t), len(x0)), np.nan)
+    path[0] = x = x0
+    step, span = float(np.diff(t[:2]).sum()), float(t[-1] - t[0])
+    steps = MOST_STEPS + len(t)
+    for row, (now, end) in enumerate(zip(t[:-1].tolist(), t[1:].tolist(), strict=True), start=1):
+        while now < end:
+            steps -= 1
+            if not steps:
+                return path
+            last = step >= end - now
+            taken = end - now if last else step
+            with np.errstate(over="ignore", invalid="ignore"):  # of steps that are too long
+                moved, error = _step(rate, x, taken, tolerance)
+            if not error < 1:
+                step = taken / 2
+                if step < SHORTEST_STEP * span:
+                    return path
+                continue
+            x, now = moved, end if last else now + taken
+            if np.abs(x).max() > farthest:
+                return path
+            if error < MUCH_BETTER and not taken < step:
+                step = 2 * taken
+        path[row] = x
+    return path
+
+
+def _step(
+    rate: Callable[[Floats], Floats], x: Floats, step: float, tolerance: float
+) -> tuple[Floats, float]:
+    """A step of order 8, and its error over the tolerance."""
+    slopes = np.empty((STAGES, len(x)))
+    slopes[0] = rate(x)
+    for stage in range(1, STAGES):
+        slopes[stage] = rate(x + step * np.add.reduce(STAGE_WEIGHTS[stage] * slopes[:stage]))
+    moved = x + step * np.add.reduce(WEIGHTS * slopes)
+    scale = tolerance * (1 + np.maximum(np.abs(x), np.abs(moved)))
+    third, fifth = (
+        float(np.add.reduce((np.add.reduce(weights * slopes) / scale) ** 2))
+        for weights in (THIRD, FIFTH)
+    )
+    if fifth == 0:
+        return moved, 0.0
+    return moved, step * fifth / np.sqrt((fifth + 0.01 * third) * len(x))
+
+
+# --------------------------------------------------------------------------------------------------
+# Polynomial dynamical systems: the one type of both the ground truth and the discovered law.
+#
+# The law is ``dx/dt = phi(x) Lambda`` (paper: Eq. 7), with a row ``phi`` of monomials and a sparse
+# matrix ``Lambda`` of coefficients. A polynomial library is closed under a shift of the origin, so
+# the law in any other frame follows exactly (paper: Eq. 10) and is never typed by hand. A law may
+# be a polynomial in functions of the state, too: then its frame is that of the data.
+
+SMALLEST, LARGEST = -5, 6
+"""Numbers of fewer and of more digits are printed with a power of ten."""
+
+
+def power_of_ten(largest: float) -> int:
+    """What numbers up to one are divided by where they are printed; 0 for those of few digits."""
+    power = int(np.floor(np.log10(largest))) if largest > 0 else 0
+    return 0 if SMALLEST <= power < LARGEST else power
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialSystem:
+    """An autonomous polynomial system ``dx/dt = phi(x) Lambda`` (paper: Eq. 7).
+
+    Parameters
+    ----------
+    names : sequence of str, length d
+        Names of the state variables: a letter, then letters, digits and underscores.
+    exponents : array_like of int, shape (l, d + k) or (l, 2 d + k)
+        The monomials of the library, one row each, in the variables and in k functions of them. If
+        the law is a fraction, also in the slopes: a term with a slope, brought to the other side,
+        belongs to the denominator.
+    coefficients : array_like, shape (l, d)
+        ``Lambda``; column j is the right-hand side of variable j.
+    functions : tuple of Function
+        Those of the k functions that a `Library` brings; none for a polynomial law.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, a name is none, an exponent is negative, not whole or repeated, or a
+        value is not finite.
+    """
+
+    names: tuple[str, ...]
+    exponents: Ints
+    coefficients: Floats
+    functions: tuple[Function, ...] = field(default=(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        names = tuple(self.names) if isinstance(self.names, Iterable) else ()
+        named = all(isinstance(name, str) and name.isidentifier() for name in names)
+        if not names or not named or len(set(names)) != len(names):
+            raise ValueError(
+                f"names: must be distinct names such as x or x1, at least one, got {self.names!r}"
+            )
+        powers = check_array("exponents", self.exponents)
+        coefficients = check_array("coefficients", self.coefficients).copy()
+        width = len(names) + len(self.functions)
+        if powers.ndim != 2 or powers.shape[1] not in (width, width + len(names)):
+            raise ValueError(f"exponents: must have shape (l, {width}), got shape {powers.shape}")
+        whole = np.isfinite(powers) & (powers >= 0) & (powers == np.rint(powers))
+        if not whole.all():
+            raise ValueError(f"exponents: must be non-negative integers, got {powers[~whole][0]:g}")
+        exponents = powers.astype(int)
+        if len(np.unique(exponents, axis=0)) != len(exponents):
+            raise ValueError("exponents: every monomial may appear once, got a repeated row")
+        shape = (len(exponents), len(names))
+        if coefficients.shape != shape:
+            raise ValueError(f"coefficients: must have shape {shape}, got {coefficients.shape}")
+        if not np.isfinite(coefficients).all():
+            raise ValueError("coefficients: must be finite, got NaN or infinity")
+        for array in (exponents, coefficients):
+            array.setflags(write=False)
+        checked = {"names": names, "exponents": exponents, "coefficients": coefficients}
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_terms(
+        cls,
+        equations: Mapping[str, Mapping[str, float]],
+        degree: int | None = None,
+        library: Library | None = None,
+    ) -> PolynomialSystem:
+        """Build a system from named terms.
+
+        Parameters
+        ----------
+        equations : mapping of str to mapping of str to float
+            For each variable its terms, e.g. ``{"x": {"x": -10, "y": 10}, "y": {...}}``. A term
+            is a product of variables, ``"1"``, ``"xz"``, ``"x^2 y"`` or ``"x*y**2"``.
+        degree : int, optional
+            Degree of the full library; by default the highest degree among the terms.
+        library : Library, optional
+            Whose functions terms may name, as in ``"sin(x)"``.
+
+        Raises
+        ------
+        ValueError
+            If the equations are no such mapping, or a term names an unknown variable or has a
+            higher degree than the library.
+        """
+        given = equations.values() if isinstance(equations, Mapping) else ()
+        if not given or not all(isinstance(terms, Mapping) for terms in given):
+            raise ValueError(
+                "equations: must give each variable its terms, e.g. {'x': {'x': -10, 'y': 10}, "
+                f"'y': {{'x': 1}}}}, got {equations!r:.60}"
+            )
+        names, held = tuple(equations), library or Library()
+        states = names[:-1] if CLOCK in names[-1:] and held.timed(names[:-1]) else names
+        m = len(states) // 2
+        measured = m if m and states[m:] == velocity_names(states[:m]) else len(states)
+        _, functions = held.resolve(names, measured)
+        known = (*names, *(function.name for function in functions))
+        known += tuple(f"{name}'" for name in names if held.denominators)
+        parsed = [
+            (parse_term(term, known), column, check_number(f"coefficient of {term}", value))
+            for column, terms in enumerate(given)
+            for term, value in terms.items()
+        ]
+        highest = max((sum(powers) for powers, _, _ in parsed), default=0)
+        degree = highest if degree is None else check_integer("degree", degree)
+        if highest > degree:
+            raise ValueError(f"degree: must be at least that of the terms, {highest}, got {degree}")
+        wanted, _ = (held + Library.polynomial(degree)).resolve(names, measured)
+        exponents = closure(np.array([*wanted.tolist(), *(powers for powers, _, _ in parsed)]))
+        index = {tuple(e): row for row, e in enumerate(exponents.tolist())}
+        coefficients = np.zeros((len(exponents), len(names)))
+        for powers, column, value in parsed:
+            coefficients[index[powers], column] += value
+        return cls(names, exponents, coefficients, functions=functions)
+
+    @property
+    def d(self) -> int:
+        """Dimension of the state."""
+        return len(self.names)
+
+    @cached_property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the monomials, e.g. ``("1", "x", "x^2", "xy")``."""
+        return self._named(tuple(f"{name}'" for name in self.names))
+
+    @cached_property
+    def factors(self) -> tuple[str, ...]:
+        """The same names without the slopes that terms hold."""
+        return self._named(("1",) * self.d)
+
+    def _named(self, slopes: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of the monomials, given those of the slopes; factors of 1 are left out.
+
+        A blank sets apart what has more than a letter, and all if a function is named like a
+        product of variables.
+        """
+        functions = tuple(function.name for function in self.functions)
+        alike = any(set(name) <= set(self.names) for name in functions)
+        names = (*self.names, *functions, *slopes)
+        return tuple(_term_text(e, names, "{}^{}", int(not alike)) for e in self.exponents)
+
+    @property
+    def is_polynomial(self) -> bool:
+        """Whether terms are products of the variables alone."""
+        return self.exponents.shape[1] == self.d
+
+    @cached_property
+    def implicit(self) -> Bools:
+        """Which terms hold a slope, bool, shape (l,); none, unless the law is a fraction."""
+        return np.asarray(self.exponents[:, self.d + len(self.functions) :].any(axis=1))
+
+    @cached_property
+    def timed(self) -> bool:
+        """Whether the last variable is the time, of which functions are terms: ``dt/dt = 1``."""
+        constant = (self.exponents.sum(axis=1) == 0).astype(float)
+        named = bool(self.functions) and self.names[-1] == CLOCK
+        return named and bool((self.coefficients[:, -1] == constant).all())
+
+    @property
+    def states(self) -> int:
+        """How many variables there are besides the time."""
+        return self.d - self.timed
+
+    @cached_property
+    def order(self) -> int:
+        """2 if the second half of the variables are the velocities of the first, else 1.
+
+        Velocities are named like vx, and the first half of the law is ``dx/dt = vx``. The time is
+        not counted.
+        """
+        m = self.states // 2
+        if self.names[m : self.states] != velocity_names(self.names[:m]):
+            return 1
+        tied = (self.exponents[:, : self.d] @ np.arange(self.d))[:, None] == np.arange(m, 2 * m)
+        tied &= self.exponents.sum(axis=1)[:, None] == 1
+        return 2 if (self.coefficients[:, :m] == tied).all() and tied.any(axis=0).all() else 1
+
+    @property
+    def support(self) -> Bools:
+        """Where a coefficient is not zero, bool, shape (l, d)."""
+        return self.coefficients != 0
+
+    @cached_property
+    def _own(self) -> PolynomialSystem:
+        """The same without functions that it has not: they may be infinite."""
+        used = self.support.any(axis=1) | self.is_polynomial
+        return replace(self, exponents=self.exponents[used], coefficients=self.coefficients[used])
+
+    def library(self, x: Floats) -> Floats:
+        """Candidate terms ``phi(x)``: (n, d) points to (n, l) values; slopes are the law's."""
+        z, _ = law_variables(self._points(x), self.functions, self.exponents, self.coefficients)
+        return monomials(z, self.exponents)
+
+    def __call__(self, x: Floats) -> Floats:
+        """Time derivative at ``x``, shape (n, d) or (d,), in state units per time unit."""
+        x = check_array("x", x)
+        return (self._own.library(np.atleast_2d(x)) @ self._own.coefficients).reshape(x.shape)
+
+    def gradient(self, x: Floats) -> Floats:
+        """Jacobian of the right-hand side.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n, d) or (d,)
+            Points.
+
+        Returns
+        -------
+        ndarray, shape (n, d, d) or (d, d)
+            ``[..., j, i]`` is the derivative of equation j with respect to variable i.
+        """
+        x, own = check_array("x", x), self._own
+        points = self._points(np.atleast_2d(x))
+        z, below = law_variables(points, own.functions, own.exponents, own.coefficients)
+        rates = np.einsum("nli,lj->nji", monomial_gradients(z, own.exponents), own.coefficients)
+        jacobian = along_state(rates, points, self.functions) / below[:, :, None]
+        return jacobian.reshape(*x.shape, self.d)
+
+    def shift(self, offset: Sequence[float] | Floats) -> PolynomialSystem:
+        """The same motion seen from a shifted origin, exactly (paper: Eq. 10).
+
+        If x(t) solves this system, x(t) + offset solves the returned one.
+
+        Parameters
+        ----------
+        offset : array_like, shape (d,)
+            Shift of the trajectory, in state units.
+
+        Raises
+        ------
+        ValueError
+            If the shift is not zero, and the law holds functions of the state, or the denominator
+            of a fraction vanishes at the new origin.
+        """
+        shift = check_vector("offset", offset, self.d)
+        moves = all(function.of_time for function in self.functions)
+        if shift[self.states :].any() or (shift.any() and not moves):
+            raise ValueError(
+                f"offset: must be zero for a law with functions of the state, got {offset!r:.60}"
+            )
+        exponents = closure(self.exponents)
+        rows = {tuple(e): row for row, e in enumerate(exponents)}
+        closed = np.zeros((len(exponents), self.d))
+        closed[[rows[tuple(e)] for e in self.exponents]] = self.coefficients
+        matrix = shift_matrix(exponents, shift)
+        shifted = matrix @ closed
+        # What cancels in exact arithmetic must not survive as a term of 1e-16.
+        shifted[np.abs(shifted) <= 1e-13 * (np.abs(matrix) @ np.abs(closed))] = 0.0
+        # A slope by itself belongs to the constant of a denominator, which is 1.
+        slopes = exponents[:, self.d + len(self.functions) :].any(axis=1)
+        slopes &= exponents.sum(axis=1) == 1
+        below = 1 - shifted[slopes].sum(axis=0)
+        if (np.abs(below) <= 1e-13).any():
+            raise ValueError(f"offset: no denominator may vanish there, got {offset!r:.60}")
+        shifted[slopes] = 0.0
+        return replace(self, exponents=exponents, coefficients=shifted / below)
+
+    def simulate(self, t: Floats, x0: Floats) -> Floats:
+        """Integrate from ``x0`` at ``t[0]`` with an adaptive 8th-order Runge-Kutta method.
+
+        The path is the same to the last digit on every machine; see `integrate`.
+
+        Parameters
+        ----------
+        t : array_like, shape (n,)
+            Increasing, finite times.
+        x0 : array_like, shape (d,)
+            State at ``t[0]``; the time itself, if it is a variable, may be left out.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+            The trajectory; rows after a blow-up are NaN, or where it is too stiff to follow.
+
+        Raises
+        ------
+        ValueError
+            If the times do not increase, a time or a number of the state is not finite, or an input
+            is not known at a time.
+        """
+        t = check_times(t)
+        if self.timed and np.shape(x0) != (self.d,):
+            x0 = np.append(check_vector("x0", x0, self.states), t[0])
+        x0 = check_vector("x0", x0, self.d)
+        self.check_inputs(x0[-1] + t - t[0])
+        fraction, size = bool(self.implicit.any()), self.d + len(self.functions)
+        above, below = (
+            one_by_one(self.exponents[rows, :size], self.coefficients[rows])
+            for rows in (~self.implicit, self.implicit)
+        )
+
+        def rate(x: Floats) -> Floats:
+            z = (extended(x[None], self.functions)[0] if self.functions else x).tolist()
+            if not fraction:
+                return np.array(above(z))
+            with np.errstate(divide="ignore", invalid="ignore"):  # at a pole the path ends
+                return np.array(above(z)) / (1 - np.array(below(z)))
+
+        return integrate(rate, t, x0, farthest=1e8 * (1 + np.abs(x0).max()))
+
+    def check_inputs(self, t: Floats) -> None:
+        """Refuse times (n,) at which an input in the law is not known."""
+        used = self.exponents[self.support.any(axis=1), self.d :].sum(axis=0)
+        for function, times in zip(self.functions, used.tolist(), strict=False):
+            if function.of_time and times:
+                unknown = ~np.isfinite(function.value(np.repeat(t[:, None], self.d, axis=1)))
+                if unknown.any():
+                    raise ValueError(
+                        f"t: must lie where {function.name} is known, got {t[unknown][0]:g}"
+                    )
+
+    def sides(self) -> dict[int, str]:
+        """What stands left in text, by number of equation: ``dx/dt``, or ``x''`` of order 2."""
+        if self.order == 1:
+            return {j: f"d{name}/dt" for j, name in enumerate(self.names[: self.states])}
+        m = self.states // 2
+        return {m + j: f"{name}''" for j, name in enumerate(self.names[:m])}
+
+    def text(self, digits: int = 4) -> str:
+        """The equations as lines of plain text, e.g. ``dx/dt = -10 x + 10 y``.
+
+        Of a law of second order its accelerations, e.g. ``x'' = -30 x - 0.25 vx``.
+        """
+        return "\n".join(
+            f"{side} = {self._right(j, self.factors, digits, '({}) / ({})', ' ')}"
+            for j, side in self.sides().items()
+        )
+
+    def _right(self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str) -> str:
+        """The right-hand side of an equation, given terms without slopes and how it is written."""
+        column = self.coefficients[:, j]
+        above = _sum_text(np.where(self.implicit, 0.0, column), terms, digits, times)
+        below = np.where(self.implicit, -column, 0.0)
+        if not below.any():
+            return above
+        return fraction.format(above, _sum_text(below, terms, digits, times, "1"))
+
+    def latex(self, digits: int = 4) -> str:
+        """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
+        names = tuple(map(name_latex, self.names))
+        left = {j: rf"\dot{{{name}}}" for j, name in enumerate(names)}
+        if self.order == 2:
+            m = self.states // 2
+            names = names[:m] + tuple(left[j] for j in range(m)) + names[2 * m :]
+            left |= {m + j: rf"\ddot{{{names[j]}}}" for j in range(m)}
+        left = {j: left[j] for j in self.sides()}
+        names += tuple(function.latex for function in self.functions) + ("1",) * self.d
+        terms = [_term_text(e, names, "{}^{{{}}}", 0) for e in self.exponents]
+        rows = (
+            f"{side} &= " + self._right(j, terms, digits, r"\frac{{{}}}{{{}}}", r"\,")
+            for j, side in left.items()
+        )
+        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def _repr_latex_(self) -> str:
+        return f"${self.latex()}$"
+
+    def _points(self, x: Floats) -> Floats:
+        x = check_array("x", x)
+        if x.ndim != 2 or x.shape[1] != self.d:
+            raise ValueError(f"x: must have shape (n, {self.d}), got {x.shape}")
+        return x
+
+
+def parse_term(term: str, names: tuple[str, ...]) -> tuple[int, ...]:
+    """The powers of the named factors in a term such as ``x^2 y``."""
+    if not isinstance(term, str) or not term.strip():
+        raise ValueError(f"term: must be '1' or a product of the variables {names}, got {term!r}")
+    exponents = dict.fromkeys(names, 0)
+    rest = "" if term.strip() == "1" else term.replace("**", "^").replace("*", " ").strip()
+    longest_first = "|".join(sorted(map(re.escape, names), key=len, reverse=True))
+    factor = re.compile(rf"({longest_first})(?:\s*\^\s*(\d+))?\s*")
+    while rest:
+        match = factor.match(rest)
+        if match is None:
+            raise ValueError(f"term: must be a product of the variables {names}, got {term!r}")
+        exponents[match[1]] += int(match[2] or 1)
+        rest = rest[match.end() :]
+    return tuple(exponents.values())
+
+
+def _term_text(exponents: Ints, names: tuple[str, ...], power: str, letters: int) -> str:
+    """A monomial as text, given how a power is written; a blank beside names of more letters."""
+    text, before = "", ""
+    for name, e in zip(names, exponents, strict=False):
+        if e and name != "1":
+            apart = text and max(len(before), len(name.rstrip("'"))) > letters
+            text += (" " if apart else "") + (name if e == 1 else power.format(name, e))
+            before = name.rstrip("'")
+    return text or "1"
+
+
+def _sum_text(
+    coefficients: Floats, terms: Sequence[str], digits: int, times: str, text: str = ""
+) -> str:
+    """A sum of terms as text, after what comes before it."""
+    # The highest monomials last, the constant first in the library: print it the way it is read.
+    for row in sorted(np.flatnonzero(coefficients).tolist(), key=lambda r: terms[r] == "1"):
+        value, term = coefficients[row], terms[row]
+        number = f"{abs(value):.{digits}g}"
+        size = number if term == "1" else term if number == "1" else f"{number}{times}{term}"
+        sign = "-" if value < 0 else "+"
+        text += f" {sign} {size}" if text else (f"-{size}" if value < 0 else size)
+    return text or "0"
+
+
+def place(law: PolynomialSystem, entry: int) -> str:
+    """Name of an entry of the coefficients, counted equation by equation."""
+    equation, term = divmod(int(entry), len(law.terms))
+    return f"{spoken(law, term, equation)} in d{law.names[equation]}/dt"
+
+
+def spoken(law: PolynomialSystem, term: int, equation: int) -> str:
+    """A term within a sentence, where a 1 would be read as a number."""
+    constant = "the constant" if law.support[term, equation] else "a constant"
+    return constant if law.terms[term] == "1" else law.terms[term]
+
+
+# --------------------------------------------------------------------------------------------------
+# The unknowns of a fit: a curve, and a law with its origin.
+
+
+@dataclass(frozen=True)
+class State:
+    """A curve and a law.
+
+    Parameters
+    ----------
+    control_points : ndarray, shape (r, d)
+        ``P``; the curve is ``G P``.
+    coefficients : ndarray, shape (l, d)
+        ``Lambda``, in monomials of ``x - offset``.
+    active : ndarray of bool, shape (l, d)
+        Terms that may differ from zero.
+    offset : ndarray, shape (d,)
+        ``Delta``, the origin of the law.
+    moving : ndarray of bool, shape (d,)
+        Coordinates of the offset that are free.
+    shared : ndarray of int, shape (l d,), optional
+        Of each coefficient, equation by equation, whose value it has; its own by default.
+    """
+
+    control_points: Floats
+    coefficients: Floats
+    active: Bools
+    offset: Floats
+    moving: Bools
+    shared: Ints | None = None
+
+    def flat(self) -> Floats:
+        """Coefficients, equation by equation, then the offset."""
+        return np.concatenate([self.coefficients.T.ravel(), self.offset])
+
+    def free(self) -> Bools:
+        """Which entries of `flat` are unknowns: of those that share a value, the first."""
+        free = np.concatenate([self.active.T.ravel(), self.moving])
+        free[[entry for entry, _ in self.followers()]] = False
+        return free
+
+    def followers(self) -> list[tuple[int, int]]:
+        """Entries of `flat` that have the value of another, and which."""
+        if self.shared is None:
+            return []
+        entries = np.flatnonzero(self.shared != np.arange(len(self.shared)))
+        return [(int(entry), int(self.shared[entry])) for entry in entries]
+
+    def whole(self, active: Bools) -> Bools:
+        """Terms, (l, d), with all that share a value with one of them."""
+        if self.shared is None:
+            return active
+        count = np.bincount(self.shared, active.T.ravel(), len(self.shared))
+        return np.asarray(count[self.shared] > 0).reshape(active.T.shape).T
+
+    def moved(self, control_points: Floats, flat: Floats) -> State:
+        """The same terms with another curve and other entries of `flat`."""
+        l, d = self.coefficients.shape
+        values, offset = flat[: l * d], flat[l * d :]
+        coefficients = (values if self.shared is None else values[self.shared]).reshape(d, l).T
+        return replace(
+            self, control_points=control_points, coefficients=coefficients, offset=offset
+        )
+
+    def of_terms(self, active: Bools) -> State:
+        """The same with these terms, those that share a value with them, and no others."""
+        active = self.whole(active)
+        return replace(self, active=active, coefficients=np.where(active, self.coefficients, 0.0))
+
+
+# --------------------------------------------------------------------------------------------------
+# The form of a law before it is searched: its variables, its candidate terms, and what is known.
+#
+# A law of second order, ``x'' = f(x, x')``, is one of first order in positions and velocities. The
+# velocities are states that nobody has measured, and their half of the law is known: ``x' = v``.
+# So is the time, if there are inputs: a last state, with ``t' = 1``.
+
+MOST_TERMS = 1000
+"""Most monomials of a law, or of its denominators: a search among more would not end."""
+SIZES, POINTS = (-3, 6), 64
+"""Decades of the sizes of points at which a function is asked whether it is none, and how many."""
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """What a law of ``d`` equations in ``l`` terms may look like.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the d state variables: first those that were measured, then their velocities, and last
+        the time, as far as a law has them.
+    exponents : ndarray of int, shape (l, d + k) or (l, 2 d + k)
+        The library: with every term all that divides it. Slopes are variables, too, if the law may
+        be a fraction.
+    functions : tuple of Function, length k
+        Of the state, in the units of the data.
+    candidates : ndarray of bool, shape (l, d)
+        Terms that are searched.
+    known : ndarray, shape (l, d)
+        Coefficients that are given, in the units of the data; zero where a term is a candidate.
+    movable : ndarray of bool, shape (d,)
+        Coordinates whose origin is unknown. What is known does not change when it moves.
+    shared : ndarray of int, shape (l d,)
+        Of each place in the coefficients, equation by equation, whose value it has: its own, but
+        for the directions of a vector, which all have that of the first.
+    """
+
+    names: tuple[str, ...]
+    exponents: Ints
+    functions: tuple[Function, ...]
+    candidates: Bools
+    known: Floats
+    movable: Bools
+    shared: Ints
+
+    @classmethod
+    def of(
+        cls, coordinates: tuple[str, ...], library: Library, order: int = 1, origin: str = "learn"
+    ) -> Form:
+        """A law in all terms of a library, for named coordinates that were measured."""
+        measured, names = len(coordinates), coordinates
+        if order == 2:
+            names += velocity_names(coordinates)
+        states = len(names)  # those that an equation is sought or known of
+        _check_size(library, states)
+        if library.timed(names):
+            names += (CLOCK,)
+        d = len(names)
+        wanted, functions = library.resolve(names, measured)
+        velocities = np.eye(wanted.shape[1], dtype=int)[measured:states]
+        exponents = closure(np.concatenate([wanted, velocities]))
+        row = {tuple(powers): k for k, powers in enumerate(exponents.tolist())}
+        known = np.zeros((len(exponents), d))
+        for position, velocity in enumerate(velocities.tolist()):
+            known[row[tuple(velocity)], position] = 1.0
+        known[0, states:] = 1.0
+        candidates, sought = np.zeros(known.shape, dtype=bool), slice(states - measured, states)
+        candidates[[row[tuple(powers)] for powers in wanted.tolist()], sought] = True
+        shared, first = np.arange(candidates.size).reshape(d, -1), None
+        alone = np.eye(wanted.shape[1], dtype=int)[d:].tolist()
+        for powers, function in zip(alone, functions, strict=False):
+            direction = function.direction
+            if direction is None:
+                continue
+            equation, here = states - measured + direction, row[tuple(powers)]
+            candidates[here, np.arange(d) != equation] = False
+            first = None if direction == 0 else first
+            if _vanishes(function, d):
+                candidates[here, equation] = False
+                continue
+            first = shared[equation, here] if first is None else first
+            shared[equation, here] = first
+        # A slope multiplies terms of its own equation alone.
+        slopes = exponents[:, d + len(functions) :]
+        candidates &= (slopes.sum(axis=1) == 0)[:, None] | (slopes > 0 if slopes.size else False)
+        # A function of the state does not move with the origin, so that none is sought; and what is
+        # given is so in the frame of the data.
+        stays = slopes.size or not all(function.of_time for function in functions)
+        still = origin == "data" or stays or library.given
+        movable = (np.arange(d) < measured) & (not still)
+        form = cls(names, exponents, functions, candidates, known, movable, shared.ravel())
+        if library.given:
+            form = form._given({of: dict(terms) for of, terms in library.given}, names[sought])
+        if not form.candidates.any():
+            raise ValueError("library: must leave a term to be found, got all of them given")
+        return form
+
+    def _given(
+        self, equations: dict[str, dict[str, float | None]], sought: tuple[str, ...]
+    ) -> Form:
+        """The same with some terms of equations given, which are among those that are sought.
+
+        What is said of a term counts more than what is said of all others.
+        """
+        if unknown := [equation for equation in equations if equation not in sought]:
+            raise ValueError(
+                f"library: must give terms of an equation of {', '.join(sought)}, "
+                f"got {unknown[0]!r}"
+            )
+        candidates, known = self.candidates.T.ravel(), self.known.T.ravel()
+        told: dict[int, float | None] = {}
+
+        def tell(entry: int, value: float | None) -> None:
+            tied = self.shared == self.shared[entry]
+            candidates[tied], known[tied] = value is None, value or 0.0
+
+        for equation, terms in equations.items():
+            for entry in self._there(equation) if terms.get(OTHERS) is not None else ():
+                tell(entry, terms[OTHERS])
+        for equation, terms in equations.items():
+            for entry, value in self._named(equation, terms).items():
+                common = int(self.shared[entry])
+                if told.setdefault(common, value) != value:
+                    raise ValueError(
+                        "library: the directions of a vector have one coefficient, got "
+                        f"{told[common]} and {value} in the equation of {equation}"
+                    )
+                tell(entry, value)
+        shape = self.known.T.shape
+        return replace(self, candidates=candidates.reshape(shape).T, known=known.reshape(shape).T)
+
+    def _there(self, equation: str) -> list[int]:
+        """Places of an equation's candidates in the coefficients, equation by equation."""
+        j = self.names.index(equation)
+        return (j * len(self.known) + np.flatnonzero(self.candidates[:, j])).tolist()
+
+    def _named(self, equation: str, terms: dict[str, float | None]) -> dict[int, float | None]:
+        """What is said of the terms of an equation that are named, by their places."""
+        there, size = self._there(equation), len(self.known)
+        rows: dict[int, float | None] = {}
+        for term, value in terms.items():
+            row = self._row(term)
+            entry = self.names.index(equation) * size + (-1 if row is None else row)
+            if row is not None and entry in there:
+                rows[entry] = value
+            elif term != OTHERS:
+                names = self.law(self.known).terms
+                raise ValueError(
+                    f"library: {term!r} is no term of the equation of {equation}, which has "
+                    f"{', '.join(names[entry % size] for entry in there)}"
+                )
+        return rows
+
+    def _row(self, term: str) -> int | None:
+        """Where a term stands in the library; none if it is not there."""
+        slopes = tuple(f"{name}'" for name in self.names)
+        variables = (*self.names, *(function.name for function in self.functions), *slopes)
+        try:
+            powers = parse_term(term, variables[: self.exponents.shape[1]])
+        except ValueError:
+            return None
+        same = (self.exponents == powers).all(axis=1)
+        return int(same.argmax()) if same.any() else None
+
+    def law(self, coefficients: Floats) -> PolynomialSystem:
+        """The law with these coefficients, (l, d), in the units of the data."""
+        return PolynomialSystem(self.names, self.exponents, coefficients, functions=self.functions)
+
+    @property
+    def states(self) -> int:
+        """How many variables there are besides the time."""
+        return self.law(self.known).states
+
+    @property
+    def implicit(self) -> Bools:
+        """Which terms hold a slope, (l,)."""
+        slopes = self.exponents[:, len(self.names) + len(self.functions) :]
+        return np.asarray(slopes.any(axis=1))
+
+    @property
+    def degree(self) -> int:
+        """The highest degree among the candidates; a function counts as a variable."""
+        return int(self.exponents[self.candidates.any(axis=1)].sum(axis=1).max())
+
+    @property
+    def searched(self) -> Ints:
+        """The candidates' places in the coefficients, equation by equation."""
+        own = self.shared == np.arange(len(self.shared))
+        return np.flatnonzero(self.candidates.T.ravel() & own)
+
+
+def _check_size(library: Library, states: int) -> None:
+    """Refuse more monomials than a search can try, before they are listed."""
+    for degree in (library.degree or 0, library.denominators):
+        if (count := comb(states + degree, states)) > MOST_TERMS:
+            raise ValueError(
+                f"library: must have at most {MOST_TERMS} monomials, got {count} of degree "
+                f"{degree} in {states} variables"
+            )
+
+
+def _vanishes(function: Function, d: int) -> bool:
+    """Whether a function is zero at points of all sizes, as a vector along an axis of none."""
+    rng = np.random.default_rng(0)
+    sizes = 10.0 ** rng.uniform(*SIZES, (POINTS, 1))
+    return not function.value(sizes * rng.standard_normal((POINTS, d))).any()

@@ -1,0 +1,453 @@
+"""Variance components: the errors of the data, their precision, and process noise.
+
+How large the errors are that a fitted curve leaves and how long they last (integrated
+autocorrelation time); how precise each measurement is; and whether the motion is kicked at random.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import cho_solve_banded
+
+from ..arrays import Bools, Floats
+from .bspline import Segment
+from .collocation import CLEANEST, Collocation, Fit
+from .data import CHANCE, autocovariances, inflation
+from .l0 import LEAST
+from .model import State
+from .problem import Problem, fit_curves, spread_to_unseen
+
+# --------------------------------------------------------------------------------------------------
+# How large the errors of the data are, as a fitted curve leaves them, and how long they last.
+
+ORDER = 40
+"""Most errors that foretell the next."""
+LARGE = 0.1
+"""Errors that last, relative to the spread of the data, beyond which a law's may well be meant."""
+REBOUND = 0.3
+"""Autocorrelation below zero from which on errors come back with the other sign, as a motion does:
+three standard errors of a hundred independent ones."""
+
+
+def residual_noise(fit: Fit) -> Floats:
+    """Standard deviation of the errors of single samples, (d,)."""
+    return np.maximum(_spread(fit), CLEANEST)
+
+
+def _spread(fit: Fit) -> Floats:
+    """Standard deviation of the data residual, less the freedom that the fit used up.
+
+    Of measurements of precision 1; for a coordinate that was never observed, as of the others.
+    """
+    collocation, seen = fit.collocation, fit.collocation.counts > 0
+    used = fit.state.free().sum() / seen.sum() + len(collocation.segments)
+    residual, _ = collocation.data_residual(fit.state.control_points)
+    squares = (residual**2 * collocation.precision).sum(axis=0)[seen]
+    spread = np.sqrt(squares / np.maximum(collocation.counts[seen] - used, 1.0))
+    return spread_to_unseen(spread, seen)
+
+
+def effective_noise(fit: Fit) -> Floats:
+    """Standard deviation of white noise that would leave a slow signal as uncertain, (d,).
+
+    Errors that last for several samples do not average out: their variance counts times the sum
+    of their autocorrelations (`inflation`).
+    """
+    lasting = np.concatenate([inflation(errors) for errors in _errors_seen(fit)])
+    return np.maximum(_spread(fit) * np.sqrt(lasting), CLEANEST)
+
+
+def errors_left(problem: Problem, fit: Fit) -> Floats:
+    """How large the errors of the data are by a fit, (d,), were they independent.
+
+    A curve that may leave its law follows the errors, too: then they are as estimated. Of errors
+    that are given only how long they last is estimated.
+    """
+    if problem.kicked:
+        return problem.noise
+    errors = effective_noise(fit)
+    return problem.noise * errors / residual_noise(fit) if problem.measured_errors else errors
+
+
+def _errors_seen(fit: Fit) -> list[list[Floats]]:
+    """Residuals of each coordinate, of precision 1, where it was seen: a column a stretch."""
+    collocation = fit.collocation
+    residual, _ = collocation.data_residual(fit.state.control_points)
+    residual *= np.sqrt(collocation.precision)
+    seen = np.isfinite(collocation.grid.x)
+    ends = np.cumsum([len(segment.t) for segment in collocation.segments])[:-1]
+    stretches = list(zip(np.split(residual, ends), np.split(seen, ends), strict=True))
+    return [
+        [errors[here[:, j], j, None] for errors, here in stretches] for j in range(collocation.d)
+    ]
+
+
+def time_inflation(fit: Fit) -> float:
+    """Size of the errors along the path over what it were if no coordinate knew of another.
+
+    At least 1, and 1 where it may be chance. A time that is not exact moves all coordinates along
+    the path, together: at most the root of their number.
+    """
+    collocation = fit.collocation
+    residual, _ = collocation.data_residual(fit.state.control_points)
+    splines = collocation.grid.splines(fit.state.control_points)
+    pairs = zip(splines, collocation.segments, strict=True)
+    slopes = np.concatenate([spline(segment.t, 1) for spline, segment in pairs])
+    seen = collocation.counts > 0
+    scale = (np.sqrt(collocation.precision) / residual_noise(fit))[:, seen]
+    residual, slopes = residual[:, seen] * scale, slopes[:, seen] * scale
+    along = (residual * slopes).sum(axis=1) ** 2 / np.maximum((slopes**2).sum(axis=1), LEAST)
+    apart = (residual**2).sum(axis=1) / np.maximum((scale > 0).sum(axis=1), 1)
+    ratio = float(along.sum() / np.maximum(apart.sum(), LEAST))
+    return float(np.sqrt(ratio)) if ratio > 1 + CHANCE * np.sqrt(2 / len(residual)) else 1.0
+
+
+def prediction_gain(fit: Fit) -> Floats:
+    """By how much the errors before it foretell an error: n times its log variance ratio, (d,).
+
+    Minus twice the log likelihood of an autoregressive model of the residual over that of white
+    noise (Levinson's recursion; its order by the Bayesian information criterion).
+    """
+    errors = [np.concatenate(pieces)[:, 0] for pieces in _errors_seen(fit)]
+    fewest = min((len(e) for e in errors if len(e)), default=0)
+    lags = range(min(ORDER, fewest // 10) + 1)
+    covariances = [np.array([e[k:] @ e[: len(e) - k] for k in lags]) for e in errors]
+    sizes = map(len, errors)
+    return np.array([_levinson(c, n).min() for c, n in zip(covariances, sizes, strict=True)])
+
+
+def passing(fit: Fit, tried: int) -> Bools:
+    """Which errors last but are none that the motion brings along, (d,).
+
+    What a law misses swings with the motion; errors of a sensor or a filter are forgotten. More
+    must be independent than are ``tried`` as further terms, so that those could tell; and they are
+    no large part of the motion. Of a coordinate that was never observed, what is true of all
+    others.
+    """
+    seen, errors = fit.collocation.counts > 0, _errors_seen(fit)
+    counts = np.array([sum(independent(piece[:, 0]) for piece in pieces) for pieces in errors])
+    lowest = np.concatenate([rebound(pieces) for pieces in errors])
+    forgotten = (counts > tried) & (lowest > -REBOUND) & (residual_noise(fit) < LARGE)
+    return np.where(seen, forgotten, forgotten[seen].all())
+
+
+def independent(errors: Floats) -> float:
+    """How many independent errors have a variance as uncertain as that of these, (n,).
+
+    Their number over the sum of the squared autocorrelations (Bartlett 1946), which is that of the
+    ordinates of their periodogram that matter: few, if they have periods.
+    """
+    powers = np.abs(np.fft.rfft(errors, max(len(errors), 1))[1:]) ** 2
+    return float(4 * powers.sum() ** 2 / (powers**2).sum()) if powers.any() else 0.0
+
+
+def rebound(pieces: Sequence[Floats]) -> Floats:
+    """The lowest autocorrelation of errors at any lag, (d,), as those of `inflation`."""
+    covariances = autocovariances(pieces)
+    return covariances.min(axis=0) / np.maximum(covariances[0], LEAST)
+
+
+def _levinson(covariance: Floats, n: int) -> Floats:
+    """The gain for every number of errors that foretell the next."""
+    gains = np.zeros(len(covariance))
+    if not covariance[0] > 0:
+        return gains  # of what was never observed
+    variance, weights = covariance[0], np.zeros(0)
+    for order in range(1, len(covariance)):
+        reflection = (covariance[order] - weights @ covariance[order - 1 : 0 : -1]) / variance
+        weights = np.append(weights - reflection * weights[::-1], reflection)
+        variance *= 1 - reflection**2
+        gains[order] = n * np.log(variance / covariance[0]) + order * np.log(n)
+    return gains
+
+
+# --------------------------------------------------------------------------------------------------
+# How precise each measurement is, as the errors that a law leaves tell.
+#
+# Noise may grow with the signal, with its speed (times that are not exact) or be larger for a
+# while, and some samples may be plainly wrong. A model of the variance is fitted to the residuals,
+# the simplest that explains them (Bayesian information criterion); each measurement then has its
+# own weight, and what is no noise at all has none.
+
+GROSS = 6.0
+"""Distance from the curve, in standard deviations of the noise there, that no noise reaches."""
+MOST_GROSS = 0.1
+"""Largest share of samples that may be wrong; if more are, the law is."""
+STRETCHES = 8
+"""Pieces of a trajectory that may have a noise of their own."""
+LIKELY = 20.0
+"""Gain of the criterion from which on a noise is not taken to be even."""
+LARGEST_RATIO = 100.0
+"""Precision of the best measurements over the typical one, at most."""
+UPDATES = 60
+"""Steps of the variance components: ten would do for most."""
+MEDIAN = 0.455
+"""Median of the square of a standard normal number."""
+LASTING = 1.5
+"""Inflation of the errors from which on they are no noise of single samples."""
+NOISELESS = 1e-4
+"""Errors as small as this are those of splines, not of measurements."""
+
+
+def smoother_weights(problem: Problem) -> Problem:
+    """The problem with the precision that the smoothed curves show each measurement to have.
+
+    The same problem where the noise is even and no sample is wrong, or the errors are given. A
+    wrong law explains what it misses by measurements of its own choice; a curve has no law.
+    """
+    if problem.measured_errors:
+        return problem
+    steps, path, left_over = 1e-3, [], []
+    for (_, (t, x)), curve in zip(problem.stretches, problem.curves, strict=True):
+        path.append(np.stack([curve(t), (curve(t + steps) - curve(t - steps)) / (2 * steps)]))
+        left_over.append(path[-1][0] - x)
+    residual = np.nan_to_num(np.concatenate(left_over))
+    observed = np.isfinite(np.concatenate([x for _, (_, x) in problem.stretches]))
+    signal, speed = np.concatenate(path, axis=1)
+    causes = [(signal - problem.home) ** 2, speed**2]  # what the variance of the noise may follow
+    spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(observed.sum(axis=0), 1))
+    factors, noise = np.ones_like(residual), problem.noise.copy()
+    for j in np.flatnonzero(spread > NOISELESS):
+        seen = observed[:, j]
+        factors[seen, j] = _factors(residual[seen, j], [cause[seen, j] for cause in causes])
+        left = (factors[seen, j] * residual[seen, j] ** 2).sum() / (factors[seen, j] > 0).sum()
+        noise[j] *= np.sqrt(left) / spread[j]
+    if (factors == 1).all():
+        return problem
+    precision = [values.copy() for values in problem.precision]
+    ends = np.cumsum([len(t) for _, (t, _) in problem.stretches])[:-1]
+    for (number, (t, _)), factor in zip(problem.stretches, np.split(factors, ends), strict=True):
+        rows = np.searchsorted(problem.trajectories[number][0], t)
+        precision[number][rows] *= factor
+    return replace(problem, precision=precision, noise=np.maximum(noise, CLEANEST))
+
+
+def _factors(residual: Floats, causes: list[Floats]) -> Floats:
+    """Precision of measurements over the typical one, (n,): 0 for what is no noise."""
+    n = len(residual)
+    even = np.ones(n)
+    pieces = np.arange(n) * STRETCHES // n
+    stretches = (pieces == np.unique(pieces)[:, None]).astype(float)
+    models = [even[None], *([even, z] for z in causes), stretches]
+    fits = [_variance(residual, np.array(model)) for model in models]
+    cost, variance, gross = min(fits, key=lambda fit: fit[0])
+    plain = n * np.log((residual**2).mean()) + n + np.log(n)
+    if not cost < plain - LIKELY or gross.mean() > MOST_GROSS:
+        return even
+    if inflation([np.where(gross, 0.0, residual / np.sqrt(variance))[:, None]])[0] > LASTING:
+        variance = even  # what lasts is no noise, but a single sample may still be wrong
+    precision = np.minimum(np.median(variance) / variance, LARGEST_RATIO)
+    return np.where(gross & _alone(residual), 0.0, precision)
+
+
+def _alone(residual: Floats) -> Bools:
+    """Which residuals are more than twice those around them, (n,)."""
+    around = np.stack([np.roll(residual, k) for k in (-2, -1, 1, 2)])
+    return np.abs(residual) > 2 * np.abs(np.median(around, axis=0))
+
+
+def _variance(residual: Floats, causes: Floats) -> tuple[float, Floats, Bools]:
+    """A variance that is a sum of causes, (k, n), each times an unknown size of at least 0.
+
+    Its criterion, itself, (n,), and what is no noise. The sizes by an ascent of the likelihood
+    that keeps them positive; what is gross at present does not count.
+    """
+    causes = causes / causes.mean(axis=1, keepdims=True)
+    squares = residual**2
+    variance = causes.sum(axis=0)
+    least = (squares / variance).mean() / LARGEST_RATIO**2  # some residuals are exactly zero
+    sizes = np.full(len(causes), max(np.median(squares / variance) / MEDIAN, least))
+    for _ in range(UPDATES):
+        variance = np.maximum(sizes @ causes, least)
+        noise = squares <= GROSS**2 * variance
+        up = (causes * (noise * squares / variance**2)).sum(axis=1)
+        down = (causes * (noise / variance)).sum(axis=1)
+        sizes = sizes * up / np.maximum(down, LEAST)
+    variance = np.maximum(sizes @ causes, variance.max() / LARGEST_RATIO**2)
+    gross = squares > GROSS**2 * variance
+    terms = np.log(variance) + np.where(gross, GROSS**2, squares / variance)
+    return float(terms.sum() + len(causes) * np.log(len(residual))), variance, gross
+
+
+# --------------------------------------------------------------------------------------------------
+# Process noise: random kicks of the motion, told from errors of the measurement by evidence.
+#
+# A law that leaves more than the noise of the data may be exact and measured with errors that
+# last, or measured well and not exact: kicked at every instant. Both are Gaussian models of the
+# same data, so their marginal likelihoods can be compared (MacKay 1992); in the language of data
+# assimilation, a strong against a weak constraint. And kicks have a spectrum of their own: what
+# lasts, such as a bent space or a law outside the library, is none.
+
+PROBES = 8
+"""Random vectors of a trace (Hutchinson): they leave an error of a hundredth at 1,500 samples."""
+MOST_UPDATES, SETTLED = 20, 0.1
+"""Updates of the variances, and the change of a logarithm at which they end."""
+HARDEST = 1e8
+"""Physics weight, relative to the misfit of a plain regression, that leaves no room for kicks."""
+OCTAVE = 8
+"""Frequencies of the lowest band of a spectrum; each next one has twice as many."""
+UNLIKE, BLUR = 4.0, 0.15
+"""Distance between two spectra in standard errors from which on they differ, and the error of a
+band's logarithm that splines make by themselves."""
+
+
+def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
+    """The problem with the kicks that its data show; the same problem if they show none.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without kicks.
+    fit : Fit
+        The best law that holds exactly.
+    rng : Generator
+        For the probes of traces.
+    """
+    segments = [
+        Segment.even(s.t, s.x, problem.spacing, s.trajectory) for s in fit.collocation.segments
+    ]
+    start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
+    every = replace(_on_knots(start, fit), active=problem.form.candidates)
+    kicked = _balanced(problem, _hard_where_known(start, free), every, rng)
+    if unlike_kicks(kicked, free, rng) > UNLIKE:
+        return problem
+    exact = _measured_badly(problem, fit, segments)
+    newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
+    measured = evidence(exact) + prediction_gain(exact).sum()
+    if not evidence(kicked) + 2 * newcomers < measured:
+        return problem
+    return _with_variances(problem, kicked.collocation)
+
+
+def rebalanced(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
+    """The problem with the kicks and the noise that a law leaves; all terms together leave less."""
+    balanced = _balanced(problem, fit.collocation, fit.state, rng)
+    return _with_variances(problem, balanced.collocation)
+
+
+def _with_variances(problem: Problem, weights: Collocation) -> Problem:
+    return replace(
+        problem,
+        noise=np.maximum(weights.data_weights**-0.5, CLEANEST),
+        process_noise=np.where(_free(problem), weights.physics_weights**-0.5, 0.0),
+    )
+
+
+def _free(problem: Problem) -> Bools:
+    """Which equations may be kicked: those that are not known, (d,)."""
+    return np.asarray(problem.form.candidates.any(axis=0), dtype=bool)
+
+
+def _hard_where_known(collocation: Collocation, free: Bools) -> Collocation:
+    """What is known of a law (the slope of a position is the velocity) holds exactly."""
+    hard = HARDEST * collocation.physics_weights
+    return collocation.weighted(
+        collocation.data_weights, np.where(free, collocation.physics_weights, hard)
+    )
+
+
+def evidence(fit: Fit) -> float:
+    """Minus twice the log marginal likelihood of a fit; comparable on the same knots."""
+    collocation, grid = fit.collocation, fit.collocation.grid
+    factor, _ = collocation.factor(fit.state)
+    weights = collocation.counts @ np.log(collocation.data_weights)
+    weights += np.log(np.outer(grid.node_weights, collocation.physics_weights)).sum()
+    return float(collocation.objective(fit.state) - weights + 2 * np.log(factor[0]).sum())
+
+
+def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
+    """The exact law on other knots, at the errors that it leaves."""
+    grid = problem.collocation(segments, residual_noise(fit))
+    exact = problem.weighted(grid, HARDEST).solve(_on_knots(grid, fit))
+    own = exact.collocation.weighted(residual_noise(exact) ** -2, exact.collocation.physics_weights)
+    return own.solve(exact.state)
+
+
+def _on_knots(collocation: Collocation, fit: Fit) -> State:
+    """The state of a fit on other knots."""
+    curves = fit.collocation.grid.splines(fit.state.control_points)
+    return replace(fit.state, control_points=fit_curves(collocation, curves))
+
+
+def _balanced(
+    problem: Problem, collocation: Collocation, state: State, rng: np.random.Generator
+) -> Fit:
+    """The fit at the variances of noise and kicks that make the data most likely.
+
+    Each is the sum of the squares of its residuals, over how many of these the curve and the terms
+    have not used up (MacKay's update). Noise that is given stays.
+    """
+    free, told = _free(problem), problem.measured_errors
+    grid, d = collocation.grid, collocation.d
+    probes = rng.choice([-1.0, 1.0], (grid.r * d, PROBES))
+    hardest = HARDEST * collocation.physics_weights
+    unfitted = len(grid.node_weights) - state.active.sum(axis=0)
+    for _ in range(MOST_UPDATES):
+        fit = collocation.solve(state, tolerance=1.0, max_steps=10)
+        state, collocation = fit.state, fit.collocation
+        factor, physics = collocation.factor(state)
+        solved = cho_solve_banded((factor, True), probes)
+        in_law = ((physics @ probes) * (physics @ solved)).mean(axis=1).reshape(-1, d).sum(axis=0)
+        in_data = _measurements_used(collocation, probes, solved)
+        residual, _ = collocation.data_residual(state.control_points)
+        missed = (collocation.precision * residual**2).sum(axis=0)
+        kicked = grid.node_weights @ collocation.physics_residual(state) ** 2
+        data = np.maximum(collocation.counts - in_data, 1.0) / np.maximum(missed, LEAST)
+        law = np.maximum(unfitted - in_law, 1.0) / np.maximum(kicked, LEAST)
+        unknown = (collocation.counts > 0) & (not told)
+        data = np.where(unknown, data, collocation.data_weights)
+        law = np.where(free, law, collocation.physics_weights)
+        data, law = np.minimum(data, CLEANEST**-2), np.minimum(law, hardest)
+        change = np.log([data / collocation.data_weights, law / collocation.physics_weights])
+        collocation = collocation.weighted(data, law)
+        if (np.abs(change) < SETTLED).all():
+            break
+    return collocation.solve(state, tolerance=1.0)
+
+
+def _measurements_used(collocation: Collocation, probes: Floats, solved: Floats) -> Floats:
+    """How many measurements of each coordinate the curve uses up, (d,): Hutchinson's trace.
+
+    From random vectors of +-1, (r d, m), and what the inverse of the normal matrix makes of them.
+    """
+    grid = collocation.grid
+    shape = (len(grid.x), collocation.d, -1)
+    before, after = (
+        (grid.samples @ v.reshape(grid.r, -1)).reshape(shape) for v in (probes, solved)
+    )
+    return ((before * after).mean(axis=2) * collocation.sample_weights).sum(axis=0)
+
+
+def unlike_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
+    """How far what the law misses is from what independent kicks and errors would leave.
+
+    Both are simulated and smoothed as the data were; their spectra are compared by octaves: the
+    largest distance between the logarithms of a band, in standard errors, over the equations that
+    are ``free`` to be kicked.
+    """
+    collocation, grid, d = fit.collocation, fit.collocation.grid, fit.collocation.d
+    factor, physics = collocation.factor(fit.state)
+    kicks = rng.standard_normal((physics.shape[0], PROBES))
+    errors = rng.standard_normal((len(grid.x), d, PROBES))
+    weighted = np.sqrt(collocation.sample_weights)[:, :, None] * errors
+    pull = (grid.samples.T @ weighted.reshape(len(grid.x), -1)).reshape(grid.r * d, PROBES)
+    pull -= physics.T @ kicks
+    simulated = kicks + physics @ cho_solve_banded((factor, True), pull)
+    root = np.sqrt(grid.node_weights[:, None] * collocation.physics_weights)
+    found = _bands((root * collocation.physics_residual(fit.state))[:, :, None])
+    expected = _bands(simulated.reshape(-1, d, PROBES))
+    count = OCTAVE * 2.0 ** np.maximum(np.arange(len(found)) - 1, 0)
+    distance = np.abs(np.log(np.maximum(found, LEAST) / np.maximum(expected, LEAST)))
+    return float((distance / np.sqrt(1 / count + BLUR**2)[:, None])[:, free].max())
+
+
+def _bands(signal: Floats) -> Floats:
+    """Mean power of signals of shape (k, d, m) in octaves of frequency, (bands, d)."""
+    power = (np.abs(np.fft.rfft(signal, axis=0)[1:]) ** 2).mean(axis=2) / len(signal)
+    octaves = int(np.log2(max(len(power) / OCTAVE, 1.0)))
+    edges = [0, *(OCTAVE * 2 ** np.arange(octaves + 1)).tolist()]
+    return np.stack([power[low:high].mean(axis=0) for low, high in pairwise(edges)])

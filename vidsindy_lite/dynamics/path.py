@@ -1,0 +1,804 @@
+"""The path of laws over the tolerated error, and the law that stays the same over most of it.
+
+One objective, in standard units, with ``s`` the error that is tolerated over that of the data::
+
+    J_s = s^-2 (sum w r^2 / sigma^2 + sum |x' - Theta(x - Delta) Lambda|^2 / q)
+          + price (|Lambda|_0 + |Delta|_0)
+
+A smooth error of a thousandth (of an integrator, of a lens) is a small change of the law: terms
+that no noise model refuses, each worth its price. Raise the error that is tolerated, and the law
+changes at every step until only the terms remain that the motion needs; then it stays the same over
+a wide range. So each equation has a *path* of laws over ``s``, and the widest plateau, in decades,
+is the law (stability selection). To tolerate an error is to divide the quadratic model of a fit by
+``s^2``: around a fit the whole path is small algebra.
+
+So there is one loop. A first law at a large ``s``; the path around it down to the errors of the
+data; of each equation the widest plateau; that law fitted where it begins; and again, until the
+path around a law leads to that law.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.interpolate import BSpline, CubicHermiteSpline
+from scipy.stats import chi2
+from tqdm import tqdm
+
+from ..arrays import Bools, Floats
+from .bspline import Segment
+from .collocation import Collocation, Fit, Status, WithCurve
+from .data import Trajectory
+from .frames import Origin, as_shifted, at_home, cheapest_at, closed, off_home, one_by_one, together
+from .l0 import PLATEAU, inverse, minimiser, subset_path, subset_search
+from .library import closure_mask
+from .model import PolynomialSystem, State, runge_kutta_4
+from .noise import effective_noise, errors_left, residual_noise, smoother_weights, time_inflation
+from .problem import COARSE, Problem, fit_curves
+from .result import Plateau, Step
+
+TOLERATED = 0.03
+"""Error that a first law tolerates, relative to the spread of the data: finer terms come after
+those that make the motion."""
+SMOOTH = 0.1
+"""Where errors are smooth, a plateau may begin here: terms below are as likely made by the errors.
+Independent errors average out, and whatever they do not explain is a term."""
+NOISELESS = 1e-4
+"""Errors as small as this are taken for smooth: no measurement is so good, a simulation may be."""
+LASTING = 2.0
+"""Errors are smooth if a signal is left so many times as uncertain as by independent ones."""
+LARGEST, STEP = 1.0, 0.1
+"""Largest error on a path, that of no law at all; and decades between two laws of a path."""
+ROUNDS = 6
+"""Most laws to which paths lead, each followed around the law before."""
+DEEPEST, DESCENT, RICHEST = 6, 3.0, 2.0
+"""Most laws at smaller errors; by what the tolerated error falls from one to the next; and most
+terms of each over those of the one before."""
+MOST_PLATEAUS = 4
+"""Most choices of plateaus that are fitted until a law has no pole on the curve."""
+CONSISTENT = 1.5
+"""Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
+RESOLVED = 1e-2
+"""Error, relative to the spread of the data, below which a misfit does not matter."""
+FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
+"""Physics weights of a fit of all terms, relative to the misfit of a plain regression."""
+WEIGHTS = (1e2, 1e4, 1e8)
+"""Physics weights of a search."""
+FINAL_WEIGHT = WEIGHTS[-1]
+"""Weight at which the law holds exactly for all that the data can tell."""
+NEEDLESS_START = 0.1
+"""Chance that a second start, from terms of all degrees, is made though the first left nothing."""
+ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
+"""A first law is sought on so many samples and turns of the motion, if they are no more than that
+share of the data."""
+LONGEST_SEARCH = 10
+"""Most rounds of a subset search, and most moves of an origin."""
+EXACT = 1e-4
+"""Tolerance of the last fits: a hundredth of a standard error, squared."""
+SPLINE_ERROR = 3e-7
+"""Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
+MOST_HALVINGS, MOST_CREEPING = 4, 2
+"""Most halvings of the knot spans, and those until a law must converge: a sharp turn that the first
+knots cannot follow takes two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The laws of all equations around a fit, from the errors that it leaves up to no law at all.
+
+    Parameters
+    ----------
+    fit : Fit
+        Around which the laws are found.
+    model : WithCurve
+        Its quadratic model: `Problem.model`.
+    own : float
+        The errors that the fit was weighted with; those of the law, where kicks are larger.
+    level : float
+        Errors that have to be tolerated: a plateau that begins above them is no law of these data.
+    plateaus : tuple of tuple of Plateau
+        Of each equation, from the smallest tolerated error up.
+    """
+
+    fit: Fit
+    model: WithCurve
+    own: float
+    level: float
+    plateaus: tuple[tuple[Plateau, ...], ...]
+
+    @property
+    def lowest(self) -> float:
+        """The smallest tolerated error."""
+        return self.plateaus[0][0].low
+
+    @property
+    def tolerated(self) -> float:
+        """Errors that have to be tolerated, times those that the fit was weighted with."""
+        return max(self.level / self.own, 1.0)
+
+    def width(self, plateau: Plateau) -> float:
+        """How far a plateau reaches beyond the errors there are, in decades."""
+        return max(replace(plateau, low=max(plateau.low, self.own)).decades, 0.0)
+
+    def ranked(self) -> list[list[Plateau]]:
+        """The plateaus of each equation that begin at or below the level, the widest first."""
+        return [
+            sorted((p for p in path if p.low <= self.level), key=lambda p: -p.decades)
+            for path in self.plateaus
+        ]
+
+    def widest(self) -> list[Plateau]:
+        """The widest plateau of each equation, of those that begin at or below the level."""
+        return [ranked[0] for ranked in self.ranked()]
+
+    def of(self, active: Bools) -> list[Plateau]:
+        """The lowest plateau with the terms of each equation of a law, or the lowest of all."""
+        return [
+            next((p for p in path if (p.terms == terms).all()), path[0])
+            for path, terms in zip(self.plateaus, active.T, strict=True)
+        ]
+
+    def restricted(self, active: Bools) -> State:
+        """The state that the quadratic model promises for other terms, (l, d)."""
+        support = np.append(active.T.ravel(), self.fit.state.moving)[self.model.columns]
+        present = self.fit.state.flat()[self.model.columns]
+        solution = minimiser(self.model.information, self.model.gradient, present, support)
+        return self.model.along(self.fit.state, solution - present, 1.0).of_terms(active)
+
+
+def follow(problem: Problem, fit: Fit) -> Path:
+    """The path of laws around a fit at a physics weight at which the law holds exactly.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its prices.
+    fit : Fit
+        Around which.
+    """
+    model, terms_end = problem.model(fit), len(problem.form.searched)
+    columns = model.columns
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
+    present, support = fit.state.flat()[columns], fit.state.free()[columns]
+    own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))
+    single = np.full(problem.d, own) if problem.kicked else residual_noise(fit)
+    lasting = single if problem.kicked else effective_noise(fit)
+    lowest = min(typical(single), LARGEST / 10**STEP)
+    smooth = bool((lasting > LASTING * single).any() or typical(single) <= NOISELESS)
+    level = max(lowest, time_inflation(fit) * typical(lasting), SMOOTH if smooth else 0.0)
+    count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
+    # What has to be tolerated is asked itself: a plateau may begin just below it.
+    levels = np.union1d(np.geomspace(lowest, LARGEST, count + 1), min(level, LARGEST))
+    paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
+    lows, highs = levels[:-1].tolist(), levels[1:].tolist()
+    shares = [(own / low) ** 2 for low in lows]
+    searched = subset_path(model.information, model.gradient, present, prices, support, shares)
+    for low, high, support in zip(lows, highs, searched, strict=True):
+        active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
+        active.flat[problem.form.searched] = support[:terms_end]
+        active = fit.state.whole(active.T).T
+        for j, terms in enumerate(active):
+            if paths[j] and (paths[j][-1].terms == terms).all():
+                low_here = paths[j].pop().low
+            else:
+                low_here = low
+            paths[j].append(Plateau(j, low_here, high, terms))
+    return Path(fit, model, own, level, tuple(map(tuple, paths)))
+
+
+def typical(noise: Floats) -> float:
+    """One number for the errors of all coordinates: their geometric mean."""
+    return float(np.exp(np.log(noise).mean()))
+
+
+# ------------------------------------------------------------------------------------ a first law
+
+
+def first_law(problem: Problem, history: History, tolerated: float | None = None) -> Fit:
+    """The cheapest law at a large tolerated error, from terms of low degree, then from all.
+
+    Relative to the spread of the data, `TOLERATED` by default; where the noise is larger, that is
+    tolerated, and kicks are as they are. Long data are searched in part: all of them then decide on
+    the terms once more.
+    """
+    least = TOLERATED if tolerated is None else tolerated
+    noise = problem.noise if problem.kicked else np.maximum(problem.noise, least)
+    tolerant, stretches = replace(problem, noise=noise), enough(problem)
+    part = replace(tolerant, stretches=stretches)
+    collocation, found = part.collocation(part.segments()), []
+    control = fit_curves(collocation, part.curves)
+    degrees, implicit = part.exponents.sum(axis=1), part.form.implicit
+    # Terms of denominators come last: a factor above and below the line changes nothing.
+    stages = [~implicit & (degrees <= 2), ~implicit, np.ones_like(implicit)]
+    for k, rows in enumerate(stages):
+        if k and (rows == stages[k - 1]).all():
+            continue
+        whole, _ = unpruned(part, collocation, control, rows, history)
+        fit = at_home(part, whole)
+        for weight in WEIGHTS:
+            fit = select(part, fit, weight, "subset search", history)
+        found.append(framed(part, fit, history))
+        if not leaves_something_over(part, whole) or history.over:
+            break
+    fit = min(found, key=lambda fit: fit.criterion)
+    if stretches is problem.stretches:
+        return fit
+    collocation = tolerant.collocation(tolerant.segments())
+    state = replace(fit.state, control_points=fit_curves(collocation, tolerant.curves))
+    fit = tightened(tolerant, collocation, state)
+    return select(tolerant, fit, FINAL_WEIGHT, "subset search, all data", history)
+
+
+def enough(problem: Problem) -> list[tuple[int, Trajectory]]:
+    """The stretches of data, or of long ones so much of each as a search needs."""
+    samples = sum(len(t) for _, (t, _) in problem.stretches)
+    time = sum(t[-1] - t[0] for _, (t, _) in problem.stretches)
+    share = max(ENOUGH_SAMPLES / samples, ENOUGH_TURNS * 2 * np.pi / time)
+    if share > LARGEST_SHARE:
+        return problem.stretches
+    cut = []
+    for i, (t, x) in problem.stretches:
+        end = t[0] + max(share * (t[-1] - t[0]), 2 * np.pi)
+        cut.append((i, (t[t <= end], x[t <= end])))
+    return cut
+
+
+def unpruned(
+    problem: Problem,
+    collocation: Collocation,
+    control: Floats,
+    rows: Bools,
+    history: History,
+) -> tuple[Fit, float]:
+    """Fit all terms of some rows of the library, (l,), while the physics weight rises.
+
+    The last weight comes back, too. Many terms that the data hardly tell apart cannot be fitted at
+    a large one: such a fit does not converge, and even those before it lean on the terms. Then the
+    first fit is the start.
+    """
+    d = problem.d
+    x, slope = collocation.node_states(control)
+    coefficients = np.zeros(problem.known.shape)
+    terms = problem.terms(x)
+    left = slope - terms @ problem.known
+    coefficients[rows] = np.linalg.lstsq(terms[:, rows], left, rcond=problem.noise.min())[0]
+    active = rows[:, None] & problem.form.candidates
+    coefficients[~active] = 0.0
+    still, shared = np.zeros(d, dtype=bool), problem.form.shared
+    state = State(control, coefficients, active, np.zeros(d), still, shared)
+    fits: list[tuple[Fit, float]] = []
+    for weight in FIRST_WEIGHTS:
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
+        state = fit.state
+        history.add("all terms", problem, fit, weight)
+        fits.append((fit, weight))
+        if fit.status is not Status.CONVERGED:
+            return fits[0]
+    return fits[-1]
+
+
+def leaves_something_over(problem: Problem, fit: Fit) -> bool:
+    """Would the other terms together explain more of the data than chance does?"""
+    searched = problem.form.searched
+    left_out = len(searched) - int(fit.state.free()[searched].sum())
+    if not left_out:
+        return False
+    _, gain = fit.collocation.linearise(fit.state, searched).newton()
+    return bool(gain > chi2.isf(NEEDLESS_START, left_out))
+
+
+def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
+    """The fit of a state's terms while the physics weight rises to its last.
+
+    At that weight alone the law holds so exactly that a state far from the minimum creeps.
+    """
+    for weight in WEIGHTS:
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=10)
+        state = fit.state
+    return fit
+
+
+def select(problem: Problem, start: Fit, weight: float, stage: str, history: History) -> Fit:
+    """Alternate between the subset search and Gauss-Newton until the criterion stops falling.
+
+    The search runs over all terms, active or not, on the quadratic model with the curve
+    eliminated; its proposal is kept only if the true criterion falls after a refit.
+    """
+    weighted = problem.weighted(start.collocation, weight)
+
+    def refit(state: State) -> Fit:
+        fit = weighted.solve(state, tolerance=0.1)
+        return replace(fit, criterion=problem.criterion(weighted, fit.state))
+
+    best = refit(start.state)
+    history.add(stage, problem, best, weight)
+    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
+    for _ in range(LONGEST_SEARCH):
+        state = best.state
+        columns = problem.columns(state)
+        model = weighted.linearise(state, columns)
+        support, solution, _ = subset_search(
+            model.information, model.gradient, state.flat()[columns], prices[columns],
+            state.free()[columns],
+        )  # fmt: skip
+        if (support == state.free()[columns]).all():
+            break
+        promised = model.along(state, solution - state.flat()[columns], 1.0)
+        trial = refit(replace(promised, active=promised.coefficients != 0))
+        if not trial.criterion < best.criterion - PLATEAU or history.over:
+            break
+        best = trial
+        history.add(stage, problem, best, weight)
+    return best
+
+
+def framed(problem: Problem, fit: Fit, history: History) -> Fit:
+    """The law with its origin off the data's, or back, while the criterion falls.
+
+    Axes move together, to where a term vanishes; only if that does not pay, one by one.
+    """
+    for _ in range(LONGEST_SEARCH):
+        if fit.status is not Status.CONVERGED or history.over:
+            break  # what has not converged is no law whose terms could tell
+        trial = _moved(problem, fit, together(problem, fit.state), history)
+        if not trial.criterion < fit.criterion:
+            trial = _moved(problem, fit, list(one_by_one(problem, fit.state)), history)
+        if not trial.criterion < fit.criterion:
+            break
+        fit = trial
+    return fit
+
+
+def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: History) -> Fit:
+    """The law in the cheapest of other frames; as it is where none is cheaper."""
+    others = [there for there in origins if (there[1] != fit.state.moving).any()]
+    if not others:
+        return fit
+    whole = closed(problem, fit, FINAL_WEIGHT)
+    law = as_shifted(problem, whole)
+    starts = [cheapest_at(problem, whole, law, there) for there in others]
+    start = min(starts, key=lambda candidate: candidate.criterion)
+    if not start.criterion < fit.criterion + problem.penalties.max():
+        return fit
+    start = start.collocation.solve(start.state)  # its curve is still that of the frame before
+    trial = select(problem, start, FINAL_WEIGHT, "another frame", history)
+    cheaper = trial.criterion < fit.criterion - PLATEAU
+    return trial if cheaper and problem.holds_origin(trial.state.offset) else fit
+
+
+# ---------------------------------------------------------------------------- the law that persists
+
+
+def persistent(
+    problem: Problem, fit: Fit, history: History, free: bool = True
+) -> tuple[Fit, Path, bool]:
+    """The law whose terms are those of the widest plateaus of the path around it, and that path.
+
+    Parameters
+    ----------
+    problem : Problem
+    fit : Fit
+        A first law.
+    history : History
+    free : bool
+        Whether an axis that is at home by chance may leave it.
+
+    Returns
+    -------
+    fit : Fit
+    path : Path
+        Around it.
+    persists : bool
+        Whether the path leads to the law; else it is the last to which one led.
+    """
+    crossed = not gaps(fit.collocation.segments)
+    for k in range(ROUNDS):
+        coarse = k > 0 or not crossed or not near(problem, fit, TOLERATED)
+        fit = at_own_errors(problem, fit) if coarse else polish(problem, fit, history)
+        path = follow(problem, fit)
+        if k == 0:
+            path = deepest(problem, path, history)
+        if crossed and coarse and has_terms(fit, path.widest()):
+            fit, coarse = polish(problem, fit, history), False
+            path = follow(problem, fit)
+        if not has_terms(fit, path.widest()):
+            other = refit(problem, path, history)
+            if other.status is not Status.CONVERGED and fit.status is Status.CONVERGED:
+                break  # what cannot be fitted is no law
+            fit = other
+        elif not crossed:
+            fit, crossed = bridged(problem, fit), True
+        else:
+            state = off_home(problem.cautious, fit.state, path.model, path.tolerated)
+            if not free or state is fit.state:
+                return fit, path, fit.status is Status.CONVERGED
+            fit = replace(fit, state=state)
+        if not history.another():
+            break
+    fit = polish(problem, fit if crossed else bridged(problem, fit), history)
+    path = follow(problem, fit)
+    return fit, path, fit.status is Status.CONVERGED and has_terms(fit, path.widest())
+
+
+def near(problem: Problem, fit: Fit, tolerated: float) -> bool:
+    """Whether a law leaves hardly more than the noise, or than is tolerated."""
+    limit = CONSISTENT * np.maximum(problem.noise, tolerated)
+    return bool((errors_left(problem, fit) <= limit).all())
+
+
+def has_terms(fit: Fit, goal: Sequence[Plateau]) -> bool:
+    """Whether a fit has the terms of these plateaus."""
+    return all((p.terms == fit.state.active[:, p.equation]).all() for p in goal)
+
+
+def deepest(problem: Problem, path: Path, history: History) -> Path:
+    """The path around the last of the richer laws that explain what the one before left over.
+
+    A missing term leaves smooth errors, too, and only its own law tells: so the error that is
+    tolerated is lowered as long as what a law leaves falls with it.
+    """
+    for _ in range(DEEPEST):
+        errors = errors_left(problem, path.fit)
+        if near(problem, path.fit, 0.0) or history.over:
+            break
+        tolerant = replace(problem, noise=np.maximum(problem.noise, errors / DESCENT))
+        collocation = path.fit.collocation
+        weighted = collocation.weighted(tolerant.noise**-2, collocation.physics_weights)
+        start = replace(path.fit, collocation=weighted)
+        fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
+        fit = at_own_errors(problem, framed(tolerant, fit, history))
+        richer = fit.state.active.sum() > RICHEST * path.fit.state.active.sum()
+        explained = typical(errors_left(problem, fit)) < typical(errors) / CONSISTENT
+        if fit.status is not Status.CONVERGED or richer or not explained:
+            break  # around what has not converged nothing is told
+        path = follow(problem, fit)
+    return path
+
+
+def at_own_errors(problem: Problem, fit: Fit) -> Fit:
+    """The fit weighted with the errors that it leaves, the law exact."""
+    fit = problem.along(fit)
+    collocation = problem.weighted(fit.collocation, FINAL_WEIGHT)
+    for _ in range(2):
+        weights = errors_left(problem, fit) ** -2
+        weighted = collocation.weighted(weights, collocation.physics_weights)
+        fit = weighted.solve(fit.state, tolerance=0.1, max_steps=10)
+        if fit.status is not Status.CONVERGED:  # it creeps where the law is held too firmly
+            fit = tightened(problem, weighted, fit.state)
+    return fit
+
+
+def refit(problem: Problem, path: Path, history: History) -> Fit:
+    """The law of the widest plateaus of a path; where such a law has a pole, of the next ones."""
+    ranked = path.ranked()
+    for _ in range(MOST_PLATEAUS):
+        goal = [plateaus[0] for plateaus in ranked]
+        fit = _refitted(problem, path, goal, history)
+        if np.isfinite(fit.collocation.objective(fit.state)):
+            return fit
+        highest = max(goal, key=lambda plateau: plateau.low)
+        ranked[highest.equation].remove(highest)
+        if not ranked[highest.equation]:
+            break
+    return path.fit
+
+
+def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: History) -> Fit:
+    """The law of these plateaus, fitted and framed where they begin; other terms only shift it."""
+    fit = path.fit
+    active = fit.state.whole(np.stack([plateau.terms for plateau in goal], axis=1))
+    tolerated = max(max(plateau.low for plateau in goal) / path.own, 1.0)
+    shifts = closure_mask(problem.exponents, active, problem.form.movable)
+    form = replace(problem.form, candidates=shifts & problem.form.candidates)
+    tolerant = replace(problem, noise=errors_left(problem, fit) * tolerated, form=form)
+    collocation = fit.collocation.weighted(tolerant.noise**-2, fit.collocation.physics_weights)
+    trial = tightened(tolerant, collocation, path.restricted(active))
+    trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
+    if not np.isfinite(trial.criterion):
+        return trial
+    history.add("another law of the path", tolerant, trial, FINAL_WEIGHT)
+    return framed(tolerant, trial, history)
+
+
+def polish(problem: Problem, fit: Fit, history: History) -> Fit:
+    """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
+    fit = problem.along(fit)
+    fit = first = problem.weighted(fit.collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
+    columns, creeps = np.flatnonzero(fit.state.free()), first.status is Status.MAX_STEPS
+    for halving in range(MOST_HALVINGS):
+        if creeps and halving == MOST_CREEPING:
+            fit = first
+            break
+        before = fit.state.flat()[columns]
+        segments = [segment.refined() for segment in fit.collocation.segments]
+        finer = problem.collocation(segments, errors_left(problem, fit))
+        splines = fit.collocation.grid.splines(fit.state.control_points)
+        state = replace(fit.state, control_points=fit_curves(finer, splines))
+        fit = problem.along(Fit(state, problem.weighted(finer, FINAL_WEIGHT), fit.status))
+        fit = fit.collocation.solve(state, EXACT)
+        creeps = creeps and fit.status is Status.MAX_STEPS
+        information = fit.collocation.linearise(fit.state, columns).information
+        spread = np.sqrt(np.diag(inverse(information)))
+        # Half the spacing, a sixteenth of the error: so much is left of what it just was.
+        error = np.abs(fit.state.flat()[columns] - before) / 15
+        if (error < np.maximum(0.1 * spread, SPLINE_ERROR)).all():
+            break
+    history.add("polish", problem, fit, FINAL_WEIGHT)
+    return fit
+
+
+def bridged(problem: Problem, fit: Fit) -> Fit:
+    """Integrate the law across gaps and fit again with the physics enforced there.
+
+    A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut
+    at gaps. Groups of gaps are tried, shortest first; a group whose bridges spoil the fit is
+    halved, down to single gaps.
+    """
+    return _bridge_group(problem, fit, gaps(fit.collocation.segments))
+
+
+def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
+    """The fit with these gaps crossed, or those of them that the data allow."""
+    law = problem.law(fit.state).shift(fit.state.offset)
+    splines = fit.collocation.grid.splines(fit.state.control_points)
+    joined, curves = join(
+        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing
+    )
+    bridged = problem.collocation(joined)
+    start = replace(fit.state, control_points=fit_curves(bridged, curves))
+    trial = tightened(problem, bridged, start)
+    # A bridge takes away the freedom of one initial condition: so much may the fit lose.
+    freedom = problem.d * len(group) + (bridged.counts - fit.collocation.counts).sum()
+    loss = trial.collocation.objective(trial.state) - fit.collocation.objective(fit.state)
+    if loss < freedom + 4 * np.sqrt(2 * freedom):
+        return replace(fit, state=trial.state, collocation=trial.collocation)
+    if len(group) > 1:
+        for half in (group[: len(group) // 2], group[len(group) // 2 :]):
+            fit = _bridge_group(problem, fit, half)
+    return fit
+
+
+# --------------------------------------------------------------------------------------------------
+# Noise of data with few samples a turn, told by candidate terms together.
+#
+# A curve without a law has as much freedom as there are samples a turn. Where these are few, it
+# takes motion for noise, or gives the motion up and is flat. So terms are fitted at once, as many
+# as converge, and what they leave is the noise; each of the two noises has its law.
+
+FLAT = 0.9
+"""Errors, relative to the spread of the data, of a curve that has given the motion up."""
+
+
+def views(pose: Callable[..., Problem]) -> list[Problem]:
+    """A problem with the noise that its curves leave, and, if far less, with what terms leave.
+
+    Parameters
+    ----------
+    pose : callable
+        Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
+        the samples, which serve where smoothed ones leave out a part of the motion.
+    """
+    problem = smoother_weights(pose())
+    # A curve that has given up has no turns.
+    enough = problem.samples_a_turn > COARSE and problem.noise.max() < FLAT
+    if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():
+        return [problem]
+    told = _by_terms(problem) or _by_terms(pose(True))
+    return [problem] if told is None else [problem, told]
+
+
+def _by_terms(problem: Problem) -> Problem | None:
+    """The problem with the noise that terms leave, as many as converge, if it is far less."""
+    collocation = problem.collocation(problem.segments())
+    control = fit_curves(collocation, problem.curves)
+    degrees = problem.exponents.sum(axis=1)
+    for degree in range(problem.form.degree, 0, -1):
+        rows = ~problem.form.implicit & (degrees <= degree)
+        fit, weight = unpruned(problem, collocation, control, rows, History())
+        left = residual_noise(fit)
+        over = CONSISTENT * left < problem.noise
+        if weight == FIRST_WEIGHTS[-1] and over.any():
+            return replace(problem, noise=np.where(over, left, problem.noise))
+    return None
+
+
+def evidence(problem: Problem, fit: Fit) -> float:
+    """What a law costs whose noise is its own: n log variance, and the price of its terms.
+
+    The lower, the better (Bayesian information criterion); of laws of the same data.
+    """
+    counts = fit.collocation.counts
+    seen = counts > 0
+    # Of a law that is kicked, what is not foretold: the curve follows its data.
+    single = (
+        np.hypot(problem.noise, problem.process_noise) if problem.kicked else residual_noise(fit)
+    )
+    return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.price(fit.state)
+
+
+# --------------------------------------------------------------------------------------------------
+# Curves across gaps in the data, by integrating a law from both sides.
+#
+# A smoothing spline crosses a gap on whatever branch is smooth, not on the one that the motion
+# took. A law found from the stretches between the gaps tells which.
+
+Gap = tuple[int, float]
+"""A gap is named by its trajectory and the time of the last sample before it."""
+
+
+def gaps(segments: Sequence[Segment]) -> list[Gap]:
+    """The gaps between segments of the same trajectory, shortest first."""
+    lengths = {
+        (left.trajectory, left.t[-1]): right.t[0] - left.t[-1]
+        for left, right in zip(segments[:-1], segments[1:], strict=True)
+        if left.trajectory == right.trajectory
+    }
+    return sorted(lengths, key=lengths.__getitem__)
+
+
+@dataclass(frozen=True)
+class Joined:
+    """A curve made of splines, with the gaps between them crossed by a law.
+
+    Parameters
+    ----------
+    splines : sequence of scipy.interpolate.BSpline
+        Pieces in the order of time, with values of shape (d,).
+    law : PolynomialSystem
+        Integrated forward from the left end and backward from the right end of each gap; the two
+        are blended linearly.
+    """
+
+    splines: Sequence[BSpline]
+    law: PolynomialSystem
+
+    def __call__(self, t: Floats) -> Floats:
+        """Evaluate at increasing times, shape (n, d)."""
+        values = np.empty((len(t), self.law.d))
+        ends = [(spline.t[0], spline.t[-1]) for spline in self.splines]
+        for (low, high), spline in zip(ends, self.splines, strict=True):
+            inside = (t >= low) & (t <= high)
+            values[inside] = spline(t[inside])
+        crossed = [(low, high) for (_, low), (high, _) in zip(ends[:-1], ends[1:], strict=True)]
+        inside = [(t > low) & (t < high) for low, high in crossed]
+        steps = 1 + max(rows.sum() for rows in inside)
+        forward, backward = self._crossings(np.array(crossed), steps)
+        for (low, high), rows, left, right in zip(crossed, inside, forward, backward, strict=True):
+            share = (t[rows] - low) / (high - low)
+            values[rows] = (1 - share[:, None]) * left(share) + share[:, None] * right(1 - share)
+        return values
+
+    def _crossings(
+        self, crossed: Floats, steps: int
+    ) -> tuple[list[CubicHermiteSpline], list[CubicHermiteSpline]]:
+        """Each gap from its left and from its right end, as functions of the share covered."""
+        x0 = np.array(
+            [spline(low) for spline, (low, _) in zip(self.splines[:-1], crossed, strict=True)]
+            + [spline(high) for spline, (_, high) in zip(self.splines[1:], crossed, strict=True)]
+        )
+        length = np.diff(crossed)
+        pace = np.concatenate([length, -length])
+        share = np.linspace(0, 1, steps + 1)
+
+        def rate(x: Floats) -> Floats:
+            return pace * self.law(x)
+
+        with np.errstate(over="ignore", invalid="ignore"):
+            paths = runge_kutta_4(rate, share, x0, substeps=1)
+            slopes = np.array([rate(x) for x in paths])
+        # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
+        lost = ~(np.isfinite(paths) & np.isfinite(slopes)).all(axis=(0, 2))
+        paths[:, lost], slopes[:, lost] = x0[lost], 0.0
+        curves = [CubicHermiteSpline(share, paths[:, i], slopes[:, i]) for i in range(len(x0))]
+        return curves[: len(crossed)], curves[len(crossed) :]
+
+
+def join(
+    segments: Sequence[Segment],
+    splines: Sequence[BSpline],
+    bridged: Sequence[Gap],
+    trajectories: Sequence[Trajectory],
+    law: PolynomialSystem,
+    spacing: float,
+) -> tuple[list[Segment], list[BSpline | Joined]]:
+    """Join segments across the named gaps.
+
+    Parameters
+    ----------
+    segments, splines
+        The present pieces and their fitted curves.
+    bridged : sequence of Gap
+        Which gaps to cross.
+    trajectories : sequence of Trajectory
+        All data, including samples that were too few to make a segment of their own.
+    law : PolynomialSystem
+        The law, in the frame of the trajectories.
+    spacing : float
+        Length of a knot span.
+
+    Returns
+    -------
+    segments : list of Segment
+    curves : list of callable
+        A first curve for each of them.
+    """
+    groups: list[list[int]] = []
+    for i, segment in enumerate(segments):
+        left = segments[i - 1]
+        if i and left.trajectory == segment.trajectory and (left.trajectory, left.t[-1]) in bridged:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    joined, curves = [], []
+    for group in groups:
+        first, last = segments[group[0]], segments[group[-1]]
+        if len(group) == 1:
+            joined.append(first)
+            curves.append(splines[group[0]])
+            continue
+        t, x = trajectories[first.trajectory]
+        inside = (t >= first.t[0]) & (t <= last.t[-1])
+        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory))
+        curves.append(Joined([splines[i] for i in group], law))
+    return joined, curves
+
+
+# --------------------------------------------------------------------------------------------------
+# How a discovery went: the steps of its fits, in the order of time.
+
+
+@dataclass(frozen=True)
+class History:
+    """The steps of a discovery so far, in the order of time, and how much of it is left.
+
+    Parameters
+    ----------
+    steps : list of Step
+    began : float
+        On the clock of `time.perf_counter`.
+    end : float
+        When no further round begins, on that clock.
+    bar : tqdm, optional
+        Moves with every round.
+    """
+
+    steps: list[Step] = field(default_factory=list)
+    began: float = field(default_factory=time.perf_counter)
+    end: float = np.inf
+    bar: tqdm | None = None
+
+    @property
+    def over(self) -> bool:
+        """Whether there is no time left."""
+        return time.perf_counter() > self.end
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be told if the time was not enough."""
+        told = "the time limit ended the search: this is the best law so far; raise time_limit"
+        return (told,) if self.over else ()
+
+    def another(self) -> bool:
+        """Count a round, and say whether there is time for another."""
+        if self.bar is not None:
+            self.bar.update()
+        return not self.over
+
+    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
+        """Add what a fit at a relative physics weight has reached."""
+        state, collocation = fit.state, fit.collocation
+        data = collocation.data_loss(collocation.curve(state.control_points))
+        self.steps.append(
+            Step(
+                stage=stage,
+                seconds=time.perf_counter() - self.began,
+                physics_weight=weight,
+                data_loss=data / collocation.counts.sum(),
+                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
+                terms=int(state.active.sum()),
+                offset=problem.units.point(state.offset),
+            )
+        )

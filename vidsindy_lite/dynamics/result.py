@@ -1,0 +1,713 @@
+"""The result of a discovery: the law in two frames, its uncertainty, and whether to trust it; as a
+file, and its path of laws as a picture."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline
+
+from ..arrays import Bools, Floats
+from ..checks import check_array, check_output, check_path
+from ..values import decoded, encoded
+from .data import Trajectory
+from .library import Function, Library, extended, harmonic
+from .mechanics import Physics, Quantity, Round, on_circle, physics_of
+from .model import PolynomialSystem, place, power_of_ten
+from .smoothing import smooth
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+# --------------------------------------------------------------------------------------------------
+# The result of a discovery: the law in two frames, its uncertainty, and whether to trust it.
+
+SHOWN = 3
+"""Most absent terms that are printed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plateau:
+    """A range of tolerated errors over which the law of one equation has the same terms.
+
+    Parameters
+    ----------
+    equation : int
+        Column of the coefficients.
+    low, high : float
+        Tolerated errors, relative to the spread of the data.
+    terms : ndarray of bool, shape (l,)
+        Which terms the equation has, in the law's own frame.
+    """
+
+    equation: int
+    low: float
+    high: float
+    terms: Bools
+
+    @property
+    def decades(self) -> float:
+        """Width of the range in decades."""
+        return float(np.log10(self.high / self.low))
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the history of a discovery.
+
+    Parameters
+    ----------
+    stage : str
+        What was done.
+    seconds : float
+        Time since the start.
+    physics_weight : float
+        Relative weight of the physics loss.
+    data_loss : float
+        Mean square residual of the data over the noise variance.
+    physics_loss : float
+        Mean square residual of the law in standard units.
+    terms : int
+        Number of active terms.
+    offset : ndarray, shape (d,)
+        Origin of the law in the data's frame.
+    """
+
+    stage: str
+    seconds: float
+    physics_weight: float
+    data_loss: float
+    physics_loss: float
+    terms: int
+    offset: Floats
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What a law foretells.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+    x : ndarray, shape (n, d)
+        NaN from where the path has left all bounds.
+    status : str
+        ``"ok"``, or where the path diverges.
+    """
+
+    t: Floats
+    x: Floats
+    status: str
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """A discovered law.
+
+    Parameters
+    ----------
+    system : PolynomialSystem
+        The law in the frame of the data.
+    native : PolynomialSystem
+        The law in the frame in which it is sparsest, or in one such frame if there are several:
+        ``system`` is ``native.shift(offset)``, less the terms that the data cannot tell from zero.
+    offset : ndarray, shape (d,)
+        Origin of the native frame, in units of the data.
+    covariance, native_covariance : ndarray, shape (l d, l d)
+        Of the coefficients, equation by equation, if the terms are the right ones; zero for
+        inactive terms.
+    offset_errors : ndarray, shape (d,)
+        Standard errors of the offset; zero along an axis that was not moved.
+    noise : ndarray, shape (d,)
+        Estimated standard deviation of the errors of single samples, in units of the data.
+    model_error : ndarray, shape (d,)
+        How far the motion departs from the law by itself: what random kicks add to each
+        coordinate in a unit of time (standard deviation, in units of the data over the square root
+        of time). Zero where the data agree with a law that holds exactly.
+    warnings : tuple of str
+        Why the law should not be trusted, with advice; empty if nothing was found.
+    path : tuple of tuple of Plateau
+        Of each equation, its laws in the native frame over the tolerated error, from the least
+        errors that a law leaves up to the spread of the data. The law is the widest of those that
+        begin below what has to be tolerated.
+    history : tuple of Step
+        How the fit went.
+    curves : tuple of scipy.interpolate.BSpline
+        The fitted curve, one spline per stretch of data, in units of the data.
+    absent : ndarray, shape (l, d, 2)
+        Of each candidate term of ``native`` that the law has not, the 95 % interval of what it
+        would be if it alone were added, all else fitted again; NaN for what is in the law or no
+        candidate. See `intervals` of the module ``absent`` for the formula.
+    note : str
+        Which order the law has and why, where both were looked for.
+    orientation : ndarray, shape (m, m), optional
+        Axes of a law whose orientation was learned, one a row, in those of the data: the law, its
+        curve and what it simulates are in them, a place of the data is ``x @ orientation.T`` there,
+        and one of theirs ``x @ orientation`` in the data. None where they are the data's own.
+    swing : Swing, optional
+        Where positions are bound to a circle, and no law of theirs is beyond doubt: the circle, as
+        ``swing.circle``, and the law of the angle on it, ``swing.law``. None elsewhere.
+    """
+
+    system: PolynomialSystem
+    native: PolynomialSystem
+    offset: Floats
+    covariance: Floats
+    native_covariance: Floats
+    offset_errors: Floats
+    noise: Floats
+    model_error: Floats
+    warnings: tuple[str, ...]
+    path: tuple[tuple[Plateau, ...], ...]
+    history: tuple[Step, ...]
+    curves: tuple[BSpline, ...]
+    absent: Floats
+    note: str = ""
+    orientation: Floats | None = None
+    swing: Swing | None = None
+
+    @property
+    def status(self) -> str:
+        """``"ok"``, or ``"suspect"`` if there is a warning."""
+        return "suspect" if self.warnings else "ok"
+
+    @property
+    def axes(self) -> str:
+        """Where the axes of the law point in those of the data; empty if they are these."""
+        if self.orientation is None:
+            return ""
+        rows = (", ".join(f"{part:.4f}" for part in row) for row in self.orientation)
+        pairs = zip(self.system.names, rows, strict=False)
+        return "turned, " + ", ".join(f"{name} along ({row})" for name, row in pairs)
+
+    @property
+    def coefficients(self) -> Floats:
+        """``Lambda`` in the frame of the data, shape (l, d)."""
+        return self.system.coefficients
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the candidate terms, length l."""
+        return self.system.terms
+
+    @property
+    def standard_errors(self) -> Floats:
+        """Standard errors of `coefficients`, shape (l, d)."""
+        return _errors(self.covariance, self.system)
+
+    @property
+    def native_standard_errors(self) -> Floats:
+        """Standard errors of the coefficients of `native`, shape (l, d)."""
+        return _errors(self.native_covariance, self.native)
+
+    def equations(self, frame: str = "data") -> str:
+        """The law as text, every coefficient with its standard error.
+
+        Parameters
+        ----------
+        frame : {"data", "native"}
+            Which frame.
+        """
+        if frame not in ("data", "native"):
+            raise ValueError(f"frame: must be 'data' or 'native', got {frame!r}")
+        native = frame == "native"
+        law = self.native if native else self.system
+        errors = self.native_standard_errors if native else self.standard_errors
+        lines = []
+        for j, side in law.sides().items():
+            above, below = (
+                " ".join(
+                    _with_error(sign * law.coefficients[r, j], errors[r, j], law.factors[r])
+                    for r in np.flatnonzero(law.support[:, j] & rows)
+                )
+                for sign, rows in ((1, ~law.implicit), (-1, law.implicit))
+            )
+            text = above.removeprefix("+ ") or "0"
+            lines.append(f"{side} = ({text}) / (1 {below})" if below else f"{side} = {text}")
+        return "\n".join(lines)
+
+    def curve(self, t: Floats) -> Floats:
+        """The fitted curve, shape (n, d), in the frame of the data; NaN outside the stretches."""
+        t = check_array("t", t)
+        values = np.full((*t.shape, self.system.d), np.nan)
+        for spline in self.curves:
+            low, high = spline.t[0], spline.t[-1]
+            slack = 1e-9 * (high - low)
+            inside = (t >= low - slack) & (t <= high + slack)
+            values[inside] = spline(np.clip(t[inside], low, high))
+        return values
+
+    def predict(self, x: Floats) -> Floats:
+        """Time derivative at states, shape (n, d) or (d,), in units of the data.
+
+        Raises
+        ------
+        ValueError
+            If the states have another shape, or an input of the law is not known at their times.
+        """
+        slopes = self.system(x)
+        self.system.check_inputs(np.atleast_2d(x)[:, -1])
+        return slopes
+
+    def simulate(self, x0: Floats, t: Floats) -> Simulation:
+        """Follow the law from the state ``x0`` at ``t[0]``.
+
+        Parameters
+        ----------
+        x0 : array_like, shape (d,)
+            Where to start; of a law with inputs without the time, its last variable.
+        t : array_like, shape (n,)
+            Increasing times.
+
+        Raises
+        ------
+        ValueError
+            If the state has another shape, or an input of the law is not known at a time.
+        """
+        x = self.system.simulate(t, x0)
+        lost = np.isnan(x).any(axis=1)
+        t = np.asarray(t, dtype=float)
+        status = f"diverges after t = {t[lost.argmax() - 1]:g}" if lost.any() else "ok"
+        return Simulation(t, x, status)
+
+    def physics(self, down: ArrayLike | None = None) -> Physics:
+        """What a law of motion says of a body: g and drag, or springs and periods; its energy.
+
+        Parameters
+        ----------
+        down : array_like, shape (m,), optional
+            Direction of gravity, if it is known: g is the pull along it. By default that of the
+            force that acts on a body at rest.
+
+        Returns
+        -------
+        Physics
+            Named numbers with standard errors, carried through from those of the coefficients, as
+            in ``found.physics()["g"].value``; ``print`` shows them all, and what cannot be said.
+
+        Raises
+        ------
+        ValueError
+            If ``down`` is no direction.
+        """
+        return physics_of(self.system, self.covariance, self.curves, down)
+
+    def plot_path(self) -> Figure:
+        """Draw `path`: the terms of each equation over the error that is tolerated.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            One panel an equation. The law is drawn broad: it should be the widest plateau by far.
+        """
+
+        return draw_path(self.path, self.native.support, self.system.sides())
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write everything to a text file (JSON), with all digits; `load` reads it.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be there: it is a folder, or its folder does not exist.
+        """
+
+        write(self, path)
+
+    @staticmethod
+    def load(path: str | os.PathLike, library: Library | None = None) -> Discovery:
+        """Read a discovery that `save` has written.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        library : Library, optional
+            That holds the functions of one's own in the law, if there are any: a file holds their
+            names, and enough of their values to tell others.
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file.
+        ValueError
+            If the file holds none, or the library not all functions of the law, or others.
+        """
+
+        return read(path, library)
+
+    def statement(self) -> str:
+        """The law as text, and what was found out beside it: all but the warnings."""
+        lines = [self.equations()]
+        if self.swing is not None:
+            lines = [str(self.swing), "a law of its positions, one of many that fit alike:", *lines]
+        if self.model_error.any():
+            sizes = zip(self.model_error, self.system.names, strict=True)
+            kicks = ", ".join(f"{size:.2g} in {name}" for size, name in sizes if size)
+            lines.append(f"as if kicked at random, by {kicks} over a unit of time")
+        if said := self.physics().headline:
+            lines.append(said)
+        if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
+            frame = "in its own frame, " if self.offset.any() else ""
+            more = f" and {len(terms) - SHOWN} more" if len(terms) > SHOWN else ""
+            lines.append(
+                f"not seen, though they may be as large as terms of the law: {frame}"
+                f"{', '.join(terms[:SHOWN])}{more}"
+            )
+        if self.orientation is not None:
+            lines.append(f"axes: {self.axes}; the error bars hold theirs")
+        if self.note:
+            lines.append(f"note: {self.note}")
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return "\n".join([self.statement(), *(f"warning: {text}" for text in self.warnings)])
+
+
+def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:
+    variance = np.maximum(np.diag(covariance), 0.0)
+    return np.sqrt(variance).reshape(law.coefficients.shape[::-1]).T
+
+
+def _with_error(value: float, error: float, term: str) -> str:
+    """A term of an equation with two digits of its error; one that is known has none."""
+    power = power_of_ten(max(abs(value), error))
+    size, spread = abs(value) / 10.0**power, error / 10.0**power
+    number = f"{size:g}"
+    if error > 0:
+        digits = int(np.clip(1 - np.floor(np.log10(spread)), 0, 12))
+        number = f"({size:.{digits}f} ± {spread:.{digits}f})"
+    number += f"e{power}" if power else ""
+    return f"{'-' if value < 0 else '+'} {number}" + ("" if term == "1" else f" {term}")
+
+
+def unseen(
+    law: PolynomialSystem, offset: Floats, curves: Sequence[BSpline], absent: Floats
+) -> Iterator[str]:
+    """Absent terms that may make more of a slope than one of the law does, the largest first.
+
+    How much a term makes of a slope is its root mean square along the curve.
+    """
+    x = np.concatenate([curve(np.unique(curve.t)) for curve in curves]) - offset
+    size = np.sqrt((law.library(x) ** 2).mean(axis=0))[:, None]
+    own = np.where(law.support, size * np.abs(law.coefficients), np.inf).min(axis=0)
+    most = np.nan_to_num(np.abs(absent).max(axis=2), nan=0.0, posinf=np.inf)
+    with np.errstate(invalid="ignore"):  # of an equation without terms
+        reach = size * most / own
+    for entry in np.argsort(-reach, axis=None, kind="stable")[: int((reach > 1).sum())].tolist():
+        row, j = divmod(entry, law.d)
+        low, high = absent[row, j]
+        between = f"{low:.2g} to {high:.2g}" if np.isfinite(most[row, j]) else "of any size"
+        yield f"{place(law, j * len(law.terms) + row)} ({between})"
+
+
+# --------------------------------------------------------------------------------------------------
+# A motion on a circle and the law of its angle, sought where a law of its positions is doubted.
+#
+# On a circle the coordinates depend on each other, and many laws of them fit alike; the angle is
+# the one that is free. Of a bob on a string it obeys angle'' = -(g / L) sin(angle) - ..., with the
+# angle counted from where the bob would rest.
+
+LIBRARY = Library.polynomial(1) + Library.fourier(1)
+"""What may pull at an angle: a push, a spring, friction, and gravity in any direction."""
+NAME = "angle"
+SUPPOSED = "if all its mass is at that radius and all axes have the same scale"
+TURNS = 3
+"""Most laws of an angle, each of which tells better where it is zero."""
+OVER = 4 * 2 * np.pi
+"""Most that a run goes round: beside an angle that grows on and on, what pulls at it is small."""
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """A motion on a circle, as `Discovery.swing`.
+
+    Parameters
+    ----------
+    circle : Round
+        Where it takes place: centre, radius and angle, zero where the motion would rest.
+    law : Discovery
+        Of the angle, in radians: ``angle'' = f(angle, vangle)``.
+    """
+
+    circle: Round
+    law: Discovery
+
+    @property
+    def g(self) -> Quantity | None:
+        """What pulls at it; None if no sine is in the law.
+
+        If all its mass is at that radius, and all axes have the same scale: along an arc, a scale
+        that is off by one per cent makes two of the radius, and the data hardly tell.
+        """
+        row, circle = self.law.terms.index(f"sin({NAME})"), self.circle
+        pull, error = -self.law.coefficients[row, 1], self.law.standard_errors[row, 1]
+        if not pull:
+            return None
+        error = np.hypot(circle.radius * error, pull * circle.radius_error)
+        return Quantity("g", np.asarray(circle.radius * pull), np.asarray(error))
+
+    def __str__(self) -> str:
+        radius, g = f"{self.circle.radius:.6g} ± {self.circle.radius_error:.2g}", self.g
+        pulled = "" if g is None else f"; {g}, {SUPPOSED}"
+        doubts = (f"doubt: {text}" for text in (*self.circle.warnings, *self.law.warnings))
+        law = f"on a circle of radius {radius}: {self.law.equations()}{pulled}"
+        return "\n".join([law, *doubts])
+
+
+def swinging(
+    runs: Sequence[Trajectory],
+    shared: Sequence[Floats],
+    solve: Callable[[list[Trajectory], list[Floats]], Discovery],
+) -> Swing:
+    """The swing of a motion that is on a circle.
+
+    Parameters
+    ----------
+    runs : sequence of (t, x)
+        Its positions in the plane or in space, with NaN where it was not seen.
+    shared : sequence of ndarray, shape (n, d, k)
+        Errors that all positions share.
+    solve : callable
+        From angles, (n, 1), with the errors that they share, (n, 1, k), to their law.
+
+    Raises
+    ------
+    ValueError
+        If there is too little of a motion for a law.
+    """
+    x = np.concatenate([values for _, values in runs])
+    modes = np.moveaxis(np.concatenate(list(shared)), -1, 0)
+    own, zero = on_circle(x).centre_covariance, None
+    for _ in range(TURNS):
+        circle = on_circle(x, zero, modes)
+        law = solve(*_samples(circle, own, runs))
+        rest = _rest(law)
+        if not rest:
+            break
+        zero = np.array([np.cos(rest), np.sin(rest)]) @ circle.axes
+    return Swing(circle, law)
+
+
+def _samples(
+    circle: Round, own: Floats, runs: Sequence[Trajectory]
+) -> tuple[list[Trajectory], list[Floats]]:
+    """The angles of each run where they were seen, and the errors that they share, (n, 1, k).
+
+    Those of positions, and those of the centre, of covariance ``own``, which moves the angle by
+    what it moves across the line of sight from there. What goes round and round is several runs.
+    """
+    variances, directions = np.linalg.eigh(circle.axes @ own @ circle.axes.T)
+    moves = np.sqrt(np.maximum(variances, 0.0)) * directions / circle.radius  # one a column
+    sizes = np.cumsum([len(t) for t, _ in runs])[:-1]
+    given = np.split(np.asarray(circle.systematic)[:, :, 0].T, sizes)
+    angles, errors, rng = [], [], np.random.default_rng(0)
+    for (t, _), angle, known in zip(runs, np.split(circle.angle, sizes), given, strict=True):
+        seen = np.isfinite(angle)
+        angles.append((t[seen], angle[seen, None]))
+        # Without the noise of the samples, which would explain itself.
+        curve = smooth([angles[-1]], rng).splines[0](t[seen])
+        across = np.hstack([np.sin(curve), -np.cos(curve)]) @ moves
+        errors.append(np.hstack([known[seen], across])[:, None])
+    parts = [
+        ((t[part], angle[part] - _bottom(angle[part])), error[part])
+        for (t, angle), error in zip(angles, errors, strict=True)
+        for part in _rounds(angle[:, 0])
+    ]
+    return [run for run, _ in parts], [error for _, error in parts]
+
+
+def _rounds(angle: Floats) -> list[Bools]:
+    """Which samples are a run of its own, of a few turns at most; the law is that of each turn."""
+    gone = np.maximum.accumulate(np.abs(angle - angle[0]))
+    number = max(int(np.ceil(gone[-1] / OVER)), 1)
+    part = np.minimum(number * gone / max(gone[-1], OVER), number - 0.5).astype(int)
+    return [part == k for k in range(number)]
+
+
+def _bottom(angle: Floats) -> float:
+    """The full turns nearest to the middle of a motion."""
+    return float(2 * np.pi * np.round(angle.mean() / (2 * np.pi)))
+
+
+def _rest(law: Discovery) -> float:
+    """The angle at which nothing pulls, if that is told from zero; otherwise zero.
+
+    What goes over the top may have no place of rest near the middle of its motion: then its sine
+    and cosine say.
+    """
+    places = [quantity for quantity in law.physics().quantities if quantity.name == "rest"]
+    if not places:
+        sine, cosine = (
+            law.coefficients[law.terms.index(f"{f}({NAME})"), 1] for f in ("sin", "cos")
+        )
+        return float(np.arctan2(cosine, 0.0 - sine))
+    return sum(float(q.value[0]) for q in places if abs(q.value[0]) > q.error[0])
+
+
+# --------------------------------------------------------------------------------------------------
+# A discovery as a text file: JSON in which every number keeps all its digits.
+
+POINTS = 20
+"""Places on the curve where a file holds the values of the law's functions."""
+ALIKE = 1e-6
+"""Difference of such values, over the largest, by which a function is still the same."""
+FORMAT = "vidsindy_lite discovery, version 1"
+TYPES: dict[str, Any] = {
+    kind.__name__: kind for kind in (Discovery, PolynomialSystem, Plateau, Step, Swing, Round)
+}
+
+
+def write(found: Discovery, path: str | os.PathLike) -> None:
+    """Write a discovery to a file."""
+    file = check_output("path", path)
+    content = {
+        "format": FORMAT,
+        "functions": encoded(_values(found), str),
+        "discovery": encoded(found, attrgetter("__name__"), (Function,)),
+    }
+    text = json.dumps(content, indent=1)
+    file.write_text(text + "\n", encoding="utf-8")
+
+
+def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
+    """Read a discovery from a file that `write` has made.
+
+    Functions of one's own are those of the library: a file holds their names, and a few values
+    by which another function of that name is told.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If the file holds none, or the library not all functions of the law, or others.
+    """
+    file = check_path("path", path)
+    message = f"path: must be a file that Discovery.save has written, got '{file}'"
+    if not file.is_file():
+        raise FileNotFoundError(f"{message}, which does not exist")
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        found = decoded(content["discovery"], _built) if content["format"] == FORMAT else None
+        values = decoded(content.get("functions"), _built)
+    except (ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
+        raise ValueError(message) from error
+    if not isinstance(found, Discovery):
+        raise ValueError(message)
+    found = _with_functions(found, library)
+    if values is not None:  # of a file of today
+        _check_alike(found, values)
+    if found.swing is None:
+        return found
+    return replace(found, swing=replace(found.swing, law=_with_functions(found.swing.law, None)))
+
+
+def _with_functions(found: Discovery, library: Library | None) -> Discovery:
+    """A discovery with the functions of which a file holds the names."""
+    system, native = found.system, found.native
+    written = cast("tuple[str, ...]", system.functions)
+    measured, used = system.d // system.order, _used(found)
+    functions = _restored(system.names, measured, written, used, library)
+    return replace(
+        found,
+        system=replace(system, functions=functions),
+        native=replace(native, functions=functions),
+    )
+
+
+def _restored(
+    names: tuple[str, ...],
+    measured: int,
+    written: Sequence[str],
+    used: Bools,
+    library: Library | None,
+) -> tuple[Function, ...]:
+    """Functions by their names; one's own, if the law uses them, from a library that holds them."""
+    _, held = (library or Library()).resolve(names, measured)
+    known = {function.name: function for function in held}
+    functions = []
+    for name, needed in zip(written, used, strict=True):
+        match = re.fullmatch(r"(sin|cos)\((?:(\d+) )?(\w+)\)", name)
+        if name in known:
+            functions.append(known[name])
+        elif match and match[3] in names:
+            functions.append(harmonic(names, names.index(match[3]), int(match[2] or 1), match[1]))
+        elif not needed:
+            functions.append(Function.unknown(name))
+        else:
+            raise ValueError(
+                f"library: must hold the function {name!r} of the law, as a file holds its name "
+                f"alone; got {library or 'none'}"
+            )
+    return tuple(functions)
+
+
+def _used(found: Discovery) -> Bools:
+    """Which functions of the library are in the law, in either frame."""
+    rows = (found.system.support | found.native.support).any(axis=1)
+    d, k = found.system.d, len(found.system.functions)
+    return np.asarray(found.system.exponents[rows, d : d + k].any(axis=0))
+
+
+def _values(found: Discovery) -> Floats:
+    """What the functions of a law are at a few places on its curve, (n, k)."""
+    d, knots = found.system.d, np.concatenate([curve.t for curve in found.curves])
+    x = found.curve(np.quantile(knots, np.linspace(0, 1, POINTS), method="nearest"))
+    return extended(x, found.system.functions)[:, d:]
+
+
+def _check_alike(found: Discovery, written: Floats) -> None:
+    """Refuse functions that have other values than when the law was written."""
+    values = np.where(_used(found), _values(found), written)
+    size = np.where(np.isfinite(written), np.abs(written), 0.0).max(axis=0)
+    alike = np.isclose(values, written, rtol=0, atol=ALIKE * size, equal_nan=True).all(axis=0)
+    if not alike.all():
+        name = found.system.functions[int(alike.argmin())].name
+        raise ValueError(
+            f"library: must hold the function {name!r} that the law was found with, got another of "
+            "that name"
+        )
+
+
+def _built(kind: str, parts: dict[str, Any]) -> Any:
+    """What a file holds under the name of a type."""
+    return TYPES[kind](**parts)
+
+
+# --------------------------------------------------------------------------------------------------
+# The path of laws as a picture: what a reader looks at before believing a law.
+
+
+def draw_path(path: Sequence[Sequence[Plateau]], support: Bools, sides: dict[int, str]) -> Figure:
+    """Number of terms of each equation over the error that is tolerated; see `plot_path`."""
+    import matplotlib.pyplot as plt
+    from matplotlib.ticker import MaxNLocator
+
+    figure, panels = plt.subplots(
+        1, len(sides), figsize=(2.9 * len(sides), 2.8), sharex=True, sharey=True, squeeze=False,
+        layout="constrained",
+    )  # fmt: skip
+    for axes, (j, side) in zip(panels[0], sides.items(), strict=True):
+        plateaus = path[j]
+        edges = [plateaus[0].low, *(plateau.high for plateau in plateaus)]
+        counts = [int(plateau.terms.sum()) for plateau in plateaus]
+        axes.stairs(counts, edges, color="0.4", baseline=None, label="all laws")
+        for own in (p for p in plateaus if (p.terms == support[:, j]).all()):
+            axes.hlines(own.terms.sum(), own.low, own.high, color="C1", lw=5, label="the law")
+        axes.set(xscale="log", xlabel="tolerated error / spread", title=side)
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    panels[0, 0].set(ylabel="terms", ylim=(0, None))
+    drawn = [axes.get_legend_handles_labels() for axes in panels[0]]
+    shown = {label: one for pair in drawn for one, label in zip(*pair, strict=True)}
+    figure.legend(shown.values(), shown, loc="outside upper center", ncols=2)
+    return figure
