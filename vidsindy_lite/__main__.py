@@ -88,8 +88,8 @@ def _discover(options: argparse.Namespace) -> int:
     2 if there is no law; the error says why.
     """
     from .cameras import Rig, list_lags
+    from .companion.plane_report import write_plane_report
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
-    from .dynamics import check_library
     from .refusal import Refused
     from .vision import check_detector
 
@@ -99,19 +99,11 @@ def _discover(options: argparse.Namespace) -> int:
         raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
     check_folder_is_free(options.out)
-    if options.rig is None:
-        return _discover_in_plane(options)
-    rig, videos = Rig.load(options.rig), options.videos or None
-    library = check_library(options.degree, options.library)
-    told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
-    told |= {"order": options.order, "origin": options.origin}
-    told |= {"orientation": options.orientation}
-    told |= {"lags": "learned" if options.lag is None else options.lag}
-    told |= {"targets": options.targets} if options.targets != 1 else {}
-    told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
-    told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
+    alone = options.rig is None
+    rig, videos = None if alone else Rig.load(options.rig), options.videos or None
+    told = _told(options)
     try:
-        found = _found(options, rig)
+        found = _found_in_plane(options) if alone else _found(options, rig)
     except Refused as refused:
         try:
             write_refusal(refused, videos, rig, options.out, told)
@@ -120,22 +112,53 @@ def _discover(options: argparse.Namespace) -> int:
         page = Path(options.out) / PAGE
         raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
     # First the law: if the report cannot be written, it is not lost.
-    lags = list_lags(found.lags.frames)
-    print(f"{found}\nstatus: {found.status}; lags of the videos: {lags} frames", flush=True)
-    write_report(found, videos, options.out, told, progress=True)
+    lags = "" if alone else f"; lags of the videos: {list_lags(found.lags.frames)} frames"
+    print(f"{found}\nstatus: {found.status}{lags}", flush=True)
+    if alone:
+        write_plane_report(found, options.videos[0], options.out, told)
+    else:
+        write_report(found, videos, options.out, told, progress=True)
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
 
 
-def _discover_in_plane(options: argparse.Namespace) -> int:
+def _told(options: argparse.Namespace) -> dict[str, object]:
+    """How a law is asked for, for its report."""
+    from .dynamics import check_library
+
+    given = {
+        name.replace("_", " "): value
+        for name in ("length", "up", "corners", "hint")
+        if (value := getattr(options, name)) is not None
+    }
+    if options.rig is None:
+        given |= {"degree": options.degree} if options.degree else {}
+        given |= {"length error": options.length_error} if options.length else {}
+    elif given:
+        raise ValueError(f"{next(iter(given))}: must not be given with --rig")
+    else:
+        library = str(check_library(options.degree, options.library))
+        given |= {"rig file": options.rig, "library": library, "origin": options.origin}
+        given |= {"orientation": options.orientation}
+        given |= {"lags": "learned" if options.lag is None else options.lag}
+        given |= {"targets": options.targets} if options.targets != 1 else {}
+    given |= {"order": options.order, "seed": options.seed}
+    tracks = {"tracks": ", ".join(options.tracks or ())}
+    given |= {"detector": options.detector} if options.videos else tracks
+    return given | ({} if options.fps is None else {"frames in a unit of time": options.fps})
+
+
+def _found_in_plane(options: argparse.Namespace) -> Any:
     """The law of a motion in a plane, in the film of one camera."""
-    from .companion.plane_report import write_plane_report
     from .plane import discover_from_video
     from .vision import Hint
 
-    if options.tracks or len(options.videos) != 1:
+    if len(options.videos) != 1:
         raise ValueError("rig: must be given, unless there is one video of a motion in a plane")
-    (path,), corners, hint = options.videos, options.corners, None
+    asked = options.library, options.lag, options.targets, options.origin, options.orientation
+    if asked != (None, None, 1, "learn", "data"):
+        raise ValueError("rig: must be given with library, lag, targets, origin and orientation")
+    corners, hint = options.corners, None
     if corners is not None:
         if len(corners) != 10:
             raise ValueError(f"corners: must be four marks and two sides, got {corners}")
@@ -143,20 +166,12 @@ def _discover_in_plane(options: argparse.Namespace) -> int:
     if options.hint is not None:
         frame, *box = options.hint
         hint = Hint(frame=int(frame), box=tuple(box))
-    told = {
-        name: value
-        for name in ("length", "length_error", "up", "corners", "fps", "hint", "degree", "order")
-        if (value := getattr(options, name)) is not None
-    }
-    found = discover_from_video(
-        path, options.length, options.up, options.fps, corners=corners, hint=hint,
+    return discover_from_video(
+        options.videos[0], options.length, options.up, options.fps, corners=corners, hint=hint,
         length_error=options.length_error, detector=options.detector, degree=options.degree,
         order="auto" if options.order == "auto" else int(options.order), seed=options.seed,
         progress=True,
     )  # fmt: skip
-    print(f"{found}\nstatus: {found.status}", flush=True)
-    print(f"report: {write_plane_report(found, path, options.out, told)}")
-    return 0 if found.status == "ok" else 1
 
 
 def _found(options: argparse.Namespace, rig: Any) -> Any:

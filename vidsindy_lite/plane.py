@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from .arrays import Floats
 from .checks import check_array, check_integer, check_number, check_positive, check_vector
 from .dynamics import (
-    SWINGS,
     Discovery,
     PolynomialSystem,
     Quantity,
@@ -25,10 +24,9 @@ from .dynamics import (
     check_library,
     check_order,
     discover,
+    find_swing,
     homogeneous,
-    is_on_circle,
     smooth,
-    swinging,
 )
 from .refusal import refusing
 from .vision import Hint, Track, check_detector, frame_clock, track, video_info
@@ -130,10 +128,10 @@ class PlaneDiscovery:
 
     def in_picture(self, x: Floats) -> Floats:
         """Places of the plane, (n, 2), in pixels of the first frame."""
-        return _mapped(np.linalg.inv(self.homography), x)
+        return _mapped(np.asarray(np.linalg.inv(self.homography), float), x)
 
     def __str__(self) -> str:
-        said = [f"{name}: {q}" for name, q in (("g", self.g), ("period", self.period)) if q]
+        said = [f"of small swings: {self.period}"] if self.swing and self.period else []
         if len(self.line[1]) == 1:
             said.append(
                 "along a line, on which x points to ({:.3f}, {:.3f})".format(*self.line[1][0])
@@ -217,7 +215,8 @@ def discover_from_video(
     seen = track(path, detector, hint)
     t, x = frame_clock(path) / rate, _mapped(homography, seen.pixels)
     with refusing("law", [seen.pixels], [Path(path).name]):
-        line, law, swing = _law(t, x, degree, order, seed, progress)
+        there = np.isfinite(x[:, 0])
+        line, law, swing = _law(t[there], x[there], degree, order, seed, progress)
     doubts = list(law.warnings)
     if swing is None:
         law = replace(
@@ -322,7 +321,7 @@ def _mapped(homography: Floats, places: Floats) -> Floats:
 def _law(
     t: Floats, x: Floats, degree: int | None, order: int | str, seed: int, progress: bool
 ) -> tuple[tuple[Floats, Floats], Discovery, Swing | None]:
-    """The law of a path: of nested ones the simplest that the data bear, or the one asked for.
+    """The law of places: of nested ones the simplest that the data bear, or the one asked for.
 
     And of what it has the coordinates, see `PlaneDiscovery`.
     """
@@ -332,45 +331,20 @@ def _law(
         return plane, found if found.swing is None else found.swing.law, found.swing
     if (flight := homogeneous(t, x, NAMES)) is not None:
         return plane, flight, None
-    origin, axes = _moving(t, x)
-    if len(axes) == 2 and (swing := _swing(t, x, seed)) is not None:
+    if (line := _line(t, x)) is None and (swing := find_swing(t, x, seed)) is not None:
         return plane, swing.law, swing
-    way = (x - origin) @ axes.T
-    return (origin, axes), discover(t, way, 1, seed, progress, order=2), None
+    origin, axes = line or plane
+    return (origin, axes), discover(t, (x - origin) @ axes.T, 1, seed, progress, order=2), None
 
 
-def _swing(t: Floats, x: Floats, seed: int) -> Swing | None:
-    """The law of the angle of a path that is bound to a circle within its noise."""
-    seen = np.isfinite(x[:, 0])
-    t, x = t[seen], x[seen]
-    noise = smooth([(t, x)], np.random.default_rng(seed)).noise
-    if not is_on_circle(x, noise):
+def _line(t: Floats, x: Floats) -> tuple[Floats, Floats] | None:
+    """Origin and direction, (1, 2), of the line that a path does not leave within its noise."""
+    middle = x.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(x - middle, full_matrices=False)
+    noise = smooth([(t, (x - middle) @ axes.T)], np.random.default_rng(0)).noise
+    if sizes[1] > ASIDE * noise[1] * np.sqrt(len(x)):
         return None
-
-    def solved(runs: list[tuple[Floats, Floats]], shared: list[Floats]) -> Discovery:
-        named = [(times, angle.view(_Angle)) for times, angle in runs]
-        modes = [np.moveaxis(errors, -1, 0) for errors in shared]
-        return discover(named, seed=seed, systematic=modes, order=2, library=SWINGS)
-
-    return swinging([(t, x)], [np.zeros((*x.shape, 0))], solved)
-
-
-class _Angle(np.ndarray):
-    """An array whose column has a name, as those of a data frame."""
-
-    columns = ("angle",)
-
-
-def _moving(t: Floats, x: Floats) -> tuple[Floats, Floats]:
-    """Origin and axes of the plane, or of the line that a path does not leave within its noise."""
-    seen = np.isfinite(x[:, 0])
-    middle = x[seen].mean(axis=0)
-    _, sizes, axes = np.linalg.svd(x[seen] - middle, full_matrices=False)
-    noise = smooth([(t[seen], (x[seen] - middle) @ axes.T)], np.random.default_rng(0)).noise
-    if sizes[1] > ASIDE * noise[1] * np.sqrt(seen.sum()):
-        return np.zeros(2), np.eye(2)
-    main = axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
-    return middle, main
+    return middle, axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
 
 
 def _with_scale(covariance: Floats, law: PolynomialSystem, error: float) -> Floats:
@@ -383,13 +357,15 @@ def _doubts(found: PlaneDiscovery, vertical: bool) -> list[str]:
     """What the law says against scale, frame rate and vertical."""
     doubts, g = [], found.g
     if found.unit == "m" and g is not None:
-        off, known = float(g.value) - EARTH, np.hypot(float(g.error), ELSEWHERE)
-        if abs(off) > SURE * known:
-            doubts.append(
-                f"length: {g} is not the {EARTH} of what flies or swings freely: the length may be "
-                f"{g.value / EARTH:.3g} times too large, or the frame rate "
-                f"{np.sqrt(g.value / EARTH):.3g} times, or the plane lies askew"
+        times = float(g.value) / EARTH
+        if abs(times - 1) * EARTH > SURE * np.hypot(float(g.error), ELSEWHERE):
+            wrong = (
+                f"the length may be {times:.3g} times too large, or the frame rate "
+                f"{np.sqrt(times):.3g} times, or the plane lies askew"
+                if times > 0
+                else "it does not hang there, or the plane lies askew"
             )
+            doubts.append(f"length: {g} is not the {EARTH} of what flies or swings freely: {wrong}")
     if vertical and found.swing is None and g is not None:
         pull = found.discovery.physics()["direction"]
         tilt = np.arctan2(pull.value[0], -pull.value[1])

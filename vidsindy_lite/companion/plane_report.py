@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -17,7 +14,7 @@ from ..plane import PlaneDiscovery
 from ..values import as_json
 from ..vision import read_frame
 from .pages import page
-from .report import DATA, FORMAT, PAGE, TRACKS, check_folder_is_free
+from .report import DATA, FORMAT, PAGE, TRACKS, check_folder_is_free, encoded, replacing, write_data
 
 COLOURS = "tab:blue", "tab:orange"
 DRAWN = 600
@@ -52,20 +49,15 @@ def write_plane_report(
     ValueError
         If the folder holds anything but a report.
     """
-    folder = check_folder_is_free(folder)
+    folder = check_folder_is_free(folder).absolute()
     content = plane_summary(found, path, options)
     text = page(
         "plane.html", look=_look(found, path), said=str(found),
         physics_text=str(found.discovery.physics()), data_file=DATA, tracks_file=TRACKS, **content,
     )  # fmt: skip
-    folder.mkdir(exist_ok=True)
-    for old in folder.iterdir():
-        old.unlink()
-    (folder / PAGE).write_text(text, "utf-8")
-    (folder / DATA).write_text(json.dumps(content, allow_nan=False, indent=1) + "\n", "utf-8")
-    rows = np.column_stack([found.t, found.track.pixels])
-    lines = (",".join(f"{v:.10g}" if np.isfinite(v) else "" for v in row) for row in rows)
-    (folder / TRACKS).write_text("\n".join(["t,u1,v1", *lines]) + "\n", "utf-8")
+    with replacing(folder) as new:
+        write_data(new, content, found.t, [found.track.pixels])
+        (new / PAGE).write_text(text, "utf-8")
     return folder / PAGE
 
 
@@ -95,16 +87,12 @@ def _look(found: PlaneDiscovery, path: str | Path) -> str:
     """The law over a frame, and both coordinates over the time, as a PNG in base64."""
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        figure = _drawn(found, path)
-        image = io.BytesIO()
-        figure.savefig(image, format="png", dpi=110)
-        plt.close(figure)
-    return base64.b64encode(image.getvalue()).decode()
+        return encoded(_drawn(found, path))
 
 
 def _drawn(found: PlaneDiscovery, path: str | Path) -> Figure:
     seen = np.flatnonzero(np.isfinite(found.x[:, 0]))
-    t = np.linspace(*found.t[seen[[0, -1]]], DRAWN)
+    t = np.linspace(found.t[seen[0]], found.t[seen[-1]], DRAWN)
     law = found.along(t)
     figure, (picture, graph) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
     # The track is in the pixels of the first frame.

@@ -110,8 +110,8 @@ def write_report(
     if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)
-    with _replacing(folder) as new:
-        _write_data(new, content, found.t, found.tracks)
+    with replacing(folder) as new:
+        write_data(new, content, found.t, found.tracks)
         found.rig.save(new / RIG)
         (new / PAGE).write_text(_page(found, paths, content, progress), "utf-8")
     return folder / PAGE
@@ -120,7 +120,7 @@ def write_report(
 def write_refusal(
     refused: Refused,
     paths: Sequence[str | Path] | None,
-    rig: Rig,
+    rig: Rig | None,
     folder: str | Path,
     options: Mapping[str, object] | None = None,
 ) -> Path:
@@ -131,8 +131,8 @@ def write_refusal(
     refused : Refused
     paths, folder, options
         See `write_report`.
-    rig : Rig
-        As it was given.
+    rig : Rig, optional
+        As it was given; not needed with videos.
 
     Returns
     -------
@@ -147,21 +147,22 @@ def write_refusal(
         "tracks": [as_json(track, "tracks") for track in refused.tracks],
         "share_of_frames_seen": [float(np.isfinite(t).all(axis=1).mean()) for t in refused.tracks],
     }  # fmt: skip
-    sizes = [camera.image_size for camera in rig.cameras]
+    cameras = rig.cameras if rig else ()
+    sizes = [camera.image_size for camera in cameras] or [(1, 1)] * len(names)
     # See `_figures`.
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        look = _encoded(_overview(refused.tracks, paths, names, sizes))
+        look = encoded(_overview(refused.tracks, paths, names, sizes))
     frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
-    with _replacing(folder) as new:
-        _write_data(new, content, frames, refused.tracks, "frame")
+    with replacing(folder) as new:
+        write_data(new, content, frames, refused.tracks, "frame")
         text = page("refusal.html", look=look, what=STEPS[refused.step], data_file=DATA, **content)
         (new / PAGE).write_text(text, "utf-8")
     return folder / PAGE
 
 
 @contextmanager
-def _replacing(folder: Path) -> Iterator[Path]:
+def replacing(folder: Path) -> Iterator[Path]:
     """A new folder, which takes the place of another when all is written into it."""
     with tempfile.TemporaryDirectory(prefix=".report-", dir=folder.parent) as scratch:
         new = Path(scratch) / "new"
@@ -182,7 +183,7 @@ def _replacing(folder: Path) -> Iterator[Path]:
                     raise
 
 
-def _write_data(
+def write_data(
     folder: Path,
     content: Mapping[str, object],
     instants: Floats,
@@ -342,14 +343,14 @@ def _figures(
         # Several targets are drawn as one that begins again.
         t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
         x = stacked(found.x, 3)
-        yield "path", _encoded(plot_path(t, x, stacked(found.fitted, 3)))
+        yield "path", encoded(plot_path(t, x, stacked(found.fitted, 3)))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
-            yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
-        yield "rig", _encoded(plot_rig(found.rig, x))
+            yield "look", encoded(_first_look(found, paths, int(seen.argmax())))
+        yield "rig", encoded(plot_rig(found.rig, x))
         missed = [stacked(one, 2) for one in found.residuals]
-        yield "residuals", _encoded(plot_residuals(t, missed, DISAGREEMENT))
-        yield "plateaus", _encoded(found.discovery.plot_path())
+        yield "residuals", encoded(plot_residuals(t, missed, DISAGREEMENT))
+        yield "plateaus", encoded(found.discovery.plot_path())
 
 
 def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:
@@ -386,7 +387,7 @@ def _short(name: str, i: int) -> str:
     return fitting.replace("$", r"\$")
 
 
-def _encoded(figure: Figure) -> str:
+def encoded(figure: Figure) -> str:
     """A figure as text, closed."""
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=110)

@@ -23,16 +23,14 @@ from .library import Function, monomial_exponents, monomial_gradients, monomials
 from .solver import check_order
 from .frames import ShiftedLaw
 from .homogeneous import homogeneous
-from .result import LIBRARY as SWINGS
-from .result import Plateau, Swing, swinging
+from .result import Plateau, Swing
 from .model import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
-from .diagnostics import is_on_circle
 from .mechanics import Quantity, Round, on_circle, on_sphere
 from .l0 import closest_rival, subset_search
 from .solver import SplineSINDy
 from .smoothing import smooth
-from .solver import discover
+from .solver import discover, find_swing
 from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .model import State
 from .data import Trajectory, check_trajectory, cut, typical_step

@@ -123,7 +123,7 @@ def homogeneous(t: Floats, x: Floats, names: tuple[str, ...]) -> Discovery | Non
     t : ndarray, shape (n,)
         Increasing times.
     x : ndarray, shape (n, m)
-        Places; rows with NaN do not count. One standard error goes for all coordinates.
+        Places. One standard error goes for all coordinates.
     names : tuple of str
         Of the coordinates.
 
@@ -138,10 +138,8 @@ def homogeneous(t: Floats, x: Floats, names: tuple[str, ...]) -> Discovery | Non
     ValueError
         If there are fewer than six samples.
     """
-    seen = np.isfinite(x).all(axis=1)
-    if seen.sum() < FEWEST:
-        raise ValueError(f"x: must hold at least {FEWEST} places, got {seen.sum()}")
-    t, x = t[seen], x[seen]
+    if len(x) < FEWEST:
+        raise ValueError(f"x: must hold at least {FEWEST} places, got {len(x)}")
     middle = (t[0] + t[-1]) / 2
     order = np.arange(COLUMNS)[:, None] + np.zeros(x.shape[1], dtype=int)
     rest, straight, thrown = (Flight(t - middle, x, order <= k) for k in range(COLUMNS))
