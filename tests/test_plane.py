@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from phones import write_at
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
@@ -13,6 +14,7 @@ from vidsindy_lite import plane
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.dynamics import homogeneous
 from vidsindy_lite.vision import Track
+from vidsindy_lite.vision.rendering import render
 
 REAL = Path(vl.__file__).parents[2] / "shared" / "real"
 SCALE = 250.0  # pixels in a metre
@@ -25,6 +27,16 @@ def flight(velocity=(1.5, 5.0), drag=0.0, samples=34):
     first = -np.expm1(-drag * t) / drag if drag else t
     second = (t - first) / drag if drag else t**2 / 2
     return t, np.outer(first, velocity) + np.outer(second, (0, -9.81))
+
+
+def swung(t, length, drag):
+    """Places of a pendulum in metres, from its rest."""
+
+    def pull(t, y):
+        return [y[1], -9.81 / length * np.sin(y[0]) - drag * y[1]]
+
+    angle = solve_ivp(pull, (0, t[-1]), [0.6, 0], t_eval=t, rtol=1e-9, atol=1e-9).y[0]
+    return length * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
 
 
 def noisy(x, seed, error=4e-4):
@@ -217,16 +229,83 @@ def test_what_moves_along_a_line_has_one_coordinate(monkeypatch):
 
 @pytest.mark.slow
 def test_a_swing_on_its_circle(monkeypatch):
-    t, y = np.arange(90) / 30, np.array([0.6, 0.0])
-    pull = lambda t, y: [y[1], -9.81 / 0.6 * np.sin(y[0]) - 0.05 * y[1]]  # noqa: E731
-    angle = solve_ivp(pull, (0, 3), y, t_eval=t, rtol=1e-9, atol=1e-9).y[0]
-    x = 0.6 * np.column_stack([np.sin(angle), -np.cos(angle)])
+    t = np.arange(90) / 30
+    x = swung(t, 0.6, 0.05)
     filmed(monkeypatch, pixels_of(noisy(x, 0)))
     found = vl.discover_from_video("swing.mp4", STICK)
     assert found.swing is not None
     assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.7
     assert float(found.period.value) == pytest.approx(2 * np.pi * np.sqrt(0.6 / 9.81), rel=0.01)
     np.testing.assert_allclose(found.fitted, found.x, atol=0.01)
+
+
+# ----------------------------------------------------------------------------------- rendered films
+
+
+def telephone(path, motion, seconds, size=(480, 360), fps=30.0, roll=0.0, pan=0.0, codec=None):
+    """A film of a motion in a plane 2.5 m away, and two marks there, half a metre apart.
+
+    The camera is rolled by so much, and the plane turned about its vertical, in radians. Without a
+    codec it is H.264, as telephones write it.
+    """
+
+    def seen(x):
+        x = np.asarray(x)
+        across, depth = x[:, 0] * np.cos(pan), 2.5 - x[:, 0] * np.sin(pan)
+        flat = np.column_stack([across, -x[:, 1]]) / depth[:, None] * max(size)
+        c, s = np.cos(roll), np.sin(roll)
+        return np.array(size) / 2 + flat @ np.array([[c, s], [-s, c]])
+
+    t = np.arange(round(seconds * fps)) / fps
+    scene = vl.Scene("wood", size=16, image_size=size, noise_variance=0.0005)
+    frames = render(seen(motion(t)), scene, 0)
+    if codec is None:
+        write_at(path, t, frames, "libx264", "yuv420p", crf="24")
+    else:
+        vl.write_video(path, frames, fps, codec)
+    return vl.discover_from_video(path, (*seen([[-0.3, -0.2], [-0.3, 0.3]]).ravel(), 0.5))
+
+
+def thrown(t):
+    return np.column_stack([0.8 * (t - 0.3), -0.3 + 2.8 * t - 9.81 * t**2 / 2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("roll", [0.0, 0.04])
+def test_a_film_of_a_throw(tmp_path, roll):
+    found = telephone(tmp_path / "film.mp4", thrown, 0.6, (360, 480), roll=roll)
+    direction = found.discovery.physics()["direction"].value
+    assert found.status == "ok"
+    assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.5
+    assert np.arctan2(direction[0], -direction[1]) == pytest.approx(-roll, abs=0.005)
+
+
+@pytest.mark.slow
+def test_a_film_of_a_spring(tmp_path):
+    def sprung(t):
+        return np.column_stack([0 * t, 0.2 * np.exp(-0.1 * t) * np.cos(5.3 * t)])
+
+    found = telephone(tmp_path / "film.mp4", sprung, 3, fps=24.0, roll=0.03, codec="mp4v")
+    said = found.discovery.physics()
+    assert found.status == "ok"
+    assert found.discovery.system.support.sum() == 1 + 3  # x' = vx, x'' = rest, spring, drag
+    assert abs(found.period.value - 2 * np.pi / 5.3) < 3 * found.period.error < 0.001
+    assert abs(said["damping"].value - 0.1) < 3 * said["damping"].error < 0.01
+
+
+@pytest.mark.slow
+def test_a_film_of_a_swing(tmp_path):
+    found = telephone(tmp_path / "film.mp4", lambda t: swung(t, 0.5, 0.1) - [0, 0.1], 3)
+    assert found.swing is not None
+    assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.6
+    assert float(found.period.value) == pytest.approx(2 * np.pi / np.sqrt(9.81 / 0.5), rel=2e-3)
+
+
+@pytest.mark.slow
+def test_a_film_of_a_plane_that_lies_askew_is_doubted(tmp_path):
+    found = telephone(tmp_path / "film.mp4", thrown, 0.6, pan=0.6)
+    assert found.status == "suspect"
+    assert any("the plane lies askew" in doubt for doubt in found.warnings)
 
 
 # --------------------------------------------------------------------------------------- real clips

@@ -344,7 +344,9 @@ def _line(t: Floats, x: Floats) -> tuple[Floats, Floats] | None:
     noise = smooth([(t, (x - middle) @ axes.T)], np.random.default_rng(0)).noise
     if sizes[1] > ASIDE * noise[1] * np.sqrt(len(x)):
         return None
-    return middle, axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
+    main = axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
+    # Zero next to that of the plane: a zero near where the target rests would pass for its rest.
+    return middle - middle @ main.T @ main, main
 
 
 def _with_scale(covariance: Floats, law: PolynomialSystem, error: float) -> Floats:
