@@ -35,6 +35,7 @@ from .dynamics import (
 )
 from .observation import Observation, observe, observe_tracks
 from .pipeline import VideoDiscovery, discover_from_tracks, discover_from_videos
+from .plane import PlaneDiscovery, discover_from_video
 from .vision import (
     Hint,
     Scene,
@@ -51,6 +52,7 @@ __all__ = [
     "discover_from_videos",
     "discover_from_tracks",
     "VideoDiscovery",
+    "discover_from_video",
     "observe",
     "observe_tracks",
     "Observation",

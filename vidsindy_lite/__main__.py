@@ -75,6 +75,11 @@ def _discover(options: argparse.Namespace) -> int:
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml --lag 0,7,0 --degree 2
       python -m vidsindy_lite discover "a/%04d.png" "b/%04d.png" c/ --rig rig.toml --fps 240
       python -m vidsindy_lite discover --tracks a.csv b.csv c.csv --rig rig.toml --fps 30
+      python -m vidsindy_lite discover swing.mp4 --length 120,80,125,410,0.45
+
+    Of a motion in a plane that faces the camera, one video and no rig file are enough: --length
+    gives the scale (without it, places are in pixels), --up the vertical, --fps the frames in a
+    second of slow motion, --hint the target; --corners marks out a plane that is seen askew.
 
     The folder then holds report.html (one page, images included), result.json (the same as data),
     tracks.csv and rig.toml (the learned cameras), beside whatever else is there. If tracks were
@@ -84,8 +89,8 @@ def _discover(options: argparse.Namespace) -> int:
     2 if there is no law; the error says why.
     """
     from .cameras import Rig, list_lags
+    from .companion.plane_report import write_plane_report
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
-    from .dynamics import check_library
     from .refusal import Refused
     from .vision import check_detector
 
@@ -97,17 +102,11 @@ def _discover(options: argparse.Namespace) -> int:
         raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
     check_folder_is_free(options.out)
-    rig, videos = Rig.load(options.rig), options.videos or None
-    library = check_library(options.degree, options.library)
-    told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
-    told |= {"order": options.order, "origin": options.origin}
-    told |= {"orientation": options.orientation}
-    told |= {"lags": "learned" if options.lag is None else options.lag}
-    told |= {"targets": options.targets} if options.targets != 1 else {}
-    told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
-    told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
+    alone = options.rig is None
+    rig, videos = None if alone else Rig.load(options.rig), options.videos or None
+    told = _told(options)
     try:
-        found = _found(options, rig)
+        found = _found_in_plane(options) if alone else _found(options, rig)
     except Refused as refused:
         try:
             write_refusal(refused, videos, rig, options.out, told)
@@ -116,11 +115,66 @@ def _discover(options: argparse.Namespace) -> int:
         page = Path(options.out) / PAGE
         raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
     # First the law: if the report cannot be written, it is not lost.
-    lags = list_lags(found.lags.frames)
-    print(f"{found}\nstatus: {found.status}; lags of the videos: {lags} frames", flush=True)
-    write_report(found, videos, options.out, told, progress=True)
+    lags = "" if alone else f"; lags of the videos: {list_lags(found.lags.frames)} frames"
+    print(f"{found}\nstatus: {found.status}{lags}", flush=True)
+    if alone:
+        write_plane_report(found, options.videos[0], options.out, told)
+    else:
+        write_report(found, videos, options.out, told, progress=True)
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
+
+
+def _told(options: argparse.Namespace) -> dict[str, object]:
+    """How a law is asked for, for its report."""
+    from .dynamics import check_library
+
+    given = {
+        name.replace("_", " "): value
+        for name in ("length", "up", "corners", "hint")
+        if (value := getattr(options, name)) is not None
+    }
+    if options.rig is None:
+        given |= {"degree": options.degree} if options.degree else {}
+        given |= {"length error": options.length_error} if options.length else {}
+    elif given:
+        raise ValueError(f"{next(iter(given))}: must not be given with --rig")
+    else:
+        library = str(check_library(options.degree, options.library))
+        given |= {"rig file": options.rig, "library": library, "origin": options.origin}
+        given |= {"orientation": options.orientation}
+        given |= {"lags": "learned" if options.lag is None else options.lag}
+        given |= {"targets": options.targets} if options.targets != 1 else {}
+    given |= {"order": options.order, "seed": options.seed}
+    tracks = {"tracks": ", ".join(options.tracks or ())}
+    given |= {"detector": options.detector} if options.videos else tracks
+    return given | ({} if options.fps is None else {"frames in a unit of time": options.fps})
+
+
+def _found_in_plane(options: argparse.Namespace) -> Any:
+    """The law of a motion in a plane, in the film of one camera."""
+    from .plane import discover_from_video
+    from .vision import Hint
+
+    if len(options.videos) != 1:
+        raise ValueError("rig: must be given, unless there is one video of a motion in a plane")
+    asked = options.library, options.lag, options.targets, options.origin, options.orientation
+    if asked != (None, None, 1, "learn", "data"):
+        raise ValueError("rig: must be given with library, lag, targets, origin and orientation")
+    corners, hint = options.corners, None
+    if corners is not None:
+        if len(corners) != 10:
+            raise ValueError(f"corners: must be four marks and two sides, got {corners}")
+        corners = [corners[k : k + 2] for k in range(0, 8, 2)], corners[8:]
+    if options.hint is not None:
+        frame, *box = options.hint
+        hint = Hint(frame=int(frame), box=tuple(box))
+    return discover_from_video(
+        options.videos[0], options.length, options.up, options.fps, corners=corners, hint=hint,
+        length_error=options.length_error, detector=options.detector, degree=options.degree,
+        order="auto" if options.order == "auto" else int(options.order), seed=options.seed,
+        progress=True,
+    )  # fmt: skip
 
 
 def _found(options: argparse.Namespace, rig: Any) -> Any:
@@ -310,7 +364,28 @@ COMMANDS = {
         "--individual": words(
             "NAME", "which of several targets of these files, by its name there"
         ),
-        "--rig": words("FILE", "where the cameras stand", required=True),
+        "--rig": words("FILE", "where the cameras stand; not for one video of a motion in a plane"),
+        "--length": words(
+            "U1,V1,U2,V2,METRES", "of one video: two marks in its first frame, pixels, and how far "
+            "they are apart in the plane of the motion", type=as_numbers
+        ),
+        "--length-error": words(
+            "SHARE", "standard error of that length, as a share of it (default: 0.01)",
+            type=as_number(float, "a number"), default=0.01
+        ),
+        "--up": words(
+            "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "
+            "lower one first (default: 0,-1)", type=as_numbers
+        ),
+        "--corners": words(
+            "U1,V1,...,WIDTH,HEIGHT", "of one video, in place of --length: four marks on a "
+            "rectangle in the plane of the motion, from its lower left to its lower right and "
+            "round, and its sides in metres", type=as_numbers
+        ),
+        "--hint": words(
+            "FRAME,U,V,WIDTH,HEIGHT", "of one video: a frame and a box around the target in it",
+            type=as_numbers
+        ),
         "--out": words("DIR", "folder of the report (default: report)", default="report"),
         "--lag": words(
             "0,L2,L3", "by how many frames of the first video each one starts later; the default "

@@ -52,6 +52,8 @@ def _likely_causes(step: str, tracks: Sequence[Floats], names: Sequence[str]) ->
         if any(map(_is_strange, np.split(track, track.shape[1] // 2, axis=1)))
     ]  # fmt: skip
     tracker = "the tracker" + (f" (look at {', '.join(strange)})" if strange else "")
+    if len(tracks) == 1:
+        return tracker
     if strange or step == "track":
         return f"{tracker}, the lags, the rig"
     return f"the lags, the rig, {tracker}" if step == "lags" else f"the rig, the lags, {tracker}"

@@ -123,15 +123,15 @@ def write_report(
     if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)
-    files = _data(content, found.t, found.tracks) | {RIG: found.rig.text()}
-    _put(folder, files | {PAGE: _page(found, paths, content, progress)})
+    files = data_files(content, found.t, found.tracks) | {RIG: found.rig.text()}
+    put(folder, files | {PAGE: _page(found, paths, content, progress)})
     return folder / PAGE
 
 
 def write_refusal(
     refused: Refused,
     paths: Sequence[str | Path] | None,
-    rig: Rig,
+    rig: Rig | None,
     folder: str | Path,
     options: Mapping[str, object] | None = None,
 ) -> Path:
@@ -142,8 +142,8 @@ def write_refusal(
     refused : Refused
     paths, folder, options
         See `write_report`.
-    rig : Rig
-        As it was given.
+    rig : Rig, optional
+        As it was given; not needed with videos.
 
     Returns
     -------
@@ -158,19 +158,20 @@ def write_refusal(
         "tracks": [as_json(track, "tracks") for track in refused.tracks],
         "share_of_frames_seen": [float(np.isfinite(t).all(axis=1).mean()) for t in refused.tracks],
     }  # fmt: skip
-    sizes = [camera.image_size for camera in rig.cameras]
+    cameras = rig.cameras if rig else ()
+    sizes = [camera.image_size for camera in cameras] or [(1, 1)] * len(names)
     # See `_figures`.
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
-        look = _encoded(_overview(refused.tracks, paths, names, sizes))
+        look = encoded(_overview(refused.tracks, paths, names, sizes))
     frames = np.arange(max(len(track) for track in refused.tracks), dtype=float)
-    files = _data(content, frames, refused.tracks, "frame")
+    files = data_files(content, frames, refused.tracks, "frame")
     text = page("refusal.html", look=look, what=STEPS[refused.step], data_file=DATA, **content)
-    _put(folder, files | {PAGE: text})
+    put(folder, files | {PAGE: text})
     return folder / PAGE
 
 
-def _put(folder: Path, texts: Mapping[str, str]) -> None:
+def put(folder: Path, texts: Mapping[str, str]) -> None:
     """Put the files of a report into its folder, and take away those of an earlier one."""
     check_folder_is_free(folder)  # again: a while has passed
     is_new = not folder.exists()
@@ -185,7 +186,7 @@ def _put(folder: Path, texts: Mapping[str, str]) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def _data(
+def data_files(
     content: Mapping[str, object], instants: Floats, tracks: Sequence[Floats], instant: str = "t"
 ) -> dict[str, str]:
     """The data as JSON, and the tracks as a table that `discover --tracks` reads."""
@@ -340,14 +341,14 @@ def _figures(
         # Several targets are drawn as one that begins again.
         t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
         x = stacked(found.x, 3)
-        yield "path", _encoded(plot_path(t, x, stacked(found.fitted, 3)))
+        yield "path", encoded(plot_path(t, x, stacked(found.fitted, 3)))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
-            yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
-        yield "rig", _encoded(plot_rig(found.rig, x))
+            yield "look", encoded(_first_look(found, paths, int(seen.argmax())))
+        yield "rig", encoded(plot_rig(found.rig, x))
         missed = [stacked(one, 2) for one in found.residuals]
-        yield "residuals", _encoded(plot_residuals(t, missed, DISAGREEMENT))
-        yield "plateaus", _encoded(found.discovery.plot_path())
+        yield "residuals", encoded(plot_residuals(t, missed, DISAGREEMENT))
+        yield "plateaus", encoded(found.discovery.plot_path())
 
 
 def _first_look(found: VideoDiscovery, paths: Sequence[str | Path], instant: int) -> Figure:
@@ -384,7 +385,7 @@ def _short(name: str, i: int) -> str:
     return fitting.replace("$", r"\$")
 
 
-def _encoded(figure: Figure) -> str:
+def encoded(figure: Figure) -> str:
     """A figure as text, closed."""
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=110)
