@@ -121,31 +121,34 @@ def test_too_few_places_are_refused():
 # ------------------------------------------------------------------------- from pixels to the plane
 
 
+def placed(pixels, length=None, up=None, corners=None, size=(1280, 720)):
+    """Where pixels are in the plane."""
+    marks, places, _ = plane.four_places(length, up, corners, size)
+    return plane.mapped(plane.homography_of(marks, places), np.array(pixels))
+
+
 def test_two_marks_and_a_length():
-    to_plane, pixels = plane._to_plane(STICK, None, None, (1280, 720))
-    marks = np.array([[100.0, 600], [100, 600 - SCALE], [100 + SCALE, 600]])
-    np.testing.assert_allclose(plane._mapped(to_plane, marks), [[0, 0], [0, 1], [1, 0]], atol=1e-12)
-    assert pixels == SCALE / 2
+    marks = [[100.0, 600], [100, 600 - SCALE], [100 + SCALE, 600]]
+    np.testing.assert_allclose(placed(marks, STICK), [[0, 0], [0, 1], [1, 0]], atol=1e-9)
 
 
 def test_without_a_length_places_are_pixels_from_the_lower_left():
-    to_plane, pixels = plane._to_plane(None, None, None, (1280, 720))
-    np.testing.assert_allclose(plane._mapped(to_plane, np.array([[3.0, 719 - 4]])), [[3, 4]])
-    assert pixels == 0
+    np.testing.assert_allclose(placed([[3.0, 719 - 4]]), [[3, 4]], atol=1e-9)
 
 
 @pytest.mark.parametrize("up", [(1, 0), (10, 5, 30, 5)])
 def test_a_camera_that_lies_on_its_side(up):
-    to_plane, _ = plane._to_plane((0, 0, 10, 0, 10), up, None, (100, 100))
-    np.testing.assert_allclose(plane._mapped(to_plane, np.array([[2.0, 3]])), [[3, 2]], atol=1e-12)
+    np.testing.assert_allclose(placed([[2.0, 3]], (0, 0, 10, 0, 10), up), [[3, 2]], atol=1e-9)
 
 
 def test_four_marks_of_a_rectangle_that_is_seen_askew():
     askew = np.array([[200.0, 20, 300], [-10, -180, 600], [0.05, 0.02, 1]])
     places = np.array([[0.0, 0], [2, 0], [2, 1], [0, 1], [0.7, 0.4]])
-    marks = plane._mapped(askew, places)
-    to_plane, _ = plane._to_plane(None, None, (marks[:4], (2, 1)), (1280, 720))
-    np.testing.assert_allclose(plane._mapped(to_plane, marks), places, atol=1e-9)
+    marks = plane.mapped(askew, places)
+    np.testing.assert_allclose(placed(marks, corners=(marks[:4], (2, 1))), places, atol=1e-9)
+    leans = plane.mapped(askew, np.array([[1.0, 0.5], [1.001, 0.501]]))  # at 45 degrees
+    turned = placed(marks, corners=(marks[:4], (2, 1)), up=np.diff(leans, axis=0)[0])
+    np.testing.assert_allclose(turned[1], [np.sqrt(2), np.sqrt(2)], atol=5e-3)
 
 
 @pytest.mark.parametrize(
@@ -180,13 +183,15 @@ def test_a_film_without_a_rate_needs_one(monkeypatch):
 
 
 def test_the_error_of_the_length_is_that_of_g(monkeypatch):
+    monkeypatch.setattr(plane, "TILTED", 0.0)
     filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
     found = vl.discover_from_video("throw.mp4", STICK, length_error=0.03)
     assert found.status == "ok"
-    assert found.scale_error == pytest.approx(np.hypot(0.03, np.sqrt(2) / (SCALE / 2)))
-    assert found.g.error == pytest.approx(found.scale_error * 9.81, rel=0.1)
+    error = found.rig.cameras[0].scale_error
+    assert error == pytest.approx(np.hypot(0.03, np.sqrt(2) / (SCALE / 2)))
+    assert found.g.error == pytest.approx(error * 9.81, rel=0.1)
     assert found.period is None
-    np.testing.assert_allclose(found.in_picture(found.x), found.track.pixels)
+    np.testing.assert_allclose(found.rig.cameras[0].project(found.x), found.tracks[0])
     np.testing.assert_allclose(found.fitted, found.x, atol=0.01)
 
 
@@ -208,9 +213,8 @@ def test_the_command_writes_g_with_its_error(monkeypatch, tmp_path, capsys):
     assert main(given) == 0
     assert "status: ok" in capsys.readouterr().out
     data = json.loads((tmp_path / "law" / "result.json").read_text("utf-8"))
-    assert abs(data["g"]["value"] - 9.81) < 2 * data["g"]["error"] < 0.5
+    assert abs(data["g"]["value"] - 9.81) < 2 * data["g"]["error"] < 0.8
     assert data["period"] is None
-    assert data["unit"] == "m"
     assert "<img" in (tmp_path / "law" / "report.html").read_text("utf-8")
     assert main(given) == 0  # an earlier report is replaced
 
@@ -228,9 +232,12 @@ def test_the_command_draws_the_track_of_what_has_no_law(monkeypatch, tmp_path, c
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (["--targets", "2"], "rig: must be given with library, lag, targets"),
-        (["--up", "0,-1", "--rig", "rig.toml"], "up: must not be given with --rig"),
-        (["--corners", "1,2"], "corners: must be four marks and two sides"),
+        (["--targets", "2"], "targets: must be given with --rig, got 2"),
+        (
+            ["--up", "0,-1", "--rig", "rig.toml"],
+            "up: must not be given with --rig, got [0.0, -1.0]",
+        ),
+        (["--corners", "1,2"], "corners: must"),
     ],
 )
 def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, capsys, given, message):

@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from . import __version__
 from .options import Parser, as_library, as_number, as_numbers, as_size, choice, count, words
 from .study import SYSTEMS
@@ -63,6 +65,11 @@ def _parser() -> argparse.ArgumentParser:
 def _discover(options: argparse.Namespace) -> int:
     """Find the equations of motion of one target in your own videos, and write a report.
 
+    Of a motion in a plane that faces the camera, such as a throw, a swing or a weight on a spring,
+    one video is enough: --length gives the scale by two marks in its first frame, (u right, v
+    down) in pixels, and the metres between them in that plane; without it, places are in pixels.
+    The report has g, or the period of small swings, with their errors. For all else:
+
     There is one video per camera of the rig file, in its order: cameras at rest, one thing that
     moves. They may start at different times, differ in length and in frame rate; the first one is
     the clock. A video may be a file, a folder of images, or a pattern of their names in quotes.
@@ -70,16 +77,12 @@ def _discover(options: argparse.Namespace) -> int:
     Argus, Tracker, Kinovea, TrackMate, DeepLabCut, SLEAP, detectors and this command write them.
 
     examples:
+      python -m vidsindy_lite discover swing.mp4 --length 120,80,125,410,0.45
       python -m vidsindy_lite rig-template --output rig.toml           and fill it in
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml --lag 0,7,0 --degree 2
       python -m vidsindy_lite discover "a/%04d.png" "b/%04d.png" c/ --rig rig.toml --fps 240
       python -m vidsindy_lite discover --tracks a.csv b.csv c.csv --rig rig.toml --fps 30
-      python -m vidsindy_lite discover swing.mp4 --length 120,80,125,410,0.45
-
-    Of a motion in a plane that faces the camera, one video and no rig file are enough: --length
-    gives the scale (without it, places are in pixels), --up the vertical, --fps the frames in a
-    second of slow motion, --hint the target; --corners marks out a plane that is seen askew.
 
     The folder then holds report.html (one page, images included), result.json (the same as data),
     tracks.csv and rig.toml (the learned cameras), beside whatever else is there. If tracks were
@@ -89,8 +92,8 @@ def _discover(options: argparse.Namespace) -> int:
     2 if there is no law; the error says why.
     """
     from .cameras import Rig, list_lags
-    from .companion.plane_report import write_plane_report
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
+    from .dynamics import check_library
     from .refusal import Refused
     from .vision import check_detector
 
@@ -103,8 +106,25 @@ def _discover(options: argparse.Namespace) -> int:
     check_detector(options.detector)
     check_folder_is_free(options.out)
     alone = options.rig is None
+    if alone and len(options.videos) != 1:
+        raise ValueError("rig: must be given, unless there is one video of a motion in a plane")
+    for name in _OF_A_RIG if alone else _OF_ONE_VIDEO:
+        if (value := getattr(options, name)) != COMMANDS["discover"].default(name):
+            rule = f"must {'' if alone else 'not '}be given with --rig"
+            raise ValueError(f"{name}: {rule}, got {value}")
     rig, videos = None if alone else Rig.load(options.rig), options.videos or None
-    told = _told(options)
+    told = {"seed": options.seed, "order": options.order}
+    if alone:
+        asked = ("degree", *_OF_ONE_VIDEO)
+        told |= {name: value for name in asked if (value := getattr(options, name)) is not None}
+    else:
+        library = check_library(options.degree, options.library)
+        told |= {"rig file": options.rig, "library": str(library), "origin": options.origin}
+        told |= {"orientation": options.orientation}
+        told |= {"lags": "learned" if options.lag is None else options.lag}
+        told |= {"targets": options.targets} if options.targets != 1 else {}
+    told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
+    told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
     try:
         found = _found_in_plane(options) if alone else _found(options, rig)
     except Refused as refused:
@@ -117,64 +137,29 @@ def _discover(options: argparse.Namespace) -> int:
     # First the law: if the report cannot be written, it is not lost.
     lags = "" if alone else f"; lags of the videos: {list_lags(found.lags.frames)} frames"
     print(f"{found}\nstatus: {found.status}{lags}", flush=True)
-    if alone:
-        write_plane_report(found, options.videos[0], options.out, told)
-    else:
-        write_report(found, videos, options.out, told, progress=True)
+    write_report(found, videos, options.out, told, progress=True)
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
 
 
-def _told(options: argparse.Namespace) -> dict[str, object]:
-    """How a law is asked for, for its report."""
-    from .dynamics import check_library
-
-    given = {
-        name.replace("_", " "): value
-        for name in ("length", "up", "corners", "hint")
-        if (value := getattr(options, name)) is not None
-    }
-    if options.rig is None:
-        given |= {"degree": options.degree} if options.degree else {}
-        given |= {"length error": options.length_error} if options.length else {}
-    elif given:
-        raise ValueError(f"{next(iter(given))}: must not be given with --rig")
-    else:
-        library = str(check_library(options.degree, options.library))
-        given |= {"rig file": options.rig, "library": library, "origin": options.origin}
-        given |= {"orientation": options.orientation}
-        given |= {"lags": "learned" if options.lag is None else options.lag}
-        given |= {"targets": options.targets} if options.targets != 1 else {}
-    given |= {"order": options.order, "seed": options.seed}
-    tracks = {"tracks": ", ".join(options.tracks or ())}
-    given |= {"detector": options.detector} if options.videos else tracks
-    return given | ({} if options.fps is None else {"frames in a unit of time": options.fps})
-
-
 def _found_in_plane(options: argparse.Namespace) -> Any:
     """The law of a motion in a plane, in the film of one camera."""
+    from .checks import check_vector
     from .plane import discover_from_video
     from .vision import Hint
 
-    if len(options.videos) != 1:
-        raise ValueError("rig: must be given, unless there is one video of a motion in a plane")
-    asked = options.library, options.lag, options.targets, options.origin, options.orientation
-    if asked != (None, None, 1, "learn", "data"):
-        raise ValueError("rig: must be given with library, lag, targets, origin and orientation")
-    corners, hint = options.corners, None
-    if corners is not None:
-        if len(corners) != 10:
-            raise ValueError(f"corners: must be four marks and two sides, got {corners}")
-        corners = [corners[k : k + 2] for k in range(0, 8, 2)], corners[8:]
+    names = ("length", "up", "fps", "detector", "degree", "seed")
+    given = {name: getattr(options, name) for name in names}
+    given |= {"order": "auto" if options.order == "auto" else int(options.order)}
+    if options.length_error is not None:
+        given["length_error"] = options.length_error
+    if options.corners is not None:
+        *marks, width, height = check_vector("corners", options.corners, 10)
+        given["corners"] = np.reshape(marks, (4, 2)), (width, height)
     if options.hint is not None:
-        frame, *box = options.hint
-        hint = Hint(frame=int(frame), box=tuple(box))
-    return discover_from_video(
-        options.videos[0], options.length, options.up, options.fps, corners=corners, hint=hint,
-        length_error=options.length_error, detector=options.detector, degree=options.degree,
-        order="auto" if options.order == "auto" else int(options.order), seed=options.seed,
-        progress=True,
-    )  # fmt: skip
+        frame, *box = check_vector("hint", options.hint, 5)
+        given["hint"] = Hint(frame=int(frame), box=tuple(box))
+    return discover_from_video(options.videos[0], progress=True, **given)
 
 
 def _found(options: argparse.Namespace, rig: Any) -> Any:
@@ -337,6 +322,8 @@ def _compare(options: argparse.Namespace) -> int:
 # ------------------------------------------------------------------------------------ their options
 
 
+_OF_ONE_VIDEO = ("length", "length_error", "up", "corners", "hint")
+_OF_A_RIG = ("library", "lag", "targets", "origin", "orientation")
 _KEPT = "files are as they were"  # as they are written in one step, at the end
 
 
@@ -352,6 +339,10 @@ class _Command(NamedTuple):
     options: dict[str, dict[str, Any]]
     typed: dict[str, str] = {}
     kept: str = _KEPT
+
+    def default(self, name: str) -> Any:
+        """What an option is if it is not given."""
+        return self.options[f"--{name.replace('_', '-')}"].get("default")
 
 
 COMMANDS = {
@@ -371,16 +362,16 @@ COMMANDS = {
         ),
         "--length-error": words(
             "SHARE", "standard error of that length, as a share of it (default: 0.01)",
-            type=as_number(float, "a number"), default=0.01
+            type=as_number(float, "a number")
         ),
         "--up": words(
             "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "
             "lower one first (default: 0,-1)", type=as_numbers
         ),
         "--corners": words(
-            "U1,V1,...,WIDTH,HEIGHT", "of one video, in place of --length: four marks on a "
-            "rectangle in the plane of the motion, from its lower left to its lower right and "
-            "round, and its sides in metres", type=as_numbers
+            "U1,V1,...,WIDTH,HEIGHT", "of one video seen askew, in place of --length: the corners "
+            "of a rectangle in that plane, from its lower left to its lower right and round, and "
+            "its sides in metres", type=as_numbers
         ),
         "--hint": words(
             "FRAME,U,V,WIDTH,HEIGHT", "of one video: a frame and a box around the target in it",

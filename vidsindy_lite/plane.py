@@ -1,37 +1,37 @@
 """From the film of one camera to the law of a motion in a plane that faces it, or is marked out.
 
-`discover_from_video` tracks the target, takes its pixels to the plane (two marks and the distance
-between them, or the corners of a rectangle), and looks for the law. Of nested laws, each class with
-fewer symmetries than the one before it, the simplest is taken that the data bear: forces that are
-the same everywhere (`homogeneous`), forces linear in place and velocity, all that `discover` knows.
+The camera is known by what it sees of the plane z = 0: from two marks and the distance between
+them, or from the corners of a rectangle. Of nested laws, each class with fewer symmetries than the
+one before it, the simplest is taken that the data bear: forces that are the same everywhere
+(`homogeneous`), forces linear in place and velocity, a swing on a circle.
 """
 
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Floats
+from .cameras import Lags, OrthographicCamera, Rig
 from .checks import check_array, check_integer, check_number, check_positive, check_vector
 from .dynamics import (
     Discovery,
-    PolynomialSystem,
-    Quantity,
+    Round,
     Swing,
     check_library,
     check_order,
     discover,
-    find_swing,
     homogeneous,
     smooth,
 )
+from .pipeline import VideoDiscovery
 from .refusal import refusing
-from .vision import Hint, Track, check_detector, frame_clock, track, video_info
+from .vision import Hint, check_detector, frame_clock, track, video_info
 
-NAMES = ("x", "y")
 MARK = 1.0
 """Standard error of a mark that is set by hand, in pixels."""
 EARTH, ELSEWHERE = 9.81, 0.03
@@ -39,110 +39,63 @@ EARTH, ELSEWHERE = 9.81, 0.03
 SURE = 3.0
 """Standard errors from which on a difference is one."""
 TILTED = np.deg2rad(2.0)
-"""Angle between a pull and a vertical that is marked by hand, up to which they may be one."""
+"""Standard error of a direction that is set by hand: of a vertical, and of where a camera looks."""
+FOCAL = 0.75
+"""Focal length of a telephone over the longer side of its picture."""
 ASIDE = 5.0
 """Spread across a line, over the noise, up to which a motion is one along it."""
 
 
-@dataclass(frozen=True, eq=False)
-class PlaneDiscovery:
-    """A motion in a plane, and the law that it obeys.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlaneCamera(OrthographicCamera):
+    """A camera of which is known how it sees the plane z = 0, and its scale between the marks.
 
     Parameters
     ----------
-    t : ndarray, shape (n,)
-        Times of the frames, in seconds unless ``fps`` says otherwise.
-    x : ndarray, shape (n, 2)
-        Where the target is in the plane, rightwards and upwards; NaN where it was not seen.
-    unit : {"m", "px"}
-        Of places.
-    scale_error : float
-        Standard error of the scale, as a share of it: all places are off by it alike.
     homography : ndarray, shape (3, 3)
-        From pixels of the first frame to the plane, homogeneous.
-    track : Track
-        The target in the film.
-    line : tuple of ndarray, shapes (2,) and (m, 2)
-        An origin and unit vectors: of what they are the coordinates that the law has. The axes of
-        the plane, x and y; or the one line along which the target moves, x.
-    discovery : Discovery
-        The law; the errors of its terms hold that of the scale. Where the target swings on a
-        circle, that of the angle.
-    swing : Swing, optional
-        The circle, if the target swings on one.
-    warnings : tuple of str
-        Why not to trust it: those of the track, of the law, and what they say of the scale.
+        From pixels to the plane, homogeneous.
+    position, normal, scale, angle, scale_error, image_size
+        See `Camera`.
     """
 
-    t: Floats
-    x: Floats
-    unit: str
-    scale_error: float
+    model: ClassVar[str] = "plane"
+
     homography: Floats
-    track: Track
-    line: tuple[Floats, Floats]
-    discovery: Discovery
-    warnings: tuple[str, ...]
-    swing: Swing | None = None
+
+    def image(self, x: Floats) -> Floats:
+        """Pixels at which points of the plane are seen, (n, 2)."""
+        return mapped(np.linalg.inv(self.homography), x[:, :2])
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneDiscovery(VideoDiscovery):
+    """A motion in the plane z = 0 of one camera, x rightwards and y upwards, and its law.
+
+    Parameters
+    ----------
+    unit : {"m", "px"}
+        Of places.
+    circle : Round, optional
+        Where the target swings on a circle; then the law is that of the angle. That of what moves
+        along a line is the law of one coordinate, see `Discovery.orientation`.
+    """
+
+    unit: str
+    circle: Round | None = None
 
     @property
-    def status(self) -> str:
-        """``"ok"``, or ``"suspect"`` if there is a warning."""
-        return "suspect" if self.warnings else "ok"
-
-    @property
-    def g(self) -> Quantity | None:
-        """The pull of gravity on what flies, or swings on a circle; None of other motions."""
-        if self.swing is not None:
-            return self.swing.g
-        said = [q for q in self.discovery.physics() if q.name == "g"]
-        return said[0] if said else None
-
-    @property
-    def period(self) -> Quantity | None:
-        """Of small swings: of the coordinate or mode that moves most; None if nothing swings."""
-        said = [q for q in self.discovery.physics() if q.name.startswith("period")]
-        return min(said, key=lambda q: self._left_of(float(q.value)), default=None)
-
-    def _left_of(self, period: float) -> float:
-        """Squares that oscillations of one period leave of the path."""
-        seen = np.isfinite(self.x[:, 0])
-        phase = 2 * np.pi * self.t[seen] / period
-        waves = np.column_stack([np.ones_like(phase), np.cos(phase), np.sin(phase)])
-        left = self.x[seen] - waves @ np.linalg.lstsq(waves, self.x[seen], rcond=None)[0]
-        return float((left**2).sum())
+    def swing(self) -> Swing | None:
+        """The circle and the law of the angle on it, if the target swings on one."""
+        return None if self.circle is None else Swing(self.circle, self.discovery)
 
     @property
     def fitted(self) -> Floats:
         """The path that obeys the law, in the shape of ``x``; NaN before and after it."""
-        return self.along(self.t)
-
-    def along(self, t: Floats) -> Floats:
-        """Places of the path that obeys the law at times (n,), (n, 2)."""
-        if self.swing is not None:
-            circle, angle = self.swing.circle, self.discovery.curve(t)[:, :1]
-            ways = np.hstack([np.cos(angle), np.sin(angle)]) @ circle.axes
-            return circle.centre + circle.radius * ways
-        origin, axes = self.line
-        return origin + self.discovery.curve(t)[:, : len(axes)] @ axes
-
-    def in_picture(self, x: Floats) -> Floats:
-        """Places of the plane, (n, 2), in pixels of the first frame."""
-        return _mapped(np.asarray(np.linalg.inv(self.homography), float), x)
-
-    def __str__(self) -> str:
-        said = [f"of small swings: {self.period}"] if self.swing and self.period else []
-        if len(self.line[1]) == 1:
-            said.append(
-                "along a line, on which x points to ({:.3f}, {:.3f})".format(*self.line[1][0])
-            )
-        scale = f"places in {self.unit}"
-        scale += f", their scale known to {100 * self.scale_error:.2g} %" * (self.unit == "m")
-        warnings = (f"warning: {text}" for text in self.warnings)
-        # The doubts below the law of a swing are among the warnings.
-        law = self.discovery.statement()
-        law = law if self.swing is None else str(self.swing).partition("\n")[0]
-        return "\n".join([law, *said, scale, *warnings])
+        if self.circle is None:
+            return super().fitted
+        angle = self.discovery.curve(self.t)[:, :1]
+        away = np.hstack([np.cos(angle), np.sin(angle)]) @ self.circle.axes
+        return _in_space(self.circle.centre + self.circle.radius * away)
 
 
 def discover_from_video(
@@ -184,7 +137,7 @@ def discover_from_video(
         See ``target`` and ``detector`` of `track`.
     degree, order, seed, progress
         See `discover`. By default, of nested laws the simplest that the data bear: forces that are
-        the same at every place, linear ones, all up to degree 3.
+        the same at every place, linear ones, a swing on a circle.
 
     Returns
     -------
@@ -206,59 +159,79 @@ def discover_from_video(
     share = check_number("length_error", length_error)
     if not 0 <= share < 1:
         raise ValueError(f"length_error: must be a share of the length, 0 to 1, got {share}")
-    shot = video_info(path)
+    shot, name = video_info(path), Path(path).name
     if fps is None and not shot.fps:
-        raise ValueError(f"fps: must be given, as {Path(path).name} states no frame rate")
-    homography, pixels = _to_plane(length, up, corners, shot.size)
-    error = float(np.hypot(share, np.sqrt(2) * MARK / pixels)) if pixels else 0.0
+        raise ValueError(f"fps: must be given, as {name} states no frame rate")
     rate = shot.fps if fps is None else check_positive("fps", fps)
+    marks, places, pixels = four_places(length, up, corners, shot.size)
+    to_plane = homography_of(marks, places)
+    error = float(np.hypot(share, np.sqrt(2) * MARK / pixels)) if pixels else 0.0
+    unit, scale = ("m", f", their scale known to {100 * error:.2g} %") if pixels else ("px", "")
+    middle, centre = marks.mean(axis=0), (np.array(shot.size) - 1) / 2
+    across = complex(*np.diff(mapped(to_plane, middle + [[0.0, 0], [1, 0]]), axis=0)[0])
+    camera = PlaneCamera(
+        homography=to_plane, position=_in_space(mapped(to_plane, centre[None]))[0],
+        normal=np.array([0, 0, 1]), scale=abs(across), angle=-float(np.angle(across)), scale_error=error, image_size=shot.size,
+    )  # fmt: skip
+    rig = Rig((camera,), note=f"the plane of the motion, places in {unit}{scale}")
     seen = track(path, detector, hint)
-    t, x = frame_clock(path) / rate, _mapped(homography, seen.pixels)
-    with refusing("law", [seen.pixels], [Path(path).name]):
-        there = np.isfinite(x[:, 0])
-        line, law, swing = _law(t[there], x[there], degree, order, seed, progress)
-    doubts = list(law.warnings)
-    if swing is None:
-        law = replace(
-            law,
-            covariance=_with_scale(law.covariance, law.system, error),
-            native_covariance=_with_scale(law.native_covariance, law.native, error),
-        )
-    else:  # an angle has no scale, its circle has
-        circle = swing.circle
-        spread = float(np.hypot(circle.radius_error, error * circle.radius))
-        swing = replace(swing, circle=replace(circle, radius_error=spread))
-        doubts += circle.warnings
-    unit = "m" if pixels else "px"
-    found = PlaneDiscovery(t, x, unit, error, homography, seen, line, law, (), swing)
-    doubts += _doubts(found, up is not None or corners is not None)
-    return replace(found, warnings=(*seen.warnings, *doubts))
+    t, x = frame_clock(path) / rate, mapped(to_plane, seen.pixels)
+    modes = [error * x, *_tilts(camera, seen.pixels, middle)][
+        : 1 if corners else 3 if pixels else 0
+    ]
+    with refusing("law", [seen.pixels], [name]):
+        law = _law(t, x, modes, degree, order, seed, progress)
+    swing = law.swing
+    doubts = law.warnings if swing is None else (*swing.circle.warnings, *swing.law.warnings)
+    found = PlaneDiscovery(
+        tracks=(seen.pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
+        t=t, x=_in_space(x), systematic=np.stack([_in_space(mode) for mode in modes]),
+        warnings=(), discovery=law if swing is None else swing.law,
+        unit=unit, circle=None if swing is None else swing.circle,
+    )  # fmt: skip
+    contradicted = _contradicted(found, up is not None or corners is not None)
+    return replace(found, warnings=(*seen.warnings, *doubts, *contradicted))
 
 
-def _to_plane(
+def _in_space(places: Floats) -> Floats:
+    """Places of the plane, (n, 2), in space, (n, 3)."""
+    return np.column_stack([places, np.where(np.isnan(places[:, 0]), np.nan, 0.0)])
+
+
+def four_places(
     length: Sequence[float] | None,
     up: Sequence[float] | None,
     corners: tuple[ArrayLike, Sequence[float]] | None,
     size: tuple[int, int],
-) -> tuple[Floats, float]:
-    """From pixels to the plane, (3, 3); and the pixels its scale was measured on, 0 if none."""
-    direction = _upwards(up)
+) -> tuple[Floats, Floats, float]:
+    """Four pixels and where they are in the plane, (4, 2) each.
+
+    And the pixels that their distances were measured on, 0 if there are none.
+    """
+    upwards, square = _upwards(up), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     if corners is not None:
         if length is not None:
             raise ValueError("corners: must not be given with length, got both")
-        return _rectified(*_checked(corners), direction if up is not None else None)
-    origin, scale, pixels = np.array([0.0, size[1] - 1.0]), 1.0, 0.0
+        marks, sides = _checked(corners)
+        places = square * sides
+        if up is not None:  # of the plane, as it is seen at the middle of the rectangle
+            middle = marks.mean(axis=0)
+            seen = mapped(homography_of(marks, places), np.array([middle, middle + upwards]))
+            c, s = np.diff(seen, axis=0)[0][::-1] / np.hypot(*np.diff(seen, axis=0)[0])
+            places = places @ np.array([[c, s], [-s, c]])
+        return marks, places, float(np.hypot(*(np.roll(marks, -1, axis=0) - marks).T).min())
+    origin, metres, pixels = np.array([0.0, size[1] - 1.0]), 1.0, 0.0
     if length is not None:
-        marks = check_vector("length", length, 5)
-        origin, pixels = marks[:2], float(np.hypot(*(marks[2:4] - marks[:2])))
-        if not (pixels > 2 * MARK and marks[4] > 0):
+        *ends, metres = check_vector("length", length, 5)
+        origin, along = np.array(ends[:2]), np.subtract(ends[2:], ends[:2])
+        pixels = float(np.hypot(*along))
+        if not (pixels > 2 * MARK and metres > 0):
             raise ValueError(
                 "length: must be two marks apart from each other and a distance above 0, "
-                f"got {tuple(marks)}"
+                f"got {tuple(length)}"
             )
-        scale = marks[4] / pixels
-    turn = np.array([[-direction[1], direction[0]], direction])
-    return np.vstack([np.column_stack([scale * turn, -scale * turn @ origin]), [0, 0, 1]]), pixels
+    axes = np.array([[-upwards[1], upwards[0]], upwards])
+    return origin + (pixels or 1.0) * square @ axes, metres * square, pixels
 
 
 def _upwards(up: Sequence[float] | None) -> Floats:
@@ -293,69 +266,62 @@ def _checked(corners: tuple[ArrayLike, Sequence[float]]) -> tuple[Floats, Floats
     return marks, sides
 
 
-def _rectified(marks: Floats, sides: Floats, up: Floats | None) -> tuple[Floats, float]:
-    """The homography that takes marks to the corners of a rectangle; see `_to_plane`."""
-    places = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * sides
-    rows = []
-    for (u, v), place in zip(marks, places, strict=True):
-        for axis, value in enumerate(place):
-            row = np.zeros(9)
-            row[3 * axis : 3 * axis + 3], row[6:] = (u, v, 1), (-value * u, -value * v, -value)
-            rows.append(row)
-    homography = np.linalg.svd(np.array(rows))[2][-1].reshape(3, 3)
-    if up is not None:  # of the plane, as it is seen at the middle of the rectangle
-        middle = marks.mean(axis=0)
-        away = np.diff(_mapped(homography, np.array([middle, middle + up])), axis=0)[0]
-        c, s = away[::-1] / np.hypot(*away)
-        homography = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ homography
-    sizes = np.linalg.norm(np.roll(marks, -1, axis=0) - marks, axis=1)
-    return homography / homography[2, 2], float(sizes.min())
+def homography_of(marks: Floats, places: Floats) -> Floats:
+    """The homography, (3, 3), that takes four pixels to places, (4, 2) each."""
+    ones = np.column_stack([marks, np.ones(4)])
+    rows = [
+        np.hstack([np.kron(np.eye(2)[axis], ones), -places[:, axis, None] * marks])
+        for axis in (0, 1)
+    ]
+    return np.append(np.linalg.solve(np.vstack(rows), places.T.ravel()), 1.0).reshape(3, 3)
 
 
-def _mapped(homography: Floats, places: Floats) -> Floats:
+def mapped(homography: Floats, places: Floats) -> Floats:
     """Places, (n, 2), where a homography takes them."""
-    mapped = np.column_stack([places, np.ones(len(places))]) @ homography.T
-    return mapped[:, :2] / mapped[:, 2:]
+    there = np.column_stack([places, np.ones(len(places))]) @ homography.T
+    return there[:, :2] / there[:, 2:]
+
+
+def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
+    """By how much places are off, (n, 2), where the camera looks askew by one standard error.
+
+    To the side, and upwards. Lengths between the marks are right, what is seen beside their middle
+    is nearer to the camera or farther away.
+    """
+    away = pixels - middle
+    nearer = TILTED * away / (FOCAL * max(camera.image_size))
+    x = mapped(camera.homography, pixels)
+    return [mapped(camera.homography, pixels + nearer[:, [j]] * away) - x for j in (0, 1)]
 
 
 def _law(
-    t: Floats, x: Floats, degree: int | None, order: int | str, seed: int, progress: bool
-) -> tuple[tuple[Floats, Floats], Discovery, Swing | None]:
-    """The law of places: of nested ones the simplest that the data bear, or the one asked for.
-
-    And of what it has the coordinates, see `PlaneDiscovery`.
-    """
-    plane = np.zeros(2), np.eye(2)
+    t: Floats, x: Floats, modes: Sequence[Floats], degree: int | None, order: int | str,
+    seed: int, progress: bool,
+) -> Discovery:  # fmt: skip
+    """The law of places: of nested ones the simplest that the data bear, or the one asked for."""
+    shared, axes = np.reshape(modes, (len(modes), *x.shape)), np.eye(2)
     if degree is not None or order != "auto":
-        found = discover(t, x, degree, seed, progress, order=order)
-        return plane, found if found.swing is None else found.swing.law, found.swing
-    if (flight := homogeneous(t, x, NAMES)) is not None:
-        return plane, flight, None
-    if (line := _line(t, x)) is None and (swing := find_swing(t, x, seed)) is not None:
-        return plane, swing.law, swing
-    origin, axes = line or plane
-    return (origin, axes), discover(t, (x - origin) @ axes.T, 1, seed, progress, order=2), None
+        return discover(t, x, degree, seed, progress, systematic=shared, order=order)
+    there = np.isfinite(x[:, 0])
+    flight = homogeneous(t[there], x[there], ("x", "y"), shared[:, there])
+    if flight is not None:
+        return flight
+    axes = _axes(t[there], x[there])
+    law = discover(t, x @ axes.T, 1, seed, progress, systematic=shared @ axes.T, order=2)
+    return law if len(axes) == 2 else replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
 
 
-def _line(t: Floats, x: Floats) -> tuple[Floats, Floats] | None:
-    """Origin and direction, (1, 2), of the line that a path does not leave within its noise."""
+def _axes(t: Floats, x: Floats) -> Floats:
+    """Those of the plane, or the one along which a path moves that is a line within its noise."""
     middle = x.mean(axis=0)
     _, sizes, axes = np.linalg.svd(x - middle, full_matrices=False)
     noise = smooth([(t, (x - middle) @ axes.T)], np.random.default_rng(0)).noise
     if sizes[1] > ASIDE * noise[1] * np.sqrt(len(x)):
-        return None
-    main = axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
-    # Zero next to that of the plane: a zero near where the target rests would pass for its rest.
-    return middle - middle @ main.T @ main, main
+        return np.eye(2)
+    return axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
 
 
-def _with_scale(covariance: Floats, law: PolynomialSystem, error: float) -> Floats:
-    """With what an error of the scale makes of coefficients, 1 - p times for those of degree p."""
-    rates = (law.coefficients * (1 - law.exponents.sum(axis=1))[:, None]).T.ravel()
-    return covariance + error**2 * np.outer(rates, rates)
-
-
-def _doubts(found: PlaneDiscovery, vertical: bool) -> list[str]:
+def _contradicted(found: PlaneDiscovery, vertical: bool) -> list[str]:
     """What the law says against scale, frame rate and vertical."""
     doubts, g = [], found.g
     if found.unit == "m" and g is not None:
@@ -368,7 +334,7 @@ def _doubts(found: PlaneDiscovery, vertical: bool) -> list[str]:
                 else "it does not hang there, or the plane lies askew"
             )
             doubts.append(f"length: {g} is not the {EARTH} of what flies or swings freely: {wrong}")
-    if vertical and found.swing is None and g is not None:
+    if vertical and found.circle is None and g is not None:
         pull = found.discovery.physics()["direction"]
         tilt = np.arctan2(pull.value[0], -pull.value[1])
         if abs(tilt) > SURE * np.hypot(float(pull.error[0]), TILTED):

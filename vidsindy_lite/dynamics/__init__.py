@@ -33,7 +33,7 @@ from .mechanics import Quantity, Round, on_circle, on_sphere
 from .l0 import closest_rival, subset_search
 from .solver import SplineSINDy
 from .smoothing import smooth
-from .solver import discover, find_swing
+from .solver import discover
 from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .model import State
 from .data import Trajectory, check_trajectory, cut, typical_step

@@ -11,19 +11,21 @@ leaves, and of all classes the one that is so over the widest range of errors is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.optimize import minimize_scalar
+from scipy.optimize import least_squares
+from scipy.special import exprel
 from scipy.stats import chi2
 
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, Ints
 from .data import inflation
 from .library import monomial_exponents, velocity_names
 from .model import PolynomialSystem
 from .problem import FALSE_ALARM
-from .result import Discovery
+from .result import Discovery, Plateau
 from .smoothing import smooth
 
 FEWEST = 6
@@ -32,8 +34,6 @@ STEEP = 5.0
 """Largest drag, over one through the duration: with more, the velocity is lost at once."""
 POINTS = 201
 """Points through which the curve of a law is drawn."""
-COLUMNS = 3
-"""Of a flight: place, velocity, force."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,80 +42,76 @@ class Flight:
 
     Parameters
     ----------
-    t, x : ndarray, shape (n,), (n, m)
-        Of the samples; the time from their middle on.
-    columns : ndarray of bool, shape (3, m)
-        Which of place, velocity and force each coordinate has.
-    k : float
-        Growth of the velocity: below zero a drag.
-    sought : bool
-        Whether k was sought.
+    theta : ndarray, shape (3 m + 1,)
+        Place, velocity and f at time 0, and k: below zero a drag.
+    free : ndarray of bool, shape (3 m + 1,)
+        Which of these were sought; the others are zero.
+    covariance : ndarray, shape (3 m + 1, 3 m + 1)
+        The errors of neighbours taken as not independent.
+    left : ndarray, shape (n, m)
+        What is left of the samples.
     """
 
-    t: Floats
-    x: Floats
-    columns: Bools
-    k: float = 0.0
-    sought: bool = False
+    theta: Floats
+    free: Bools
+    covariance: Floats
+    left: Floats
 
-    def basis(self, t: Floats, slope: bool = False) -> Floats:
-        """What place, velocity and force at time 0 add to a place, or to a velocity: (n, 3)."""
-        one, k = np.ones_like(t), self.k
-        growth = np.exp(k * t)
-        # Series, where k t is so small that differences lose their digits.
-        small = np.abs(k * t).max() < 1e-4
-        first = t + k * t**2 / 2 if small else (growth - 1) / k
-        second = t**2 / 2 + k * t**3 / 6 if small else (first - t) / k
-        return np.column_stack([0 * one, growth, first] if slope else [one, first, second])
+    @classmethod
+    def fitted(cls, t: Floats, x: Floats, free: Bools) -> Flight:
+        """By least squares to samples (n, m), as many as ``free`` tells."""
+        most = STEEP / np.ptp(t)
+
+        def whole(values: Floats) -> Floats:
+            theta = np.zeros(len(free))
+            theta[free] = values
+            return theta
+
+        def left(values: Floats) -> Floats:
+            return (x - places(t, whole(values))).ravel()
+
+        bound = np.where(np.arange(len(free)) < len(free) - 1, np.inf, most)[free]
+        found = least_squares(left, np.zeros(free.sum()), "3-point", (-bound, bound), x_scale="jac")
+        errors = found.fun.reshape(x.shape)
+        size = (errors**2).sum() / max(errors.size - free.sum(), 1) * inflation([errors]).max()
+        covariance = np.zeros((len(free),) * 2)
+        covariance[np.ix_(free, free)] = np.linalg.pinv(found.jac.T @ found.jac) * size
+        return cls(whole(found.x), free, covariance, errors)
 
     @property
-    def start(self) -> Floats:
-        """Place, velocity and force at time 0, (3, m), by least squares."""
-        basis, found = self.basis(self.t), np.zeros(self.columns.shape)
-        for j, column in enumerate(self.columns.T):
-            found[column, j] = np.linalg.lstsq(basis[:, column], self.x[:, j], rcond=None)[0]
-        return found
-
-    @property
-    def left(self) -> Floats:
-        """What is left of the samples, (n, m)."""
-        return self.x - self.basis(self.t) @ self.start
+    def force(self) -> Floats:
+        """The constant force, (m,)."""
+        return np.split(self.theta[:-1], 3)[2]
 
     @property
     def error(self) -> float:
         """Standard deviation of single samples about it."""
-        free = self.x.size - self.columns.sum() - self.sought
-        return float(np.sqrt((self.left**2).sum() / max(free, 1)))
-
-    def with_drag(self) -> Flight:
-        """The same with the drag that fits best."""
-        most = STEEP / np.ptp(self.t)
-
-        def squares(k: float) -> float:
-            return float((replace(self, k=k).left ** 2).sum())
-
-        best = minimize_scalar(squares, bounds=(-most, most), method="bounded")
-        return replace(self, k=float(best.x), sought=True)
-
-    def covariance(self) -> Floats:
-        """Of force and drag, (m + 1, m + 1), the errors of neighbours taken as not independent."""
-        m, step = self.x.shape[1], 1e-4 / np.ptp(self.t)
-        bends = (replace(self, k=self.k + step).basis(self.t) - self.basis(self.t)) / step
-        places = np.flatnonzero(self.columns.T.ravel())
-        design = np.zeros((m, len(self.t), COLUMNS * m + 1))
-        for j in range(m):
-            design[j, :, COLUMNS * j : COLUMNS * (j + 1)] = self.basis(self.t)
-            design[j, :, -1] = bends @ self.start[:, j]
-        free = np.append(places, COLUMNS * m) if self.sought else places
-        rows = design[:, :, free].reshape(-1, len(free))
-        size = self.error**2 * inflation([self.left]).max()
-        whole = np.zeros((COLUMNS * m + 1,) * 2)
-        whole[np.ix_(free, free)] = np.linalg.pinv(rows.T @ rows) * size
-        wanted = [*range(COLUMNS - 1, COLUMNS * m, COLUMNS), COLUMNS * m]
-        return whole[np.ix_(wanted, wanted)]
+        return float(np.sqrt((self.left**2).sum() / max(self.left.size - self.free.sum(), 1)))
 
 
-def homogeneous(t: Floats, x: Floats, names: tuple[str, ...]) -> Discovery | None:
+def places(t: Floats, theta: Floats, slope: bool = False) -> Floats:
+    """Where a flight of these numbers is, (n, m), or how fast."""
+    start, velocity, force = np.split(theta[:-1], 3)
+    z = theta[-1] * t
+    first = t * exprel(z)  # the integral of exp(k t)
+    if slope:
+        return np.outer(np.exp(z), velocity) + np.outer(first, force)
+    near = np.abs(z) < 1e-4  # there the difference has lost its digits, and the series has not
+    second = t**2 * np.where(near, 0.5 + z / 6, (exprel(z) - 1) / np.where(near, 1.0, z))
+    return start + np.outer(first, velocity) + np.outer(second, force)
+
+
+def coefficients_of(theta: Floats, exponents: Ints) -> Floats:
+    """The law of a flight in terms of these exponents, (l, 2 m)."""
+    force = np.split(theta[:-1], 3)[2]
+    velocities = exponents[:, len(force) :]
+    pull = np.outer(exponents.sum(axis=1) == 0, force) + theta[-1] * velocities
+    return np.hstack([velocities, pull])
+
+
+def homogeneous(
+    t: Floats, x: Floats, names: tuple[str, ...], systematic: Floats | None = None
+) -> Discovery | None:
     """The law of a flight, where one that is the same at every place is to be preferred.
 
     Parameters
@@ -126,6 +122,8 @@ def homogeneous(t: Floats, x: Floats, names: tuple[str, ...]) -> Discovery | Non
         Places. One standard error goes for all coordinates.
     names : tuple of str
         Of the coordinates.
+    systematic : ndarray, shape (k, n, m), optional
+        Errors that all places share, see `discover`.
 
     Returns
     -------
@@ -140,86 +138,90 @@ def homogeneous(t: Floats, x: Floats, names: tuple[str, ...]) -> Discovery | Non
     """
     if len(x) < FEWEST:
         raise ValueError(f"x: must hold at least {FEWEST} places, got {len(x)}")
-    middle = (t[0] + t[-1]) / 2
-    order = np.arange(COLUMNS)[:, None] + np.zeros(x.shape[1], dtype=int)
-    rest, straight, thrown = (Flight(t - middle, x, order <= k) for k in range(COLUMNS))
-    classes = [rest, straight, thrown, thrown.with_drag()]
+    m, middle = x.shape[1], (t[0] + t[-1]) / 2
+    since, numbers = t - middle, np.arange(3 * m + 1)
+    classes = [Flight.fitted(since, x, numbers < count) for count in (m, 2 * m, 3 * m, 3 * m + 1)]
     noise = float(np.sqrt((smooth([(t, x)], np.random.default_rng(0)).noise ** 2).mean()))
-    bounds = np.log([*(max(one.error, noise) for one in classes), noise])
-    best = 1 + int(np.argmax(bounds[:-1] - bounds[1:]))
+    bounds = np.array([*(max(one.error, noise) for one in classes), noise])
+    best = 1 + int(np.argmax(bounds[:-1] / bounds[1:]))
     if best == len(classes):  # all other laws
         return None
-    if classes[best].k > 0:  # no drag: it comes nearer, which the constant force is doubted for
+    if classes[best].theta[-1] > 0:  # no drag: it comes nearer; the constant force is doubted
         best -= 1
     flight, richer = classes[best], classes[min(best + 1, len(classes) - 1)]
-    covariance = flight.covariance()
-    departure = _departure(flight, richer)
-    if np.trace(departure) > np.trace(covariance):
+    covariance, departure = flight.covariance, _departure(flight, richer)
+    wanted = numbers >= 2 * m  # force and drag
+    if departure[wanted, wanted].sum() > covariance[wanted, wanted].sum():
         covariance = departure
-    price = chi2.isf(FALSE_ALARM / (2 * x.shape[1]), df=1)
-    pulled = flight.start[-1] ** 2 > price * np.diag(covariance)[:-1]
-    columns = flight.columns & np.vstack([*2 * [pulled | True], pulled])
-    law = replace(flight, columns=columns)
-    covariance = covariance * np.outer(kept := np.append(pulled, True), kept)
-    return _told(law, covariance, names, middle, _doubt(flight, richer, price))
+    price = chi2.isf(FALSE_ALARM / (2 * m), df=1)
+    kept = flight.free & ((flight.theta**2 > price * np.diag(covariance)) | (numbers < 2 * m))
+    law = Flight.fitted(since, x, kept)
+    for mode in () if systematic is None else systematic:
+        moved = Flight.fitted(since, x + mode, kept).theta - law.theta
+        covariance = covariance + np.outer(moved, moved)
+    widths = np.column_stack([bounds[1:], bounds[:-1]]) / np.linalg.norm(x.std(axis=0))
+    found = _told(law, covariance * np.outer(kept, kept), t, names)
+    return replace(
+        found, warnings=_doubt(flight, richer, price), path=_path(classes, widths, found)
+    )
 
 
 def _departure(flight: Flight, richer: Flight) -> Floats:
-    """Mean products of what force and drag of a richer law are off those of a flight."""
-    away = np.append(richer.start[-1] - flight.start[-1], 0.0)
-    off = richer.covariance() + np.outer(away, away)
-    if not flight.sought:
-        off[-1] = off[:, -1] = 0.0
-    return off
+    """Mean products of what the numbers of a richer law are off those of a flight."""
+    away = richer.theta - flight.theta
+    return (richer.covariance + np.outer(away, away)) * np.outer(flight.free, flight.free)
 
 
 def _doubt(flight: Flight, richer: Flight, price: float) -> tuple[str, ...]:
     """Whether the next richer law fits better, and what it would be."""
-    if richer is flight:
-        return ()
     gained = (flight.left**2).sum() - (richer.left**2).sum()
-    if gained < price * richer.error**2 * inflation([richer.left]).max():
+    if richer is flight or gained < price * richer.error**2 * inflation([richer.left]).max():
         return ()
-    pull, left = np.linalg.norm(richer.start[-1]), richer.error / flight.error
-    if not richer.sought:
+    pull, left, k = np.linalg.norm(richer.force), richer.error / flight.error, richer.theta[-1]
+    if not k:
         return (f"a constant force of {pull:.4g} would leave {100 * left:.0f} % of the errors",)
-    cause = "drag" if richer.k < 0 else "it comes nearer, or the plane lies askew"
+    cause = "drag" if k < 0 else "it comes nearer, or the plane lies askew"
     return (
-        f"one flight hardly tells its law: velocities that change by {100 * richer.k:+.3g} % in a "
-        f"unit of time, beside a pull of {pull:.4g}, would leave {100 * left:.0f} % of the errors "
+        f"one flight hardly tells its law: velocities that change by {100 * k:+.3g} % in a unit of "
+        f"time, beside a pull of {pull:.4g}, would leave {100 * left:.0f} % of the errors "
         f"({cause}, or the lens bends the picture); the law that is the same at every place and "
         "holds over the widest range of errors is given, its error bars hold the other",
     )
 
 
-def _told(
-    flight: Flight, covariance: Floats, names: tuple[str, ...], middle: float,
-    doubts: tuple[str, ...],
-) -> Discovery:  # fmt: skip
-    """The law of a flight as a discovery; covariance (m + 1, m + 1) is that of force and drag."""
-    m, exponents = len(names), monomial_exponents(2 * len(names), 1)
-    row = {tuple(powers): k for k, powers in enumerate(exponents.tolist())}
-    velocity = [row[tuple(powers)] for powers in np.eye(2 * m, dtype=int)[m:].tolist()]
-    constant, force = row[(0,) * 2 * m], flight.start[-1]
-    l, d = len(exponents), 2 * m
-    coefficients, made = np.zeros((l, d)), np.zeros((d, l, m + 1))
-    coefficients[velocity, np.arange(m)] = 1.0
-    coefficients[constant, m:] = force
-    coefficients[velocity, m + np.arange(m)] = flight.k
-    for j in range(m):
-        made[m + j, constant, j] = made[m + j, velocity[j], m] = 1.0
-    spread = made.reshape(l * d, m + 1)
-    spread = spread @ covariance @ spread.T
+def _told(law: Flight, covariance: Floats, t: Floats, names: tuple[str, ...]) -> Discovery:
+    """The law of a flight as a discovery."""
+    exponents = monomial_exponents(2 * len(names), 1)
+    coefficients = coefficients_of(law.theta, exponents)
     system = PolynomialSystem(names + velocity_names(names), exponents, coefficients)
-    shown = np.linspace(flight.t[0], flight.t[-1], POINTS)
-    states = np.hstack([flight.basis(shown, slope) @ flight.start for slope in (False, True)])
-    error = np.sqrt((flight.left**2).mean(axis=0))
+    still = coefficients_of(0 * law.theta, exponents)
+    rates = [(coefficients_of(one, exponents) - still).T.ravel() for one in np.eye(len(law.theta))]
+    spread = np.transpose(rates) @ covariance @ rates
+    shown = np.linspace(t[0], t[-1], POINTS)
+    since = shown - (t[0] + t[-1]) / 2
+    states = np.hstack([places(since, law.theta, slope) for slope in (False, True)])
+    noise = np.append(np.sqrt((law.left**2).mean(axis=0)), np.full(len(names), np.nan))
+    nothing = np.zeros(system.d)
     return Discovery(
-        system=system, native=system, offset=np.zeros(d), covariance=spread,
-        native_covariance=spread, offset_errors=np.zeros(d),
-        noise=np.append(error, np.full(m, np.nan)), model_error=np.zeros(d), warnings=doubts,
-        path=((),) * d, history=(), curves=(make_interp_spline(shown + middle, states, k=3),),
-        absent=np.full((l, d, 2), np.nan),
+        system=system, native=system, offset=nothing, covariance=spread, native_covariance=spread,
+        offset_errors=nothing, noise=noise, model_error=nothing, warnings=(), path=(), history=(),
+        curves=(make_interp_spline(shown, states, k=3),),
+        absent=np.full((*coefficients.shape, 2), np.nan),
         note="order 2: of laws that one flight cannot tell apart, the one that is the same "
         "everywhere",
     )  # fmt: skip
+
+
+def _path(
+    classes: Sequence[Flight], bounds: Floats, found: Discovery
+) -> tuple[tuple[Plateau, ...], ...]:
+    """The laws of all classes, each between its bounds (k, 2), the richest first."""
+    laws = [coefficients_of(one.theta, found.system.exponents) != 0 for one in classes]
+    return tuple(
+        tuple(
+            Plateau(j, low, high, law[:, j])
+            for (low, high), law in zip(bounds[::-1], laws[::-1], strict=True)
+            if high > low
+        )
+        for j in range(found.system.d)
+    )

@@ -230,7 +230,7 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     found, problem, _ = _solved(task, task.form(2 if order == 2 else 1))
     if order == 1 or task.library.given or not found.warnings:
         return found
-    swing = None if problem.form.functions else _swing(task, problem.noise * problem.units.scale)
+    swing = _swing(task, problem)
     drowned = problem.noise.max() > DROWNED
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
@@ -244,23 +244,15 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     return better(found, second)
 
 
-def find_swing(t: Floats, x: Floats, seed: int = 0) -> Swing | None:
-    """The swing of positions, (n, 2), with the law of its angle; None if they are on no circle."""
-    runs = check_trajectories(t, x)
-    shared, rng = check_systematic(None, [t], runs), np.random.default_rng(seed)
-    task = _Task((runs, shared, None), (NAME,), LIBRARY, "learn", seed, False, np.inf)
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _swing(task, smooth(runs, rng).noise)
-
-
-def _swing(task: _Task, noise: Floats) -> Swing | None:
-    """The law of the angle of positions that are on a circle if their errors are so large.
+def _swing(task: _Task, problem: Problem) -> Swing | None:
+    """The law of the angle of positions that are on a circle, if nothing but polynomials is given.
 
     None elsewhere, or if there is too little of it.
     """
     trajectories, shared, _ = task.measured
     x = np.concatenate([values for _, values in trajectories])
-    if not is_on_circle(x[np.isfinite(x).all(axis=1)], noise[: x.shape[1]]):
+    noise = (problem.noise * problem.units.scale)[: x.shape[1]]
+    if problem.form.functions or not is_on_circle(x[np.isfinite(x).all(axis=1)], noise):
         return None
 
     form = Form.of((NAME,), LIBRARY, 2)
