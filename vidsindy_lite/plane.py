@@ -26,6 +26,7 @@ from .dynamics import (
     check_order,
     discover,
     homogeneous,
+    on_circle,
     smooth,
 )
 from .pipeline import VideoDiscovery
@@ -171,21 +172,21 @@ def discover_from_video(
     across = complex(*np.diff(mapped(to_plane, middle + [[0.0, 0], [1, 0]]), axis=0)[0])
     camera = PlaneCamera(
         homography=to_plane, position=_in_space(mapped(to_plane, centre[None]))[0],
-        normal=np.array([0, 0, 1]), scale=abs(across), angle=-float(np.angle(across)), scale_error=error, image_size=shot.size,
+        normal=np.array([0, 0, 1]), scale=abs(across), angle=-float(np.angle(across)),
+        scale_error=error, image_size=shot.size,
     )  # fmt: skip
     rig = Rig((camera,), note=f"the plane of the motion, places in {unit}{scale}")
     seen = track(path, detector, hint)
     t, x = frame_clock(path) / rate, mapped(to_plane, seen.pixels)
-    modes = [error * x, *_tilts(camera, seen.pixels, middle)][
-        : 1 if corners else 3 if pixels else 0
-    ]
+    known = slice(3 if corners is None else 1) if pixels else slice(0)
+    modes = np.stack([error * x, *_tilts(camera, seen.pixels, middle)])[known]
     with refusing("law", [seen.pixels], [name]):
         law = _law(t, x, modes, degree, order, seed, progress)
     swing = law.swing
     doubts = law.warnings if swing is None else (*swing.circle.warnings, *swing.law.warnings)
     found = PlaneDiscovery(
         tracks=(seen.pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
-        t=t, x=_in_space(x), systematic=np.stack([_in_space(mode) for mode in modes]),
+        t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
         warnings=(), discovery=law if swing is None else swing.law,
         unit=unit, circle=None if swing is None else swing.circle,
     )  # fmt: skip
@@ -295,20 +296,28 @@ def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
 
 
 def _law(
-    t: Floats, x: Floats, modes: Sequence[Floats], degree: int | None, order: int | str,
-    seed: int, progress: bool,
+    t: Floats, x: Floats, modes: Floats, degree: int | None, order: int | str, seed: int,
+    progress: bool,
 ) -> Discovery:  # fmt: skip
-    """The law of places: of nested ones the simplest that the data bear, or the one asked for."""
-    shared, axes = np.reshape(modes, (len(modes), *x.shape)), np.eye(2)
-    if degree is not None or order != "auto":
-        return discover(t, x, degree, seed, progress, systematic=shared, order=order)
-    there = np.isfinite(x[:, 0])
-    flight = homogeneous(t[there], x[there], ("x", "y"), shared[:, there])
-    if flight is not None:
-        return flight
-    axes = _axes(t[there], x[there])
-    law = discover(t, x @ axes.T, 1, seed, progress, systematic=shared @ axes.T, order=2)
-    return law if len(axes) == 2 else replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
+    """The law of places: of nested ones the simplest that the data bear, or the one asked for.
+
+    A plane that lies askew bends a path a little as other forces would: laws are told from each
+    other without its modes, which are in the error bars of what flies and of what swings round.
+    """
+    there, axes = np.isfinite(x[:, 0]), np.eye(2)
+    if degree is None and order == "auto":
+        flight = homogeneous(t[there], x[there], ("x", "y"), modes[:, there])
+        if flight is not None:
+            return flight
+        degree, order, axes = 1, 2, _axes(t[there], x[there])
+    how = {"systematic": modes[:1] @ axes.T, "order": order}
+    law = discover(t, x @ axes.T, degree, seed, progress, **how)
+    if law.swing is not None:
+        circle = on_circle(x, law.swing.circle.axes[0], modes)
+        law = replace(law, swing=replace(law.swing, circle=circle))
+    if len(axes) == 1:
+        law = replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
+    return law
 
 
 def _axes(t: Floats, x: Floats) -> Floats:
