@@ -229,6 +229,20 @@ def test_the_command_draws_the_track_of_what_has_no_law(monkeypatch, tmp_path, c
     assert (tmp_path / "law" / "report.html").is_file()
 
 
+def test_an_interruption_keeps_the_track(monkeypatch, tmp_path, capsys):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    film = vl.write_video(tmp_path / "a.mov", np.full((5, 90, 120, 3), 90, np.uint8))
+    filmed(monkeypatch, pixels_of(flight()[1]))
+    monkeypatch.setattr(plane, "homogeneous", interrupted)
+    folder = tmp_path / "law"
+    assert main(["discover", str(film), "--out", str(folder)]) == 130
+    kept = f"stopped; the tracks are kept beside {folder / 'report.html'}"
+    assert capsys.readouterr().err.splitlines()[-1] == kept
+    assert len((folder / "tracks.csv").read_text().splitlines()) == 1 + 34
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [

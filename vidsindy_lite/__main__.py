@@ -25,8 +25,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(arguments)
         typed, kept = options.typed, options.kept
         return options.command(options)
-    except KeyboardInterrupt:
-        print(f"\nstopped; {kept}", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"\nstopped; {str(stop) or kept}", file=sys.stderr)
         return 130
     except (ValueError, OSError) as error:
         name, colon, rest = str(error).partition(":")
@@ -94,7 +94,7 @@ def _discover(options: argparse.Namespace) -> int:
     from .cameras import Rig, list_lags
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
     from .dynamics import check_library
-    from .refusal import Refused
+    from .refusal import Refused, Stopped
     from .vision import check_detector
 
     if bool(options.videos) == bool(options.tracks):
@@ -127,12 +127,16 @@ def _discover(options: argparse.Namespace) -> int:
     told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
     try:
         found = _found_in_plane(options) if alone else _found(options, rig)
-    except Refused as refused:
+    except (Refused, Stopped) as refused:
+        if isinstance(refused, Stopped) and not videos:  # its tracks are there already
+            raise KeyboardInterrupt from None
         try:
             write_refusal(refused, videos, rig, options.out, told)
         except (ValueError, OSError) as error:
             raise ValueError(f"{refused}; the tracks could not be drawn: {error}") from None
         page = Path(options.out) / PAGE
+        if isinstance(refused, Stopped):
+            raise KeyboardInterrupt(f"the tracks are kept beside {page}") from None
         raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
     # First the law: if the report cannot be written, it is not lost.
     lags = "" if alone else f"; lags of the videos: {list_lags(found.lags.frames)} frames"

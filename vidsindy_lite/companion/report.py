@@ -28,7 +28,7 @@ from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_path
 from ..dynamics import Discovery, Quantity, Swing
 from ..pipeline import VideoDiscovery
-from ..refusal import Refused
+from ..refusal import Refused, Stopped
 from ..repository import write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
@@ -130,7 +130,7 @@ def write_report(
 
 
 def write_refusal(
-    refused: Refused,
+    refused: Refused | Stopped,
     paths: Sequence[str | Path] | None,
     rig: Rig | None,
     folder: str | Path,
@@ -140,7 +140,7 @@ def write_refusal(
 
     Parameters
     ----------
-    refused : Refused
+    refused : Refused or Stopped
     paths, folder, options
         See `write_report`.
     rig : Rig, optional
@@ -349,7 +349,8 @@ def _figures(
         # Several targets are drawn as one that begins again.
         t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
         x = stacked(found.x, 3)
-        yield "path", _encoded(plot_path(t, x, stacked(found.fitted, 3)))
+        d = 3 if len(found.rig.cameras) > 1 else 2  # in its plane
+        yield "path", _encoded(plot_path(t, x[:, :d], stacked(found.fitted, 3)[:, :d]))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
             yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))

@@ -11,7 +11,6 @@ leaves, and of all classes the one that is so over the widest range of errors is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -159,11 +158,18 @@ def homogeneous(
     for mode in () if systematic is None else systematic:
         moved = Flight.fitted(since, x + mode, kept).theta - law.theta
         covariance = covariance + np.outer(moved, moved)
-    widths = np.column_stack([bounds[1:], bounds[:-1]]) / np.linalg.norm(x.std(axis=0))
     found = _told(law, covariance * np.outer(kept, kept), t, names)
-    return replace(
-        found, warnings=_doubt(flight, richer, price), path=_path(classes, widths, found)
+    spread, classes[best] = np.linalg.norm(x.std(axis=0)), law
+    supports = [coefficients_of(one.theta, found.system.exponents) != 0 for one in classes]
+    path = tuple(
+        tuple(
+            Plateau(j, bounds[k] / spread, bounds[k - 1] / spread, supports[k][:, j])
+            for k in range(len(classes) - 1, 0, -1)
+            if bounds[k] < bounds[k - 1]
+        )
+        for j in range(found.system.d)
     )
+    return replace(found, warnings=_doubt(flight, richer, price), path=path)
 
 
 def _departure(flight: Flight, richer: Flight) -> Floats:
@@ -210,18 +216,3 @@ def _told(law: Flight, covariance: Floats, t: Floats, names: tuple[str, ...]) ->
         note="order 2: of laws that one flight cannot tell apart, the one that is the same "
         "everywhere",
     )  # fmt: skip
-
-
-def _path(
-    classes: Sequence[Flight], bounds: Floats, found: Discovery
-) -> tuple[tuple[Plateau, ...], ...]:
-    """The laws of all classes, each between its bounds (k, 2), the richest first."""
-    laws = [coefficients_of(one.theta, found.system.exponents) != 0 for one in classes]
-    return tuple(
-        tuple(
-            Plateau(j, low, high, law[:, j])
-            for (low, high), law in zip(bounds[::-1], laws[::-1], strict=True)
-            if high > low
-        )
-        for j in range(found.system.d)
-    )
