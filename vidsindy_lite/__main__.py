@@ -10,8 +10,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from . import __version__
 from .options import Parser, as_library, as_number, as_numbers, as_size, choice, count, words
 from .study import SYSTEMS
@@ -152,14 +150,9 @@ def _found_in_plane(options: argparse.Namespace) -> Any:
     from .plane import discover_from_video
     from .vision import Hint
 
-    names = ("length", "up", "fps", "detector", "degree", "seed")
+    names = (*_OF_ONE_VIDEO, "fps", "detector", "degree", "seed")
     given = {name: getattr(options, name) for name in names}
     given |= {"order": "auto" if options.order == "auto" else int(options.order)}
-    if options.length_error is not None:
-        given["length_error"] = options.length_error
-    if options.corners is not None:
-        *marks, width, height = check_vector("corners", options.corners, 10)
-        given["corners"] = np.reshape(marks, (4, 2)), (width, height)
     if options.hint is not None:
         frame, *box = check_vector("hint", options.hint, 5)
         given["hint"] = Hint(frame=int(frame), box=tuple(box))
@@ -366,7 +359,7 @@ COMMANDS = {
         ),
         "--length-error": words(
             "SHARE", "standard error of that length, as a share of it (default: 0.01)",
-            type=as_number(float, "a number")
+            type=as_number(float, "a number"), default=0.01
         ),
         "--up": words(
             "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "

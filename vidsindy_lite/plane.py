@@ -13,11 +13,17 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .arrays import Floats
 from .cameras import Lags, OrthographicCamera, Rig
-from .checks import check_array, check_integer, check_number, check_positive, check_vector
+from .checks import (
+    check_array,
+    check_integer,
+    check_number,
+    check_positive,
+    check_vector,
+    shown,
+)
 from .dynamics import (
     Discovery,
     Round,
@@ -105,7 +111,7 @@ def discover_from_video(
     up: Sequence[float] | None = None,
     fps: float | None = None,
     *,
-    corners: tuple[ArrayLike, Sequence[float]] | None = None,
+    corners: Sequence[float] | None = None,
     length_error: float = 0.01,
     hint: Hint | None = None,
     detector: str | os.PathLike = "auto",
@@ -128,9 +134,9 @@ def discover_from_video(
         that of the picture.
     fps : float, optional
         Frames in one second, where the file does not say so: slow motion.
-    corners : (marks, (width, height)), optional
-        For a plane that is seen askew: the corners of a rectangle in it, shape (4, 2), lower left,
-        lower right, upper right, upper left, and its sides in metres. The lower left is the origin.
+    corners : (u1, v1, ..., u4, v4, width, height), optional
+        For a plane that is seen askew: the corners of a rectangle in it, lower left, lower right,
+        upper right, upper left, and its sides in metres. The lower left is the origin.
     length_error : float
         Standard error of the length or of the sides, as a share of them. That of marks, a pixel
         each, comes on top.
@@ -202,7 +208,7 @@ def _in_space(places: Floats) -> Floats:
 def four_places(
     length: Sequence[float] | None,
     up: Sequence[float] | None,
-    corners: tuple[ArrayLike, Sequence[float]] | None,
+    corners: Sequence[float] | None,
     size: tuple[int, int],
 ) -> tuple[Floats, Floats, float]:
     """Four pixels and where they are in the plane, (4, 2) each.
@@ -213,19 +219,24 @@ def four_places(
     if corners is not None:
         if length is not None:
             raise ValueError("corners: must not be given with length, got both")
-        marks, sides = _checked(corners)
-        places = square * sides
+        given = check_vector("corners", corners, 10)
+        marks, places = given[:8].reshape(4, 2), square * given[8:]
+        edges = np.roll(marks, -1, axis=0) - marks
+        turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
+        if not ((turns < 0).all() and given[8:].min() > 0):  # v points down
+            raise ValueError(
+                "corners: must be lower left, lower right, upper right, upper left of a rectangle "
+                f"and two sides above 0, got {given.tolist()}"
+            )
         if up is not None:  # of the plane, as it is seen at the middle of the rectangle
-            middle = marks.mean(axis=0)
-            seen = mapped(homography_of(marks, places), np.array([middle, middle + upwards]))
-            c, s = np.diff(seen, axis=0)[0][::-1] / np.hypot(*np.diff(seen, axis=0)[0])
+            seen = mapped(homography_of(marks, places), marks.mean(axis=0) + [0 * upwards, upwards])
+            s, c = (seen[1] - seen[0]) / np.hypot(*(seen[1] - seen[0]))
             places = places @ np.array([[c, s], [-s, c]])
-        return marks, places, float(np.hypot(*(np.roll(marks, -1, axis=0) - marks).T).min())
+        return marks, places, float(np.hypot(*edges.T).min())
     origin, metres, pixels = np.array([0.0, size[1] - 1.0]), 1.0, 0.0
     if length is not None:
         *ends, metres = check_vector("length", length, 5)
-        origin, along = np.array(ends[:2]), np.subtract(ends[2:], ends[:2])
-        pixels = float(np.hypot(*along))
+        origin, pixels = np.array(ends[:2]), float(np.hypot(*np.subtract(ends[2:], ends[:2])))
         if not (pixels > 2 * MARK and metres > 0):
             raise ValueError(
                 "length: must be two marks apart from each other and a distance above 0, "
@@ -237,34 +248,13 @@ def four_places(
 
 def _upwards(up: Sequence[float] | None) -> Floats:
     """The unit vector of the vertical in the picture, (u right, v down)."""
-    if up is None:
-        return np.array([0.0, -1.0])
-    marks = check_array("up", up)
-    if marks.shape not in ((2,), (4,)):
-        raise ValueError(f"up: must be (du, dv) or two marks (u1, v1, u2, v2), got {up!r:.60}")
-    away = marks if len(marks) == 2 else marks[2:] - marks[:2]
-    if not (np.isfinite(away).all() and away.any()):
-        raise ValueError(f"up: must be a direction, got {up!r:.60}")
+    marks = check_array("up", (0, -1) if up is None else up)
+    away = marks[-2:] - (marks[:2] if marks.shape == (4,) else 0.0)
+    if marks.shape not in ((2,), (4,)) or not (np.isfinite(away).all() and away.any()):
+        raise ValueError(
+            f"up: must be a direction (du, dv) or two marks apart (u1, v1, u2, v2), got {shown(up)}"
+        )
     return away / np.hypot(*away)
-
-
-def _checked(corners: tuple[ArrayLike, Sequence[float]]) -> tuple[Floats, Floats]:
-    """Marks, (4, 2), and sides, (2,), of a rectangle."""
-    if not isinstance(corners, tuple | list) or len(corners) != 2:
-        raise ValueError(f"corners: must be four marks and two sides, got {corners!r:.60}")
-    marks, sides = check_array("corners", corners[0]), check_vector("corners", corners[1], 2)
-    if marks.shape != (4, 2) or not (np.isfinite(marks).all() and sides.min() > 0):
-        raise ValueError(
-            f"corners: must be four marks (4, 2) and two sides above 0, got {corners!r:.60}"
-        )
-    edges = np.roll(marks, -1, axis=0) - marks
-    turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
-    if not (turns < 0).all():  # v points down
-        raise ValueError(
-            "corners: must be lower left, lower right, upper right, upper left of a rectangle, "
-            f"got {marks.tolist()}"
-        )
-    return marks, sides
 
 
 def homography_of(marks: Floats, places: Floats) -> Floats:

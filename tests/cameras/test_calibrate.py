@@ -13,7 +13,6 @@ from vidsindy_lite.cameras import (
     Rig,
     calibration_errors,
     check_learnable,
-    check_learnable,
     learn_cameras,
     learn_cameras_eq4,
     learn_cameras_lbfgs,
