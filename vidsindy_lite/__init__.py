@@ -7,7 +7,8 @@
     `------------------ observation ------------------'
     `----------------------------------- pipeline ------------------------------------'
 
-`discover_from_videos` goes all the way; each room can be used by itself. The paper's world
+`discover_from_videos` goes all the way, and `discover_from_video` of one camera, where the motion
+is in a plane; each room can be used by itself. The paper's world
 (benchmark systems, trials, baselines, scores) is `vidsindy_lite.study`, what turns the notebooks
 into figures and pages is `vidsindy_lite.companion`.
 """

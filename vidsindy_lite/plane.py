@@ -71,7 +71,7 @@ class PlaneCamera(OrthographicCamera):
 
     def image(self, x: Floats) -> Floats:
         """Pixels at which points of the plane are seen, (n, 2)."""
-        return mapped(np.linalg.inv(self.homography), x[:, :2])
+        return mapped(np.asarray(np.linalg.inv(self.homography), float), x[:, :2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,8 +300,7 @@ def _law(
         if flight is not None:
             return flight
         degree, order, axes = 1, 2, _axes(t[there], x[there])
-    how = {"systematic": modes[:1] @ axes.T, "order": order}
-    law = discover(t, x @ axes.T, degree, seed, progress, **how)
+    law = discover(t, x @ axes.T, degree, seed, progress, modes[:1] @ axes.T, order)
     if law.swing is not None:
         circle = on_circle(x, law.swing.circle.axes[0], modes)
         law = replace(law, swing=replace(law.swing, circle=circle))

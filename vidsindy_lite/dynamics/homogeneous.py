@@ -150,7 +150,7 @@ def homogeneous(
     flight, richer = classes[best], classes[min(best + 1, len(classes) - 1)]
     covariance, departure = flight.covariance, _departure(flight, richer)
     wanted = numbers >= 2 * m  # force and drag
-    if departure[wanted, wanted].sum() > covariance[wanted, wanted].sum():
+    if np.diag(departure)[wanted].sum() > np.diag(covariance)[wanted].sum():
         covariance = departure
     price = chi2.isf(FALSE_ALARM / (2 * m), df=1)
     kept = flight.free & ((flight.theta**2 > price * np.diag(covariance)) | (numbers < 2 * m))
