@@ -341,7 +341,10 @@ def test_a_film_of_a_spring(tmp_path):
 @pytest.mark.slow
 def test_a_film_of_a_swing(tmp_path):
     found = telephone(tmp_path / "film.mp4", lambda t: swung(t, 0.5, 0.1) - [0, 0.1], 3)
-    assert found.swing is not None
+    law = found.discovery
+    assert [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])] == [
+        "vangle", "sin(angle)"
+    ]  # fmt: skip
     assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.6
     assert float(found.period.value) == pytest.approx(2 * np.pi / np.sqrt(9.81 / 0.5), rel=2e-3)
 

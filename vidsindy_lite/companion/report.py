@@ -349,7 +349,7 @@ def _figures(
         # Several targets are drawn as one that begins again.
         t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
         x = stacked(found.x, 3)
-        d = 3 if len(found.rig.cameras) > 1 else 2  # in its plane
+        d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
         yield "path", _encoded(plot_path(t, x[:, :d], stacked(found.fitted, 3)[:, :d]))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
