@@ -13,7 +13,7 @@
     below     `library` (candidate terms), `model` (systems, their integration, what a law may look
               like), `bspline`
     beside    `orientation` (axes in which a law is sparsest), `mechanics` (what a law says of a
-              body)
+              body), `homogeneous` (of one flight, the law that is the same at every place)
 """
 
 from .library import Library, check_library
@@ -24,10 +24,11 @@ from .model import runge_kutta_4
 from .library import Function, monomial_exponents, monomial_gradients, monomials
 from .solver import check_order
 from .frames import ShiftedLaw
+from .homogeneous import homogeneous
 from .result import Plateau, Swing
 from .model import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
-from .mechanics import Round, on_circle, on_sphere
+from .mechanics import Quantity, Round, on_circle, on_sphere
 from .l0 import closest_rival, subset_search
 from .solver import SplineSINDy
 from .smoothing import smooth
