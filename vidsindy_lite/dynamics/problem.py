@@ -25,12 +25,6 @@ from .library import Function, extended, jumps, law_variables, monomials
 from .model import Form, PolynomialSystem
 from .smoothing import PENALTIES, smooth
 
-# --------------------------------------------------------------------------------------------------
-# The problem that a discovery solves: the data in standard units, and what is known before a law.
-#
-# In standard units every coordinate has mean 0 and variance 1, and time runs so that the root-
-# mean-square speed is 1. `posing` makes it from data.
-
 FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where laws of the zoo have
 about the fewest wrong terms (`study.price`)."""
