@@ -111,7 +111,7 @@ def discover_from_videos(
     origin: str = "learn",
     orientation: str = "data",
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> VideoDiscovery:
     """Discover the governing equations of a target filmed by several fixed cameras.
 
@@ -159,7 +159,7 @@ def discover_from_tracks(
     origin: str = "learn",
     orientation: str = "data",
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> VideoDiscovery:
     """Discover the governing equations of a target from tracks that are there already.
 

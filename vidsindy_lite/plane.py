@@ -118,7 +118,7 @@ def discover_from_video(
     degree: int | None = None,
     order: int | str = "auto",
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> PlaneDiscovery:
     """Discover the law of a motion in a plane from the film of one camera.
 
@@ -287,7 +287,7 @@ def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
 
 def _law(
     t: Floats, x: Floats, modes: Floats, degree: int | None, order: int | str, seed: int,
-    progress: bool,
+    progress: bool | None,
 ) -> Discovery:  # fmt: skip
     """The law of places: of nested ones the simplest that the data bear, or the one asked for.
 

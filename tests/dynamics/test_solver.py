@@ -5,6 +5,7 @@ import pytest
 from helpers import posed
 from scipy.stats import kstest
 from threadpoolctl import threadpool_info, threadpool_limits
+from tqdm import tqdm
 
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics import path as paths
@@ -233,7 +234,7 @@ def test_same_seed_same_result():
 def test_the_progress_bar_knows_its_end(monkeypatch, persists):
     bars, shown = [], []
 
-    class Bar(solver.tqdm):
+    class Bar(tqdm):
         def update(self, n=1):
             super().update(n)
             shown.append((self.n, self.total))
@@ -243,7 +244,7 @@ def test_the_progress_bar_knows_its_end(monkeypatch, persists):
             super().close()
 
     followed = solver.persistent
-    monkeypatch.setattr(solver, "tqdm", Bar)
+    monkeypatch.setattr(solver, "bar", lambda asked, label, **how: Bar(desc=label, **how))
     monkeypatch.setattr(solver, "persistent", lambda *a: (*followed(*a)[:2], persists))
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)

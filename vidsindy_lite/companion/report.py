@@ -21,13 +21,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
-from tqdm import tqdm
 
 from ..arrays import Floats
 from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_path
 from ..dynamics import Discovery, Quantity, Swing
 from ..pipeline import VideoDiscovery
+from ..progress import bar
 from ..refusal import Refused, Stopped
 from ..repository import write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
@@ -92,7 +92,7 @@ def write_report(
     paths: Sequence[str | Path] | None,
     folder: str | Path,
     options: Mapping[str, object] | None = None,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Path:
     """Write the report on a law.
 
@@ -105,8 +105,8 @@ def write_report(
         Where; the files of an earlier report are replaced.
     options : mapping, optional
         How the law was asked for, to be told in the report.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Whether a progress bar is shown; by default after two seconds, if a person watches.
 
     Returns
     -------
@@ -322,11 +322,11 @@ def _page(
     found: VideoDiscovery,
     paths: Sequence[str | Path] | None,
     content: Mapping[str, object],
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> str:
     """The report as one HTML page."""
     total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
-    figures = tqdm(_figures(found, paths), desc="report", total=total, disable=not progress)
+    figures = bar(progress, "report", iterable=_figures(found, paths), total=total)
     about = {
         "note": found.rig.note, "driven": found.driven, "limit": DISAGREEMENT,
         "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,

@@ -10,22 +10,20 @@ by hand per system.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from multiprocessing import current_process
 from threading import Lock
 from typing import cast
 
 import numpy as np
 from scipy.interpolate import BSpline
 from threadpoolctl import OpenBLASController, threadpool_limits
-from tqdm import tqdm
 
 from ..arrays import Floats
 from ..checks import check_array, check_choice, check_integer, check_number, check_positive, shown
+from ..progress import bar
 from .bspline import DEGREE, WIDTH
 from .collocation import Fit
 from .data import (
@@ -71,12 +69,6 @@ from .smoothing import smooth
 
 MOST_LAWS = 3
 """Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
-
-
-def watched() -> bool:
-    """Whether a person sees a progress bar: in a terminal or a notebook, not in a worker."""
-    seen = sys.stderr.isatty() or "ipykernel" in sys.modules
-    return seen and current_process().name == "MainProcess"
 
 
 _lock = Lock()
@@ -294,14 +286,10 @@ def _solved(task: _Task, form: Form) -> Solved:
     probes = np.random.default_rng(task.seed)
     problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
     rounds = MOST_LAWS * (1 + ROUNDS) * len(problems)
-    unasked = task.progress is None
-    hidden = not (watched() if unasked else task.progress)
-    with tqdm(
-        total=rounds, disable=hidden, desc="discover", leave=False, delay=2 if unasked else 0
-    ) as bar:
-        history = History(end=task.end, bar=bar)
+    with bar(task.progress, "discover", total=rounds, leave=False) as shown_bar:
+        history = History(end=task.end, bar=shown_bar)
         laws = [_law(problem, probes, history, not task.turned) for problem in problems]
-        bar.update(rounds - bar.n)
+        shown_bar.update(rounds - shown_bar.n)
     problem, fit, path = min(laws, key=lambda law: evidence(*law[:2]))
     model = path.model if path.fit is fit else problem.model(fit)
     found = infer(problem, fit, model, path, history)
