@@ -128,7 +128,7 @@ def nearest(
     """Residual in pixels at the best lags near given ones."""
     with tqdm(disable=True) as bar:
         found = _Videos.of(tracks, rig, rates, clocks, bar).fitted(lags, rough=True)
-    return np.inf if found is None else found.score
+    return np.inf if found is None else found.residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +263,7 @@ def _climbed(
         if key not in tried:
             tried[key] = videos.fitted(np.array(key), True, loose)
         found = tried[key]
-        return np.inf if found is None else found.score
+        return np.inf if found is None else found.residual
 
     best = np.array([lags[0] for lags in promising])
     fits(first)
