@@ -161,6 +161,8 @@ def test_four_marks_of_a_rectangle_that_is_seen_askew():
         ({"up": (0, 0, 1)}, "up: must be a direction"),
         ({"corners": (0, 0, 1, 0, 1, 9, 0, 9, 1, 1)}, "corners: must be lower left"),
         ({"corners": (0, 9, 9, 9, 9, 0, 0, 0, 1, 0)}, "corners: must be .* two sides above 0"),
+        ({"length": (4000, 9, 4000, 5, 1)}, "length: marks must lie in the picture, .*4000"),
+        ({"corners": (0, 90, 90, 90, 90, 0, 0, -1, 1, 1)}, "corners: marks must lie in the"),
         ({"corners": 3}, "corners: must be 10 finite numbers"),
         ({"length": STICK, "corners": 3}, "corners: must not be given with length"),
         ({"length_error": 2}, "length_error: must be a share"),
@@ -199,7 +201,7 @@ def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
     filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
     found = vl.discover_from_video("throw.mp4", (*STICK[:4], 0.7), up=(0.3, -1))
     scale, vertical = found.warnings
-    assert "the length may be 1.4 times too large" in scale
+    assert "the marks may be 0.714 times as far apart as is given" in scale
     assert "degrees off the vertical" in vertical
 
 

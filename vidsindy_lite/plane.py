@@ -220,7 +220,7 @@ def four_places(
         if length is not None:
             raise ValueError("corners: must not be given with length, got both")
         given = check_vector("corners", corners, 10)
-        marks, places = given[:8].reshape(4, 2), square * given[8:]
+        marks, places = _in_picture("corners", given[:8], size), square * given[8:]
         edges = np.roll(marks, -1, axis=0) - marks
         turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
         if not ((turns < 0).all() and given[8:].min() > 0):  # v points down
@@ -235,8 +235,9 @@ def four_places(
         return marks, places, float(np.hypot(*edges.T).min())
     origin, metres, pixels = np.array([0.0, size[1] - 1.0]), 1.0, 0.0
     if length is not None:
-        *ends, metres = check_vector("length", length, 5)
-        origin, pixels = np.array(ends[:2]), float(np.hypot(*np.subtract(ends[2:], ends[:2])))
+        told = check_vector("length", length, 5)
+        ends, metres = _in_picture("length", told[:4], size), float(told[4])
+        origin, pixels = ends[0], float(np.hypot(*(ends[1] - ends[0])))
         if not (pixels > 2 * MARK and metres > 0):
             raise ValueError(
                 "length: must be two marks apart from each other and a distance above 0, "
@@ -244,6 +245,16 @@ def four_places(
             )
     axes = np.array([[-upwards[1], upwards[0]], upwards])
     return origin + (pixels or 1.0) * square @ axes, metres * square, pixels
+
+
+def _in_picture(name: str, given: Floats, size: tuple[int, int]) -> Floats:
+    """Marks, (n, 2), which are checked to lie in the picture."""
+    marks = given.reshape(-1, 2)
+    if not ((marks >= 0) & (marks <= size)).all():
+        raise ValueError(
+            f"{name}: marks must lie in the picture, {size[0]} x {size[1]}, got {marks.tolist()}"
+        )
+    return marks
 
 
 def _upwards(up: Sequence[float] | None) -> Floats:
@@ -326,8 +337,8 @@ def _contradicted(found: PlaneDiscovery, vertical: bool) -> list[str]:
         times = float(g.value) / EARTH
         if abs(times - 1) * EARTH > SURE * np.hypot(float(g.error), ELSEWHERE):
             wrong = (
-                f"the length may be {times:.3g} times too large, or the frame rate "
-                f"{np.sqrt(times):.3g} times, or the plane lies askew"
+                f"the marks may be {1 / times:.3g} times as far apart as is given, or the frames "
+                f"a second {1 / np.sqrt(times):.3g} times as many, or the plane may lie askew"
                 if times > 0
                 else "it does not hang there, or the plane lies askew"
             )

@@ -172,7 +172,7 @@ def test_where_an_input_jumps_so_does_the_slope(known, noise):
 
 
 def test_samples_that_jump_are_held_and_that_is_told():
-    with pytest.warns(UserWarning, match="inputs: u jumps at t = .*hold='zero'"):
+    with pytest.warns(UserWarning, match="inputs: u jumps, as at t = 5, .*hold='zero'"):
         told = Input.of("u", CLOCK, relay(CLOCK))
     s = np.arange(0.05, 39, 0.1)
     np.testing.assert_array_equal(told(s), relay(s))

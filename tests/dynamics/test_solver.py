@@ -260,6 +260,20 @@ def test_a_time_limit_ends_the_rounds_and_is_told(lorenz):
     assert not any("time limit" in text for text in discover(t, x, time_limit=1e9).warnings)
 
 
+def test_kicks_are_not_sought_when_the_time_is_over(monkeypatch):
+    t = np.linspace(0, 40, 400)
+    x = np.stack([np.sin(t + np.sin(3 * t)), np.cos(t)], axis=1)  # outside the library
+
+    def sought(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(solver, "with_process_noise", sought)
+    with pytest.raises(AssertionError):
+        discover(t, x, order=1)
+    found = discover(t, x, order=1, time_limit=1e-9)
+    assert "the time limit ended the search" in found.warnings[0]
+
+
 @pytest.mark.parametrize("limit", [0, -1.0, "soon", np.nan])
 def test_bad_time_limits_are_refused(limit):
     t = np.linspace(0, 10, 50)

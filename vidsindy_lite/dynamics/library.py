@@ -333,9 +333,9 @@ def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> CubicSplin
         hold = "zero" if apart.max() > WAYWARD * values.std() else "cubic"
         if hold == "zero":
             warnings.warn(
-                f"inputs: {name} jumps at t = {middles[apart.argmax()]:g}, where a cubic through "
-                "its samples is a guess: each holds until the next. Say so by hold='zero', or what "
-                "is true by 'linear' or 'cubic'",
+                f"inputs: {name} jumps, as at t = {t[1 + np.abs(np.diff(values)).argmax()]:g}, "
+                "where a cubic through its samples is a guess: the value of each holds until the "
+                "next. Say so by hold='zero', or what is true by 'linear' or 'cubic'",
                 stacklevel=2,
             )
     return {"zero": interp1d(t, values, "previous"), "linear": line, "cubic": curve}[hold]

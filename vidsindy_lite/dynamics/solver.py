@@ -294,7 +294,7 @@ def _solved(task: _Task, form: Form) -> Solved:
     model = path.model if path.fit is fit else problem.model(fit)
     found = infer(problem, fit, model, path, history)
     doubts = diagnose(problem, fit, model, path, found.system)
-    return replace(found, warnings=(*doubts, *history.warnings)), problem, fit
+    return replace(found, warnings=(*history.warnings, *doubts)), problem, fit
 
 
 def _law(
@@ -307,10 +307,10 @@ def _law(
     """
     fit = first_law(problem, history)
     asked = not near(problem, fit, TOLERATED)
-    if asked:
+    if asked and not history.over:
         problem, fit = _kicked(problem, fit, probes, history)
     fit, path, persists = persistent(problem, fit, history, free)
-    if not asked and not near(problem, fit, 0.0):
+    if not (asked or history.over or near(problem, fit, 0.0)):
         kicked, law = _kicked(problem, fit, probes, history)
         if kicked.kicked:
             return kicked, *persistent(kicked, law, history, free)[:2]
