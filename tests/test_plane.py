@@ -281,6 +281,8 @@ def test_a_swing_on_its_circle(monkeypatch):
     filmed(monkeypatch, pixels_of(noisy(x, 0)))
     found = vl.discover_from_video("swing.mp4", STICK)
     assert found.swing is not None
+    assert str(found).startswith("on a circle of radius ")
+    assert f"; {found.g}" in str(found)
     assert abs(found.g.value - 9.81) < 2 * found.g.error < 1.2
     assert float(found.period.value) == pytest.approx(2 * np.pi * np.sqrt(0.6 / 9.81), rel=0.01)
     np.testing.assert_allclose(found.fitted, found.x, atol=0.01)

@@ -104,6 +104,13 @@ class PlaneDiscovery(VideoDiscovery):
         away = np.hstack([np.cos(angle), np.sin(angle)]) @ self.circle.axes
         return _in_space(self.circle.centre + self.circle.radius * away)
 
+    def __str__(self) -> str:
+        told = super().__str__()
+        if self.circle is None:
+            return told
+        radius = f"{self.circle.radius:.4g} ± {self.circle.radius_error:.2g} {self.unit}"
+        return f"on a circle of radius {radius}{'' if self.g is None else f'; {self.g}'}\n{told}"
+
 
 def discover_from_video(
     path: str | os.PathLike,
