@@ -133,14 +133,14 @@ def _views(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterat
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
             yield Mistake(what, tracks, rates, clocks)
+    known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for axis, what in ((0, "mirrored"), (1, "with v counted upwards")):
         for views in [*([i] for i in range(count)), [*range(count)]]:
-            others = [c for i, c in enumerate(rig.cameras) if i not in views]
             told, how = names[views[0]] if len(views) == 1 else "all views", what
-            if len(views) == 1 and not rig.cameras[views[0]].is_calibrated:
+            if len(views) == 1 and not known & {*views}:
                 # Half a turn from a mirrored view is one with v counted upwards.
                 how = "mirrored, or with v counted upwards"
-            elif len(views) == 1 and not any(camera.is_calibrated for camera in others):
+            elif len(views) == 1 and known <= {*views}:
                 how = "mirrored, or with v counted upwards: then the path has the other sign"
             if axis == 1 and how != what:
                 continue
