@@ -1,11 +1,11 @@
 """One camera, motion in a plane: the scale and its error, and laws that are the same everywhere."""
 
 import json
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers import real
 from phones import write_at
 from scipy.integrate import solve_ivp
 
@@ -16,7 +16,6 @@ from vidsindy_lite.dynamics import homogeneous
 from vidsindy_lite.vision import Track
 from vidsindy_lite.vision.rendering import render
 
-REAL = Path(vl.__file__).parents[2] / "shared" / "real"
 SCALE = 250.0  # pixels in a metre
 STICK = (100.0, 600.0, 100.0, 600.0 - SCALE / 2, 0.5)
 
@@ -361,13 +360,6 @@ def test_a_film_of_a_plane_that_lies_askew_is_doubted(tmp_path):
 
 
 # --------------------------------------------------------------------------------------- real clips
-
-
-def real(name):
-    path = REAL / f"{name}.mp4"
-    if not path.is_file():
-        pytest.skip("no real footage here")
-    return path
 
 
 def test_the_toss():
