@@ -87,7 +87,7 @@ spring |= {
     "v" + axis: {axis: k, "v" + axis: -0.3, axis + "^3": -0.05} for axis, k in stiffness.items()
 }
 law = PolynomialSystem.from_terms(spring, degree=3)
-t = np.arange(fps * (10 if full else 5)) / fps
+t = np.arange(fps * (10 if full else 8)) / fps
 start = np.array([12.0, -5.0, 8.0, 0.0, 60.0, 0.0])
 x = law.simulate(t, start)[:, :3]
 print(law.text())

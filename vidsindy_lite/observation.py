@@ -178,7 +178,7 @@ def observe(
         for (path, shot), hint in zip(videos, told, strict=True)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
-    _check_found(tracks, names, targets)
+    check_found(tracks, names, targets)
     doubts = [warning for found in seen for track in found for warning in track.warnings]
     conclude = _observed if targets == 1 else _several_observed
     return conclude(tracks, rig, clock, given, names, doubts, progress)
@@ -357,8 +357,14 @@ def _track_one(
     return found
 
 
-def _check_found(tracks: Sequence[Floats], names: Sequence[str], targets: int) -> None:
-    """That each video shows its targets: all are tracked first, so that all can be looked at."""
+def check_found(tracks: Sequence[Floats], names: Sequence[str], targets: int) -> None:
+    """That each video shows its targets: all are tracked first, so that all can be looked at.
+
+    Raises
+    ------
+    Refused
+        If one does not.
+    """
     wanted = "one moving target" if targets == 1 else f"{targets} moving targets"
     for pixels, name in zip(tracks, names, strict=True):
         found = int(np.isfinite(pixels).any(axis=0).sum()) // 2

@@ -35,6 +35,7 @@ from .dynamics import (
     on_circle,
     smooth,
 )
+from .observation import check_found
 from .pipeline import VideoDiscovery
 from .refusal import refusing
 from .vision import Hint, check_detector, frame_clock, track, video_info
@@ -190,6 +191,7 @@ def discover_from_video(
     )  # fmt: skip
     rig = Rig((camera,), note=f"the plane of the motion, places in {unit}{scale}")
     seen = track(path, detector, hint)
+    check_found([seen.pixels], [name], 1)
     t, x = frame_clock(path) / rate, mapped(to_plane, seen.pixels)
     known = slice(3 if corners is None else 1) if pixels else slice(0)
     modes = np.stack([error * x, *_tilts(camera, seen.pixels, middle)])[known]

@@ -6,7 +6,10 @@ import sys
 from multiprocessing import current_process
 from typing import Any
 
+import numpy as np
 from tqdm import tqdm
+
+from .checks import shown
 
 
 def watched() -> bool:
@@ -19,6 +22,13 @@ def bar(progress: bool | None, desc: str, **how: Any) -> tqdm:
     """A progress bar with a label, which `tqdm` makes from the rest.
 
     It is shown or not as ``progress`` says; by default after two seconds, if somebody watches.
+
+    Raises
+    ------
+    ValueError
+        If ``progress`` is none of True, False and None.
     """
-    shown = watched() if progress is None else progress
-    return tqdm(desc=desc, disable=not shown, delay=0 if progress else 2, **how)
+    if not (progress is None or isinstance(progress, bool | np.bool_)):
+        raise ValueError(f"progress: must be True, False or None, got {shown(progress)}")
+    visible = watched() if progress is None else progress
+    return tqdm(desc=desc, disable=not visible, delay=0 if progress else 2, **how)
