@@ -8,10 +8,9 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from . import __version__
-from .options import Parser, as_library, as_number, as_numbers, as_size, choice, count, words
 from .study import SYSTEMS
 
 
@@ -34,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = Parser(
+    parser = _Parser(
         prog="python -m vidsindy_lite",
         description="From three videos of a moving target to its governing equations.",
         epilog="`python -m vidsindy_lite discover --help` says more, and so do the others.",
@@ -319,6 +318,77 @@ def _compare(options: argparse.Namespace) -> int:
 # ------------------------------------------------------------------------------------ their options
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that refuses as the package does: argument, rule and value in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ValueError(message.removeprefix("argument ").removeprefix("--"))
+
+
+def _as_numbers(text: str) -> list[float]:
+    """Numbers with commas between them."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"must be numbers with commas between them, got {text!r:.60}"
+        ) from None
+
+
+def _as_library(text: str) -> Any:
+    """A library of terms."""
+    from .dynamics import Library
+
+    try:
+        return Library.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error).removeprefix("library: ")) from None
+
+
+def _as_size(text: str) -> tuple[int, int]:
+    """Width and height in pixels."""
+    try:
+        width, height = text.split("x")
+        return int(width), int(height)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"must be two integers like 1920x1080, got {text!r:.60}"
+        ) from None
+
+
+def _as_number(kind: type, rule: str) -> Callable[[str], Any]:
+    """What makes a number of an option's text."""
+
+    def number(text: str) -> Any:
+        try:
+            return kind(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"must be {rule}, got {text!r:.60}") from None
+
+    return number
+
+
+def _choice(default: str, known: Sequence[str], what: str) -> dict[str, Any]:
+    """An option that has one of a few values."""
+
+    def one(text: str) -> str:
+        if text not in known:
+            raise argparse.ArgumentTypeError(f"must be one of {', '.join(known)}, got {text!r:.60}")
+        return text
+
+    return {"default": default, "type": one, "metavar": f"{{{','.join(known)}}}", "help": what}
+
+
+def _count(default: int | None, what: str) -> dict[str, Any]:
+    """An option that is an integer."""
+    return {"default": default, "type": _as_number(int, "an integer"), "help": what}
+
+
+def _words(metavar: str, what: str, **more: object) -> dict[str, Any]:
+    """An argument or an option that is text, or is made of it."""
+    return {"metavar": metavar, "help": what, **more}
+
+
 _OF_ONE_VIDEO = ("length", "length_error", "up", "corners", "hint")
 _OF_A_RIG = ("library", "lag", "targets", "origin", "orientation")
 _KEPT = "files are as they were"  # as they are written in one step, at the end
@@ -344,120 +414,122 @@ class _Command(NamedTuple):
 
 COMMANDS = {
     "discover": _Command(_discover, "from your own videos and a rig file to a report on the law", {
-        "videos": words("VIDEO", "one per camera of the rig", nargs="*"),
-        "--tracks": words(
+        "videos": _words("VIDEO", "one per camera of the rig", nargs="*"),
+        "--tracks": _words(
             "FILE", "text files of tracks, one per camera of the rig or one of all, in place of "
             "videos", nargs="+"
         ),
-        "--individual": words(
+        "--individual": _words(
             "NAME", "which of several targets of these files, by its name there"
         ),
-        "--rig": words("FILE", "where the cameras stand; not for one video of a motion in a plane"),
-        "--length": words(
+        "--rig": _words(
+            "FILE", "where the cameras stand; not for one video of a motion in a plane"
+        ),
+        "--length": _words(
             "U1,V1,U2,V2,METRES", "of one video: two marks in its first frame, pixels, and how far "
-            "they are apart in the plane of the motion", type=as_numbers
+            "they are apart in the plane of the motion", type=_as_numbers
         ),
-        "--length-error": words(
+        "--length-error": _words(
             "SHARE", "standard error of that length, as a share of it (default: 0.01)",
-            type=as_number(float, "a number"), default=0.01
+            type=_as_number(float, "a number"), default=0.01
         ),
-        "--up": words(
+        "--up": _words(
             "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "
-            "lower one first (default: 0,-1)", type=as_numbers
+            "lower one first (default: 0,-1)", type=_as_numbers
         ),
-        "--corners": words(
+        "--corners": _words(
             "U1,V1,...,WIDTH,HEIGHT", "of one video seen askew, in place of --length: the corners "
             "of a rectangle in that plane, from its lower left to its lower right and round, and "
-            "its sides in metres", type=as_numbers
+            "its sides in metres", type=_as_numbers
         ),
-        "--hint": words(
+        "--hint": _words(
             "FRAME,U,V,WIDTH,HEIGHT", "of one video: a frame and a box around the target in it",
-            type=as_numbers
+            type=_as_numbers
         ),
-        "--out": words("DIR", "folder of the report (default: report)", default="report"),
-        "--lag": words(
+        "--out": _words("DIR", "folder of the report (default: report)", default="report"),
+        "--lag": _words(
             "0,L2,L3", "by how many frames of the first video each one starts later; the default "
             "is to learn it (a first number below zero needs the form --lag=-7,0,0)",
-            type=as_numbers
+            type=_as_numbers
         ),
-        "--fps": words(
+        "--fps": _words(
             "RATE", "frames of each video in one unit of time of the equations (default: as the "
-            "files say, which makes it a second of video)", type=as_number(float, "a number")
+            "files say, which makes it a second of video)", type=_as_number(float, "a number")
         ),
-        "--degree": count(None, "highest degree of the polynomials (default: 3)"),
-        "--library": words(
+        "--degree": _count(None, "highest degree of the polynomials (default: 3)"),
+        "--library": _words(
             "TERMS", "in place of --degree: polynomial(N), fourier(N) with the sines and cosines "
             "of the coordinates, rational(N) with denominators, or a sum such as "
             "'polynomial(1) + fourier(1)'; then what is known, as in "
-            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)", type=as_library
+            "'polynomial(2); x: y = 10, z = 0' (?: to be found; ...: all others)", type=_as_library
         ),
-        "--order": choice(
+        "--order": _choice(
             "auto", ("1", "2", "auto"),
             "1 for x' = f(x), 2 for laws of motion, x'' = f(x, x'), auto (default) for the one to "
             "be trusted"
         ),
-        "--origin": choice(
+        "--origin": _choice(
             "learn", ("learn", "data"),
             "whether the law's own origin is sought (default) or is that of the data"
         ),
-        "--orientation": choice(
+        "--orientation": _choice(
             "data", ("data", "learn"),
             "whether the axes are those of the rig (default), or turned to where the law has "
             "fewest terms: for rigs that nobody has measured"
         ),
-        "--detector": words(
+        "--detector": _words(
             "NAME", "how to find the target: auto, background, learned, or the path of a YOLO-v8 "
             "ONNX file (default: auto)", default="auto"
         ),
-        "--targets": count(
+        "--targets": _count(
             1, "how many targets to follow and to find one law for (default: 1); several are told "
             "from each other by geometry"
         ),
-        "--seed": count(0, "of the search (default: 0)"),
+        "--seed": _count(0, "of the search (default: 0)"),
     }, {"path": "videos", "paths": "videos", "lags": "lag"}),
     "pick": _Command(_pick, "a page on which you show the target in your videos", {
-        "videos": words("VIDEO", "a file, a folder of images, or a pattern", nargs="+"),
-        "--out": words("FILE", "the page (default: pick.html)", default="pick.html"),
+        "videos": _words("VIDEO", "a file, a folder of images, or a pattern", nargs="+"),
+        "--out": _words("FILE", "the page (default: pick.html)", default="pick.html"),
     }, {"path": "videos", "paths": "videos"}),
     "rig-template": _Command(_rig_template, "print a rig file to fill in", {
-        "--cameras": count(3, "how many (default: 3)"),
-        "--model": choice(
+        "--cameras": _count(3, "how many (default: 3)"),
+        "--model": _choice(
             "perspective", ("perspective", "orthographic"),
             "perspective (default), or orthographic for far cameras with long lenses"
         ),
-        "--size": words(
-            "WxH", "of the videos in pixels (default: 1920x1080)", type=as_size,
+        "--size": _words(
+            "WxH", "of the videos in pixels (default: 1920x1080)", type=_as_size,
             default=(1920, 1080)
         ),
-        "--output": words("FILE", "write it there, in UTF-8 (default: print it)"),
+        "--output": _words("FILE", "write it there, in UTF-8 (default: print it)"),
     }, {"image_size": "size"}),
     "rig-import": _Command(_rig_import, "a rig file from the calibration of another tool", {
-        "files": words("FILE", "calibrations, in the order of the videos", nargs="+"),
-        "--size": words("WxH", "of the videos in pixels, if the files do not say", type=as_size),
-        "--output": words("FILE", "write it there, in UTF-8 (default: print it)"),
+        "files": _words("FILE", "calibrations, in the order of the videos", nargs="+"),
+        "--size": _words("WxH", "of the videos in pixels, if the files do not say", type=_as_size),
+        "--output": _words("FILE", "write it there, in UTF-8 (default: print it)"),
     }, {"image_size": "size", "paths": "files"}),
     "run": _Command(_run, "execute the notebooks, regenerate figures and tables", {
-        "notebooks": words("NOTEBOOK", "number, name or path (default: all)", nargs="*"),
-        "--profile": choice("full", ("full", "quick"), "size (default: full)"),
+        "notebooks": _words("NOTEBOOK", "number, name or path (default: all)", nargs="*"),
+        "--profile": _choice("full", ("full", "quick"), "size (default: full)"),
         "--force": {
             "action": "store_true",
             "help": "execute also what has been executed here with the same code",
         },
     }, kept="notebooks that have ended are kept, and results in build/cache: start it again"),
     "demo": _Command(_demo, "from three videos to the first equation, in a minute", {
-        "--system": choice("Lorenz", tuple(SYSTEMS), "default: Lorenz"),
-        "--frames": count(500, "per camera (default: 500)"),
-        "--seed": count(0, "of scenes and noise (default: 0)"),
+        "--system": _choice("Lorenz", tuple(SYSTEMS), "default: Lorenz"),
+        "--frames": _count(500, "per camera (default: 500)"),
+        "--seed": _count(0, "of scenes and noise (default: 0)"),
     }),
     "train-detector": _Command(_train, "train the learned detector from scratch", {
-        "--seed": count(0, "of weights and frames (default: 0)"),
-        "--steps": count(None, "batches of 16 frames (default: as shipped)"),
-        "--output": words("FILE", "weights (default: those of the package)"),
+        "--seed": _count(0, "of weights and frames (default: 0)"),
+        "--steps": _count(None, "batches of 16 frames (default: as shipped)"),
+        "--output": _words("FILE", "weights (default: those of the package)"),
     }, kept="the last checkpoint is kept: start it again to go on"),
     "compare": _Command(_compare, "two folders of figures, by their numbers", {
-        "committed": words("COMMITTED", "a folder like figures/"),
-        "regenerated": words("REGENERATED", "the same from another run"),
-        "--output": words(
+        "committed": _words("COMMITTED", "a folder like figures/"),
+        "regenerated": _words("REGENERATED", "the same from another run"),
+        "--output": _words(
             "FILE", "the page (default: differences.html); an earlier one is replaced",
             default="differences.html"
         ),

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_hints, check_lags, check_paths, check_several, check_shots
 from .arrays import Floats
 from .cameras import (
+    ALIKE,
     DISAGREEMENT,
     GROSS,
     Clock,
+    Factorised,
     Lags,
     Rig,
     align,
     check_learnable,
     disagreement,
     explain,
+    factorised,
     find_mistake,
     identify,
     learn_cameras,
@@ -36,17 +38,27 @@ from .cameras import (
     systematic_errors,
     trailing_errors,
 )
-from .checks import check_choice, check_integer, check_items, check_tracks
+from .checks import (
+    check_choice,
+    check_integer,
+    check_items,
+    check_path,
+    check_tracks,
+    check_vector,
+    shown,
+)
 from .dynamics import smooth as smooth_curves
 from .progress import bar
 from .refusal import Refused, refusing
 from .vision import (
     Hint,
     Track,
+    VideoInfo,
     check_detector,
     frame_clock,
     track,
     track_targets,
+    video_info,
 )
 
 _OTHER_LAG = 0.02  # frames by which it may differ without a word
@@ -164,15 +176,15 @@ def observe(
     check_detector(detector)
     check_integer("targets", targets, least=1)
     if targets > 1:
-        check_several(targets, rig, detector, hints)
-    files = check_paths(paths, rig)
-    shots = check_shots(files, rig)
+        _check_several(targets, rig, detector, hints)
+    files = _check_paths(paths, rig)
+    shots = _check_shots(files, rig)
     names = [path.name for path in files]
     clocks = [frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
-    given = check_lags(lags, clock, names)
+    given = _check_lags(lags, clock, names)
     videos = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
-    told = check_hints(hints, files)
+    told = _check_hints(hints, files)
     seen = [
         _track_one(path, shot.frames, detector, hint, targets)
         for (path, shot), hint in zip(videos, told, strict=True)
@@ -234,7 +246,7 @@ def observe_tracks(
     if isinstance(lags, str):
         check_choice("lags", lags, ["synchronous"])
         return _observed(raw, rig, clock, np.zeros(len(raw)), names, synchronous=True)
-    given = check_lags(lags, clock, names)
+    given = _check_lags(lags, clock, names)
     return _observed(raw, rig, clock, given, names, progress=progress)
 
 
@@ -252,7 +264,15 @@ def _observed(
     begun = np.zeros(len(raw)) if lags is None else lags
     if not rig.is_measured:
         with refusing("cameras", raw, names):
-            rig = posed(align(raw, begun, clock.rates, clock.uneven), rig, lags is not None)
+            far = factorised(raw, rig, clock.rates, clock.uneven, lags)
+            most = GROSS if far is None else min(GROSS, ALIKE * far.lags.residual)
+            at_once = align(raw, begun, clock.rates, clock.uneven)
+            try:
+                rig = posed(at_once, rig, lags is not None, most)
+            except ValueError:
+                if far is None:
+                    raise
+                return _from_afar(raw, far, clock, doubts)
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
     start = lags
@@ -300,6 +320,24 @@ def _observed(
     )
 
 
+def _from_afar(
+    raw: Sequence[Floats], found: Factorised, clock: Clock, doubts: Sequence[str]
+) -> Observation:
+    """What far cameras of which nothing is known tell of a path."""
+    tracks = align(raw, found.lags.frames, clock.rates, clock.uneven)
+    motion = [_smoothed(clock.times, track) for track in tracks]
+    moves = np.arange(3) < found.moving
+    return Observation(
+        tracks=tracks,
+        rig=found.rig,
+        lags=found.lags,
+        t=clock.times,
+        x=reconstruct(tracks, found.rig) * np.where(moves, 1.0, 0.0),
+        systematic=trailing_errors(tracks, found.rig, motion) * moves,
+        warnings=tuple(doubts),
+    )
+
+
 def _several_observed(
     raw: Sequence[Floats],
     rig: Rig,
@@ -330,6 +368,82 @@ def _several_observed(
         x=side_by_side(seen.x, count),
         systematic=np.reshape(modes, (len(modes), len(t), 3 * count)),
     )
+
+
+def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]) -> Floats | None:
+    """By how much each video starts later than the first, if that is given.
+
+    Each must share half of the shorter one's time with the first.
+    """
+    if lags is None:
+        return None
+    given = check_vector("lags", lags, len(names))
+    given -= given[0]
+    frames, ends = [len(one) for one in clock.frames], clock.ends
+    common = np.minimum(given + ends, ends[0]) - np.maximum(given, 0)
+    few = common < np.minimum(ends, ends[0]) / 2
+    if few.any():
+        i = int(few.argmax())
+        raise ValueError(
+            "lags: every video must have half of the shorter of the two in common with the first "
+            f"({frames[0]} frames), got {given[i]:g} for {names[i]} ({frames[i]} frames)"
+        )
+    return given
+
+
+def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
+    """One file name per camera."""
+    if isinstance(paths, str) or not isinstance(paths, Iterable):
+        raise ValueError(f"paths: must be a list of files, one per camera, got {shown(paths)}")
+    files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
+    if len(files) != len(rig.cameras):
+        raise ValueError(
+            f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
+            f"got {len(files)}"
+        )
+    return files
+
+
+def _check_several(
+    targets: int, rig: Rig, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
+) -> None:
+    """That several targets can be told apart."""
+    if len(rig.cameras) < 3 or not rig.is_measured:
+        known = "known" if rig.is_measured else "unknown"
+        raise ValueError(
+            f"targets: {targets} need three cameras of known places and directions, got "
+            f"{len(rig.cameras)} of {known} ones"
+        )
+    if detector != "auto" or any(hints or ()):
+        raise ValueError(
+            f"targets: {targets} are found by detector='auto' alone, without hints, got "
+            f"detector={shown(detector)}, hints={shown(hints)}"
+        )
+
+
+def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
+    """What each file is, if it is a video of the size that its camera has."""
+    shots = [video_info(path) for path in files]
+    for path, shot, camera in zip(files, shots, rig.cameras, strict=True):
+        if shot.frames < 2:
+            raise ValueError(f"paths: {path.name} must be a video, got a single frame")
+        if shot.size != camera.image_size:
+            raise ValueError(
+                f"paths: {path.name} must have the image size of its camera in the rig, "
+                f"{camera.image_size}, got {shot.size}"
+            )
+    return shots
+
+
+def _check_hints(
+    hints: Sequence[Hint | None] | None, files: Sequence[Path]
+) -> Sequence[Hint | None]:
+    """One hint per video, or none."""
+    if hints is None:
+        return [None] * len(files)
+    if not isinstance(hints, Sequence) or len(hints) != len(files):
+        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {shown(hints)}")
+    return hints
 
 
 def _smoothed(t: Floats, values: Floats) -> Floats:

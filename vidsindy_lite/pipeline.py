@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Floats
-from .cameras import Rig
+from .cameras import AffineCamera, Rig
 from .checks import check_instance, check_integer, check_positive, check_rows, shown
 from .dynamics import (
     Discovery,
@@ -142,7 +142,7 @@ def discover_from_videos(
         progress=progress,
     )  # fmt: skip
     names = [Path(path).name for path in paths]
-    return _with_law(seen, names, how)
+    return _with_law(seen, names, how, degree is None and library is None and order == "auto")
 
 
 def discover_from_tracks(
@@ -200,7 +200,7 @@ def discover_from_tracks(
     seen = observe_tracks(pixels, rig, times, lags=lags, names=names, progress=progress)
     doubts = [*(warning for track in read for warning in track.warnings), *doubts]
     seen = replace(seen, warnings=(*seen.warnings, *doubts))
-    return _with_law(seen, names, how)
+    return _with_law(seen, names, how, degree is None and library is None and order == "auto")
 
 
 def _checked(
@@ -298,10 +298,17 @@ def _with_law(
     seen: Observation,
     names: Sequence[str],
     how: dict[str, Any],
+    default: bool,
 ) -> VideoDiscovery:
-    """An observation with the law that it obeys, given what else `discover` takes."""
+    """An observation with the law that it obeys, given what else `discover` takes.
+
+    In a frame that is any affine map of space, the default is a law that is linear in any other.
+    """
+    if default and isinstance(seen.rig.cameras[0], AffineCamera):
+        how |= {"library": Library.polynomial(1), "order": 2}
+    moves = np.nanmin(seen.x, axis=0) < np.nanmax(seen.x, axis=0)  # in a plane or on a line
     with refusing("law", seen.tracks, names):
-        found = discover(seen.t, seen.x, systematic=seen.systematic, **how)
+        found = discover(seen.t, seen.x[:, moves], systematic=seen.systematic[..., moves], **how)
     # Who keeps the law alone keeps the doubts about what it was found in.
     law = replace(found, warnings=(*seen.warnings, *found.warnings))
     return VideoDiscovery(**vars(seen) | {"warnings": law.warnings}, discovery=law)

@@ -16,7 +16,7 @@ LIBRARIES = (
     "matplotlib", "seaborn",
 )  # fmt: skip
 """On whose versions results depend."""
-RESULTLESS = ("companion", "plots", "__main__", "options", "refusal")
+RESULTLESS = ("companion", "plots", "__main__", "refusal")
 """Folders and modules of the package that compute no result of a sweep."""
 
 

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
-from vidsindy_lite.cameras.adjust import adjust, linearised
+from vidsindy_lite.cameras.adjust import PARTS, SIZE, adjust, changed, known_to, linearised
 from vidsindy_lite.cameras.alignment import Footage
-from vidsindy_lite.cameras.changes import PARTS, SIZE, changed, known_to
 
 SEEDS = st.integers(0, 2**32 - 1)
 

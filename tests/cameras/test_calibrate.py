@@ -19,7 +19,7 @@ from vidsindy_lite.cameras import (
     reconstruct,
     residuals,
 )
-from vidsindy_lite.cameras.geometry import rodrigues
+from vidsindy_lite.cameras.models import rodrigues
 
 SEEDS = st.integers(0, 2**32 - 1)
 

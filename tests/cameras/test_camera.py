@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidsindy_lite.cameras import OrthographicCamera, Rig
-from vidsindy_lite.cameras.camera import turn
-from vidsindy_lite.cameras.geometry import plane_projection, rotation_to_z
+from vidsindy_lite.cameras.models import plane_projection, rotation_to_z, turn
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -5,7 +5,7 @@ import pytest
 from helpers import room
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras.changes import PARTS, SIZE, NearCamera, changed, known_to, units
+from vidsindy_lite.cameras.adjust import PARTS, SIZE, NearCamera, changed, known_to, units
 
 CAMERA = room(np.random.default_rng(3), principal_point=(630.0, 350.0), readout=0.3).cameras[0]
 

@@ -3,7 +3,7 @@
 import numpy as np
 from helpers import dependent
 
-from vidsindy_lite.cameras.covariance import bandwidth, fitted_factor, long_run_covariance
+from vidsindy_lite.cameras.adjust import bandwidth, fitted_factor, long_run_covariance
 
 
 def test_long_run_covariance_of_an_autoregressive_series():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from vidsindy_lite.cameras import OrthographicCamera
-from vidsindy_lite.cameras.geometry import (
+from vidsindy_lite.cameras.models import (
     plane_projection,
     plane_through,
     rodrigues,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from vidsindy_lite.cameras import OrthographicCamera, PerspectiveCamera, Rig
-from vidsindy_lite.cameras.lens import distorted, undistorted
+from vidsindy_lite.cameras.models import distorted, undistorted
 
 SEEDS = st.integers(0, 2**32 - 1)
 

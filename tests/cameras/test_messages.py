@@ -7,7 +7,7 @@ import pytest
 from helpers import trajectory
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import adjust, triangulate, unknowns
+from vidsindy_lite.cameras import adjust, calibrate, sight
 
 NOISE = 0.3  # pixels
 
@@ -44,14 +44,14 @@ def test_outliers_that_cannot_be_told(monkeypatch):
     rig, tracks = filmed()
     tracks[0][::9] += 100
     assert vl.learn_cameras(tracks, rig.uncalibrated()).warnings == ()
-    monkeypatch.setattr(unknowns, "_ROUNDS", 1)
+    monkeypatch.setattr(calibrate, "_ROUNDS", 1)
     (warning,) = vl.learn_cameras(tracks, rig.uncalibrated()).warnings
     assert "which frames hold outliers of a track cannot be told" in warning
 
 
 def test_points_that_did_not_settle(monkeypatch):
     rig, tracks = filmed(vl.PerspectiveCamera)
-    monkeypatch.setattr(triangulate, "_STEPS", 1)
+    monkeypatch.setattr(sight, "_STEPS", 1)
     warnings = vl.learn_cameras(tracks, rig.uncalibrated()).warnings
     assert "the target's place is uncertain in 120 of 120 frames" in warnings[-1]
 

@@ -8,8 +8,10 @@ from helpers import filmed
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras.alignment import Curve
-from vidsindy_lite.cameras.camera import turn
-from vidsindy_lite.cameras.pairs import (
+from vidsindy_lite.cameras.calibrate import Unknowns
+from vidsindy_lite.cameras.models import turn
+from vidsindy_lite.cameras.sight import Views, epipolar_lines
+from vidsindy_lite.cameras.synchronise import (
     _apart,
     _dips,
     _turned,
@@ -17,8 +19,6 @@ from vidsindy_lite.cameras.pairs import (
     promising_lags,
     rough_cameras,
 )
-from vidsindy_lite.cameras.triangulate import Views, epipolar_lines
-from vidsindy_lite.cameras.unknowns import Unknowns
 
 NOISE = 0.05  # pixels
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vidsindy_lite.cameras.shutter import steadied
+from vidsindy_lite.cameras.models import steadied
 
 
 def test_a_global_shutter_and_gaps_stay_as_they_are():

@@ -22,7 +22,7 @@ from vidsindy_lite.cameras import (
 )
 from vidsindy_lite.cameras import synchronise as synchrony
 from vidsindy_lite.cameras.alignment import Curve, Footage
-from vidsindy_lite.cameras.unknowns import Unknowns
+from vidsindy_lite.cameras.calibrate import Unknowns
 
 NOISE = 0.05  # pixels
 

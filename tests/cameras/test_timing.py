@@ -7,9 +7,9 @@ import pytest
 from helpers import dependent, filmed
 
 from vidsindy_lite.cameras import learn_lags
+from vidsindy_lite.cameras.adjust import PARTS, SIZE
 from vidsindy_lite.cameras.alignment import Footage
-from vidsindy_lite.cameras.changes import PARTS, SIZE
-from vidsindy_lite.cameras.timing import Timing
+from vidsindy_lite.cameras.synchronise import Timing
 
 
 def test_a_slope_that_is_noise_tells_nothing(motion, monkeypatch):

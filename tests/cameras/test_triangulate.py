@@ -15,13 +15,8 @@ from vidsindy_lite.cameras import (
     reconstruct,
     residuals,
 )
-from vidsindy_lite.cameras import triangulate as module
-from vidsindy_lite.cameras.triangulate import (
-    Views,
-    epipolar_design,
-    epipolar_lines,
-    intersect,
-)
+from vidsindy_lite.cameras import sight as module
+from vidsindy_lite.cameras.sight import Views, epipolar_design, epipolar_lines, intersect
 
 
 def scene(*kinds, frames=40, seed=3):

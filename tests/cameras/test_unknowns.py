@@ -7,9 +7,9 @@ import pytest
 from helpers import trajectory
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import unknowns as module
-from vidsindy_lite.cameras.triangulate import Views
-from vidsindy_lite.cameras.unknowns import Equations, Unknowns, solve
+from vidsindy_lite.cameras import calibrate as module
+from vidsindy_lite.cameras.calibrate import Equations, Unknowns, solve
+from vidsindy_lite.cameras.sight import Views
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from helpers import aligned_error, room, walk
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import learn_cameras_eq4, posed, unmeasured
+from vidsindy_lite.cameras import calibrate, learn_cameras_eq4, posed
 from vidsindy_lite.observation import observe_tracks
 from vidsindy_lite.study import SYSTEMS
 
@@ -227,6 +227,6 @@ def test_of_exact_tracks_some_start_is_exact():
     """What two cameras see tells where any other one stands; as if from far away, only about."""
     rng = np.random.default_rng(9)
     rig = room(rng, 4)
-    starts = unmeasured._starts(filmed(rng, rig, noise=0.0), lenses(rng, rig, off=0.0))
+    starts = calibrate._starts(filmed(rng, rig, noise=0.0), lenses(rng, rig, off=0.0))
     missed = sorted(start.missed for start in starts)
     assert missed[0] < 1e-3 < 1 < missed[-1]

@@ -1,6 +1,6 @@
 """Bundle adjustment: cameras, clocks and path together, from what was seen and what was measured.
 
-Wanted are the changes p of cameras and clocks (`changes`) and the points x of the path that make
+Wanted are the changes p of cameras and clocks (`PARTS`) and the points x of the path that make
 
 ::
 
@@ -12,6 +12,26 @@ the points out first: of the slopes in p only what no move of the frame's own po
 that is missed by more than `_OUTLIER` sigma is weighed down so that it pulls no more the further it
 is off (w = (limit / miss)^2, the weight of Geman and McClure's kind).
 
+A change of a camera is one vector: two tilts of the normal and the in-plane angle (radians), the
+logarithm of the scale, the position along the axes of the view plane and along its normal (scene
+units), the principal point (pixels), k1, k2, p1, p2, the readout of the shutter (frames); and what
+no rig file holds: by how many frames the video is late, by how many more at its end than at its
+start, and how near an orthographic camera is to what it sees (the inverse of its distance).
+
+Errors of tracks depend on their neighbours. With the slopes J of the residuals r, their noise sigma
+and the information P of measurements, what was fitted has the covariance
+
+    W = (sum_n J_n' J_n / sigma^2 + P)^-1,
+
+if errors do not depend on each other. If they do, it is the "sandwich"
+
+    S = W (M / sigma^4 + P) W,   M = sum_nm w(n - m) (J_n' r_n) (J_m' r_m)',
+
+with weights w that fall linearly to zero over as many frames as the residuals depend on each other.
+From few frames S is often too small by chance, and W never is but for such errors: so in every
+direction the larger of both counts.
+
+Newey and West 1987, Econometrica 55; Andrews 1991, Econometrica 59 (the number of frames);
 Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 """
 
@@ -19,6 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
@@ -26,11 +47,27 @@ from scipy.special import gammaincinv
 
 from ..arrays import Bools, Floats
 from .alignment import Footage
-from .camera import Camera
-from .changes import PARTS, changed, units
-from .shutter import steadied
-from .triangulate import Views, points_of_views
+from .models import USUAL, Camera, OrthographicCamera, PerspectiveCamera, frozen, steadied
+from .sight import Views, points_of_views
 
+_UNTOLD = 1e-15  # of the largest information of any direction: rounding
+PARTS = {
+    "normal": slice(0, 2),
+    "angle": slice(2, 3),
+    "scale": slice(3, 4),
+    "position": slice(4, 7),
+    "principal point": slice(7, 9),
+    "distortion": slice(9, 13),
+    "readout": slice(13, 14),
+    "lag": slice(14, 15),
+    "drift": slice(15, 16),
+    "nearness": slice(16, 17),
+}
+"""Which components of the vector belong to what."""
+
+SIZE = 17
+_LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
+_TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma
 _FINEST = 1e-6  # pixels; noise below that is rounding
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
@@ -48,6 +85,129 @@ _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
 _LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
+
+
+def fitted_factor(missed: Floats, slopes: Floats, prior: Floats, noise: float) -> Floats:
+    """A factor F of the covariance F F' of parameters, (k, k), that were fitted.
+
+    Parameters
+    ----------
+    missed, slopes : ndarray, shape (n, m) and (n, m, k)
+        Residuals, and their slopes.
+    prior : ndarray, shape (k,)
+        Information of measurements on the parameters.
+    noise : float
+        Standard deviation of the residuals.
+    """
+    square = np.einsum("nmk,nml->kl", slopes, slopes) + noise**2 * np.diag(prior)
+    size = np.sqrt(np.diag(square))  # of each parameter: units of pixels, metres and radians
+    size[size == 0] = 1.0
+    values, ways = np.linalg.eigh(square / np.outer(size, size))
+    told = values > _UNTOLD * values.max(initial=0.0)
+    # In the directions of `half`, of length one over sigma, W is the unit matrix.
+    half = ways[:, told] / np.sqrt(values[told]) / size[:, None]
+    scores = np.einsum("nmk,nm->nk", slopes, missed) @ half
+    measured = noise**2 * half.T @ np.diag(prior) @ half
+    sandwich = long_run_covariance(scores) * len(scores) + noise**2 * measured
+    grown, turned = np.linalg.eigh(sandwich)
+    return half @ turned * np.sqrt(np.maximum(grown, noise**2))
+
+
+def long_run_covariance(series: Floats) -> Floats:
+    """Covariance of the mean of a stationary series of mean zero, times its length.
+
+    Parameters
+    ----------
+    series : ndarray, shape (n, k)
+
+    Returns
+    -------
+    ndarray, shape (k, k)
+        ``sum_h w_h E[s_n s_(n+h)']`` with Bartlett's weights; their width is that which is best
+        for autoregressive series of first order.
+    """
+    n, width = len(series), bandwidth(series)
+    total = series.T @ series
+    for lag in range(1, min(int(np.ceil(width)), n - 1) + 1):
+        product = series[lag:].T @ series[:-lag]
+        total += (1 - lag / (width + 1)) * (product + product.T)
+    return total / n
+
+
+def bandwidth(series: Floats) -> float:
+    """Over how many neighbours Bartlett's weights fall to zero: best for autoregressive series."""
+    power = np.maximum((series**2).sum(axis=0), 1e-300)
+    rho = np.clip((series[1:] * series[:-1]).sum(axis=0) / power, -0.97, 0.97)
+    curvature = np.mean(4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)) if len(rho) else 0.0
+    return float(1.1447 * (curvature * len(series)) ** (1 / 3))
+
+
+def known_to(given: Camera) -> Floats:
+    """Standard errors of a camera of a rig: zero what is exact, infinite what is to be learned."""
+    errors = np.zeros(SIZE)
+    errors[PARTS["normal"]] = np.deg2rad(given.normal_error)
+    errors[PARTS["angle"]] = np.deg2rad(given.normal_error) if given.is_calibrated else np.inf
+    errors[PARTS["scale"]] = given.scale_error if given.is_calibrated else np.inf
+    errors[PARTS["position"]] = given.position_error if given.is_placed else np.inf
+    if isinstance(given, OrthographicCamera):
+        errors[PARTS["position"]][2] = 0.0  # it sees the same from anywhere on its axis
+    errors[PARTS["principal point"]] = given.principal_point_error
+    if isinstance(given, PerspectiveCamera):
+        errors[PARTS["distortion"]] = given.distortion_error * np.array(
+            [1, 1, _TANGENTIAL, _TANGENTIAL]
+        )
+    errors[PARTS["readout"]] = given.readout_error
+    return errors
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NearCamera(OrthographicCamera):
+    """What an orthographic camera would be that is not infinitely far from the point `about`."""
+
+    about: Floats
+    nearness: float = 0.0
+
+    @property
+    def _last_row(self) -> Floats:
+        away = self.nearness * self.normal
+        return np.append(-away, 1 + away @ self.about)
+
+
+def units(width: float, image: float) -> Floats:
+    """Sizes of changes that matter about equally, for a scene and an image of these widths."""
+    sizes = np.ones(SIZE)
+    sizes[PARTS["position"]] = width
+    sizes[PARTS["principal point"]] = image
+    sizes[PARTS["nearness"]] = 1 / width
+    return sizes
+
+
+def changed(camera: Camera, change: Floats) -> Camera:
+    """A calibrated camera after a change; lag and drift are none of its own."""
+    part = {name: change[place] for name, place in PARTS.items()}
+    values: dict[str, Any] = {}
+    if part["normal"].any():
+        normal = camera.normal + part["normal"] @ camera.rows
+        values["normal"] = frozen(normal / np.linalg.norm(normal))
+    if part["position"].any() and camera.position is not None:
+        axes = np.vstack((camera.rows, camera.normal))
+        values["position"] = frozen(camera.position + part["position"] @ axes)
+    if part["principal point"].any():
+        values["principal_point"] = frozen(camera.centre + part["principal point"])
+    if part["distortion"].any() and isinstance(camera, PerspectiveCamera):
+        before = np.zeros(USUAL) if camera.distortion is None else camera.distortion
+        step = np.pad(part["distortion"], (0, len(before) - len(part["distortion"])))
+        values["distortion"] = frozen(before + step)
+    if part["readout"].any():
+        values["readout"] = float(np.clip(camera.readout + part["readout"][0], -1, 1))
+    if part["nearness"].any() and isinstance(camera, NearCamera):
+        values["nearness"] = camera.nearness + part["nearness"][0]
+    moved = camera.moved(**values) if values else camera
+    if part["angle"].any() or part["scale"].any():
+        scale, angle = camera.calibration
+        grown = np.clip(part["scale"][0], -_LARGEST, _LARGEST)
+        moved = moved.calibrated(scale * np.exp(grown + 1j * (angle + part["angle"][0])))
+    return moved
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,7 @@ from scipy.spatial.transform import Rotation
 from ..arrays import Floats
 from ..checks import check_array, check_image_size, shown
 from ..reading import TREES, check_file, read_arrays, read_text, read_tree, reading
-from . import lens
-from .models import PerspectiveCamera
+from .models import LENS, PerspectiveCamera
 from .rig import Rig
 
 _NAMES = {
@@ -67,7 +66,7 @@ _OTHERS = re.compile(
     "ortho|panor|theta|stereograph"
 )
 """... and parts of the names of others."""
-_LENSES = f"of {', '.join(lens.NAMES)}"
+_LENSES = f"of {', '.join(LENS)}"
 _KNOWN = {key for keys in (*_NAMES.values(), *_SIZES, _MARKS) for key in keys} | {
     "name", "camera", "camera_name", "cam_id", "id", "serial", "serial_number", "port", "index",
     "error", "rms", "reprojection_error", "avg_reprojection_error", "grid_count", "flags", "date",
@@ -302,8 +301,8 @@ def _from_opencv(table: dict[str, Any], given: tuple[int, int] | None) -> Perspe
         raise ValueError("image_size: must be given (--size WxH), as this file does not say")
     width, height = _shaped("size", size, (2,))
     dist = np.trim_zeros(check_array("dist", table.get("dist", [])).ravel(), "b")
-    if dist.size > len(lens.NAMES):
-        raise ValueError(f"dist: must be {', '.join(lens.NAMES)}, got {dist.size} coefficients")
+    if dist.size > len(LENS):
+        raise ValueError(f"dist: must be {', '.join(LENS)}, got {dist.size} coefficients")
     shift = _shaped("t", table["t"], (3,))
     return _camera(inner, dist, rotation, shift, (round(width), round(height)))
 

@@ -17,20 +17,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as fisher
+from scipy.special import fdtri
 
 from ..arrays import Bools, Floats
-from .adjust import Adjustment, adjust, linearised
+from .adjust import (
+    PARTS,
+    SIZE,
+    Adjustment,
+    NearCamera,
+    adjust,
+    bandwidth,
+    known_to,
+    linearised,
+    long_run_covariance,
+)
 from .alignment import Footage
-from .camera import Camera
-from .changes import PARTS, SIZE, NearCamera, known_to
-from .covariance import bandwidth, long_run_covariance
-from .models import OrthographicCamera
+from .models import Camera, OrthographicCamera
 from .rig import Rig
-from .triangulate import TRIMMED, check_views, disagreement, points_of_views, residuals, trimmed
-
-GROSS = 4.0
-"""Pixels; real calibrations of real tracks leave up to half of that."""
+from .sight import TRIMMED, points_of_views, trimmed
+from .triangulate import GROSS, check_views, disagreement, residuals
 
 _CHANCE = 1e-6  # of a T that large without a cause
 _MATTERS = 0.02  # pixels rms; real tracks are no better than that
@@ -204,7 +209,7 @@ def _sizes(near: Adjustment, errors: Floats, cause: Cause) -> tuple[float, float
     rest_degrees = degrees - len(score) + 1
     if explained < _MATTERS or rest_degrees <= 0:
         return 0.0, explained
-    chance = float(fisher.isf(_CHANCE, len(score), rest_degrees))
+    chance = float(fdtri(len(score), rest_degrees, 1 - _CHANCE))
     limit = chance * len(score) * degrees / rest_degrees
     return float(score @ np.linalg.solve(covariance, score)) / limit, explained
 

@@ -12,12 +12,19 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
-from .calibrate import check_learnable
-from .camera import Camera
-from .models import independent
+from .calibrate import (
+    Complex,
+    Equations,
+    Unknowns,
+    agreement,
+    calibrated,
+    check_learnable,
+    names,
+    solve,
+)
+from .models import Camera, independent
 from .rig import Rig
 from .triangulate import check_views
-from .unknowns import Complex, Equations, Unknowns, agreement, calibrated, names, solve
 
 
 def learn_cameras_eq4(tracks: Sequence[Floats], rig: Rig) -> Rig:

@@ -17,14 +17,12 @@ import numpy as np
 
 from ..arrays import Floats
 from .alignment import Curve, Lags, align
-from .calibrate import learn_cameras
-from .camera import Camera
-from .pairs import lag_misses
+from .calibrate import Unknowns, learn_cameras
+from .models import Camera
 from .rig import Rig
-from .synchronise import learn_lags, nearest
-from .timing import DISAGREEMENT
-from .triangulate import epipolar_lines, epipolar_rows
-from .unknowns import Unknowns
+from .sight import epipolar_lines, epipolar_rows
+from .synchronise import lag_misses, learn_lags, nearest
+from .triangulate import DISAGREEMENT
 
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
 """Rates over those stated that are taken for each other."""

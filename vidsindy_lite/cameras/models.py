@@ -1,14 +1,17 @@
 """Camera models: from points in space to pixels.
 
-With the pixel (u to the right, v down) measured from the middle of the image,
-x_c = (u - (W-1)/2, (H-1)/2 - v), a scaled orthographic camera sees the point x where
+A view plane with unit normal n is rotated flat: R is the rotation that takes **n to e_z** (not e_z
+to n), and its first two rows R^- give the in-plane coordinates R^- x of a point x. Because the
+third row of R is n itself, moving the plane along its normal changes R^- x not at all; moving it
+sideways changes its origin by the in-plane offset Delta_c = R^- position.
+
+With the pixel (u to the right, v down) measured from the middle of the image, x_c = (u - (W-1)/2,
+(H-1)/2 - v), a scaled orthographic camera sees the point x where
 
     s T(theta) x_c + Delta_c = R^- x,        T = [[cos, sin], [-sin, cos]].
 
-R^- are the first two rows of the rotation that takes the unit normal to e_z, and
-Delta_c = R^- position. A perspective camera is a pinhole. In the frame of its view plane,
-R (x - position), a point lies at the distance d = normal . (position - x) in front of it and is
-seen at
+A perspective camera is a pinhole. In the frame of its view plane, R (x - position), a point lies at
+the distance d = normal . (position - x) in front of it and is seen at
 
     s d T(theta) x_c = R^- (x - position),
 
@@ -17,27 +20,547 @@ so that one pixel measures s d scene units there; 1 / s is the focal length in p
 row alone.
 
 That is the ideal image. What is seen has its principal point (x_c = 0) where the lens is mounted,
-lengths along v `aspect` times as large, and is bent by the lens (`lens`).
+lengths along v `aspect` times as large, and is bent by the lens: a point that a pinhole of focal
+length 1 would show at (x, y), y *down*, is seen at
 
-Paper: Section "Coordinates Transformation", Eq. (4)-(6).
+    x q + 2 p1 x y + p2 (r2 + 2 x^2),      y q + p1 (r2 + 2 y^2) + 2 p2 x y,
+
+    q = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3),      r2 = x^2 + y^2.
+
+The rows of a rolling shutter are read one after the other: the row v of the frame k at the instant
+k + readout (v - (H - 1) / 2) / H, in frames, a lag that depends on where the target is.
+
+Paper: Eq. (1)-(2), (4)-(6), Appendices "Detail of Projection", "Plane Projection Proof" and
+"Compute offset distance of a camera plane". Lens: Brown 1966, Photogrammetric Engineering 32;
+coefficients in OpenCV's order, k1, k2, p1, p2, k3, and k4, k5, k6 of its rational model.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from copy import copy
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from math import hypot
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import make_interp_spline
 
 from ..arrays import Floats
-from ..checks import check_array, check_rows, shown
-from . import lens
-from .camera import Camera, frozen, turn
-from .geometry import PARALLEL
+from ..checks import (
+    check_array,
+    check_image_size,
+    check_number,
+    check_positive,
+    check_rows,
+    check_vector,
+    shown,
+)
 
+PARALLEL = 1e-6
+"""Sine of the angle below which two lines of sight count as parallel."""
+LENS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+USUAL = 5
+"""How many of these most lenses have; the others are those of a fraction."""
+
+_STEPS = 30  # of Newton, from the distorted point
+_SETTLED = 1e-14  # of the focal length
+_LARGEST = 0.49  # frames; so instants never overtake each other, whatever an outlier says
 _DOWN = np.array([1.0, -1.0])  # the lens's y is down, the ideal image's up
+
+
+def rodrigues(axis: ArrayLike, angle: float) -> Floats:
+    """Rotation by an angle about an axis, by Rodrigues' formula.
+
+    Paper: Eq. (1)-(2), R = I + sin(angle) U + (1 - cos(angle)) U^2, where U w = u x w.
+
+    Parameters
+    ----------
+    axis : array_like, shape (3,)
+        Rotation axis u; need not have unit length, must not be zero.
+    angle : float
+        Rotation angle in radians, right-handed about the axis.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+
+    Raises
+    ------
+    ValueError
+        If the axis is not a finite non-zero vector of shape (3,), or the angle is not finite.
+    """
+    return _rotation(unit_vector("axis", axis), check_number("angle", angle))
+
+
+def _rotation(axis: Floats | tuple[float, ...], angle: float) -> Floats:
+    """`rodrigues` of a unit vector."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # 1 - cos(a) = 2 sin(a/2)^2 keeps its digits at small angles.
+    return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
+
+
+def rotation_to_z(normal: ArrayLike) -> Floats:
+    """The shortest rotation R that takes a plane's normal to e_z: R n = e_z.
+
+    Paper: Eq. (1)-(2) with axis n x e_z and the angle between n and e_z. The axis is 0/0 for a
+    normal along z: +e_z gives the identity (the limit), and -e_z, where every horizontal axis is
+    equally short and no limit exists, gives the rotation by pi about the x axis.
+
+    Parameters
+    ----------
+    normal : array_like, shape (3,)
+        Normal of the plane, of any length but zero.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rows: the plane's X' axis, its Y' axis, and the unit normal.
+
+    Raises
+    ------
+    ValueError
+        If the normal is not a finite non-zero vector of shape (3,).
+    """
+    a, b, c = unit_vector("normal", normal)
+    horizontal = np.hypot(a, b)
+    axis = (b / horizontal, -a / horizontal, 0.0) if horizontal > 0 else (1.0, 0.0, 0.0)
+    # arctan2 is accurate at every angle; arccos(c) loses half its digits near 0 and pi.
+    return _rotation(axis, np.arctan2(horizontal, c))
+
+
+def plane_projection(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:
+    """Foot of the perpendicular from points to the plane normal . x + d = 0.
+
+    Paper: Eq. (S3), x_p = x - n (n . x + D) / (n . n) with n = (A, B, C).
+
+    Parameters
+    ----------
+    x : array_like, shape (..., 3)
+        Points; NaN rows pass through.
+    normal : array_like, shape (3,)
+        (A, B, C), of any length but zero.
+    d : float
+        D, in the units of normal . x.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+
+    Raises
+    ------
+    ValueError
+        If `x` does not end in an axis of length 3, or the normal is not a finite non-zero vector.
+    """
+    distance = signed_distance(x, normal, d)
+    return check_array("x", x) - distance[..., None] * unit_vector("normal", normal)
+
+
+def signed_distance(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:
+    """Signed distance of points to the plane normal . x + d = 0, positive on the normal's side.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., 3)
+        Points; NaN rows pass through.
+    normal : array_like, shape (3,)
+        Normal of the plane, of any length but zero.
+    d : float
+        Constant of the plane's equation, in the units of normal . x.
+
+    Returns
+    -------
+    ndarray, shape (...)
+
+    Raises
+    ------
+    ValueError
+        If `x` does not end in an axis of length 3, or the normal is not a finite non-zero vector.
+    """
+    points = check_array("x", x)
+    if points.ndim == 0 or points.shape[-1] != 3:
+        raise ValueError(f"x: must have shape (..., 3), got {points.shape}")
+    return points @ unit_vector("normal", normal) + float(d) / np.linalg.norm(normal)
+
+
+def plane_through(p1: ArrayLike, p2: ArrayLike, p3: ArrayLike) -> tuple[Floats, float]:
+    """Plane through three points, as the normal and constant of normal . x + d = 0.
+
+    Paper: Appendix "Compute offset distance of a camera plane", n = p1p2 x p1p3.
+
+    Parameters
+    ----------
+    p1, p2, p3 : array_like, shape (3,)
+        Points; counter-clockwise as seen from the side to which the normal points.
+
+    Returns
+    -------
+    normal : ndarray, shape (3,)
+        Unit normal.
+    d : float
+
+    Raises
+    ------
+    ValueError
+        If the points lie on one line, or are not finite vectors of shape (3,).
+    """
+    p1, p2, p3 = (check_vector(f"p{i}", p, 3) for i, p in enumerate((p1, p2, p3), start=1))
+    normal = np.cross(p2 - p1, p3 - p1)
+    reach = np.linalg.norm(p2 - p1) * np.linalg.norm(p3 - p1)
+    if np.linalg.norm(normal) <= 1e-12 * reach:
+        raise ValueError(f"p1, p2, p3: must not lie on one line, got {p1}, {p2}, {p3}")
+    normal = unit_vector("normal", normal)
+    return normal, -float(normal @ p1)
+
+
+def unit_vector(name: str, value: ArrayLike) -> Floats:
+    """A finite vector of shape (3,), of any length but zero, at unit length.
+
+    Raises
+    ------
+    ValueError
+        If the vector is zero, not finite or of another shape.
+    """
+    vector = check_vector(name, value, 3)
+    largest = np.abs(vector).max()
+    if largest == 0:
+        raise ValueError(f"{name}: must not be the zero vector, got {vector.tolist()}")
+    vector = vector / largest  # so that squares neither overflow nor underflow
+    return vector / np.linalg.norm(vector)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Camera(ABC):
+    """What cameras of both models share; build an `OrthographicCamera` or a `PerspectiveCamera`.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,), optional
+        Scene units. None: to be learned.
+    normal : array_like, shape (3,)
+        Normal of the view plane, pointing from the scene to the camera. Stored with unit length.
+    scale : float, optional
+        s, scene units per pixel, of a perspective camera at distance 1. None: to be learned.
+    angle : float, optional
+        theta, in-plane angle in radians. None: to be learned, together with the scale.
+    image_size : tuple of int, default (512, 512)
+        Width and height in pixels.
+    principal_point : array_like, shape (2,), optional
+        Pixel (u, v) on the axis of the lens. None: the middle of the image.
+    aspect : float, default 1
+        Height of a square's image over its width: OpenCV's fy / fx.
+    readout : float, default 0
+        Of a rolling shutter: by how much later the last row of an image is read than the first, in
+        frames, between -1 and 1 (negative if the image is stored upside down); 10 ms at 30 frames
+        per second are 0.3. The time of a frame is that of its middle row.
+    position_error, normal_error, scale_error, principal_point_error, readout_error : float
+        Standard errors of what was measured: of each coordinate in scene units; of the normal in
+        degrees, and of the angle; of the scale as a share of it, .03 for 3 %; in pixels; in frames.
+        Zero, the default: exactly known.
+
+    Raises
+    ------
+    ValueError
+        If an argument has a wrong shape, is not finite, or only one of scale and angle is given.
+    """
+
+    model: ClassVar[str]  # its name in the file of a rig
+
+    position: Floats | None = None
+    normal: Floats = None  # type: ignore[assignment]  # of a pinhole of which nothing is known
+    scale: float | None = None
+    angle: float | None = None
+    image_size: tuple[int, int] = (512, 512)
+    principal_point: Floats | None = None
+    aspect: float = 1.0
+    readout: float = 0.0
+    position_error: float = 0.0
+    normal_error: float = 0.0
+    scale_error: float = 0.0
+    principal_point_error: float = 0.0
+    readout_error: float = 0.0
+
+    def __post_init__(self) -> None:
+        normal = check_vector("normal", self.normal, 3)
+        if abs(hypot(*normal) - 1) > 1e-15:  # a unit vector stays as it is: files round-trip
+            normal = unit_vector("normal", normal)
+        self._set(normal=frozen(normal))
+        if self.position is not None:
+            self._set(position=frozen(check_vector("position", self.position, 3)))
+        if (self.scale is None) != (self.angle is None):
+            raise ValueError(
+                "scale and angle: give both (calibrated) or neither (to be learned), got "
+                f"scale={self.scale}, angle={self.angle}"
+            )
+        if self.scale is not None and self.angle is not None:
+            self._set(scale=check_positive("scale", self.scale))
+            self._set(angle=check_number("angle", self.angle))
+        self._set(image_size=check_image_size(self.image_size))
+        if self.principal_point is not None:
+            point = check_vector("principal_point", self.principal_point, 2)
+            self._set(principal_point=frozen(point))
+        self._set(aspect=check_positive("aspect", self.aspect))
+        if not abs(check_number("readout", self.readout)) <= 1:
+            raise ValueError(f"readout: must be between -1 and 1 frames, got {self.readout}")
+        self._set(readout=float(self.readout))
+        for name in self.errors:
+            error = check_number(name, getattr(self, name))
+            if error < 0:
+                raise ValueError(f"{name}: must be zero or positive, got {error:g}")
+            self._set(**{name: error})
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Camera):
+            return NotImplemented
+        return self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(self._values)
+
+    @property
+    def _values(self) -> tuple[object, ...]:
+        parts = (getattr(self, part.name) for part in fields(self))
+        plain = (p.tolist() if isinstance(p, np.ndarray) else p for p in parts)
+        return self.model, *(tuple(p) if isinstance(p, list) else p for p in plain)
+
+    def _set(self, **values: object) -> None:
+        self.__dict__.update(values)
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Standard errors of what was measured, by their names."""
+        names = (part.name for part in fields(self) if part.name.endswith("_error"))
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether scale and angle are known."""
+        return self.scale is not None
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether the position is known."""
+        return self.position is not None
+
+    @property
+    def calibration(self) -> tuple[float, float]:
+        """Scale and angle; an error if they are unknown."""
+        if self.scale is None or self.angle is None:
+            raise ValueError("camera: scale and angle must be known, got None; see learn_cameras")
+        return self.scale, self.angle
+
+    @cached_property
+    def rows(self) -> Floats:
+        """R^-, shape (2, 3): the plane's axes, in which R^- x are in-plane coordinates."""
+        return frozen(rotation_to_z(self.normal)[:2])
+
+    @cached_property
+    def offset(self) -> Floats:
+        """Delta_c = R^- position, shape (2,), scene units.
+
+        Its two components are the *signed* distances of the position to the planes Y'OZ' and X'OZ'
+        through the reference origin (the paper's text names the image plane X'OY' itself, and
+        distances without a sign). Paper: Appendix "Compute offset distance of a camera plane".
+        """
+        if self.position is None:
+            raise ValueError("camera: position must be known, got None; see learn_cameras")
+        return frozen(self.rows @ self.position)
+
+    @cached_property
+    def matrix(self) -> Floats:
+        """Camera matrix, shape (3, 4): s T(theta) x_c = (X, Y) / W, (X, Y, W) = matrix @ (x, 1)."""
+        return frozen(np.vstack((np.column_stack((self.rows, -self.offset)), self._last_row)))
+
+    @property
+    @abstractmethod
+    def _last_row(self) -> Floats:
+        """W as a linear function of (x, 1): in front of the camera it is positive."""
+
+    def project(self, x: ArrayLike) -> Floats:
+        """Pixels at which points are seen.
+
+        Parameters
+        ----------
+        x : array_like, shape (n, 3)
+            Points in the reference frame, scene units. A row holding NaN gives NaN pixels.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Pixels (u to the right, v down), the centre of the first pixel being (0, 0). NaN for
+            points behind a perspective camera.
+
+        Raises
+        ------
+        ValueError
+            If the camera is not calibrated, or x has a wrong shape or an infinite value.
+        """
+        return self.image(check_rows("x", x, 3))
+
+    def plane_coordinates(self, pixels: ArrayLike) -> Floats:
+        """In-plane coordinates R^- x = s T(theta) x_c + Delta_c of what is seen at the pixels.
+
+        For a perspective camera, of what is seen there at distance 1.
+
+        Parameters
+        ----------
+        pixels : array_like, shape (n, 2)
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Scene units; NaN rows pass through.
+
+        Raises
+        ------
+        ValueError
+            If the camera is not calibrated, or pixels has a wrong shape or an infinite value.
+        """
+        scale, _ = self.calibration
+        return scale * self.turned(check_rows("pixels", pixels, 2)) + self.offset
+
+    # What follows takes its arguments as they are: arrays of floats of the right shape.
+
+    def image(self, x: Floats) -> Floats:
+        """Pixels at which points are seen, see `project`."""
+        scale, angle = self.calibration
+        image = x @ self.matrix[:, :3].T + self.matrix[:, 3]
+        image[~(image[:, 2] > 0)] = np.nan
+        plane = image[:, :2] / (scale * image[:, 2:])
+        return self.seen(plane @ turn(angle))  # row vectors: (T^-1 w)^T = w^T T
+
+    def turned(self, pixels: Floats) -> Floats:
+        """Pixels along the axes of the view plane: T(theta) x_c, shape (n, 2)."""
+        _, angle = self.calibration
+        return self.centred(pixels) @ turn(angle).T
+
+    def seen(self, centred: Floats) -> Floats:
+        """Pixels at which points x_c of the ideal image are seen through the lens, shape (n, 2)."""
+        u, v = self.centre
+        bent = self._bent(centred)
+        return np.column_stack((u + bent[:, 0], v - self.aspect * bent[:, 1]))
+
+    def centred(self, pixels: Floats) -> Floats:
+        """Pixels in the ideal image, measured from its principal point, right and *up*: x_c.
+
+        Shape (n, 2). Of a camera that is not calibrated, without its distortion.
+        """
+        u, v = self.centre
+        return self._unbent(np.column_stack((pixels[:, 0] - u, (v - pixels[:, 1]) / self.aspect)))
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """The principal point."""
+        if self.principal_point is not None:
+            return self.principal_point[0], self.principal_point[1]
+        width, height = self.image_size
+        return (width - 1) / 2, (height - 1) / 2
+
+    def _bent(self, centred: Floats) -> Floats:
+        """What the lens makes of an ideal image."""
+        return centred
+
+    def _unbent(self, centred: Floats) -> Floats:
+        """The ideal image of what is seen."""
+        return centred
+
+    def calibrated(self, turned: complex) -> Self:
+        """The same camera with s exp(i theta)."""
+        twin = copy(self)  # and what was computed of it: none of that hangs on scale or angle
+        twin._set(scale=float(abs(turned)), angle=float(np.angle(turned)))
+        return twin
+
+    def moved(self, **values: object) -> Self:
+        """The same camera with values that need no check: a search builds very many."""
+        twin = copy(self)
+        twin._set(**values)
+        for name in ("rows", "offset", "matrix") if "normal" in values else ("offset", "matrix"):
+            twin.__dict__.pop(name, None)
+        return twin
+
+    def placed(self, offset: Floats) -> Self:
+        """The same camera at the point of this in-plane offset that is closest to the origin."""
+        return self.moved(position=frozen(offset @ self.rows))
+
+
+def turn(angle: float) -> Floats:
+    """T(theta), shape (2, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, s], [-s, c]])
+
+
+def frozen(array: Floats) -> Floats:
+    """The array, read-only from now on."""
+    array.flags.writeable = False
+    return array
+
+
+def distorted(points: Floats, coefficients: Floats) -> Floats:
+    """Where points of the ideal image, (n, 2), are seen through the lens."""
+    return _distorted(points, coefficients)[0]
+
+
+def undistorted(points: Floats, coefficients: Floats) -> Floats:
+    """Points of the ideal image that are seen at `points`, (n, 2).
+
+    NaN where the model shows none: beyond the circle in which its images do not overlap.
+    """
+    ideal = points.copy()
+    missed = np.zeros_like(points)
+    for _ in range(_STEPS):
+        seen, slope = _distorted(ideal, coefficients)
+        missed = points - seen
+        with np.errstate(over="ignore", invalid="ignore"):
+            determinant = slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] ** 2
+        folded = ~(determinant > 0)  # the image turns over there: no lens does that
+        missed[folded] = np.nan
+        slope[folded] = np.eye(2)
+        step = np.linalg.solve(slope, missed[..., None])[..., 0]
+        ideal = ideal + step
+        if not np.nanmax(np.abs(step), initial=0.0) > _SETTLED:
+            break
+    ideal[~(np.abs(missed).max(axis=1, initial=0.0) < np.sqrt(_SETTLED))] = np.nan
+    return ideal
+
+
+def _distorted(points: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
+    """Where points are seen, (n, 2), and the slope of that, (n, 2, 2)."""
+    k1, k2, p1, p2, k3, k4, k5, k6 = np.pad(coefficients, (0, len(LENS) - len(coefficients)))
+    x, y = points.T
+    with np.errstate(all="ignore"):  # a step of Newton's may lead far away
+        r2 = x**2 + y**2
+        below = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / below
+        growth = k1 + r2 * (2 * k2 + r2 * 3 * k3) - radial * (k4 + r2 * (2 * k5 + r2 * 3 * k6))
+        growth *= 2 / below  # of radial, along x: x times this
+        seen = np.column_stack(
+            (
+                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2),
+                y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y,
+            )
+        )
+        across = x * y * growth + 2 * p1 * x + 2 * p2 * y
+        slope = np.empty((len(points), 2, 2))
+        slope[:, 0, 0] = radial + x**2 * growth + 2 * p1 * y + 6 * p2 * x
+        slope[:, 0, 1] = slope[:, 1, 0] = across
+        slope[:, 1, 1] = radial + y**2 * growth + 6 * p1 * y + 2 * p2 * x
+    return seen, slope
+
+
+def steadied(track: Floats, readout: float, height: int) -> Floats:
+    """What a camera that reads all rows at once would have seen: the track at whole frames."""
+    seen = np.flatnonzero(np.isfinite(track).all(axis=1))
+    if readout == 0 or len(seen) < 4:
+        return track
+    behind = readout * (track[seen, 1] - (height - 1) / 2) / height
+    instants = seen + np.clip(behind, -_LARGEST, _LARGEST)
+    still = track.copy()
+    still[seen] = make_interp_spline(instants, track[seen], k=3)(seen)
+    return still
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,6 +595,45 @@ class OrthographicCamera(Camera):
     @property
     def _last_row(self) -> Floats:
         return np.array([0.0, 0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AffineCamera(OrthographicCamera):
+    """A camera far away of which nothing is known: pixels are an affine map of space.
+
+    Parameters
+    ----------
+    axes : array_like, shape (2, 3)
+        By how many pixels to the right and up the image of a point moves with each coordinate.
+    position, normal, scale, angle, image_size
+        See `Camera`; the scale is 1, as that of the frame is not known, and the angle zero.
+    """
+
+    model: ClassVar[str] = "affine"
+
+    axes: Floats
+
+    def __post_init__(self) -> None:
+        axes = check_array("axes", self.axes)
+        if axes.shape != (2, 3) or np.linalg.matrix_rank(np.nan_to_num(axes)) < 2:
+            raise ValueError(f"axes: must be two independent rows of three, got {shown(axes)}")
+        self._set(axes=frozen(axes))
+        super().__post_init__()
+
+    @property
+    def rows(self) -> Floats:
+        """What stands in the place of R^-: the axes."""
+        return self.axes
+
+    @classmethod
+    def of(cls, down: Floats, centre: Floats, image_size: tuple[int, int]) -> AffineCamera:
+        """The camera that sees x at centre + down @ x, in pixels right and down."""
+        axes = down * _DOWN[:, None]
+        half = (np.array(image_size) - 1) / 2
+        return cls(
+            axes=axes, normal=np.cross(*axes), scale=1.0, angle=0.0, image_size=image_size,
+            position=-np.linalg.pinv(axes) @ ((centre - half) * _DOWN),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -122,24 +684,24 @@ class PerspectiveCamera(Camera):
         super().__post_init__()
         if self.distortion is not None:
             given = check_array("distortion", self.distortion)
-            if given.ndim != 1 or len(given) > len(lens.NAMES) or not np.isfinite(given).all():
+            if given.ndim != 1 or len(given) > len(LENS) or not np.isfinite(given).all():
                 raise ValueError(
-                    f"distortion: must be at most {len(lens.NAMES)} finite numbers, "
-                    f"{', '.join(lens.NAMES)}, got {shown(self.distortion)}"
+                    f"distortion: must be at most {len(LENS)} finite numbers, "
+                    f"{', '.join(LENS)}, got {shown(self.distortion)}"
                 )
-            size = lens.USUAL if len(given) <= lens.USUAL else len(lens.NAMES)
+            size = USUAL if len(given) <= USUAL else len(LENS)
             self._set(distortion=frozen(np.pad(given, (0, size - len(given)))))
 
     def _bent(self, centred: Floats) -> Floats:
         if self.distortion is None:
             return centred
         scale, _ = self.calibration
-        return lens.distorted(scale * centred * _DOWN, self.distortion) * _DOWN / scale
+        return distorted(scale * centred * _DOWN, self.distortion) * _DOWN / scale
 
     def _unbent(self, centred: Floats) -> Floats:
         if self.distortion is None or self.scale is None:
             return centred
-        return lens.undistorted(self.scale * centred * _DOWN, self.distortion) * _DOWN / self.scale
+        return undistorted(self.scale * centred * _DOWN, self.distortion) * _DOWN / self.scale
 
     @property
     def _last_row(self) -> Floats:
@@ -216,7 +778,9 @@ class PerspectiveCamera(Camera):
         return np.stack(ends, axis=-1)
 
 
-MODELS: dict[str, Any] = {kind.model: kind for kind in (OrthographicCamera, PerspectiveCamera)}
+MODELS: dict[str, Any] = {
+    kind.model: kind for kind in (OrthographicCamera, PerspectiveCamera, AffineCamera)
+}
 """The models by their names in the files of rigs."""
 
 

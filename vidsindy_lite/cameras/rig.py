@@ -33,9 +33,7 @@ from ..checks import (
 )
 from ..reading import check_file, read_tree, reading
 from ..repository import write_file
-from .camera import Camera
-from .geometry import rotation_to_z
-from .models import MODELS, OrthographicCamera, all_orthographic, independent
+from .models import MODELS, Camera, OrthographicCamera, all_orthographic, independent, rotation_to_z
 
 _FEWEST = 3  # cameras of which nothing is measured
 _MOST = 100  # cameras of a template
@@ -367,7 +365,7 @@ def _vector(values: Floats) -> str:
 
 def _to_table(camera: Camera) -> dict[str, object]:
     """A camera as plain numbers under the keys of the file; defaults are left out."""
-    known = {} if isinstance(camera, OrthographicCamera) else {"model": camera.model}
+    known = {} if type(camera) is OrthographicCamera else {"model": camera.model}
     for part in fields(camera):
         value = getattr(camera, part.name)
         default = isinstance(value, float) and value == part.default

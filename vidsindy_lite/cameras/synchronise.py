@@ -17,53 +17,313 @@ normal is no reason for a wrong lag.
 
 A motion that repeats itself fits at several lags, one that hardly moves at all of them: then the
 result says so.
+
+The errors of lags are those of least squares, but for residuals that depend on their neighbours,
+and for slopes that are noise: with a share p of motion in the squares of the slopes they are 1 / p
+times as large.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from ..progress import bar
-from .alignment import (
-    Curve,
-    Footage,
-    Lags,
-    align,
-    check_clocks,
-    check_lags,
-    check_rates,
-    list_lags,
-)
-from .calibrate import check_learnable
-from .camera import Camera
-from .changes import PARTS, known_to
-from .messages import ambiguous_lags, blurred_lag, no_lags, unsettled_lags
-from .pairs import promising_lags, rough_cameras
+from .adjust import PARTS, Adjustment, adjust, fitted_factor, known_to
+from .alignment import Curve, Footage, Lags, align, check_clocks, check_lags, check_rates, list_lags
+from .calibrate import Unknowns, agreement, calibrated, check_learnable, posed
+from .models import Camera, all_orthographic, steadied
 from .rig import Rig
-from .shutter import steadied
-from .timing import DISAGREEMENT, Timing
-from .triangulate import Views, check_seen, residuals_of_views, trimmed
-from .unknowns import Unknowns
-from .unmeasured import posed
+from .sight import (
+    TRIMMED,
+    Views,
+    epipolar_equations,
+    epipolar_lines,
+    epipolar_rows,
+    residuals_of_views,
+    trimmed,
+)
+from .triangulate import ALIKE, DISAGREEMENT, FINE, GROSS, check_seen
 
+_OVERLAP = 0.5  # share of the shorter of two videos that both must show
+_BLOCK = 200_000  # pairs of a lag and an instant at a time
+_PROMISING = 4  # lags of each camera, with and without a shift
+_NEAR = 4.0  # frames
+_ROUNDS = 5  # of leaving the others out
+_BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
+_APART = 1.0  # frames; lags closer than that are one and the same
+_PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
+_CLEAR = 4.0  # standard errors by which a clock must drift, ...
+_ENOUGH = 0.05  # ... and frames over the whole video
+_LEAST = 1e-6  # share of a slope that is motion
+_USED = 0.5  # weight of an instant that holds no outlier
+_TIMES = _LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
-ALIKE = 2.0
-"""Ratio of residuals up to which two lags fit equally well, ..."""
-FINE = 0.05
-"""... and residual in pixels below which all do: real tracks are no better than that."""
 
-_INSTANTS = 300  # at which all cameras are compared in the second step
+_INSTANTS = 300  # at which views are compared before all frames are
 _ROUGH_STEPS = 8  # of the second step
 _SHOWN = 3  # of the lags that fit equally well
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 _BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
+
+
+def rough_cameras(views: Views, unknowns: Unknowns) -> tuple[Camera, ...] | None:
+    """Cameras to start a search from, however badly they fit; None if there is no telling.
+
+    What learning asks for, that the motion determines a camera and that no view contradicts it, is
+    not asked for here: it would not hold at a wrong lag, nor with a wrong normal.
+    """
+    cameras = unknowns.cameras
+    if not unknowns.any:
+        return cameras
+    turns = unknowns.uncalibrated
+    if all_orthographic(cameras):
+        equations, _ = agreement(views, unknowns)
+        if len(equations.design) <= equations.design.shape[1]:
+            return None
+        solution = np.linalg.lstsq(equations.design, equations.target)[0]
+        turned = solution[: 2 * len(turns)].view(complex)
+        widths = np.array([cameras[i].image_size[0] for i in unknowns.unplaced])
+        offsets = solution[2 * len(turns) :].reshape(-1, 2) * widths[:, None] / 2
+        return unknowns.filled(turned, offsets) if turned.all() else None
+    for i in turns:
+        one = _turned(views, cameras, int(i))
+        if one == 0:
+            return None
+        cameras = calibrated(cameras, [i], [one])
+    return cameras
+
+
+def _turned(views: Views, cameras: Sequence[Camera], i: int) -> complex:
+    """s exp(i theta) of a camera from those that are calibrated; zero if there is no telling."""
+    design, target = epipolar_equations(cameras, views.tracks, i)
+    fits = np.ones(len(target), bool)
+    turned = 0j
+    for _ in range(_ROUNDS):
+        if fits.sum() <= 4:
+            break
+        solution = np.linalg.lstsq(design[fits], target[fits])[0]
+        missed = np.abs(design @ solution - target)
+        fits, turned = missed <= np.quantile(missed, _BETTER_PART), complex(*solution)
+    return turned
+
+
+def promising_lags(curves: Sequence[Curve], rates: Floats, unknowns: Unknowns) -> list[list[float]]:
+    """Whole lags of each camera behind the first calibrated one, the most promising first."""
+    known = unknowns.known
+    found = []
+    for lags, missed in lag_misses(curves, rates, unknowns):
+        choices = [_dips(lags, part)[:_PROMISING] for part in missed]
+        found.append(_apart(np.concatenate(choices)).tolist() or [0.0])
+    return [*found[:known], [0.0], *found[known:]]
+
+
+def lag_misses(
+    curves: Sequence[Curve],
+    rates: Floats,
+    unknowns: Unknowns,
+    most: int = _INSTANTS,
+    shifts: Sequence[bool] = (False, True),
+) -> Iterator[tuple[Floats, Floats]]:
+    """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
+
+    The misses are those without and with a shift, at so many instants at most.
+    """
+    known = unknowns.known
+    frames = curves[known].clock
+    frames = frames[:: max(1, len(frames) // most)]
+    ends = np.array([curve.clock[-1] + 1 for curve in curves]) / rates  # on the first one's clock
+    for other in range(len(curves)):
+        if other == known:
+            continue
+        margin = _OVERLAP * min(ends[known], ends[other])
+        lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
+        first, second = unknowns.cameras[known], unknowns.cameras[other]
+        placed = first.is_placed and second.is_placed
+        near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
+        lines = epipolar_lines(near, curves[known].at(frames), far)
+        instants, rate = frames / rates[known], rates[other]
+        missed = []
+        for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
+            theirs = curves[other].at((instants - block[:, None]) * rate)
+            missed.append([pair_missed(second, placed, lines, theirs, shift) for shift in shifts])
+        yield lags, np.concatenate(missed, axis=1)
+
+
+def _dips(lags: Floats, missed: Floats) -> Floats:
+    """The lags of the minima, the lowest first."""
+    padded = np.concatenate(([np.inf], missed, [np.inf]))
+    dips = np.flatnonzero((missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed))
+    return _apart(lags[dips[np.argsort(missed[dips])]])
+
+
+def _apart(lags: Floats) -> Floats:
+    """Those that no earlier one is close to: a search goes to the best within a few frames."""
+    kept: list[float] = []
+    for lag in lags:
+        if all(abs(lag - other) >= _NEAR for other in kept):
+            kept.append(lag)
+    return np.array(kept)
+
+
+def pair_missed(
+    other: Camera, placed: bool, lines: tuple[Floats, Floats], theirs: Floats, shift: bool
+) -> Floats:
+    """By how much its pixels, (k, n, 2), miss the epipolar lines at best, (k,), scene units rms.
+
+    `placed` says whether both positions are known, `shift` whether the image may be shifted. One
+    instant in ten is left out. Infinite where too few are left.
+    """
+    design, target = epipolar_rows(lines, other, theirs)
+    if other.is_calibrated:
+        scale, angle = other.calibration
+        design, target = (
+            design[..., :0],
+            target - design @ [scale * np.cos(angle), scale * np.sin(angle)],
+        )
+    extra = lines[0] if shift else np.ones((len(lines[0]), 1)) if not placed else lines[0][:, :0]
+    extra = np.broadcast_to(extra, (*target.shape, extra.shape[1]))
+    design = np.concatenate((design, extra), axis=-1)
+    seen = np.isfinite(target) & np.isfinite(design).all(axis=-1)
+    design, target = np.where(seen[..., None], design, 0), np.where(seen, target, 0)
+    size = np.abs(design).max(axis=(0, 1), initial=0, keepdims=True)
+    design = design / np.where(size > 0, size, 1)
+    fits, unknown = seen, design.shape[-1]
+    for _ in range(2):
+        used = np.where(fits[..., None], design, 0)
+        square = used.swapaxes(-1, -2) @ used
+        right = np.einsum("kni,kn->ki", used, np.where(fits, target, 0))
+        solution = np.einsum(
+            "kij,kj->ki", np.linalg.pinv(square, rcond=1e-10, hermitian=True), right
+        )
+        missed = np.where(seen, np.abs(np.einsum("kni,ki->kn", design, solution) - target), np.nan)
+        enough = fits.sum(axis=1) > 2 * unknown
+        limit = np.nanquantile(np.where(enough[:, None], missed, 0), TRIMMED, axis=1)
+        fits = seen & (missed <= limit[:, None])
+    total = np.sum(np.where(fits, missed, 0) ** 2, axis=1)
+    return np.where(enough, np.sqrt(total / np.maximum(fits.sum(axis=1), 1)), np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Timing:
+    """What was fitted, and to what."""
+
+    footage: Footage
+    cameras: tuple[Camera, ...]
+    fit: Adjustment
+
+    @classmethod
+    def of(
+        cls,
+        footage: Footage,
+        cameras: tuple[Camera, ...],
+        errors: Floats,
+        *,
+        begin: Floats | None = None,
+        most: int | None = None,
+    ) -> Timing | None:
+        """None if the views have too little in common."""
+        fit = adjust(footage, cameras, errors, begin=begin, most=most)
+        told = np.isfinite(fit.misses).any(axis=1).sum()
+        return cls(footage, cameras, fit) if 3 * told > np.isinf(errors[:, _TIMES]).sum() else None
+
+    @property
+    def lags(self) -> Floats:
+        """In frames."""
+        return self.fit.footage.lags
+
+    @property
+    def used(self) -> Bools:
+        """Instants that hold no outlier."""
+        return self.fit.weights > _USED
+
+    @property
+    def missed(self) -> Floats:
+        """Residuals, (m, n, 2)."""
+        return np.stack(np.split(self.fit.misses, len(self.cameras), axis=1))
+
+    @property
+    def residual(self) -> float:
+        """The worst camera's, pixels."""
+        return max(map(trimmed, self.missed))
+
+    @property
+    def score(self) -> float:
+        """The same, if errors are normal but for some outliers: from the better part of them."""
+        return max(trimmed(part, _BETTER_PART) for part in self.missed)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether residuals are small, and not like those of the next frame.
+
+        Noise of the tracks, however large, is no reason to look for other lags.
+        """
+        missed = self.fit.misses[self.used]
+        now, then = missed[:-1], missed[1:]
+        both = np.isfinite(now) & np.isfinite(then)
+        square = max(float(np.sum((now**2)[both])), 1e-300)
+        alike = max(float(np.sum((now * then)[both])) / square, 0.0)
+        misfit = self.score * np.sqrt(alike / _PERSISTENT)
+        return bool(alike <= _PERSISTENT and misfit <= DISAGREEMENT and self.score <= GROSS)
+
+    def near(self, lags: Floats) -> bool:
+        """Whether its lags are those."""
+        return bool(np.abs(self.lags - lags).max() < _APART)
+
+    @property
+    def shares(self) -> Floats:
+        """Share of each lag's squared slope that is motion and not noise, between 0 and 1.
+
+        Interpolated noise has a slope, too: with a variance of half of the noise's, as it is taken
+        between two frames that are two apart.
+        """
+        fit, used = self.fit, self.used
+        slopes = fit.slopes[used].reshape(-1, fit.slopes.shape[-1])
+        parts = np.argwhere(fit.errors > 0)[:, 1]
+        lags, others = slopes[:, parts == _LAG], slopes[:, ~np.isin(parts, _TIMES)]
+        lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
+        # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
+        seen = np.isfinite(self.missed[:, used, 0])
+        views = np.maximum(seen.sum(axis=0), 2)
+        freedom = np.maximum((seen * (2 - 3 / views)).sum(axis=1)[1:], 1e-9)
+        speeds = fit.footage.rates[1:]
+        chance = 0.5 * fit.noise**2 * speeds**2 * (freedom + 2 * np.sqrt(2 * freedom))
+        total = np.sum(lags**2, axis=0)
+        return np.clip((total - chance) / np.maximum(total, 1e-300), 0, 1)
+
+    @property
+    def covariance(self) -> Floats:
+        """Of lags and drifts, if that of cameras is known as well as the tracks tell it."""
+        fit = self.fit
+        factor = fitted_factor(*fit.weighed, fit.prior, fit.noise)
+        covariance = factor @ factor.T
+        cameras, parts = np.argwhere(fit.errors > 0).T
+        order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
+        # Slopes that are noise add to the information, but mend nothing.
+        share = np.append(1.0, np.maximum(self.shares, _LEAST))[cameras[order]]
+        return covariance[np.ix_(order, order)] / np.outer(share, share)
+
+    def drifted(self) -> Timing:
+        """The same with drifts of clocks, if any are clear and large enough to matter."""
+        errors, change = self.fit.errors.copy(), self.fit.change
+        errors[1:, _DRIFT] = np.inf
+        free = Timing.of(self.footage, self.cameras, errors, begin=change)
+        if free is None:
+            return self
+        drift, off = free.fit.change[:, _DRIFT], np.zeros(len(errors))
+        off[1:] = np.sqrt(np.diag(free.covariance))[len(off) - 1 :]
+        clear = np.abs(drift) > np.maximum(_CLEAR * off, _ENOUGH)
+        if not clear.any():
+            return self
+        errors[~clear, _DRIFT] = 0.0
+        begin = np.where(errors > 0, free.fit.change, 0.0)
+        return Timing.of(self.footage, self.cameras, errors, begin=begin) or self
 
 
 def learn_lags(
@@ -226,7 +486,11 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
     told = _told(videos, best.drifted(), first)
     if len(alike) > 1 and not best.near(first):
         choices = [best, *(f for f in alike if f is not best)][:_SHOWN]
-        warning = ambiguous_lags([list_lags(f.lags) for f in choices])
+        lags = " or ".join(f"({list_lags(f.lags)})" for f in choices)
+        warning = (
+            f"the lags of the videos cannot be told: {lags} frames fit about equally well, because "
+            "the motion repeats itself; give the lags if you know them"
+        )
         told = replace(told, warnings=(warning, *told.warnings))
     return told
 
@@ -310,9 +574,12 @@ def _told(videos: _Videos, found: Timing, first: Floats) -> Lags:
     if beside @ information @ beside < count * np.log(found.used.sum()):
         lags = rounded
     blurred = np.flatnonzero(errors > BLURRED)
-    warnings = [blurred_lag(int(i) + 1, lags[i]) for i in blurred]
+    warnings = [_blurred(int(i), lags) for i in blurred]
     if not fit.settled:
-        warnings.append(unsettled_lags(fit.steps))
+        warnings.append(
+            f"the search for the lags of the videos did not converge in {fit.steps} steps: give "
+            "the lags if you know them"
+        )
     return Lags(
         lags, fit.footage.rates, errors, found.residual, tuple(warnings), rate_errors=rate_errors
     )
@@ -326,7 +593,19 @@ def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     if cameras is not None:
         missed = residuals_of_views(Views.of(footage.aligned), cameras)
         residual = max(map(trimmed, missed))
-    warnings = [blurred_lag(i + 1, lags[i]) for i in range(1, len(lags))]
+    warnings = [_blurred(i, lags) for i in range(1, len(lags))]
     if not agree:
-        warnings = [no_lags(list_lags(lags), residual)]
+        left = f"leave {residual:.2g} pixels" if residual < np.inf else "no cameras fit"
+        warnings = [
+            f"no lags of the videos make the views agree: ({list_lags(lags)}) frames were taken, "
+            f"which {left}; check the rig, or give the lags if you know them"
+        ]
     return Lags(lags, videos.rates, errors, residual, tuple(warnings))
+
+
+def _blurred(i: int, lags: Floats) -> str:
+    """That many lags of a video fit."""
+    return (
+        f"the lag of video {i + 1} cannot be told, because the target moves too little or too "
+        f"slowly: {lags[i]:g} frames were taken; give the lags if you know them"
+    )

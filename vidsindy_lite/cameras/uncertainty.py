@@ -19,18 +19,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
-from .adjust import linearised
+from .adjust import PARTS, fitted_factor, known_to, linearised
 from .alignment import Curve, Footage, Lags, check_clocks
-from .changes import PARTS, known_to
-from .covariance import fitted_factor
 from .rig import Rig
-from .triangulate import (
-    check_calibrated,
-    check_views,
-    points_of_views,
-    residuals_of_views,
-    views_of,
-)
+from .sight import points_of_views, residuals_of_views, views_of
+from .triangulate import check_calibrated, check_views
 
 _TRAIL = 0.5  # of the tracks' noise; mp4v made up to .6 of it, Motion JPEG .1
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
-from scipy.stats import beta, chi2
+from scipy.special import betaincc, chdtrc, chdtri
 
 from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
@@ -379,8 +379,8 @@ class Beyond:
         Half more, where errors are all but independent, such as those of tracks in compressed video
         (1.2 was seen).
         """
-        several = self.gain > 1.5 * chi2.isf(1e-4, self.count)
-        return bool(self.count and (several or chi2.sf(self.best, 1) * self.tried < 1e-3))
+        several = self.gain > 1.5 * chdtri(self.count, 1e-4)
+        return bool(self.count and (several or chdtrc(1, self.best) * self.tried < 1e-3))
 
     @property
     def decisive(self) -> bool:
@@ -391,7 +391,7 @@ class Beyond:
         independent errors as are left, one direction seldom has such a share.
         """
         share, others = min(self.best / self.left, 1.0), max(self.left - 1, 0.0) / 2
-        alone = others and beta.sf(share, 0.5, others) * self.tried < 1e-3
+        alone = others and betaincc(0.5, others, share) * self.tried < 1e-3
         most, few = 0.9 * self.left, self.count and 4 * self.count < self.left
         return bool(alone and self.best > most or few and self.gain > most)
 

@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import least_squares
-from scipy.special import exprel
-from scipy.stats import chi2
+from scipy.special import chdtri, exprel
 
 from ..arrays import Bools, Floats, Ints
 from .data import inflation
@@ -152,7 +151,7 @@ def homogeneous(
     wanted = numbers >= 2 * m  # force and drag
     if np.diag(departure)[wanted].sum() > np.diag(covariance)[wanted].sum():
         covariance = departure
-    price = chi2.isf(FALSE_ALARM / (2 * m), df=1)
+    price = chdtri(1, FALSE_ALARM / (2 * m))
     kept = flight.free & ((flight.theta**2 > price * np.diag(covariance)) | (numbers < 2 * m))
     law = Flight.fitted(since, x, kept)
     for mode in () if systematic is None else systematic:

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
-from scipy.stats import chi2
+from scipy.special import chdtri
 from tqdm import tqdm
 
 from ..arrays import Bools, Floats
@@ -275,7 +275,7 @@ def leaves_something_over(problem: Problem, fit: Fit, chance: float = 0.1) -> bo
     if not left_out:
         return False
     _, gain = fit.collocation.linearise(fit.state, searched).newton()
-    return bool(gain > chi2.isf(chance, left_out))
+    return bool(gain > chdtri(left_out, chance))
 
 
 def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from ..arrays import Bools, Floats, Ints
 from .bspline import DEGREE, WIDTH, Segment, basis, normal_band
@@ -289,7 +289,7 @@ def term_penalties(
     degrees = exponents.sum(axis=1)
     equations = exponents.shape[1] if equations is None else equations
     rivals = equations * np.bincount(degrees)[degrees] * 2.0 ** (degrees + 1)
-    return chi2.isf(false_alarm / rivals, df=1)
+    return chdtri(1, false_alarm / rivals)
 
 
 def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:

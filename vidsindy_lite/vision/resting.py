@@ -8,7 +8,6 @@ own is in few of these.
 
 import cv2
 import numpy as np
-from scipy.stats import trim_mean
 
 from ..arrays import Bools, Floats, Floats32, Image
 from .background import light
@@ -89,4 +88,6 @@ def _gain(one: Floats32, other: Floats32) -> float:
     both = np.isfinite(one) & np.isfinite(other)
     if not both.any():
         return 0.0
-    return float(trim_mean(np.log((other[both] + _FAINT) / (one[both] + _FAINT)), _ASIDE))
+    ratios = np.sort(np.log((other[both] + _FAINT) / (one[both] + _FAINT)))
+    aside = int(_ASIDE * len(ratios))
+    return float(ratios[aside : len(ratios) - aside].mean())
