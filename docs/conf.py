@@ -18,6 +18,11 @@ CONTENTS = """
 :caption: The book
 
 docs/guide
+docs/data
+docs/rigs
+docs/films
+docs/laws
+docs/targets
 docs/formats
 docs/results
 docs/paper

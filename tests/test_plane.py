@@ -247,10 +247,11 @@ def test_an_interruption_keeps_the_track(monkeypatch, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (["--targets", "2"], "targets: must be given with --rig, got 2"),
+        (["b.mov"], "rig: must be given for tracks or two videos, got none"),
+        (["--targets", "2"], "targets: must be given with several videos, got 2"),
         (
             ["--up", "0,-1", "--rig", "rig.toml"],
-            "up: must not be given with --rig, got [0.0, -1.0]",
+            "up: must be given with one video alone, got [0.0, -1.0]",
         ),
     ],
 )

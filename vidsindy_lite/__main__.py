@@ -77,6 +77,7 @@ def _discover(options: argparse.Namespace) -> int:
       python -m vidsindy_lite discover swing.mp4 --length 120,80,125,410,0.45
       python -m vidsindy_lite rig-template --output rig.toml           and fill it in
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml
+      python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4               nothing known of the cameras
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml --lag 0,7,0 --degree 2
       python -m vidsindy_lite discover "a/%04d.png" "b/%04d.png" c/ --rig rig.toml --fps 240
       python -m vidsindy_lite discover --tracks a.csv b.csv c.csv --rig rig.toml --fps 30
@@ -102,21 +103,25 @@ def _discover(options: argparse.Namespace) -> int:
         raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
     check_folder_is_free(options.out)
-    alone = options.rig is None
-    if alone and len(options.videos) != 1:
-        raise ValueError("rig: must be given, unless there is one video of a motion in a plane")
+    alone = options.rig is None and len(options.videos) == 1
+    if options.rig is None and len(options.videos) in (0, 2):
+        raise ValueError("rig: must be given for tracks or two videos, got none")
     for name in _OF_A_RIG if alone else _OF_ONE_VIDEO:
         if (value := getattr(options, name)) != COMMANDS["discover"].default(name):
-            rule = f"must {'' if alone else 'not '}be given with --rig"
+            rule = f"must be given with {'several videos' if alone else 'one video alone'}"
             raise ValueError(f"{name}: {rule}, got {value}")
-    rig, videos = None if alone else Rig.load(options.rig), options.videos or None
+    rig, videos = Rig.load(options.rig) if options.rig else None, options.videos or None
     told = {"seed": options.seed, "order": options.order}
     if alone:
         asked = ("degree", *_OF_ONE_VIDEO)
         told |= {name: value for name in asked if (value := getattr(options, name)) is not None}
     else:
         library = check_library(options.degree, options.library)
-        told |= {"rig file": options.rig, "library": str(library), "origin": options.origin}
+        told |= {
+            "rig file": options.rig or "none",
+            "library": str(library),
+            "origin": options.origin,
+        }
         told |= {"orientation": options.orientation}
         told |= {"lags": "learned" if options.lag is None else options.lag}
         told |= {"targets": options.targets} if options.targets != 1 else {}
@@ -174,7 +179,10 @@ def _found(options: argparse.Namespace, rig: Any) -> Any:
     t = None
     if options.fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
-    shared |= {"detector": options.detector, "hints": load_hints(options.rig)}
+    shared |= {
+        "detector": options.detector,
+        "hints": load_hints(options.rig) if options.rig else None,
+    }
     shared |= {"targets": options.targets}
     return discover_from_videos(options.videos, rig, t, **shared)
 
@@ -423,7 +431,8 @@ COMMANDS = {
             "NAME", "which of several targets of these files, by its name there"
         ),
         "--rig": _words(
-            "FILE", "where the cameras stand; not for one video of a motion in a plane"
+            "FILE", "where the cameras stand; without it, three or more are learned from the "
+            "videos alone, or one video is of a motion in a plane"
         ),
         "--length": _words(
             "U1,V1,U2,V2,METRES", "of one video: two marks in its first frame, pixels, and how far "

@@ -18,6 +18,7 @@ from .cameras import (
     Clock,
     Factorised,
     Lags,
+    PerspectiveCamera,
     Rig,
     align,
     check_learnable,
@@ -117,7 +118,7 @@ class Observation:
 
 def observe(
     paths: Sequence[str | Path],
-    rig: Rig,
+    rig: Rig | None = None,
     t: ArrayLike | None = None,
     *,
     lags: Sequence[float] | None = None,
@@ -137,10 +138,12 @@ def observe(
     paths : sequence of path
         One video per camera of the rig: a file, a folder of images, or a pattern of their names,
         see `read_video`.
-    rig : Rig
+    rig : Rig, optional
         Positions and normals of all cameras, scale and angle of at least one. Or of three or more
-        perspective cameras nothing but the scale, which may be rough; then the videos must start
-        within a frame or two of each other, or their lags be given.
+        perspective cameras nothing, the default, or the scale, which may be rough; then the videos
+        must start within a frame or two of each other, or their lags be given. Where that leads to
+        no rig, as for cameras far away or pictures that were cut out, the path is known but for an
+        affine map, and the note of the result's rig says what that leaves of a law.
     t : array_like, shape (n,), optional
         Time of each frame of the first video, increasing; all videos then have the same frame rate.
         By default as the file states, in seconds from its first frame.
@@ -172,9 +175,13 @@ def observe(
         given lags are clearly wrong, or if the cameras cannot be learned (see `learn_cameras`).
         What can be told before a video is tracked is.
     """
-    check_learnable(rig)
+    if rig is not None:
+        check_learnable(rig)
     check_detector(detector)
     check_integer("targets", targets, least=1)
+    if rig is None:
+        videos = check_items("paths", paths)
+        rig = Rig(tuple(PerspectiveCamera(image_size=video_info(one).size) for one in videos))
     if targets > 1:
         _check_several(targets, rig, detector, hints)
     files = _check_paths(paths, rig)
@@ -183,11 +190,11 @@ def observe(
     clocks = [frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     given = _check_lags(lags, clock, names)
-    videos = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
+    films = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
     told = _check_hints(hints, files)
     seen = [
         _track_one(path, shot.frames, detector, hint, targets)
-        for (path, shot), hint in zip(videos, told, strict=True)
+        for (path, shot), hint in zip(films, told, strict=True)
     ]
     tracks = [np.hstack([track.pixels for track in found]) for found in seen]
     check_found(tracks, names, targets)

@@ -98,7 +98,7 @@ class VideoDiscovery(Observation):
 
 def discover_from_videos(
     paths: Sequence[str | Path],
-    rig: Rig,
+    rig: Rig | None = None,
     t: ArrayLike | None = None,
     *,
     lags: Sequence[float] | None = None,

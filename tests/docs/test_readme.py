@@ -38,7 +38,8 @@ def test_every_page_of_docs_can_be_reached_from_the_readme():
 @pytest.mark.usefixtures("tracked_once")
 def test_the_code_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    phone, smallest, own_videos, test_videos = blocks("python")
+    phone, own_videos = blocks("python")
+    smallest, test_videos = blocks("python", PAGES["data"])
     names = {}
     exec(phone, names)
     (typed,) = re.findall(r"^python -m vidsindy_lite (discover throw.*)$", GUIDE, re.MULTILINE)
@@ -49,7 +50,7 @@ def test_the_code_runs(tmp_path, monkeypatch, capsys):
     exec(test_videos, names)  # which writes the files that the last reads
     exec(own_videos, names)
     assert "all true terms found, 0 false" in capsys.readouterr().out
-    printed = re.search(r"^dx/dt.*?(?=^```)", GUIDE, re.DOTALL | re.MULTILINE)[0]
+    printed = re.search(r"^dx/dt.*?(?=^```)", PAGES["data"], re.DOTALL | re.MULTILINE)[0]
     assert NUMBER.sub("", said) == NUMBER.sub("", printed)
     values = [[float(number) for number in NUMBER.findall(text)] for text in (said, printed)]
     np.testing.assert_allclose(*values, rtol=0.2, atol=0.01)
@@ -64,14 +65,14 @@ def test_the_code_of_the_readme_runs(tmp_path, monkeypatch, capsys):
 
 
 def test_the_rig_file_is_one(tmp_path):
-    text = "\n".join(blocks("toml"))  # the second one adds a camera
+    text = "\n".join(blocks("toml", PAGES["rigs"]))  # the second one adds a camera
     (tmp_path / "rig.toml").write_text(text)
     rig = Rig.load(tmp_path / "rig.toml")
     assert [camera.is_calibrated for camera in rig.cameras] == [True, False, False, True]
 
 
 def test_a_line_that_does_not_run_is_seen():
-    code = blocks("python")[1].replace("vl.discover(", "vl.find(")
+    code = blocks("python", PAGES["data"])[0].replace("vl.discover(", "vl.find(")
     with pytest.raises(AttributeError, match="find"):
         exec(code, {})
 
