@@ -341,7 +341,7 @@ def _from_afar(
         t=clock.times,
         x=reconstruct(tracks, found.rig) * np.where(moves, 1.0, 0.0),
         systematic=trailing_errors(tracks, found.rig, motion) * moves,
-        warnings=tuple(doubts),
+        warnings=(*found.lags.warnings, *doubts),
     )
 
 

@@ -29,6 +29,8 @@ _INSTANTS = 300  # at which lags are compared
 _PROMISING = 20  # lags of each view
 _TRIED = 10  # of all of them together, to fractions of a frame
 _STEPS = 30  # of each such search
+_BETTER = 1.25  # times less noise is a reason for one more direction of motion
+_MOVES = 5.0  # times what is left by which a target must move, rms, in every view
 _COMMON = 0.5  # share of the shortest video that all must show
 _NOTE = (
     "nothing is known of the cameras: the path is known but for an affine map, its axes are those "
@@ -72,16 +74,20 @@ def factorised(
         views.best(rank) if lags is None else (views.left(lags, range(len(tracks)), rank), lags)
         for rank in ranks
     ]
-    enough = max(ALIKE * found[-1][0], FINE)
+    enough = max(_BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, _) in zip(ranks, found, strict=True) if left <= enough)
     left, best = found[rank - 1]
     every = views.matrix(best, views.footage.instants, range(len(tracks)))
     every = every[np.isfinite(every).all(axis=1)]
-    if not left <= GROSS:
+    count, middle = len(tracks), every.mean(axis=0)
+    moved = every - middle
+    axes = np.linalg.svd(moved, full_matrices=False)[2]
+    missed = moved - moved @ axes[:rank].T @ axes[:rank]
+    of_views = [
+        (part**2).reshape(len(every), count, 2).mean(axis=(0, 2)) for part in (moved, missed)
+    ]
+    if not (of_views[0] >= _MOVES**2 * of_views[1]).all():
         return None
-    middle = every.mean(axis=0)
-    axes = np.linalg.svd(every - middle, full_matrices=False)[2]
-    count = len(tracks)
     cameras = [
         AffineCamera.of(
             np.sqrt(count) * axes[:3, 2 * i : 2 * i + 2].T, middle[2 * i : 2 * i + 2],
@@ -90,7 +96,10 @@ def factorised(
         for i, camera in enumerate(rig.cameras)
     ]  # fmt: skip
     errors = views.errors(best, rank) if lags is None else np.zeros(count)
-    told = Lags(best, rates, errors, left, clocks=() if clocks is None else tuple(ticks))
+    doubts = () if left <= GROSS else (
+        f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
+    )  # fmt: skip
+    told = Lags(best, rates, errors, left, doubts, clocks=() if clocks is None else tuple(ticks))
     return Factorised(Rig(tuple(cameras), note=_NOTE), told, rank)
 
 
