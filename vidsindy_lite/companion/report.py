@@ -331,6 +331,7 @@ def _page(
         "note": found.rig.note, "driven": found.driven, "limit": DISAGREEMENT,
         "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
     }  # fmt: skip
+    about |= {"unit": getattr(found, "unit", "scene units")}  # metres or pixels of one camera
     law = found.discovery
     about |= {"axes": law.axes, "swing": "" if found.swing is None else str(found.swing)}
     about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
