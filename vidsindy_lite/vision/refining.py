@@ -8,15 +8,15 @@ in one, and is left out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .candidates import Plate
-from .colours import shadowed, whole
 from .pixels import dot, hull, lengths, relit
+from .plate import Plate
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
@@ -32,6 +32,7 @@ _MOSTLY = 0.8  # share of the views that must show it whole
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
 _ASTRAY = 0.3  # of its size, by which a view may be off the way
 _BESIDE = 5  # views before and after such a meeting, which show how large it was and is
+_CORE = np.ones((5, 5), np.uint8)  # a rim of two pixels
 
 
 @dataclass(frozen=True)
@@ -121,9 +122,9 @@ class Lens:
         now: Floats32,
     ) -> View:  # fmt: skip
         """Centroid and area of one connected part; `bound` tells what differs from the ground."""
-        near = cv2.dilate(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        near = cv2.dilate(label.astype(np.uint8), _CORE) > 0
         rim = near & ~label
-        core = cv2.erode(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        core = cv2.erode(label.astype(np.uint8), _CORE) > 0
         square = dot(contrast, contrast)
         alpha = dot(change, contrast) / np.maximum(square, self.least**2)
         alpha = np.clip(alpha, 0, 1)
@@ -286,3 +287,48 @@ def scatter(frames: Ints, places: Floats) -> float:
         return float("inf")
     fourth = sum(c * places[runs + k] for k, c in enumerate((1, -4, 6, -4, 1)))
     return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70))
+
+
+class Whole(NamedTuple):
+    """All that differs from the background in one piece with what has the target's colour.
+
+    `label` (h, w) is where; `colours` (h, w, 3) are those inside it, continued to its edge; `plain`
+    is whether there is hardly another colour.
+    """
+
+    label: Bools
+    colours: Floats32
+    plain: bool
+
+
+def shadowed(now: Floats32, ground: Floats32) -> Bools:
+    """Where (h, w) the same surface is seen in less light: darker by the same in all colours."""
+    ratio = cv2.split((now + 4) / (ground + 4))
+    mean = sum(ratio) / 3
+    apart = np.maximum.reduce(ratio) - np.minimum.reduce(ratio)
+    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < 0.12 * mean))
+
+
+def whole(
+    own: Bools, differs: Bools, other: Bools, now: Floats32, ground: Floats32
+) -> Whole | None:
+    """The whole of which `own` is a part, None if it is not one compact thing.
+
+    Not all that `differs` has an `other` colour: what lies between ground and target is its blur.
+    """
+    shadow = shadowed(now, ground)
+    mask = (own | (differs & ~shadow)).astype(np.uint8)
+    _, labels = cv2.connectedComponents(np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, _CORE)))
+    inside = np.bincount(labels[own], minlength=2)
+    label = labels == 1 + int(inside[1:].argmax()) if inside[1:].any() else own
+    core = cv2.erode(label.astype(np.uint8), _CORE) > 0
+    outline = cv2.fillConvexPoly(np.zeros(label.shape, np.uint8), hull(label), 1)
+    if not core.any() or label.sum() < 0.85 * outline.sum():
+        return None
+    _, nearest = cv2.distanceTransformWithLabels(
+        (~core).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    colours = np.zeros((1 + np.count_nonzero(core), 3), np.float32)
+    colours[nearest[core]] = now[core]
+    plain = (label & other & ~shadow).sum() < 0.15 * label.sum()
+    return Whole(label, colours[nearest], bool(plain))

@@ -12,8 +12,8 @@ from scipy.stats import trim_mean
 
 from ..arrays import Bools, Floats, Floats32, Image
 from .background import light
-from .candidates import Plate
 from .pixels import lengths, relit
+from .plate import Plate
 from .steadying import displacement
 
 _PARTS = 12  # into which each side of an image is cut

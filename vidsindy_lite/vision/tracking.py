@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats, Image
 from ..checks import check_instance
@@ -34,6 +35,7 @@ from .video import read_video
 DETECTORS = ("auto", "background", "learned")
 
 _KEPT = 0.5  # share of the frames below which many of them are lost
+_MOSTLY = 0.75  # share of the frames in which the background model sees a target that it suits
 _SOFT = 1.0  # of a sharp outline it is 0.6, see `Blob`
 _FEW = 0.95  # share of views that are whole, below which a blurred outline cannot be trusted
 _ROUGH = 1.0  # pixels that a track may scatter about a smooth motion
@@ -46,7 +48,7 @@ _MEMORY = 25  # frames after which the target may be anywhere
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The target in each frame of a video.
+    """The target in each frame of a video; `np.asarray` of it is its pixels.
 
     Parameters
     ----------
@@ -77,6 +79,9 @@ class Track:
         confidence = np.where(seen, np.exp(-found.errors / 3), 0.0)
         moves = not np.array_equal(found.maps, np.broadcast_to(np.eye(3), found.maps.shape))
         return cls(found.pixels, confidence, "motion", found.doubts, found.maps if moves else None)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray:
+        return np.array(self.pixels, dtype, copy=copy)
 
     @property
     def in_frames(self) -> Floats:
@@ -150,7 +155,16 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     found, blurred = _track_blobs(frames.reel, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return _follow(frames, samples, target)
-    return replace(found, warnings=model.unrest)
+    found = replace(found, warnings=model.unrest)
+    if detector == "auto" and _seen(found) < _MOSTLY:  # it may cover its own ground
+        other = _follow(frames, samples, target)
+        return other if _seen(other) > _seen(found) + 0.1 else found
+    return found
+
+
+def _seen(found: Track) -> float:
+    """Share of the frames in which the target is seen."""
+    return float(np.isfinite(found.pixels[:, 0]).mean())
 
 
 def _lost(found: Track) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
 from .aligning import Aligned, Ground, align, grounds, pyramid
-from .candidates import Plate
+from .plate import Plate
 from .reducing import ReducedFrames, enlarged
 from .steadying import CameraMotion, carry, displacement
 
