@@ -37,9 +37,13 @@ class Looks(NamedTuple):
 
 
 class Appearance:
-    """A correlation filter and two histograms, of patches that are resampled to one size."""
+    """A correlation filter and two histograms, of patches that are resampled to one size.
 
-    def __init__(self, frame: Image, centre: Floats, size: Floats) -> None:
+    Centres and sizes are in pixels of frames that are reduced by `factor`; the frames are whole.
+    """
+
+    def __init__(self, frame: Image, centre: Floats, size: Floats, factor: int = 1) -> None:
+        self._factor = factor
         self._hann = np.outer(np.hanning(_SIDE), np.hanning(_SIDE)).astype(np.float32)
         t = np.arange(_SIDE) - _SIDE // 2
         peak = np.exp(-(t[:, None] ** 2 + t**2) / (2 * (_SIDE / _WIDE / 12) ** 2))
@@ -50,7 +54,7 @@ class Appearance:
 
     def learn(self, frame: Image, centre: Floats, size: Floats, rate: float) -> None:
         """Take in what the target looks like in one more frame."""
-        patch = _patch(frame, centre, size)
+        patch = self._patch(frame, centre, size)
         z = self._features(patch)
         radius = np.abs(np.mgrid[:_SIDE, :_SIDE] - (_SIDE - 1) / 2) * 2 * _WIDE / _SIDE
         inner, outer = (radius**2).sum(axis=0) < 0.7, (radius > 1.25).any(axis=0)
@@ -69,7 +73,7 @@ class Appearance:
 
     def find(self, frame: Image, centre: Floats, size: Floats) -> tuple[Floats, float, float]:
         """The best place near a centre, the filter's answer there, and that of the histograms."""
-        patch = _patch(frame, centre, size)
+        patch = self._patch(frame, centre, size)
         z = self._features(patch)
         damped = self._power + 0.02 * self._power.mean() + 1e-3
         answer = np.fft.irfft2((self._cross * z).sum(axis=0) / damped, s=(_SIDE, _SIDE))
@@ -82,6 +86,15 @@ class Appearance:
         step = (off - _SIDE // 2) / _SIDE * (_WIDE * size + 4)
         return centre + step, float(answer[y, x]), float(colour[y, x])
 
+    def _patch(self, frame: Image, centre: Floats, size: Floats) -> Image:
+        side = self._factor * (_WIDE * size + 4)
+        low = self._factor * centre + (self._factor - 1 - side) / 2
+        k = 2 * _SIDE  # then halved: a large target is not sampled at single pixels
+        m = np.array([[side[0] / k, 0, low[0]], [0, side[1] / k, low[1]]])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        fine = cv2.warpAffine(frame, m, (k, k), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(cv2.resize(fine, (_SIDE, _SIDE), interpolation=cv2.INTER_AREA), np.uint8)
+
     def _features(self, patch: Image) -> Floats:
         """Fourier transforms of eight gradients and three colours."""
         grey = cv2.cvtColor(patch, cv2.COLOR_BGR2GRAY).astype(np.float32)
@@ -92,16 +105,6 @@ class Appearance:
         lab = cv2.cvtColor(patch, cv2.COLOR_BGR2LAB).astype(np.float32)
         maps += [(x - x.mean()) / s for x, s in zip(cv2.split(lab), (60, 25, 25), strict=True)]
         return np.fft.rfft2(np.array(maps) * self._hann)
-
-
-def _patch(frame: Image, centre: Floats, size: Floats) -> Image:
-    side = _WIDE * np.asarray(size) + 4
-    low = centre - side / 2
-    k = 2 * _SIDE  # then halved: a large target is not sampled at single pixels
-    m = np.array([[side[0] / k, 0, low[0]], [0, side[1] / k, low[1]]])
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    fine = cv2.warpAffine(frame, m, (k, k), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.resize(fine, (_SIDE, _SIDE), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _bins(image: Image) -> Ints:
@@ -133,8 +136,9 @@ def followed(
         Where a path leads; NaN where none does.
     """
     n = len(maps)
+    factor = frames.factor if frames.reel.few else 1
     box, fit = np.full((n, 4), np.nan), np.zeros(n)
-    like = np.zeros(len(found.frame))
+    like = np.ones(len(found.frame))  # of what is not looked at, nothing is said
     bounds = np.searchsorted(found.frame, np.arange(n + 1))
     for way in (1, -1):
         looks: Appearance | None = None
@@ -143,12 +147,12 @@ def followed(
         for i, frame in _in_order(frames, seed[0], way, n):
             here = np.s_[bounds[i] : bounds[i + 1]]
             if looks is None:
-                looks = Appearance(frame, seed[1], size)
+                looks = Appearance(frame, seed[1], size, factor)
                 box[i], fit[i] = [*seed[1], *size], 1.0
                 last = [(i, carry(maps[i], seed[1][None])[0])]
-                like[here] = _likeness(looks, frame, found.box[here])
+                like[here] = _likeness(looks, frame[::factor, ::factor], found.box[here])
                 continue
-            like[here] = _likeness(looks, frame, found.box[here])
+            like[here] = _likeness(looks, frame[::factor, ::factor], found.box[here])
             gap = abs(i - last[-1][0])
             speed = np.zeros(2)
             if len(last) > 1:
@@ -159,28 +163,28 @@ def followed(
             for one in [ahead, *near] if np.isnan(guide[i, 0]) else [ahead, guide[i], *near]:
                 if not any(np.linalg.norm(one - other) < size.min() / 4 for other in tries):
                     tries.append(one)
-            best: tuple[float, Floats, float, float] = (-np.inf, ahead, 0.0, 0.0)
+            best = -np.inf, ahead, 0.0, 0.0, False
             for centre in tries:
                 place, answer, colour = looks.find(frame, centre, size)
                 apart = np.linalg.norm(place - ahead) / (size.max() + 8)
-                moved = (
-                    0.25 if any(np.linalg.norm(place - one) < size.min() / 2 for one in near) else 0
-                )
-                score = 0.7 * answer + 0.3 * colour + moved - 0.1 * apart
+                moved = any(np.linalg.norm(place - one) < size.min() / 2 for one in near)
+                score = 0.7 * answer + 0.3 * colour + 0.25 * moved - 0.1 * apart
                 if score > best[0]:
-                    best = score, place, answer, colour
-            _, place, answer, colour = best
-            inside = ((place >= 0) & (place < frame.shape[1::-1])).all()
+                    best = score, place, answer, colour, moved
+            _, place, answer, colour, moved = best
+            inside = ((place >= 0) & (factor * place < frame.shape[1::-1])).all()
             usual = answer if len(last) == 1 and gap == 1 else usual
-            if not inside or answer < max(0.12, 0.35 * usual):
-                if gap > 60:
+            # What differs from the ground and has its colours may be blurred or turned.
+            sure = answer > max(0.12, 0.35 * usual) or (moved and colour > 0.5)
+            if not (inside and sure):
+                if gap > 60 and np.isnan(guide[i, 0]):
                     break
                 continue
             usual = 0.95 * usual + 0.05 * answer
-            for factor in (0.96, 1.04) if i % 2 else ():
-                there, a, c = looks.find(frame, place, size * factor)
+            for grown in (0.96, 1.04) if i % 2 else ():
+                there, a, c = looks.find(frame, place, size * grown)
                 if a + 0.3 * c > 1.03 * (answer + 0.3 * colour):
-                    place, answer, size = there, a, size * factor
+                    place, answer, size = there, a, size * grown
                     break
             box[i], fit[i] = [*place, *size], answer
             looks.learn(frame, place, size, 0.03)
@@ -189,13 +193,16 @@ def followed(
 
 
 def _in_order(frames: ReducedFrames, first: int, way: int, n: int) -> Iterator[tuple[int, Image]]:
-    """The reduced frames with their numbers from one on, forwards or backwards."""
+    """The frames, reduced if they are many, with their numbers from one on, in both directions."""
+    whole = frames.reel.few
     if way > 0:
-        yield from ((i, frame) for i, frame in zip(range(n), frames, strict=False) if i >= first)
+        forward = frames.reel if whole else frames
+        yield from ((i, frame) for i, frame in zip(range(n), forward, strict=False) if i >= first)
         return
     for last in range(first + 1, 0, -50):
         numbers = range(max(last - 50, 0), last)
-        yield from reversed(list(zip(numbers, frames.some(numbers), strict=False)))
+        some = frames.reel.pick(numbers) if whole else frames.some(numbers)
+        yield from reversed(list(zip(numbers, some, strict=False)))
 
 
 def _near(found: Candidates, like: Floats, ahead: Floats, size: Floats, gap: int) -> list[Floats]:
