@@ -16,7 +16,6 @@ GAP = 15
 """Frames that a path may miss."""
 TOLD = 20.0
 """Quality of a candidate that somebody points at."""
-_GAIN = 0.2  # of quality, that a candidate must exceed to be worth anything
 
 
 class Path(NamedTuple):
@@ -31,7 +30,8 @@ def best_path(seen: Candidates) -> tuple[Ints, float]:
     if not len(seen.frame):
         return np.zeros(0, int), 0.0
     size = seen.size + 2
-    value, before = seen.quality - _GAIN, np.full(len(size), -1)
+    # Of quality, that a candidate must exceed to be worth anything.
+    value, before = seen.quality - 0.2, np.full(len(size), -1)
     speed, bent = np.full((2, len(size), 2), np.nan)
     bounds = np.searchsorted(seen.frame, np.arange(seen.frame[-1] + 2))
     for i in np.unique(seen.frame):

@@ -107,6 +107,8 @@ def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> F
         rows = paths[0].rows if paths else np.zeros(0, int)
         if boxes is not None or (boxes := _covering(seen, rows, seed, n)) is None:
             break
+    if seed is None and boxes is not None and _turns_only(seen, rows):
+        return nothing(film.motion, n)
     guide = np.full((n, 2), np.nan)
     guide[seen.frame[rows]] = seen.centre[rows]
     start = seed or _plainest(seen, rows)
@@ -149,9 +151,11 @@ def _paths(
             return []
         quality = np.where(here, np.where(near & alike, seen.quality + TOLD, -TOLD), seen.quality)
         return [Path(best_path(seen._replace(quality=quality))[0], np.inf)]
+    liked = seen
     if hint is not None and hint.colour is not None:
-        seen = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
-    return [path for path in plainest_paths(seen) if np.median(seen.quality[path.rows]) > 0.05]
+        liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
+    # Of less, noise is made.
+    return [path for path in plainest_paths(liked) if np.median(seen.quality[path.rows]) > 0.2]
 
 
 def _plainest(seen: Candidates, rows: Ints) -> tuple[int, Floats, Floats]:
@@ -188,6 +192,12 @@ def _covering(
     boxes = np.full((n, 4), np.nan)
     boxes[seen.frame[rows]] = seen.box[rows]
     return boxes
+
+
+def _turns_only(seen: Candidates, rows: Ints) -> bool:
+    """Does a thing that covers its own ground leave its place by less than a tenth of its size?"""
+    low, high = np.percentile(seen.place[rows], [5, 95], axis=0)
+    return bool(np.linalg.norm(high - low) < 0.1 * np.median(seen.size[rows]))
 
 
 def _together(
@@ -359,6 +369,8 @@ def _filled(
             if np.linalg.norm(way - rough) < min(0.25 * side[i], _ROUGHLY):
                 pixels[i], errors[i] = way, _ROUGHLY
                 continue
+        if not told and looks.fit[i] < 0.7 * usual:
+            continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         near = near[on[near]]
         shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0

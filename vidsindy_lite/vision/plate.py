@@ -16,8 +16,6 @@ from .background import light, median_image
 from .pixels import relit
 from .steadying import carry
 
-_LARGEST = 2.5  # frames that the plate may hold, side by side
-_FEWEST = 3  # samples that must show a place of the plate
 _STRIP = 128  # rows of a canvas whose median is taken at once
 
 
@@ -53,7 +51,8 @@ class Plate:
             low = np.floor(np.percentile([e.min(axis=0) for e in ends], 5, axis=0))
             high = np.ceil(np.percentile([e.max(axis=0) for e in ends], 95, axis=0))
             middle = carry(maps[known][len(maps[known]) // 2], corners).mean(axis=0)
-            reach = size * np.sqrt(_LARGEST) / 2
+            # Frames that the plate may hold, side by side.
+            reach = size * np.sqrt(2.5) / 2
             low = np.floor(np.maximum(low, middle - 1.5 * reach))
             high = np.minimum(high, middle + 1.5 * reach)
             self.shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
@@ -65,7 +64,8 @@ class Plate:
         moves = [self.shift @ maps[i] for i in use]
         shown = [samples[i] for i in use]  # views: copies would fill the memory
         self.image, count = _masked_median(shown, [shows[i] for i in use], moves, (width, height))
-        self.valid = np.where(count >= _FEWEST, 255, 0).astype(np.uint8)
+        # Samples that must show a place of the plate.
+        self.valid = np.where(count >= 3, 255, 0).astype(np.uint8)
         if hidden is not None:
             self._continue([shows[i] for i in use], moves, count)
 

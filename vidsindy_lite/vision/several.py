@@ -20,12 +20,6 @@ from .moving import Film, Ways, expected, finished, lens_of, nothing, sighted, v
 from .reducing import ReducedFrames
 from .tracking import Track
 
-_MEETINGS = 8  # paths of a target that may follow each other
-_AS_PLAIN = 0.4  # worth of a candidate of a path, relative to those of the plainest
-_APART = 1.3  # sizes between two targets that do not touch
-_ROOM = 2.0  # pixels more
-_STRANGE = 0.2  # share of the frames in which one more thing moves, above which there is doubt
-
 
 def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     """Track so many moving targets of a video, each where it is apart from the others.
@@ -55,7 +49,8 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
     seen, lights = sighted(film, targets=count)
     n = len(lights)
-    paths = plainest_paths(seen, most=count * _MEETINGS)
+    # Paths of a target that may follow each other.
+    paths = plainest_paths(seen, most=count * 8)
     lanes, strange = _lanes(seen, paths, count)
     ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
     touching = _touching(ways)
@@ -79,7 +74,8 @@ def _lanes(
     left = []
     plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
     for path in sorted(paths, key=lambda path: -len(path.rows)):
-        if path.rating / len(path.rows) < _AS_PLAIN * plainest:
+        # Worth of a candidate of a path, relative to those of the plainest.
+        if path.rating / len(path.rows) < 0.4 * plainest:
             continue
         free = [lane for lane in lanes if not any(_overlap(seen, path, other) for other in lane)]
         if free:
@@ -114,7 +110,8 @@ def _touching(ways: list[Ways]) -> list[Bools]:
             apart = np.linalg.norm(one.centre - other.centre, axis=1)
             sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
             with np.errstate(invalid="ignore"):
-                met = apart < _APART * sizes + _ROOM
+                # Sizes, and pixels more, between two targets that do not touch.
+                met = apart < 1.3 * sizes + 2.0
             found[i] |= met
             found[j] |= met
     return found
@@ -125,7 +122,8 @@ def _doubts(
 ) -> tuple[str, ...]:
     """Does one thing more move than there are targets?"""
     longest = max(strange, key=lambda path: len(path.rows), default=None)
-    if longest is None or len(longest.rows) < _STRANGE * frames:
+    # Share of the frames in which one more thing moves, above which there is doubt.
+    if longest is None or len(longest.rows) < 0.2 * frames:
         return ()
     row = longest.rows[len(longest.rows) // 2]
     u, v = factor * seen.place[row]

@@ -34,11 +34,6 @@ from .video import read_video
 
 DETECTORS = ("auto", "background", "learned")
 
-_KEPT = 0.5  # share of the frames below which many of them are lost
-_MOSTLY = 0.75  # share of the frames in which the background model sees a target that it suits
-_SOFT = 1.0  # of a sharp outline it is 0.6, see `Blob`
-_FEW = 0.95  # share of views that are whole, below which a blurred outline cannot be trusted
-_ROUGH = 1.0  # pixels that a track may scatter about a smooth motion
 _GAIN = 0.15  # of confidence, that a sighting has to exceed to be worth anything
 _GAP = 1.0  # price of a gap, in units of confidence: what is seen for a single frame is an error
 _JUMP = 2.0  # price of a jump
@@ -156,7 +151,7 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return _follow(frames, samples, target)
     found = replace(found, warnings=model.unrest)
-    if detector == "auto" and _seen(found) < _MOSTLY:  # it may cover its own ground
+    if detector == "auto" and _seen(found) < 0.75 and model.shows_target():
         other = _follow(frames, samples, target)
         return other if _seen(other) > _seen(found) + 0.1 else found
     return found
@@ -170,7 +165,8 @@ def _seen(found: Track) -> float:
 def _lost(found: Track) -> tuple[str, ...]:
     """Is the target lost in many of the frames from its first to its last?"""
     at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
-    if not len(at) or len(at) >= _KEPT * (between := at[-1] - at[0] + 1):
+    # Share of the frames below which many of them are lost.
+    if not len(at) or len(at) >= 0.5 * (between := at[-1] - at[0] + 1):
         return ()
     lost = between - len(at)
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
@@ -188,7 +184,8 @@ def _plausible(found: Track, hint: Hint | None) -> bool:
         return False
     if hint is None:
         rough = scatter(at, found.pixels[at])
-        return not np.isfinite(rough) or rough < _ROUGH
+        # Pixels that a track may scatter about a smooth motion.
+        return not np.isfinite(rough) or rough < 1.0
     if hint.box is None or hint.frame not in at:
         return False
     middle = np.array(hint.box[:2]) + (np.array(hint.box[2:]) - 1) / 2
@@ -227,7 +224,9 @@ def _track_blobs(reel: Reel, model: BackgroundModel) -> tuple[Track, bool]:
     centroids[~whole] = np.nan
     inside = np.array([b is not None and b.inside for b in blobs])
     soft = [b.softness for b in blobs if b is not None and b.inside]
-    blurred = bool(inside.any() and np.median(soft) > _SOFT and whole[inside].mean() < _FEW)
+    # Of a sharp outline it is 0.6, see `Blob`.
+    # Share of views that are whole, below which a blurred outline cannot be trusted.
+    blurred = bool(inside.any() and np.median(soft) > 1.0 and whole[inside].mean() < 0.95)
     return Track(centroids, np.exp(-distance), "background"), blurred
 
 
