@@ -83,7 +83,7 @@ def _price(
     return np.asarray(np.where(known, turn, start) + 0.6 * resize + colour / 120 + 0.12 * (gap - 1))
 
 
-def plainest_paths(seen: Candidates, most: int = 4) -> list[Path]:
+def plainest_paths(seen: Candidates, most: int = 3) -> list[Path]:
     """Several paths that have nothing in common, the plainest first."""
     left, found = np.arange(len(seen.frame)), []
     for _ in range(most):

@@ -117,16 +117,15 @@ def _with_neighbours(
 
 def _from_neighbours(frame: Image, others: list[tuple[Image, Floats]], moves: bool) -> Floats32:
     """Grey levels (h, w) by which a frame differs from each of its neighbours."""
-    least = None
-    everywhere = np.ones(frame.shape[:2], bool)
+    least = np.full(frame.shape[:2], np.inf, np.float32)
+    bright = np.array(cv2.mean(frame)[:3]) + 1
     for other, move in others:
         if moves:
             other = cv2.warpPerspective(
                 other, move, frame.shape[1::-1], frame.copy(), borderMode=cv2.BORDER_TRANSPARENT
             )
-        apart = lengths(frame - relit(other, light(frame, other, everywhere)))
-        least = apart if least is None else np.minimum(least, apart)
-    assert least is not None
+        lit = (bright / (np.array(cv2.mean(other)[:3]) + 1)).astype(np.float32)
+        least = np.minimum(least, lengths(frame - relit(other, lit)))
     return least
 
 

@@ -357,24 +357,29 @@ def _filled(
     usual = np.median(looks.fit[good & on]) if (good & on).any() else 0.5
     at = np.flatnonzero(good)
     told = seed is not None
-    for i in np.flatnonzero(on & ~good).tolist():
-        if looks.fit[i] < 0.5 * usual and not (told and i == seed[0]):
+    for i in np.flatnonzero(~good & np.isfinite(ways.centre[:, 0])).tolist():
+        if not told and not (len(at) and at[0] < i < at[-1]):
             continue
+        size, view = ways.box[i, 2:].mean(), views[i]
         beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
-        within = len(at) and at[0] < i < at[-1]
-        if not (within or told):
-            continue
         if len(beside) == 8 and np.ptp(beside) < 40:
             way, rough = (_curve(beside - i, pixels[beside], degree) for degree in (3, 2))
-            if np.linalg.norm(way - rough) < min(0.25 * side[i], _ROUGHLY):
+            known = np.linalg.norm(way - rough) < (0.25 * size if told else min(0.25 * size, 2))
+            there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
+            part = np.linalg.norm(there - way) < 0.75 * size
+            if known and (part or (on[i] and looks.fit[i] > 0.5 * usual)):
                 pixels[i], errors[i] = way, _ROUGHLY
                 continue
-        if not told and looks.fit[i] < 0.7 * usual:
+        pointed = seed is not None and i == seed[0]
+        if not pointed and not (on[i] and looks.fit[i] > (0.5 if told else 0.7) * usual):
             continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         near = near[on[near]]
         shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
         pixels[i], errors[i] = alike[i] + shift, _ROUGHLY
+    if not len(at) and np.isfinite(pixels[:, 0]).any():
+        looks_only = "no view tells it from its ground: it is followed by its looks alone"
+        return Followed(pixels, errors, found.maps, (looks_only,))
     return found._replace(pixels=pixels, errors=errors)
 
 
