@@ -333,6 +333,20 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     assert "16 to 19" in doubt
 
 
+@pytest.mark.parametrize(("part", "told"), [(0.99, False), (0.8, True)])
+def test_an_outline_that_changes_from_frame_to_frame_is_told(part, told):
+    square = np.array([[-50.0, -50], [50, -50], [50, 50], [-50, 50]])
+    places = [np.array([90.0 + 3 * k, 90]) for k in range(40)]
+    areas = 1e4 * np.where(np.random.default_rng(0).random(40) < 0.5, part, 1)
+    views = [
+        View(place, area, np.zeros(3), True, place + square)
+        for place, area in zip(places, areas, strict=True)
+    ]
+    found = finished(views, at_rest(40), ())
+    assert any("outline of the target" in doubt for doubt in found.doubts) == told
+    assert (np.median(found.errors) > 2) == told
+
+
 def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are():
     square = np.array([[-5.0, -5], [5, -5], [5, 5], [-5, 5]])
     places = [np.array([20.0 + 3 * k, 50]) for k in range(20)]

@@ -50,6 +50,28 @@ def test_a_ball_that_circles_within_a_few_of_its_own_widths(tmp_path, flicker, h
 
 
 @pytest.mark.parametrize("hinted", [False, True])
+@pytest.mark.parametrize("radius", [30, 45])
+def test_a_large_ball_that_never_leaves_its_own_ground(tmp_path, radius, hinted):
+    rng = np.random.default_rng(2)
+    leaves = 0.45 * radius * np.column_stack([np.sin(ANGLE), np.sin(2.3 * ANGLE + 1)])
+    truth, back = [160, 90] + leaves, texture(rng, 320, 180)
+
+    def frames():
+        for place in truth:
+            image = back.copy()
+            disc(image, place, radius, (210, 60, 30))
+            image += rng.normal(0, 2, image.shape)
+            yield np.clip(image, 0, 255).astype(np.uint8)
+
+    path = write_video(tmp_path / "ball.mov", frames())
+    found = track(path, target=around(truth, 2 * radius + 4) if hinted else None)
+    error = np.linalg.norm(found.pixels - truth, axis=1)
+    assert np.isfinite(error).mean() >= 0.95
+    assert np.nanpercentile(error, 95) < 1
+    assert not found.warnings
+
+
+@pytest.mark.parametrize("hinted", [False, True])
 def test_a_mark_on_a_wheel_whose_tyre_differs_from_the_ground_all_the_time(tmp_path, hinted):
     rng = np.random.default_rng(1)
     back = texture(rng, 240, 200)

@@ -79,6 +79,8 @@ class Film(NamedTuple):
         """The ground, without what is in boxes (n, 4) of the frames."""
         known = np.isfinite(self.motion.errors[self.sampled])
         hide = None if boxes is None else boxes[self.sampled]
+        if hide is not None:  # in the others it may be anywhere
+            known &= np.isfinite(hide[:, 0])
         return Plate(samples, maps[self.sampled], known, hide)
 
 
@@ -98,15 +100,17 @@ def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> F
     film = Film.of(frames, samples)
     seed = hint and hint.boxed(frames.reel.info.size, len(film.maps), film.factor)
     n, boxes = len(film.maps), None
-    for _ in range(2):  # a target that covers its own ground, once more without it
+    for _ in range(4):  # of a target that covers its own ground, until the ground is without it
         seen, lights = sighted(film, boxes)
         n = min(n, len(lights))
         paths = _paths(seen, hint, seed)
         if not paths and seed is None:
             return nothing(film.motion, n)
         rows = paths[0].rows if paths else np.zeros(0, int)
-        if boxes is not None or (boxes := _covering(seen, rows, seed, n)) is None:
+        covered = _covering(seen, rows, n, seed, rims=boxes is None)
+        if covered is None or (boxes is not None and _same(covered, boxes)):
             break
+        boxes = covered
     if seed is None and boxes is not None and _turns_only(seen, rows):
         return nothing(film.motion, n)
     guide = np.full((n, 2), np.nan)
@@ -167,11 +171,12 @@ def _plainest(seen: Candidates, rows: Ints) -> tuple[int, Floats, Floats]:
 
 
 def _covering(
-    seen: Candidates, rows: Ints, seed: tuple[int, Floats, Floats] | None, n: int
+    seen: Candidates, rows: Ints, n: int, seed: tuple[int, Floats, Floats] | None, *, rims: bool
 ) -> Floats | None:
     """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not.
 
-    One that hardly leaves its place shows its rims only: it is all that differs there.
+    Of one that hardly leaves its place a plate with it shows the `rims` only: all that differs
+    there is the target's place.
     """
     if not len(rows):
         return None
@@ -181,7 +186,7 @@ def _covering(
         return None
     low = np.percentile(seen.box[rows, :2], 5, axis=0)
     high = np.percentile(seen.box[rows, :2] + seen.box[rows, 2:], 95, axis=0)
-    if ((high - low) < 2 * np.median(size, axis=0) + 4).all():
+    if rims and ((high - low) < 2 * np.median(size, axis=0) + 4).all():
         beside = (np.abs(seen.centre - (low + high) / 2) < (high - low) / 2 + 2).all(axis=1)
         beside &= seen.area < 2 * (high - low).prod()
         low = np.minimum(low, np.percentile(seen.box[beside, :2], 5, axis=0))
@@ -191,7 +196,16 @@ def _covering(
         return np.tile([*low, *(high - low)], (n, 1))
     boxes = np.full((n, 4), np.nan)
     boxes[seen.frame[rows]] = seen.box[rows]
+    if seed is not None:  # its size is told
+        boxes[seen.frame[rows]] = np.column_stack([centre - seed[2] / 2, 0 * centre + seed[2]])
     return boxes
+
+
+def _same(one: Floats, other: Floats) -> bool:
+    """Are most boxes (n, 4) those of before, by a tenth of their size?"""
+    apart = np.abs(one - other).max(axis=1) / other[:, 2:].mean(axis=1)
+    known = np.isfinite(apart)
+    return bool(known.any() and np.median(apart[known]) < 0.1)
 
 
 def _turns_only(seen: Candidates, rows: Ints) -> bool:
@@ -326,7 +340,14 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
         doubts += (f"from frame {at[good][first]} on, what is followed has another size at once: "
                    "perhaps it is something else",)  # fmt: skip
     pixels[at[good]] = steady[good]
-    errors[at[good]] = np.hypot(scatter(at[good], steady[good]), motion.errors[at[good]])
+    # What is missing of a view is missing on one side of it.
+    side = np.sqrt(np.median(areas[good]))
+    torn = scatter(at[good], np.log(np.maximum(areas[good], 1))[:, None]) * side / 2
+    rough = np.hypot(scatter(at[good], steady[good]), torn if np.isfinite(torn) else 0.0)
+    errors[at[good]] = np.hypot(rough, motion.errors[at[good]])
+    if np.isfinite(torn) and torn > max(LOOSE, 0.02 * side):
+        doubts += (f"the outline of the target changes from frame to frame: its place is known to "
+                   f"{torn:.1f} px only",)  # fmt: skip
     if np.median(motion.errors[at[good]]) > LOOSE:
         error = np.median(motion.errors[at[good]])
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)

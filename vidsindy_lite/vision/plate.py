@@ -16,6 +16,7 @@ from .background import light, median_image
 from .pixels import relit
 from .steadying import carry
 
+_SHOWN = 3  # samples that must show a place of the plate
 _STRIP = 128  # rows of a canvas whose median is taken at once
 
 
@@ -40,6 +41,7 @@ class Plate:
         self.size = size
         self.moves = not np.allclose(maps, np.eye(3))
         self.shift = np.eye(3)
+        self.unsure: Floats32 | float = 0.0
         if not self.moves and hidden is None:
             self.image = median_image(samples)
             self.valid = np.full(self.image.shape[:2], 255, np.uint8)
@@ -64,13 +66,15 @@ class Plate:
         moves = [self.shift @ maps[i] for i in use]
         shown = [samples[i] for i in use]  # views: copies would fill the memory
         self.image, count = _masked_median(shown, [shows[i] for i in use], moves, (width, height))
-        # Samples that must show a place of the plate.
-        self.valid = np.where(count >= 3, 255, 0).astype(np.uint8)
+        self.valid = np.where(count >= _SHOWN, 255, 0).astype(np.uint8)
         if hidden is not None:
             self._continue([shows[i] for i in use], moves, count)
 
     def _continue(self, shows: Sequence[Image], moves: Sequence[Floats], count: Image) -> None:
-        """Ground that the target hides is what is seen of it, or what is around it."""
+        """Ground that the target hides is what is seen of it, or what is around it.
+
+        Such a guess is as unsure as what is around it varies.
+        """
         size = self.image.shape[1::-1]
         covered = np.zeros(self.valid.shape, np.uint8)
         for one, move in zip(shows, moves, strict=True):
@@ -80,6 +84,9 @@ class Plate:
         left, top, width, height = cv2.boundingRect(never)
         if width:
             window = np.s_[max(top - 8, 0) : top + height + 8, max(left - 8, 0) : left + width + 8]
+            known = (never[window] == 0) & (self.valid[window] > 0)
+            spread = np.sqrt(self.image[window][known].var(axis=0).sum()) if known.any() else 0.0
+            self.unsure = np.float32(spread) * never
             self.image[window] = cv2.inpaint(
                 self.image[window], never[window], 3, cv2.INPAINT_TELEA
             )
@@ -145,7 +152,7 @@ def tolerance(plate: Plate, noise: float) -> Floats32:
     slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     # Pixels by which an edge may be displaced, and levels below which nothing differs.
     edge = 0.5 if plate.moves else 0.12
-    bound = np.clip(5 * noise, 8.0, 60.0) + edge * slope.astype(np.float32)
+    bound = np.clip(5 * noise, 8.0, 60.0) + edge * slope.astype(np.float32) + plate.unsure
     if plate.moves:
         bound[plate.valid == 0] = 1e3
     return np.asarray(bound, np.float32)
