@@ -86,7 +86,13 @@ def candidates(
             allowed = cv2.warpPerspective(bound, back, (width, height), borderValue=1e3)
         lit = light(frame, ground, known)
         lights.append(lit)
-        strengths = [lengths(frame - relit(ground, lit)) / allowed * known]
+        differs = lengths(frame - relit(ground, lit))
+        if plate.unsure is not None:  # a guess says nothing of what is within its error
+            unsure = plate.unsure
+            if plate.moves:
+                unsure = cv2.warpPerspective(unsure, back, (width, height))
+            differs = np.maximum(differs - unsure, 0)
+        strengths = [differs / allowed * known]
         if others:
             strengths.append(_from_neighbours(frame, others, plate.moves) / allowed)
         rows = [

@@ -41,7 +41,7 @@ class Plate:
         self.size = size
         self.moves = not np.allclose(maps, np.eye(3))
         self.shift = np.eye(3)
-        self.unsure: Floats32 | float = 0.0
+        self.unsure: Floats32 | None = None
         if not self.moves and hidden is None:
             self.image = median_image(samples)
             self.valid = np.full(self.image.shape[:2], 255, np.uint8)
@@ -152,7 +152,7 @@ def tolerance(plate: Plate, noise: float) -> Floats32:
     slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     # Pixels by which an edge may be displaced, and levels below which nothing differs.
     edge = 0.5 if plate.moves else 0.12
-    bound = np.clip(5 * noise, 8.0, 60.0) + edge * slope.astype(np.float32) + plate.unsure
+    bound = np.clip(5 * noise, 8.0, 60.0) + edge * slope.astype(np.float32)
     if plate.moves:
         bound[plate.valid == 0] = 1e3
     return np.asarray(bound, np.float32)
