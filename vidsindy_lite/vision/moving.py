@@ -164,9 +164,7 @@ def _paths(
     return [path for path in plainest_paths(liked) if np.median(seen.quality[path.rows]) > 0.2]
 
 
-def _tightened(
-    seen: Candidates, seed: tuple[int, Floats, Floats]
-) -> tuple[int, Floats, Floats]:
+def _tightened(seen: Candidates, seed: tuple[int, Floats, Floats]) -> tuple[int, Floats, Floats]:
     """A box that is drawn loosely around one plain thing, close around it."""
     frame, centre, size = seed
     here = (seen.frame == frame) & (np.abs(seen.centre - centre) < size / 4).all(axis=1)
@@ -407,7 +405,9 @@ def _filled(
             if known and (part or (on[i] and looks.fit[i] > 0.5 * usual)):
                 pixels[i], errors[i] = way, _ROUGHLY
                 continue
-        pointed = seed is not None and i == seed[0]
+        if not told and view is not None:  # what hides a part of it draws its looks aside
+            continue
+        pointed = told and i == seed[0]
         if not pointed and not (on[i] and looks.fit[i] > (0.5 if told else 0.7) * usual):
             continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
