@@ -98,7 +98,8 @@ def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> F
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(frames, samples)
-    seed = hint and hint.boxed(frames.reel.info.size, len(film.maps), film.factor)
+    shape = frames.reel.info.size, len(film.maps), film.factor
+    seed = None if hint is None else hint.boxed(*shape)
     n, boxes = len(film.maps), None
     for _ in range(4):  # of a target that covers its own ground, until the ground is without it
         seen, lights = sighted(film, boxes)
@@ -407,7 +408,7 @@ def _filled(
                 continue
         if not told and view is not None:  # what hides a part of it draws its looks aside
             continue
-        pointed = told and i == seed[0]
+        pointed = seed is not None and i == seed[0]
         if not pointed and not (on[i] and looks.fit[i] > (0.5 if told else 0.7) * usual):
             continue
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
