@@ -60,6 +60,7 @@ from vidsindy_lite.study import (
     SYSTEMS,
     Asked,
     add_noise,
+    cramer_rao,
     law_error,
     plots,
     price_curve,
@@ -919,7 +920,7 @@ assert found.native.support.sum() < found.system.support.sum()
 draws, part, noise = (24, 500, 0.05) if full else (3, 300, 0.05)
 axes_moved = np.array([True, True, False])
 sigma = noise * clean[:part].std(axis=0)
-bound = dynamics.cramer_rao(native, t[:part], native.x0, sigma, moving=axes_moved)
+bound = cramer_rao.bound(native, t[:part], native.x0, sigma, moving=axes_moved)
 
 
 def repeat(stream):

@@ -64,6 +64,7 @@ from vidsindy_lite.study import (
     ablations,
     add_noise,
     by_condition,
+    cramer_rao,
     grid,
     plots,
     rate,
@@ -513,7 +514,7 @@ def weakest(name):
     law = SYSTEMS[name]
     t, x = law.trajectory(frames)
     spread, moving = np.std(x, axis=0), [True, True, False]
-    bound = dynamics.cramer_rao(law, t, law.x0, spread, moving).coefficients
+    bound = cramer_rao.bound(law, t, law.x0, spread, moving).coefficients
     needed = bound * np.sqrt(dynamics.term_penalties(law.exponents))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         level = np.where(law.support, np.abs(law.coefficients) / needed, np.inf)

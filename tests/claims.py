@@ -86,7 +86,9 @@ def claims_of(page: Path) -> list[Claim]:
 def _claim(item: str, page: Path) -> Claim:
     """One claim with its checks looked up."""
     text = " ".join(BY.sub("", item).removeprefix("* ").split())
-    text = re.sub(r"\]\((?:notebooks/)?(?=\d\d_)", "](../notebooks/", text)  # as from docs/
+    text = re.sub(r"\]\((?:notebooks/)?(?=\d\d_)", "](../notebooks/", text).replace(
+        "](docs/", "]("
+    )  # as from docs/
     if not (by := BY.search(item)):
         raise ValueError(f"{page.name}: no check is named behind {text!r}")
     checks = tuple(_check(" ".join(check.split()), page) for check in by[1].split("; "))

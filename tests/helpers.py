@@ -4,12 +4,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.vision.candidates import Candidates
+
+REAL = Path(vl.__file__).parents[2] / "shared" / "real"
 
 HEADER = """\
 # ---
@@ -34,6 +37,14 @@ HEADER = """\
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
 """
+
+
+def real(name):
+    """A clip that people filmed, where these are at hand; they are no part of the repository."""
+    path = REAL / f"{name}.mp4"
+    if not path.is_file():
+        pytest.skip("no real footage here")
+    return path
 
 
 def trajectory(rng, n):

@@ -127,7 +127,7 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
         (["--rig", "rig.toml", "--seed", "x"], "seed: must be an integer, got 'x'"),
         (["--rig", "rig.toml", "--order", "3"], "order: must be one of 1, 2, auto, got '3'"),
         (["--rig", "rig.toml", "--loud"], "unrecognized arguments: --loud"),
-        ([], "the following arguments are required: --rig"),
+        ([], "rig: must be given, unless there is one video of a motion in a plane"),
         (["--rig", "rig.toml", "--degree", "0"], "degree: must be an integer of at least 1"),
         (
             ["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"],

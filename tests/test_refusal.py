@@ -60,6 +60,13 @@ def test_other_errors_go_their_way():
         raise OSError("disk")
 
 
+def test_an_interruption_holds_the_tracks_and_is_no_error_to_be_caught():
+    with pytest.raises(KeyboardInterrupt) as caught, refusing("law", [LOOP], ["a"]):
+        raise KeyboardInterrupt
+    assert caught.value.step == "law"
+    np.testing.assert_array_equal(caught.value.tracks[0], LOOP)
+
+
 def test_tracks_of_which_nothing_can_be_learned_come_with_the_refusal():
     _, x = study.SYSTEMS["Lorenz"].trajectory(150)
     rig = vl.Rig.around(x)

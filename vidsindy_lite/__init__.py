@@ -7,7 +7,8 @@
     `------------------ observation ------------------'
     `----------------------------------- pipeline ------------------------------------'
 
-`discover_from_videos` goes all the way; each room can be used by itself. The paper's world
+`discover_from_videos` goes all the way, and `discover_from_video` of one camera, where the motion
+is in a plane; each room can be used by itself. The paper's world
 (benchmark systems, trials, baselines, scores) is `vidsindy_lite.study`, what turns the notebooks
 into figures and pages is `vidsindy_lite.companion`.
 """
@@ -35,6 +36,7 @@ from .dynamics import (
 )
 from .observation import Observation, observe, observe_tracks
 from .pipeline import VideoDiscovery, discover_from_tracks, discover_from_videos
+from .plane import PlaneDiscovery, discover_from_video
 from .vision import (
     Hint,
     Scene,
@@ -51,6 +53,7 @@ __all__ = [
     "discover_from_videos",
     "discover_from_tracks",
     "VideoDiscovery",
+    "discover_from_video",
     "observe",
     "observe_tracks",
     "Observation",

@@ -23,8 +23,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(arguments)
         typed, kept = options.typed, options.kept
         return options.command(options)
-    except KeyboardInterrupt:
-        print(f"\nstopped; {kept}", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"\nstopped; {str(stop) or kept}", file=sys.stderr)
         return 130
     except (ValueError, OSError) as error:
         name, colon, rest = str(error).partition(":")
@@ -63,6 +63,11 @@ def _parser() -> argparse.ArgumentParser:
 def _discover(options: argparse.Namespace) -> int:
     """Find the equations of motion of one target in your own videos, and write a report.
 
+    Of a motion in a plane that faces the camera, such as a throw, a swing or a weight on a spring,
+    one video is enough: --length gives the scale by two marks in its first frame, (u right, v
+    down) in pixels, and the metres between them in that plane; without it, places are in pixels.
+    The report has g, or the period of small swings, with their errors. For all else:
+
     There is one video per camera of the rig file, in its order: cameras at rest, one thing that
     moves. They may start at different times, differ in length and in frame rate; the first one is
     the clock. A video may be a file, a folder of images, or a pattern of their names in quotes.
@@ -70,6 +75,7 @@ def _discover(options: argparse.Namespace) -> int:
     Argus, Tracker, Kinovea, TrackMate, DeepLabCut, SLEAP, detectors and this command write them.
 
     examples:
+      python -m vidsindy_lite discover swing.mp4 --length 120,80,125,410,0.45
       python -m vidsindy_lite rig-template --output rig.toml           and fill it in
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml
       python -m vidsindy_lite discover a.mp4 b.mp4 c.mp4 --rig rig.toml --lag 0,7,0 --degree 2
@@ -86,7 +92,7 @@ def _discover(options: argparse.Namespace) -> int:
     from .cameras import Rig, list_lags
     from .companion.report import PAGE, check_folder_is_free, write_refusal, write_report
     from .dynamics import check_library
-    from .refusal import Refused
+    from .refusal import Refused, Stopped
     from .vision import check_detector
 
     if bool(options.videos) == bool(options.tracks):
@@ -97,30 +103,60 @@ def _discover(options: argparse.Namespace) -> int:
         raise ValueError(f"targets: must be 1 with --tracks, got {options.targets}")
     check_detector(options.detector)
     check_folder_is_free(options.out)
-    rig, videos = Rig.load(options.rig), options.videos or None
-    library = check_library(options.degree, options.library)
-    told = {"rig file": options.rig, "library": str(library), "seed": options.seed}
-    told |= {"order": options.order, "origin": options.origin}
-    told |= {"orientation": options.orientation}
-    told |= {"lags": "learned" if options.lag is None else options.lag}
-    told |= {"targets": options.targets} if options.targets != 1 else {}
+    alone = options.rig is None
+    if alone and len(options.videos) != 1:
+        raise ValueError("rig: must be given, unless there is one video of a motion in a plane")
+    for name in _OF_A_RIG if alone else _OF_ONE_VIDEO:
+        if (value := getattr(options, name)) != COMMANDS["discover"].default(name):
+            rule = f"must {'' if alone else 'not '}be given with --rig"
+            raise ValueError(f"{name}: {rule}, got {value}")
+    rig, videos = None if alone else Rig.load(options.rig), options.videos or None
+    told = {"seed": options.seed, "order": options.order}
+    if alone:
+        asked = ("degree", *_OF_ONE_VIDEO)
+        told |= {name: value for name in asked if (value := getattr(options, name)) is not None}
+    else:
+        library = check_library(options.degree, options.library)
+        told |= {"rig file": options.rig, "library": str(library), "origin": options.origin}
+        told |= {"orientation": options.orientation}
+        told |= {"lags": "learned" if options.lag is None else options.lag}
+        told |= {"targets": options.targets} if options.targets != 1 else {}
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
     told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
     try:
-        found = _found(options, rig)
-    except Refused as refused:
+        found = _found_in_plane(options) if alone else _found(options, rig)
+    except (Refused, Stopped) as refused:
+        if isinstance(refused, Stopped) and not videos:  # its tracks are there already
+            raise KeyboardInterrupt from None
         try:
             write_refusal(refused, videos, rig, options.out, told)
         except (ValueError, OSError) as error:
             raise ValueError(f"{refused}; the tracks could not be drawn: {error}") from None
         page = Path(options.out) / PAGE
+        if isinstance(refused, Stopped):
+            raise KeyboardInterrupt(f"the tracks are kept beside {page}") from None
         raise ValueError(f"{refused}; the tracks are drawn in {page}") from None
     # First the law: if the report cannot be written, it is not lost.
-    lags = list_lags(found.lags.frames)
-    print(f"{found}\nstatus: {found.status}; lags of the videos: {lags} frames", flush=True)
+    lags = "" if alone else f"; lags of the videos: {list_lags(found.lags.frames)} frames"
+    print(f"{found}\nstatus: {found.status}{lags}", flush=True)
     write_report(found, videos, options.out, told, progress=True)
     print(f"report: {Path(options.out) / PAGE}")
     return 0 if found.status == "ok" else 1
+
+
+def _found_in_plane(options: argparse.Namespace) -> Any:
+    """The law of a motion in a plane, in the film of one camera."""
+    from .checks import check_vector
+    from .plane import discover_from_video
+    from .vision import Hint
+
+    names = (*_OF_ONE_VIDEO, "fps", "detector", "degree", "seed")
+    given = {name: getattr(options, name) for name in names}
+    given |= {"order": "auto" if options.order == "auto" else int(options.order)}
+    if options.hint is not None:
+        frame, *box = check_vector("hint", options.hint, 5)
+        given["hint"] = Hint(frame=int(frame), box=tuple(box))
+    return discover_from_video(options.videos[0], progress=True, **given)
 
 
 def _found(options: argparse.Namespace, rig: Any) -> Any:
@@ -283,6 +319,8 @@ def _compare(options: argparse.Namespace) -> int:
 # ------------------------------------------------------------------------------------ their options
 
 
+_OF_ONE_VIDEO = ("length", "length_error", "up", "corners", "hint")
+_OF_A_RIG = ("library", "lag", "targets", "origin", "orientation")
 _KEPT = "files are as they were"  # as they are written in one step, at the end
 
 
@@ -299,6 +337,10 @@ class _Command(NamedTuple):
     typed: dict[str, str] = {}
     kept: str = _KEPT
 
+    def default(self, name: str) -> Any:
+        """What an option is if it is not given."""
+        return self.options[f"--{name.replace('_', '-')}"].get("default")
+
 
 COMMANDS = {
     "discover": _Command(_discover, "from your own videos and a rig file to a report on the law", {
@@ -310,7 +352,28 @@ COMMANDS = {
         "--individual": words(
             "NAME", "which of several targets of these files, by its name there"
         ),
-        "--rig": words("FILE", "where the cameras stand", required=True),
+        "--rig": words("FILE", "where the cameras stand; not for one video of a motion in a plane"),
+        "--length": words(
+            "U1,V1,U2,V2,METRES", "of one video: two marks in its first frame, pixels, and how far "
+            "they are apart in the plane of the motion", type=as_numbers
+        ),
+        "--length-error": words(
+            "SHARE", "standard error of that length, as a share of it (default: 0.01)",
+            type=as_number(float, "a number"), default=0.01
+        ),
+        "--up": words(
+            "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "
+            "lower one first (default: 0,-1)", type=as_numbers
+        ),
+        "--corners": words(
+            "U1,V1,...,WIDTH,HEIGHT", "of one video seen askew, in place of --length: the corners "
+            "of a rectangle in that plane, from its lower left to its lower right and round, and "
+            "its sides in metres", type=as_numbers
+        ),
+        "--hint": words(
+            "FRAME,U,V,WIDTH,HEIGHT", "of one video: a frame and a box around the target in it",
+            type=as_numbers
+        ),
         "--out": words("DIR", "folder of the report (default: report)", default="report"),
         "--lag": words(
             "0,L2,L3", "by how many frames of the first video each one starts later; the default "

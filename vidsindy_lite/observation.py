@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from tqdm import tqdm
 
 from .arguments import check_hints, check_lags, check_paths, check_several, check_shots
 from .arrays import Floats
@@ -39,6 +38,7 @@ from .cameras import (
 )
 from .checks import check_choice, check_integer, check_items, check_tracks
 from .dynamics import smooth as smooth_curves
+from .progress import bar
 from .refusal import Refused, refusing
 from .vision import (
     Hint,
@@ -112,7 +112,7 @@ def observe(
     detector: str | os.PathLike = "auto",
     hints: Sequence[Hint | None] | None = None,
     targets: int = 1,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Observation:
     """Track a target in the videos of several fixed cameras and reconstruct its path.
 
@@ -143,8 +143,8 @@ def observe(
         How many targets there are. Several are followed wherever they are apart, and told from each
         other by geometry: in three or more views of a measured rig that start together, or whose
         lags are given. The first is furthest left where the first view first tells them apart.
-    progress : bool
-        Show progress bars.
+    progress : bool, optional
+        Whether progress bars are shown; by default after two seconds, if a person watches.
 
     Returns
     -------
@@ -171,7 +171,7 @@ def observe(
     clocks = [frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
     given = check_lags(lags, clock, names)
-    videos = tqdm(list(zip(files, shots, strict=True)), desc="track", disable=not progress)
+    videos = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
     told = check_hints(hints, files)
     seen = [
         _track_one(path, shot.frames, detector, hint, targets)
@@ -191,7 +191,7 @@ def observe_tracks(
     *,
     lags: Sequence[float] | str | None = None,
     names: Sequence[str] | None = None,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Observation:
     """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
 
@@ -210,8 +210,8 @@ def observe_tracks(
         the times of each track by its own clock, if rates differ or frames are missing.
     names : sequence of str, optional
         What messages call the tracks.
-    progress : bool
-        Show progress bars.
+    progress : bool, optional
+        Whether progress bars are shown; by default after two seconds, if a person watches.
 
     Returns
     -------
@@ -245,7 +245,7 @@ def _observed(
     lags: Floats | None,
     names: Sequence[str],
     doubts: Sequence[str] = (),
-    progress: bool = False,
+    progress: bool | None = None,
     synchronous: bool = False,
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
@@ -307,7 +307,7 @@ def _several_observed(
     lags: Floats | None,
     names: Sequence[str],
     doubts: Sequence[str],
-    progress: bool,
+    progress: bool | None,
 ) -> Observation:
     """What the tracks (n_i, 2 k) of k targets tell: once told apart, they are one long track."""
     count, begun = raw[0].shape[1] // 2, np.zeros(len(raw)) if lags is None else lags

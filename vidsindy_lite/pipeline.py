@@ -17,6 +17,8 @@ from .dynamics import (
     Form,
     Library,
     PolynomialSystem,
+    Quantity,
+    Swing,
     check_library,
     check_order,
     check_orientation,
@@ -49,9 +51,38 @@ class VideoDiscovery(Observation):
 
         In gaps, too, that the law bridges; NaN elsewhere.
         """
-        curve = self.discovery.curve(self.t)[:, : self.x.shape[1]]
-        turn = self.discovery.orientation
-        return curve if turn is None else curve @ turn
+        law = self.discovery
+        m = law.system.states // law.system.order
+        turn = np.eye(self.x.shape[1])[:m] if law.orientation is None else law.orientation
+        still = np.nanmean(self.x - self.x @ turn.T @ turn, axis=0)  # of what the law does not move
+        return law.curve(self.t)[:, :m] @ turn + still
+
+    @property
+    def swing(self) -> Swing | None:
+        """The circle to which the target is bound, and the law of its angle; None elsewhere."""
+        return self.discovery.swing
+
+    @property
+    def g(self) -> Quantity | None:
+        """The pull of gravity on what flies, or swings on a circle; None of other motions."""
+        if self.swing is not None:
+            return self.swing.g
+        return next((q for q in self.discovery.physics() if q.name == "g"), None)
+
+    @property
+    def period(self) -> Quantity | None:
+        """Of small swings: of the coordinate or mode that moves most; None if nothing swings."""
+        law = self.discovery if self.swing is None else self.swing.law
+        said = [q for q in law.physics() if q.name.startswith("period")]
+        return min(said, key=lambda q: self._left_of(float(q.value)), default=None)
+
+    def _left_of(self, period: float) -> float:
+        """Squares that oscillations of one period leave of the path."""
+        seen = np.isfinite(self.x[:, 0])
+        phase = 2 * np.pi * self.t[seen] / period
+        waves = np.column_stack([np.ones_like(phase), np.cos(phase), np.sin(phase)])
+        left = self.x[seen] - waves @ np.linalg.lstsq(waves, self.x[seen], rcond=None)[0]
+        return float((left**2).sum())
 
     @property
     def driven(self) -> str:
@@ -80,7 +111,7 @@ def discover_from_videos(
     origin: str = "learn",
     orientation: str = "data",
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> VideoDiscovery:
     """Discover the governing equations of a target filmed by several fixed cameras.
 
@@ -128,7 +159,7 @@ def discover_from_tracks(
     origin: str = "learn",
     orientation: str = "data",
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> VideoDiscovery:
     """Discover the governing equations of a target from tracks that are there already.
 

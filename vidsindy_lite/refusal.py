@@ -33,13 +33,27 @@ class Refused(ValueError):
         self.tracks = tuple(tracks)
 
 
+class Stopped(KeyboardInterrupt):
+    """An interruption when there were tracks already; see `Refused`."""
+
+    def __init__(self, step: str, tracks: Sequence[Floats]) -> None:
+        super().__init__("stopped before there was a law")
+        self.step = step
+        self.tracks = tuple(tracks)
+
+
 @contextmanager
 def refusing(step: str, tracks: Sequence[Floats], names: Sequence[str]) -> Iterator[None]:
-    """What cannot be done in a step, as a refusal that says where to look first."""
+    """What cannot be done in a step, as a refusal that says where to look first.
+
+    And an interruption with the tracks, which took the longest.
+    """
     try:
         yield
-    except Refused:
+    except (Refused, Stopped):
         raise
+    except KeyboardInterrupt:
+        raise Stopped(step, tracks) from None
     except ValueError as error:
         message = f"{error}; likely causes, in this order: {_likely_causes(step, tracks, names)}"
         raise Refused(message, step, tracks) from None
@@ -52,6 +66,8 @@ def _likely_causes(step: str, tracks: Sequence[Floats], names: Sequence[str]) ->
         if any(map(_is_strange, np.split(track, track.shape[1] // 2, axis=1)))
     ]  # fmt: skip
     tracker = "the tracker" + (f" (look at {', '.join(strange)})" if strange else "")
+    if len(tracks) == 1:
+        return tracker
     if strange or step == "track":
         return f"{tracker}, the lags, the rig"
     return f"the lags, the rig, {tracker}" if step == "lags" else f"the rig, the lags, {tracker}"

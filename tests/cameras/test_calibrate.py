@@ -12,6 +12,7 @@ from vidsindy_lite.cameras import (
     OrthographicCamera,
     Rig,
     calibration_errors,
+    check_learnable,
     learn_cameras,
     learn_cameras_eq4,
     learn_cameras_lbfgs,
@@ -110,8 +111,10 @@ class TestRig:
             Rig(cameras)
 
     def test_needs_two_cameras(self, small):
-        with pytest.raises(ValueError, match="cameras: must be two or more, got 1"):
-            Rig(small[1].cameras[:1])
+        with pytest.raises(ValueError, match="rig: must hold two or more cameras, got 1"):
+            check_learnable(Rig(small[1].cameras[:1]))
+        with pytest.raises(ValueError, match="cameras: must be one or more, got none"):
+            Rig([])
         for none in (None, small[1].cameras[0], 3):
             with pytest.raises(ValueError, match="cameras.*: must be"):
                 Rig(none)

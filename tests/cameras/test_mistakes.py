@@ -38,7 +38,11 @@ def flipped(axis, what):
         k = int(rng.integers(3))
         given = [track.copy() for track in tracks]
         given[k][:, axis] = rig.cameras[k].image_size[axis] - 1 - given[k][:, axis]
-        return given, f"{NAMES[k]} {what}"
+        # Without an angle, which is learned, they are the same but for half a turn; and half a turn
+        # of all that was learned is that of the one camera that is known.
+        free = "mirrored, or with v counted upwards"
+        known = all(camera.is_calibrated for camera in rig.cameras)
+        return given, f"{NAMES[k]} {what if known else free}"
 
     return flip
 
@@ -69,9 +73,10 @@ def named(cause, seed):
     return found is not None and what in found.text and found.lags.residual < 1
 
 
+@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("cause", CAUSES)
-def test_a_mistake_is_named(cause):
-    assert named(cause, 1)
+def test_a_mistake_is_named(cause, seed):
+    assert named(cause, seed)
 
 
 @pytest.mark.thorough

@@ -229,7 +229,7 @@ def test_missing_rows_and_several_trajectories():
     ("systematic", "message"),
     [
         (np.zeros((2, 9, 2)), r"systematic: must have shape \(k, 10, 2\), got \(2, 9, 2\)"),
-        (np.zeros((10, 2)), "systematic: must be one array per trajectory"),
+        (np.zeros((10, 2)), r"systematic: must have shape \(k, 10, 2\), got \(10, 2\)"),
         (np.full((1, 10, 2), np.nan), "systematic: must be finite where x is"),
         (-1, r"systematic: must have shape \(k, n, d\), got -1"),
     ],

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from vidsindy_lite.__main__ import main
 from vidsindy_lite.cameras import Rig
 from vidsindy_lite.repository import PACKAGE
 
@@ -37,8 +38,12 @@ def test_every_page_of_docs_can_be_reached_from_the_readme():
 @pytest.mark.usefixtures("tracked_once")
 def test_the_code_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    smallest, own_videos, test_videos = blocks("python")
+    phone, smallest, own_videos, test_videos = blocks("python")
     names = {}
+    exec(phone, names)
+    (typed,) = re.findall(r"^python -m vidsindy_lite (discover throw.*)$", GUIDE, re.MULTILINE)
+    assert main(typed.split()) == 0
+    assert re.search(r"`(g = [\d.]+ ± [\d.]+)`", GUIDE)[1] in capsys.readouterr().out
     exec(smallest, names)
     said = capsys.readouterr().out
     exec(test_videos, names)  # which writes the files that the last reads
@@ -66,7 +71,7 @@ def test_the_rig_file_is_one(tmp_path):
 
 
 def test_a_line_that_does_not_run_is_seen():
-    code = blocks("python")[0].replace("vl.discover(", "vl.find(")
+    code = blocks("python")[1].replace("vl.discover(", "vl.find(")
     with pytest.raises(AttributeError, match="find"):
         exec(code, {})
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import cholesky_banded
 
-from vidsindy_lite.dynamics import bspline as banded
-from vidsindy_lite.dynamics.bspline import BLOCK, normal_band, rows_from, solve_factored
+from vidsindy_lite.dynamics.bspline import normal_band, rows_from, solve_factored
+
+BLOCK = 48  # rows that are solved at once
 
 
 @pytest.mark.parametrize("alike", [1, 2])
@@ -40,13 +41,12 @@ def test_many_right_hand_sides_are_solved_for(n, reach):
 
 
 @pytest.mark.parametrize("held", [1, 2, 3])
-def test_a_solution_is_the_same_however_many_blocks_are_held_at_once(held, monkeypatch):
+def test_a_solution_is_the_same_however_many_blocks_are_(held):
     rng = np.random.default_rng(held)
     band = np.vstack((np.ones(5 * BLOCK - 7), rng.uniform(-0.2, 0.2, (3, 5 * BLOCK - 7))))
     right = rng.normal(size=(band.shape[1], 4))
     at_once, in_parts = right.copy(), right.copy()
     solve_factored(band, at_once)
-    monkeypatch.setattr(banded, "UNROLLED", held)
-    solve_factored(band, in_parts)
+    solve_factored(band, in_parts, held=held)
     assert (at_once == in_parts).all()
     assert not np.allclose(at_once, right)

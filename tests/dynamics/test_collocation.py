@@ -7,9 +7,8 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from vidsindy_lite.dynamics.bspline import Segment
-from vidsindy_lite.dynamics.collocation import Collocation, Status, _without_systematic
+from vidsindy_lite.dynamics.collocation import Collocation, State, Status, _without_systematic
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.model import State
 
 
 @pytest.fixture

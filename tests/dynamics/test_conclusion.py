@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from helpers import posed
 
+from vidsindy_lite.dynamics.collocation import State
 from vidsindy_lite.dynamics.inference import _pruned, infer
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.model import State
 from vidsindy_lite.dynamics.path import FINAL_WEIGHT, LARGEST, History, follow
 from vidsindy_lite.dynamics.problem import fit_curves
 

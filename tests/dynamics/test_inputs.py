@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.library import Input
+from vidsindy_lite.dynamics.library import Input, jumps
 from vidsindy_lite.dynamics.result import Discovery
 
 T = np.linspace(0, 40, 800)
@@ -129,9 +131,71 @@ def test_slopes_are_refused_where_an_input_of_the_law_is_not_known():
     assert np.isfinite(free.predict([0.1, 0.2, 42.0])).all()  # nothing of it hangs on the input
 
 
+SWITCHED = np.array([5.0, 9.0, 12.5, 21.0, 30.0])  # among the samples
+
+
+def relay(t):
+    return np.searchsorted(SWITCHED, t, side="right") % 2
+
+
+def charged(rate=0.8, gain=2.0):
+    """The exact answer of x' = -rate x + gain relay(t) at a fine grid of times."""
+    x, answer = 0.0, []
+    for before, after in zip(np.append(CLOCK[:1], CLOCK[:-1]), CLOCK, strict=True):
+        level = gain / rate * relay(before)
+        x = level + (x - level) * np.exp(-rate * (after - before))
+        answer.append(x)
+    return np.array(answer)[:, None]
+
+
+CLOCK = np.arange(0, 40, 0.1)
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        Library.inputs(CLOCK, {"u": relay(CLOCK)}, hold="zero"),
+        Library.terms({"u": lambda t: relay(t).astype(float)}),
+    ],
+    ids=["samples", "function"],
+)
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_where_an_input_jumps_so_does_the_slope(known, noise):
+    found = vl.discover(CLOCK, noisy(charged(), noise), library=Library.polynomial(1) + known)
+    law = found.system
+    assert found.status == "ok"
+    assert terms(law, "x") == {"x", "u"}
+    rows = [law.terms.index(term) for term in ("x", "u")]
+    off = law.coefficients[rows, 0] - (-0.8, 2.0)
+    assert (np.abs(off) < 4 * found.standard_errors[rows, 0]).all()
+    assert noise or np.abs(off).max() < 1e-5
+
+
+def test_samples_that_jump_are_held_and_that_is_told():
+    with pytest.warns(UserWarning, match="inputs: u jumps, as at t = 5, .*hold='zero'"):
+        told = Input.of("u", CLOCK, relay(CLOCK))
+    s = np.arange(0.05, 39, 0.1)
+    np.testing.assert_array_equal(told(s), relay(s))
+    for hold in ("linear", "cubic"):  # who says so is not told
+        assert not np.array_equal(Input.of("u", CLOCK, relay(CLOCK), hold)(s), relay(s))
+
+
+@given(st.lists(st.floats(0.01, 9.99), min_size=1, max_size=4), st.integers(50, 200))
+def test_jumps_are_found_where_they_are(times, n):
+    times = np.unique(times)
+    t = np.linspace(0, 10, n)
+    apart = np.unique(np.searchsorted(t, times)).size == times.size  # one an interval
+    found = jumps(lambda s: np.sin(s) + np.searchsorted(times, s, side="right"), t)
+    if apart:
+        np.testing.assert_allclose(found, times, atol=1e-6)
+    assert all(np.abs(times - one).min() < 1e-6 for one in found)
+    assert jumps(np.tanh, t).size == 0
+    assert jumps(lambda s: np.tanh(1e3 * (s - 5)), t).size == 0  # steep, and yet none
+
+
 def test_an_input_is_a_spline_and_unknown_outside():
     t = np.array([0.0, 1.0, 2.5, 3.0, 4.0])
-    u = Input.of("u", t, np.sin(t))
+    u = Input.of("u", t, np.sin(t), "cubic")
     s = np.linspace(0, 4, 41)
     np.testing.assert_array_equal(u(s), CubicSpline(t, np.sin(t))(s))
     assert np.isnan(u(np.array([-0.1, 4.1]))).all()

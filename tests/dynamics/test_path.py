@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import path as paths
-from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
+from vidsindy_lite.dynamics.collocation import Collocation, Fit, State, Status
 from vidsindy_lite.dynamics.data import check_trajectory
 from vidsindy_lite.dynamics.library import Library
-from vidsindy_lite.dynamics.model import Form, PolynomialSystem, State
+from vidsindy_lite.dynamics.model import Form, PolynomialSystem
 from vidsindy_lite.dynamics.path import LARGEST, History, Path, Plateau
 from vidsindy_lite.dynamics.problem import fit_curves, pose
 from vidsindy_lite.dynamics.solver import discover

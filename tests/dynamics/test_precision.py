@@ -176,3 +176,34 @@ def test_fewer_errors_than_stretches_have_precisions_too(n):
     precision = weighing._factors(residual, [np.linspace(1, 2, n)])
     assert precision.shape == (n,)
     assert (np.isfinite(precision) & (precision >= 0)).all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])
+@pytest.mark.parametrize(
+    ("slopes", "start"),
+    [
+        ({"x": {"x": -20.0}}, [1.0]),
+        ({"x": {"1": 8.0, "x": -16.0}}, [3.0]),
+        ({"x": {"x": -25.0, "y": 1.0}, "y": {"y": -0.5}}, [1.0, 1.0]),
+    ],
+    ids=["a decay", "mixing", "a stiff start"],
+)
+def test_a_transient_of_few_samples_is_the_laws_and_no_error(slopes, start, noise):
+    law, t = PolynomialSystem.from_terms(slopes), np.linspace(0, 5, 100)
+    x = law.simulate(t, start)
+    x += noise * np.random.default_rng(0).standard_normal(x.shape)
+    found = vl.discover(t, x, degree=1, order=1)
+    assert not any("far from those" in warning for warning in found.warnings)
+    rows = [found.system.terms.index(term) for term in law.terms]
+    off, kept = found.coefficients[rows] - law.coefficients, law.support
+    if noise < 1e-2:
+        np.testing.assert_array_equal(found.system.support[rows], kept)
+        assert (np.abs(off[kept]) < 4 * found.standard_errors[rows][kept]).all()
+
+
+def test_a_wrong_sample_is_told_where_the_law_does_not_meet_it():
+    x = LAW.simulate(TIMES, [2.0, 0.0])
+    x[400] += 100.0
+    found = vl.discover(TIMES, x)
+    assert (found.system.support == LAW.support).all()
+    assert any(f"t = {TIMES[400]:g}" in warning for warning in found.warnings)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from helpers import posed
 
-from vidsindy_lite.dynamics.collocation import Fit, Status
+from vidsindy_lite.dynamics.collocation import Fit, State, Status
 from vidsindy_lite.dynamics.frames import as_shifted, cheapest_at, closed, nearer_home
 from vidsindy_lite.dynamics.library import Library
-from vidsindy_lite.dynamics.model import Form, State
+from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.noise import residual_noise
 from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, pose, term_penalties
 from vidsindy_lite.study import SYSTEMS

@@ -9,10 +9,9 @@ from helpers import dependent, posed
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import PolynomialSystem, solver
 from vidsindy_lite.dynamics.bspline import Segment
-from vidsindy_lite.dynamics.collocation import Collocation, Fit, Status
+from vidsindy_lite.dynamics.collocation import Collocation, Fit, State, Status
 from vidsindy_lite.dynamics.inference import _kicks
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.model import State
 from vidsindy_lite.dynamics.noise import OCTAVE, _bands, evidence
 from vidsindy_lite.dynamics.path import first_law
 

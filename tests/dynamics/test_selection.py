@@ -9,11 +9,7 @@ from hypothesis import strategies as st
 
 from vidsindy_lite.dynamics import l0 as selection
 from vidsindy_lite.dynamics.l0 import (
-    _descend,
-    _moved_by_newcomers,
     _Quadratic,
-    _single_changes,
-    _Tableau,
     closest_rival,
     equilibrated,
     inverse,
@@ -172,35 +168,14 @@ def test_the_closest_rival_may_have_no_term_in_common():
     assert cost == pytest.approx(swapped - own, abs=1e-6)
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(2, 8), st.floats(0.1, 100), st.integers(1, 2))
-def test_a_newcomer_moves_others_if_a_fit_with_it_says_so(seed, m, price, batches):
-    information, pull, rng = random_problem(seed, m)
-    penalty = price * rng.uniform(0.5, 2, m)
-    model = _Quadratic.of(information, pull, rng.standard_normal(m), penalty)
-    support = rng.random(m) < 0.5
-    assume(not support.all())
-    before = _Tableau.of(model, model.fit(support))
-    assume((before.room > 1e-6).all())
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(selection, "BATCH", 10**6 if batches == 1 else 1)
-        moved = _moved_by_newcomers(model, before)
-    for number, entry in enumerate(before.outside):
-        joined = support.copy()
-        joined[entry] = True
-        fixed = model.priced(entry, -np.inf)
-        changes = _single_changes(fixed, _Tableau.of(fixed, fixed.fit(joined)))
-        least = min(cost for cost, _, _ in changes)
-        assume(abs(least) > 1e-4)
-        assert moved[number] == (least < 0)
-
-
 @given(st.integers(0, 2**32 - 1), st.integers(2, 8), st.floats(0.1, 100))
 def test_a_path_is_a_search_of_each_share_that_begins_where_the_last_ended(seed, m, price):
     information, pull, rng = random_problem(seed, m)
     penalty, present, support = price * rng.uniform(0.5, 2, m), rng.standard_normal(m), np.ones(m)
     penalty[0], support = rng.choice([penalty[0], -np.inf]), support.astype(bool)
     shares = np.geomspace(1, 1e-4, 9).tolist()
-    path = subset_path(information, pull, present, penalty, support, shares)
+    functions = [(information, pull, share) for share in shares]
+    path = subset_path(functions, present, penalty, support)
     for share, found in zip(shares, path, strict=True):
         support, *_ = subset_search(share * information, share * pull, present, penalty, support)
         assert (found == support).all()
@@ -208,26 +183,16 @@ def test_a_path_is_a_search_of_each_share_that_begins_where_the_last_ended(seed,
 
 def test_a_path_solves_no_support_twice(monkeypatch):
     information, pull, _ = random_problem(3, 8)
-    solved, fit = [], _Quadratic.fit
+    solved, fitted = [], _Quadratic._fitted
 
     def counted(model, support):
         solved.append(support.tobytes())
-        return fit(model, support)
+        return fitted(model, support)
 
-    monkeypatch.setattr(_Quadratic, "fit", counted)
-    shares = np.geomspace(1, 1e-2, 20).tolist()
-    subset_path(information, pull, 0 * pull, np.full(8, 1.0), np.ones(8, dtype=bool), shares)
+    monkeypatch.setattr(_Quadratic, "_fitted", counted)
+    functions = [(information, pull, share) for share in np.geomspace(1, 1e-2, 20)]
+    subset_path(functions, 0 * pull, np.full(8, 1.0), np.ones(8, dtype=bool))
     assert len(solved) == len(set(solved))
-
-
-def test_a_descent_that_cannot_reach_its_goal_is_given_up():
-    information, pull, _ = random_problem(5, 8)
-    model = _Quadratic.of(information, pull, np.zeros(8), np.full(8, 1e-3))
-    start = np.arange(8) < 2
-    lowest = _descend(model, start).value
-    assert lowest < model.fit(start).value
-    assert _descend(model, start, goal=lowest).value == lowest
-    assert (_descend(model, start, goal=-np.inf).support == start).all()
 
 
 def test_a_penalty_of_minus_infinity_keeps_a_worthless_column():

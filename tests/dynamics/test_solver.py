@@ -5,12 +5,14 @@ import pytest
 from helpers import posed
 from scipy.stats import kstest
 from threadpoolctl import threadpool_info, threadpool_limits
+from tqdm import tqdm
 
 from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics import path as paths
 from vidsindy_lite.dynamics.bspline import Segment
+from vidsindy_lite.dynamics.collocation import State
 from vidsindy_lite.dynamics.library import Library, monomial_exponents
-from vidsindy_lite.dynamics.model import Form, PolynomialSystem, State
+from vidsindy_lite.dynamics.model import Form, PolynomialSystem
 from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, polish
 from vidsindy_lite.dynamics.problem import fit_curves, pose, term_penalties
 from vidsindy_lite.dynamics.solver import discover
@@ -232,7 +234,7 @@ def test_same_seed_same_result():
 def test_the_progress_bar_knows_its_end(monkeypatch, persists):
     bars, shown = [], []
 
-    class Bar(solver.tqdm):
+    class Bar(tqdm):
         def update(self, n=1):
             super().update(n)
             shown.append((self.n, self.total))
@@ -242,7 +244,7 @@ def test_the_progress_bar_knows_its_end(monkeypatch, persists):
             super().close()
 
     followed = solver.persistent
-    monkeypatch.setattr(solver, "tqdm", Bar)
+    monkeypatch.setattr(solver, "bar", lambda asked, label, **how: Bar(desc=label, **how))
     monkeypatch.setattr(solver, "persistent", lambda *a: (*followed(*a)[:2], persists))
     t = np.linspace(0, 12, 200)
     discover(t, np.stack([np.sin(t), np.cos(t)], axis=1), degree=1, progress=True)
@@ -256,6 +258,20 @@ def test_a_time_limit_ends_the_rounds_and_is_told(lorenz):
     found = discover(t, x, time_limit=1e-9)
     assert any("the time limit ended the search" in text for text in found.warnings)
     assert not any("time limit" in text for text in discover(t, x, time_limit=1e9).warnings)
+
+
+def test_kicks_are_not_sought_when_the_time_is_over(monkeypatch):
+    t = np.linspace(0, 40, 400)
+    x = np.stack([np.sin(t + np.sin(3 * t)), np.cos(t)], axis=1)  # outside the library
+
+    def sought(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(solver, "with_process_noise", sought)
+    with pytest.raises(AssertionError):
+        discover(t, x, order=1)
+    found = discover(t, x, order=1, time_limit=1e-9)
+    assert "the time limit ended the search" in found.warnings[0]
 
 
 @pytest.mark.parametrize("limit", [0, -1.0, "soon", np.nan])

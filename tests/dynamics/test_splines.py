@@ -94,6 +94,22 @@ def test_nodes_are_midpoints_and_ends():
     np.testing.assert_allclose(grid.slopes.toarray()[:k, :r], design_matrix(knots, nodes, order=1))
 
 
+def test_at_a_kink_the_curve_is_continuous_and_its_slope_is_not():
+    t = np.linspace(0, 3, 40)
+    x = np.abs(t - 1.3)[:, None]
+    segment = Segment.even(t, x, 0.3, 0, np.array([-1.0, 1.3, 3.0])).refined()
+    assert segment.kinks.tolist() == [1.3]
+    grid = Grid.of([segment])
+    assert grid.nodes.shape[0] == grid.r - 1  # as many equations as without: all but the start
+    control = np.linalg.lstsq(grid.samples.toarray(), x, rcond=None)[0]
+    (spline,) = grid.splines(control)
+    fine = np.linspace(0, 3, 333)
+    np.testing.assert_allclose(spline(fine)[:, 0], np.abs(fine - 1.3), atol=1e-10)
+    slopes = grid.slopes @ control
+    np.testing.assert_allclose(np.abs(slopes), 1, atol=1e-8)
+    assert (np.diff(slopes[:, 0]) > 1).sum() == 1
+
+
 def test_node_weights_are_the_lengths_that_nodes_stand_for():
     segments = [
         Segment(np.arange(4.0), np.zeros((4, 1)), np.array([0.0, 1.0, 3.0])),

@@ -1,15 +1,14 @@
 """The tracker for films that people make: phone footage with known truth, hints, real clips."""
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 from footage import Phone, camera_maps, write_phone
+from helpers import real
 
-import vidsindy_lite
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import moving
 from vidsindy_lite.vision.candidates import Candidates
@@ -25,7 +24,6 @@ from vidsindy_lite.vision.steadying import (
     stands_still,
 )
 
-REAL = Path(vidsindy_lite.__file__).parents[2] / "shared" / "real"
 SMALL = {"image_size": (320, 240), "frames": 60}
 
 
@@ -405,13 +403,6 @@ def test_scatter_is_the_noise_of_a_smooth_motion():
 
 
 # --------------------------------------------------------------------------------------- real clips
-
-
-def real(name):
-    path = REAL / f"{name}.mp4"
-    if not path.is_file():
-        pytest.skip("no real footage here")
-    return path
 
 
 def test_the_toss():

@@ -123,6 +123,8 @@ def check_learnable(rig: Rig) -> None:
         If it is not.
     """
     check_instance("rig", rig, Rig)
+    if len(rig.cameras) < 2:
+        raise ValueError("rig: must hold two or more cameras, got 1, which sees no depth")
     if not rig.is_measured:
         return
     if not any(camera.is_calibrated for camera in rig.cameras):

@@ -29,9 +29,9 @@ from .unknowns import Unknowns
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
 """Rates over those stated that are taken for each other."""
 BETTER = 3.0
-"""Times by which a mistake has to mend the disagreement of two views, and of all together."""
+"""Times by which a mistake has to mend the disagreement of all views together."""
 _INSTANTS = 60  # at which two views are compared
-_TRIED = 6  # mistakes that mend most, tried with all cameras
+_TRIED = 16  # mistakes of a kind that mend most, tried with all cameras
 _PART = 0.4  # of the videos, in which their cameras are learned if frames were dropped elsewhere
 _FRAMES = 1500  # of the first video at which a jump of the lag is sought
 _LONGEST = 60  # frames by which it may jump
@@ -106,15 +106,17 @@ def _found(none: Mistake, rig: Rig, start: Floats, names: Sequence[str]) -> Mist
     if none.left(rig, start) <= 2 * DISAGREEMENT:
         return None
     unknowns = Unknowns.of(rig)
-    before, lags = none.paired(unknowns)
+    _, lags = none.paired(unknowns)
     left = none.left(rig, lags)
     if left <= 2 * DISAGREEMENT:
         return None
     for kind in (_views, _rates, _dropped):
-        found = [(*one.paired(unknowns), one) for one in kind(none, rig, unknowns, names)]
-        found = sorted((one for one in found if BETTER * one[0] < before), key=lambda one: one[0])
-        for _, best, one in found[:_TRIED]:
-            if BETTER * one.left(rig, best) < left:
+        # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse none.
+        ranked = [(*one.paired(unknowns), one) for one in kind(none, rig, unknowns, names)]
+        ranked = sorted(ranked, key=lambda one: one[0])[:_TRIED]
+        tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
+        for now, best, one in sorted(tried, key=lambda one: one[0]):
+            if BETTER * now < left:
                 told = learn_lags(one.tracks, rig, one.rates, best, one.clocks)
                 if told.residual <= DISAGREEMENT:
                     return replace(one, lags=told, before=left)
@@ -131,15 +133,23 @@ def _views(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterat
             how = "swapped" if len(moved) == 2 else "in another order than their cameras"
             what = f"{' and '.join(names[i] for i in moved)} {how}"
             yield Mistake(what, tracks, rates, clocks)
+    known = {i for i, camera in enumerate(rig.cameras) if camera.is_calibrated}
     for axis, what in ((0, "mirrored"), (1, "with v counted upwards")):
         for views in [*([i] for i in range(count)), [*range(count)]]:
+            told, how = names[views[0]] if len(views) == 1 else "all views", what
+            if len(views) == 1 and not known & {*views}:
+                # Half a turn from a mirrored view is one with v counted upwards.
+                how = "mirrored, or with v counted upwards"
+            elif len(views) == 1 and known <= {*views}:
+                how = "mirrored, or with v counted upwards: then the path has the other sign"
+            if axis == 1 and how != what:
+                continue
             given = list(none.tracks)
             for i in views:
                 turned = [given[i][:, 0], given[i][:, 1]]
                 turned[axis] = sizes[i][axis] - 1 - turned[axis]
                 given[i] = np.column_stack(turned)
-            told = names[views[0]] if len(views) == 1 else "all views"
-            yield replace(none, what=f"{told} {what}", tracks=tuple(given))
+            yield replace(none, what=f"{told} {how}", tracks=tuple(given))
 
 
 def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:

@@ -72,9 +72,10 @@ class Rig:
     Parameters
     ----------
     cameras : sequence of Camera
-        Two or more, orthographic or perspective, that do not all look along the same lines: two
-        orthographic normals must not be parallel, or two pinholes not coincide, or there is one
-        camera of each kind. Or three or more perspective ones without position and normal.
+        One, before a motion in a plane. Or more, orthographic or perspective, that do not all look
+        along the same lines: two orthographic normals must not be parallel, or two pinholes not
+        coincide, or there is one camera of each kind. Or three or more perspective ones without
+        position and normal.
     warnings : tuple of str, optional
         What `learn_cameras` has to say of the cameras that it learned. Not part of a file, nor of
         what makes two rigs equal.
@@ -87,7 +88,7 @@ class Rig:
     Raises
     ------
     ValueError
-        If there are fewer than two cameras, or all look along the same lines.
+        If there is no camera, or all of several look along the same lines.
     """
 
     cameras: tuple[Camera, ...]
@@ -101,10 +102,10 @@ class Rig:
         object.__setattr__(self, "warnings", check_items("warnings", self.warnings))
         for i, camera in enumerate(cameras):
             check_instance(f"cameras[{i}]", camera, Camera)
-        if len(cameras) < 2:
-            raise ValueError(f"cameras: must be two or more, got {len(cameras)}")
+        if not cameras:
+            raise ValueError("cameras: must be one or more, got none")
         self._check_measured()
-        if self.is_measured and not independent(cameras):
+        if len(cameras) > 1 and self.is_measured and not independent(cameras):
             kind = "normal" if isinstance(cameras[0], OrthographicCamera) else "position"
             raise ValueError(
                 f"cameras: must have at least two independent {kind}s, got only "

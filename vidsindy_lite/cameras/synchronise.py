@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from ..arrays import Floats
+from ..progress import bar
 from .alignment import (
     Curve,
     Footage,
@@ -72,7 +73,7 @@ def learn_lags(
     start: ArrayLike | None = None,
     clocks: Sequence[ArrayLike] | None = None,
     *,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Lags:
     """Learn by how much each video starts later than the first, and whether its clock drifts.
 
@@ -92,8 +93,8 @@ def learn_lags(
         Lags that are tried first, by default zero; of several that fit equally well, these win.
     clocks : sequence of array_like, shape (n_i,), optional
         See `align`.
-    progress : bool
-        Show a progress bar if it takes longer than two seconds.
+    progress : bool, optional
+        Whether a progress bar is shown; by default after two seconds, if a person watches.
 
     Returns
     -------
@@ -111,8 +112,8 @@ def learn_lags(
     first = check_lags("start", np.zeros(len(tracks)) if start is None else start, len(tracks))
     given = check_rates(rates, len(tracks))
     rig = posed(align(tracks, first, given, clocks), rig, synchronous=False)
-    with tqdm(desc="synchronise", unit="fit", delay=2, disable=not progress) as bar:
-        videos = _Videos.of(tracks, rig, given, clocks, bar)
+    with bar(progress, "synchronise", unit="fit") as shown:
+        videos = _Videos.of(tracks, rig, given, clocks, shown)
         found = _learned(videos, first)
     return found if clocks is None else replace(found, clocks=tuple(c.clock for c in videos.curves))
 
@@ -127,7 +128,7 @@ def nearest(
     """Residual in pixels at the best lags near given ones."""
     with tqdm(disable=True) as bar:
         found = _Videos.of(tracks, rig, rates, clocks, bar).fitted(lags, rough=True)
-    return np.inf if found is None else found.score
+    return np.inf if found is None else found.residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +263,7 @@ def _climbed(
         if key not in tried:
             tried[key] = videos.fitted(np.array(key), True, loose)
         found = tried[key]
-        return np.inf if found is None else found.score
+        return np.inf if found is None else found.residual
 
     best = np.array([lags[0] for lags in promising])
     fits(first)

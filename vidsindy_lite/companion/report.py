@@ -21,14 +21,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
-from tqdm import tqdm
 
 from ..arrays import Floats
 from ..cameras import DISAGREEMENT, Rig, stacked
 from ..checks import check_path
-from ..dynamics import Discovery, Swing
+from ..dynamics import Discovery, Quantity, Swing
 from ..pipeline import VideoDiscovery
-from ..refusal import Refused
+from ..progress import bar
+from ..refusal import Refused, Stopped
 from ..repository import write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
@@ -92,7 +92,7 @@ def write_report(
     paths: Sequence[str | Path] | None,
     folder: str | Path,
     options: Mapping[str, object] | None = None,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Path:
     """Write the report on a law.
 
@@ -105,8 +105,8 @@ def write_report(
         Where; the files of an earlier report are replaced.
     options : mapping, optional
         How the law was asked for, to be told in the report.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Whether a progress bar is shown; by default after two seconds, if a person watches.
 
     Returns
     -------
@@ -123,15 +123,16 @@ def write_report(
     if paths is not None and len(paths) != len(found.rig.cameras):
         raise ValueError(f"paths: must be {len(found.rig.cameras)} videos, got {len(paths)}")
     content = summary(found, paths, options)
-    files = _data(content, found.t, found.tracks) | {RIG: found.rig.text()}
+    files = _data(content, found.t, found.tracks)
+    files |= {RIG: found.rig.text()} if len(found.rig.cameras) > 1 else {}
     _put(folder, files | {PAGE: _page(found, paths, content, progress)})
     return folder / PAGE
 
 
 def write_refusal(
-    refused: Refused,
+    refused: Refused | Stopped,
     paths: Sequence[str | Path] | None,
-    rig: Rig,
+    rig: Rig | None,
     folder: str | Path,
     options: Mapping[str, object] | None = None,
 ) -> Path:
@@ -139,11 +140,11 @@ def write_refusal(
 
     Parameters
     ----------
-    refused : Refused
+    refused : Refused or Stopped
     paths, folder, options
         See `write_report`.
-    rig : Rig
-        As it was given.
+    rig : Rig, optional
+        As it was given; not needed with videos.
 
     Returns
     -------
@@ -158,7 +159,7 @@ def write_refusal(
         "tracks": [as_json(track, "tracks") for track in refused.tracks],
         "share_of_frames_seen": [float(np.isfinite(t).all(axis=1).mean()) for t in refused.tracks],
     }  # fmt: skip
-    sizes = [camera.image_size for camera in rig.cameras]
+    sizes = [camera.image_size for camera in rig.cameras] if rig else [(1, 1)] * len(names)
     # See `_figures`.
     plt.draw_if_interactive()
     with plt.style.context("vidsindy_lite.study.plots.vidsindy"):
@@ -231,7 +232,8 @@ def summary(
             "video": names[i], "frames": shot.frames, "fps": shot.fps,
             "image_size": list(shot.size), "model": camera.model,
             "position": camera.position, "normal": camera.normal,
-            "scale": camera.scale, "angle": camera.angle,
+            "scale": camera.scale, "scale_error": camera.scale_error, "angle": camera.angle,
+            "homography": getattr(camera, "homography", None),
             "lag": found.lags.frames[i], "lag_error": found.lags.errors[i],
             "share_of_frames_seen": seen.mean(),
             "residual_rms": np.sqrt(np.mean(length**2)) if len(length) else np.nan,
@@ -246,8 +248,10 @@ def summary(
             "data": _law(law, "data", np.zeros(law.system.d), np.zeros(law.system.d)),
             "native": _law(law, "native", law.offset, law.offset_errors),
             "orientation": law.orientation,
-            "swing": None if law.swing is None else _swing(law.swing),
+            "swing": None if found.swing is None else _swing(found.swing),
         },
+        "g": _quantity(found.g),
+        "period": _quantity(found.period),
         "noise": law.noise,
         "cameras": cameras,
         "options": dict(options or {}),
@@ -306,6 +310,11 @@ def _swing(swing: Swing) -> dict[str, object]:
     }  # fmt: skip
 
 
+def _quantity(found: Quantity | None) -> dict[str, object] | None:
+    """A number with its error."""
+    return None if found is None else {"value": found.value, "error": found.error}
+
+
 # ---------------------------------------------------------------------------------------- the page
 
 
@@ -313,17 +322,17 @@ def _page(
     found: VideoDiscovery,
     paths: Sequence[str | Path] | None,
     content: Mapping[str, object],
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> str:
     """The report as one HTML page."""
-    total = 4 + (paths is not None)
-    figures = tqdm(_figures(found, paths), desc="report", total=total, disable=not progress)
+    total = 2 + (paths is not None) + 2 * (len(found.rig.cameras) > 1)
+    figures = bar(progress, "report", iterable=_figures(found, paths), total=total)
     about = {
         "note": found.rig.note, "driven": found.driven, "limit": DISAGREEMENT,
         "data_file": DATA, "rig_file": RIG, "tracks_file": TRACKS,
     }  # fmt: skip
     law = found.discovery
-    about |= {"axes": law.axes, "swing": "" if law.swing is None else str(law.swing)}
+    about |= {"axes": law.axes, "swing": "" if found.swing is None else str(found.swing)}
     about |= {"physics": str(law.physics()) if law.system.order == 2 else ""}
     film = None if paths is None else base64.b64encode(law_over_videos(found, paths)).decode()
     return page("report.html", figures=figures, film=film, **about, **content)
@@ -340,13 +349,15 @@ def _figures(
         # Several targets are drawn as one that begins again.
         t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
         x = stacked(found.x, 3)
-        yield "path", _encoded(plot_path(t, x, stacked(found.fitted, 3)))
+        d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
+        yield "path", _encoded(plot_path(t, x[:, :d], stacked(found.fitted, 3)[:, :d]))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
             yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))
-        yield "rig", _encoded(plot_rig(found.rig, x))
-        missed = [stacked(one, 2) for one in found.residuals]
-        yield "residuals", _encoded(plot_residuals(t, missed, DISAGREEMENT))
+        if len(found.rig.cameras) > 1:
+            yield "rig", _encoded(plot_rig(found.rig, x))
+            missed = [stacked(one, 2) for one in found.residuals]
+            yield "residuals", _encoded(plot_residuals(t, missed, DISAGREEMENT))
         yield "plateaus", _encoded(found.discovery.plot_path())
 
 

@@ -13,28 +13,28 @@
     below     `library` (candidate terms), `model` (systems, their integration, what a law may look
               like), `bspline`
     beside    `orientation` (axes in which a law is sparsest), `mechanics` (what a law says of a
-              body)
+              body), `homogeneous` (of one flight, the law that is the same at every place)
 """
 
 from .library import Library, check_library
 from .collocation import Collocation, Status
-from .inference import cramer_rao
 from .result import Discovery
 from .model import Form
 from .model import runge_kutta_4
-from .library import Function, monomial_exponents, monomial_gradients, monomials, variable_names
+from .library import Function, monomial_exponents, monomial_gradients, monomials
 from .solver import check_order
 from .frames import ShiftedLaw
+from .homogeneous import homogeneous
 from .result import Plateau, Swing
 from .model import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
-from .mechanics import Round, on_circle, on_sphere
+from .mechanics import Quantity, Round, on_circle, on_sphere
 from .l0 import closest_rival, subset_search
 from .solver import SplineSINDy
 from .smoothing import smooth
 from .solver import discover
 from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis
-from .model import State
-from .data import Trajectory, check_trajectory, cut, typical_step
+from .collocation import State
+from .data import Trajectory, check_trajectory, cut, typical_step, variable_names
 from .orientation import check_orientation
 from .data import Units

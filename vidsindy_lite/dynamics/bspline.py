@@ -7,8 +7,9 @@ them, so that normal matrices in ``P`` are banded.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy import sparse
@@ -27,6 +28,8 @@ from ..arrays import Floats, Ints
 DEGREE = 3
 WIDTH = DEGREE + 1
 """Control points that a point of the curve depends on."""
+BESIDE = 1e-3
+"""Distance of a node from a kink, in knot spans: more than rounding moves a time."""
 
 
 def clamped_knots(breakpoints: Floats) -> Floats:
@@ -107,18 +110,42 @@ class Segment:
         Ends of the knot spans.
     trajectory : int
         Which trajectory the stretch is cut from.
+    kinks : ndarray, shape (k,)
+        Breakpoints within at which the slope may jump.
     """
 
     t: Floats
     x: Floats
     breakpoints: Floats
     trajectory: int = 0
+    kinks: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
-    def even(cls, t: Floats, x: Floats, spacing: float, trajectory: int) -> Segment:
-        """A segment with knots at even distances of at most ``spacing``."""
-        spans = max(1, int(np.ceil((t[-1] - t[0]) / spacing)))
-        return cls(t, x, np.linspace(t[0], t[-1], spans + 1), trajectory)
+    def even(
+        cls, t: Floats, x: Floats, spacing: float, trajectory: int, jumps: Floats | None = None
+    ) -> Segment:
+        """A segment with knots at even distances of at most ``spacing`` between jumps of a slope.
+
+        ``jumps`` are times, of which those within the segment count.
+        """
+        jumps = np.zeros(0) if jumps is None else jumps
+        kinks = jumps[(jumps > t[0]) & (jumps < t[-1])]
+        ends = np.concatenate([t[:1], kinks, t[-1:]])
+        spans = np.maximum(1, np.ceil(np.diff(ends) / spacing).astype(int))
+        pieces = [np.linspace(*piece) for piece in zip(ends[:-1], ends[1:], spans + 1, strict=True)]
+        return cls(t, x, np.unique(np.concatenate(pieces)), trajectory, kinks)
+
+    @property
+    def pieces(self) -> list[Floats]:
+        """The breakpoints between two kinks, with these: there the curve has all derivatives."""
+        cuts = np.searchsorted(self.breakpoints, self.kinks)
+        ends = [0, *cuts.tolist(), len(self.breakpoints) - 1]
+        return [self.breakpoints[low : high + 1] for low, high in pairwise(ends)]
+
+    @property
+    def knots(self) -> Floats:
+        """The knot vector: a kink is a knot of multiplicity three."""
+        return np.sort(np.concatenate([clamped_knots(self.breakpoints), self.kinks.repeat(2)]))
 
     def refined(self) -> Segment:
         """The same stretch with every knot span halved."""
@@ -159,12 +186,11 @@ class Grid:
     @classmethod
     def of(cls, segments: Sequence[Segment]) -> Grid:
         """The grid of these segments."""
-        knots = tuple(clamped_knots(segment.breakpoints) for segment in segments)
+        knots = tuple(segment.knots for segment in segments)
         starts = np.cumsum([0] + [len(k) - WIDTH for k in knots])
-        ends = [segment.breakpoints for segment in segments]
-        nodes = [np.concatenate([b[:1], (b[1:] + b[:-1]) / 2, b[-1:]]) for b in ends]
-        spans = [np.diff(b) for b in ends]
-        width = np.concatenate([np.concatenate([w[:1] / 2, w, w[-1:] / 2]) for w in spans])
+        pieces = [[_nodes(b, s.kinks) for b in s.pieces] for s in segments]
+        nodes = [np.concatenate([times for times, _ in parts]) for parts in pieces]
+        width = np.concatenate([shares for parts in pieces for _, shares in parts])
         x = np.concatenate([segment.x for segment in segments])
         return cls(
             segments=tuple(segments),
@@ -238,6 +264,15 @@ class Grid:
         return [BSpline(k, p, DEGREE) for k, p in zip(self.knots, parts, strict=True)]
 
 
+def _nodes(b: Floats, kinks: Floats) -> tuple[Floats, Floats]:
+    """Collocation nodes of a piece between its breakpoints, and how much of it each stands for."""
+    spans = np.diff(b)
+    # The law jumps at a kink: on this side of it, what holds is asked just beside it.
+    low, high = np.isin(b[[0, -1]], kinks) * BESIDE * spans[[0, -1]]
+    nodes = np.concatenate([b[:1] + low, (b[1:] + b[:-1]) / 2, b[-1:] - high])
+    return nodes, np.concatenate([spans[:1] / 2, spans, spans[-1:] / 2])
+
+
 def basis(
     knots: Sequence[Floats], starts: Ints, times: Sequence[Floats], order: int = 0
 ) -> sparse.csr_array:
@@ -263,14 +298,9 @@ def rows_from(first: Ints, values: Floats, size: int) -> sparse.csr_array:
 # A point of a curve touches few control points, so its normal matrix is a narrow band, and so is
 # the Cholesky factor of that.
 
-BLOCK = 48
-"""Rows that `solve_factored` takes at once, at least."""
-UNROLLED = 400
-"""Blocks of which the triangles are held at once."""
-
 
 def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: int = 1) -> Floats:
-    """Lower banded storage of ``rows' W rows``, for rows as `splines.rows_from` makes them.
+    """Lower banded storage of ``rows' W rows``, for rows as `rows_from` makes them.
 
     ``W`` is diagonal, with weights (n,) of the rows; by default the identity. So many rows one
     after the other as are ``alike`` have the same columns.
@@ -287,21 +317,22 @@ def normal_band(rows: sparse.csr_array, weights: Floats | None = None, alike: in
     return band
 
 
-def solve_factored(factor: Floats, right: Floats) -> None:
+def solve_factored(factor: Floats, right: Floats, block: int = 48, held: int = 400) -> None:
     """Solve ``L L' x = right`` for many right-hand sides, (n, m), in their place.
 
     ``L`` is in lower banded storage. LAPACK takes one right-hand side after the other; block by
-    block, all of them at once are three times as fast.
+    block, of so many rows at least, all of them at once are three times as fast. The triangles of
+    so many blocks are held at once.
     """
     reach, n = len(factor) - 1, len(right)
-    size = max(BLOCK, 2 * reach)
+    size = max(block, 2 * reach)
     blocks = [right[start : start + size] for start in range(0, n, size)]
-    last, parts = len(blocks) - 1, range(0, len(blocks), UNROLLED)
+    last, parts = len(blocks) - 1, range(0, len(blocks), held)
 
     def unrolled(part: int) -> list[tuple[int, Floats, Floats, Floats]]:
         """Blocks of a part: number, triangle, what reaches on to the next, and right-hand side."""
-        rows = _unrolled(factor[:, part * size : (part + UNROLLED) * size], size)
-        numbered = enumerate(zip(rows, blocks[part : part + UNROLLED], strict=True), part)
+        rows = _unrolled(factor[:, part * size : (part + held) * size], size)
+        numbered = enumerate(zip(rows, blocks[part : part + held], strict=True), part)
         return [
             (k, row[: len(here), : len(here)].T, row[size + 1 - reach :, :reach], here)
             for k, (row, here) in numbered

@@ -18,11 +18,10 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import LinAlgError, cholesky_banded
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from .bspline import WIDTH, Grid, Segment, normal_band, solve_factored
 from .l0 import RIDGE, equilibrated
 from .library import Function, along_state, law_variables, monomials, shift_generators
-from .model import State
 
 CLEANEST = 1e-5
 """Least noise, relative to the spread of the data, that the splines are trusted to resolve."""
@@ -39,8 +38,72 @@ AT_ONCE = 10_000
 ROUNDING = 1e-14
 """What rounding does to a banded factor, relative to its largest entry: less could leave it without
 a root, more would hold the curve back."""
-STRONGEST_DAMPING = 1e2
-"""Relative Levenberg-Marquardt damping at which a fit that still finds no lower point stops."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A curve and a law.
+
+    Parameters
+    ----------
+    control_points : ndarray, shape (r, d)
+        ``P``; the curve is ``G P``.
+    coefficients : ndarray, shape (l, d)
+        ``Lambda``, in monomials of ``x - offset``.
+    active : ndarray of bool, shape (l, d)
+        Terms that may differ from zero.
+    offset : ndarray, shape (d,)
+        ``Delta``, the origin of the law.
+    moving : ndarray of bool, shape (d,)
+        Coordinates of the offset that are free.
+    shared : ndarray of int, shape (l d,), optional
+        Of each coefficient, equation by equation, whose value it has; its own by default.
+    """
+
+    control_points: Floats
+    coefficients: Floats
+    active: Bools
+    offset: Floats
+    moving: Bools
+    shared: Ints | None = None
+
+    def flat(self) -> Floats:
+        """Coefficients, equation by equation, then the offset."""
+        return np.concatenate([self.coefficients.T.ravel(), self.offset])
+
+    def free(self) -> Bools:
+        """Which entries of `flat` are unknowns: of those that share a value, the first."""
+        free = np.concatenate([self.active.T.ravel(), self.moving])
+        free[[entry for entry, _ in self.followers()]] = False
+        return free
+
+    def followers(self) -> list[tuple[int, int]]:
+        """Entries of `flat` that have the value of another, and which."""
+        if self.shared is None:
+            return []
+        entries = np.flatnonzero(self.shared != np.arange(len(self.shared)))
+        return [(int(entry), int(self.shared[entry])) for entry in entries]
+
+    def whole(self, active: Bools) -> Bools:
+        """Terms, (l, d), with all that share a value with one of them."""
+        if self.shared is None:
+            return active
+        count = np.bincount(self.shared, active.T.ravel(), len(self.shared))
+        return np.asarray(count[self.shared] > 0).reshape(active.T.shape).T
+
+    def moved(self, control_points: Floats, flat: Floats) -> State:
+        """The same terms with another curve and other entries of `flat`."""
+        l, d = self.coefficients.shape
+        values, offset = flat[: l * d], flat[l * d :]
+        coefficients = (values if self.shared is None else values[self.shared]).reshape(d, l).T
+        return replace(
+            self, control_points=control_points, coefficients=coefficients, offset=offset
+        )
+
+    def of_terms(self, active: Bools) -> State:
+        """The same with these terms, those that share a value with them, and no others."""
+        active = self.whole(active)
+        return replace(self, active=active, coefficients=np.where(active, self.coefficients, 0.0))
 
 
 class Status(Enum):
@@ -447,7 +510,7 @@ class Collocation:
                     break
             else:
                 damping = max(10 * damping, 1e-6)
-                if damping > STRONGEST_DAMPING:
+                if damping > 1e2:
                     return Fit(state, self, Status.STALLED)
                 continue
             miss = abs(value - trial_value - promise)

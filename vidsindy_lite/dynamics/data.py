@@ -10,7 +10,6 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..checks import FARTHEST, check_array, check_times, shown
-from .library import variable_names
 
 # --------------------------------------------------------------------------------------------------
 # Measured trajectories: checked input, and its cut into stretches without gaps.
@@ -19,8 +18,6 @@ CHANCE = 4.0
 """Lag-1 autocorrelation, in standard errors of white noise, from which on errors are dependent."""
 Trajectory = tuple[Floats, Floats]
 """Times (n,) and states (n, d), NaN where a coordinate was not seen; in each row one was."""
-CLOCKS = ("t", "time", "times", "seconds", "timestamp")
-"""What a column of times is called."""
 
 
 def check_trajectory(t: Floats, x: Floats) -> Trajectory:
@@ -114,6 +111,11 @@ def check_trajectories(
     return trajectories
 
 
+def variable_names(d: int) -> tuple[str, ...]:
+    """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
+    return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
+
+
 def coordinate_names(
     t: Floats | Sequence[tuple[Floats, Floats]], x: Floats | None
 ) -> tuple[str, ...]:
@@ -130,7 +132,8 @@ def coordinate_names(
         raise ValueError(f"x: columns must be named alike in all trajectories, got {columns}")
     for times, frame in [(t, x)] if x is not None else t:
         for name in columns[0]:
-            if str(name).lower() in CLOCKS and np.array_equal(frame[name], times):
+            clock = str(name).lower() in ("t", "time", "times", "seconds", "timestamp")
+            if clock and np.array_equal(frame[name], times):
                 raise ValueError(f"x: must hold states alone, got the times as column {name!r}")
     if columns[0] and all(isinstance(name, str) and name.isidentifier() for name in columns[0]):
         return tuple(columns[0])
@@ -213,7 +216,8 @@ def check_systematic(
         return [np.empty((*x.shape, 0)) for _, x in trajectories]
     if not isinstance(systematic, np.ndarray | list | tuple):
         raise ValueError(f"systematic: must have shape (k, n, d), got {shown(systematic)}")
-    parts = [systematic] if len(trajectories) == 1 and np.ndim(systematic) == 3 else systematic
+    alone = len(trajectories) == 1 and not (len(systematic) == 1 and np.ndim(systematic[0]) == 3)
+    parts = [systematic] if alone else systematic
     if len(parts) != len(trajectories):
         raise ValueError(
             f"systematic: must be one array per trajectory ({len(trajectories)}), got {len(parts)}"

@@ -16,14 +16,10 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .collocation import Fit, Linearisation
+from .collocation import Fit, Linearisation, State
 from .l0 import newcomers, subset_search
 from .library import closure_mask, divides, shift_generators, shift_matrix
-from .model import State
 from .problem import Problem
-
-ROUNDING = 1e-9
-"""Moves of an origin, in units of the spread of the data, that are none."""
 
 Origin = tuple[Floats, Bools]
 """An origin, and which of its axes are not where the data have theirs."""
@@ -137,7 +133,7 @@ def _vanishing(problem: Problem, state: State, movable: Bools) -> list[Origin]:
     found: list[Origin] = []
     entries = np.argwhere((state.active & (below @ state.active)).T)
     for step in frames.vanish(np.zeros((len(entries), problem.d)), entries[:, None]):
-        origin, moved = state.offset + step, np.abs(step) > ROUNDING
+        origin, moved = state.offset + step, np.abs(step) > 1e-9  # more than rounding
         known = any(np.allclose(origin, other) for other, _ in found)
         inside = ((low <= origin) & (origin <= high))[moved].all()  # not if it is infinite
         if inside and moved.any() and not known:

@@ -6,7 +6,7 @@ matrix: all matrices are scaled to a unit diagonal before they are solved or inv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -20,16 +20,10 @@ NONE = np.array([], dtype=int)
 """No entries."""
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
-BATCH = 1_000_000
-"""Most numbers of an array over newcomers, those outside and those inside."""
 PLATEAU = 1e-6
 """Changes of the function below this are taken for rounding."""
 MOST_CHANGES = 4
 """Most changes of a support on its way down, for each entry that there is."""
-NOTHING = 1e-250
-"""Least information; its inverse, even over the ridge, is still a number."""
-DEPENDENT = 1e-9
-"""Share of a term that those of the law leave, below which they have it already."""
 FAR = 4.0
 """Standard errors of a coefficient beyond which another law has another coefficient."""
 LEAST = 1e-300
@@ -81,26 +75,24 @@ def subset_search(
 
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
 def subset_path(
-    information: Floats,
-    gradient: Floats,
+    functions: Iterable[tuple[Floats, Floats, float]],
     present: Floats,
     penalty: Floats,
     start: Bools,
-    shares: Sequence[float],
 ) -> list[Bools]:
-    """The supports that `subset_search` finds of shares of a function, each from the one before.
-
-    Nine of ten supports that such a search tries, one before it has tried: each is solved once.
+    """The supports that `subset_search` finds of several functions, each from the one before.
 
     Parameters
     ----------
-    information, gradient, present, penalty, start
+    functions : iterable of (ndarray, ndarray, float)
+        Information, gradient, and what the function is multiplied by; the penalties are not.
+    present, penalty, start
         See `subset_search`.
-    shares : sequence of float
-        What the function is multiplied by; the penalties are not.
     """
-    model, supports = _Remembering.of(information, gradient, present, penalty), [start]
-    for share in shares:
+    supports, known, model = [start], None, None
+    for information, gradient, share in functions:
+        if model is None or information is not known:
+            known, model = information, _Quadratic.of(information, gradient, present, penalty)
         supports.append(_search(replace(model, share=share), supports[-1]).support)
     return supports[1:]
 
@@ -129,31 +121,12 @@ def closest_rival(
         The entries that leave and enter.
     """
     model = _Quadratic.of(information, gradient, present, penalty)
-    fit = model.fit(support)
-    tableau = model.tableau(fit)
-    moved = _moved_by_newcomers(model, tableau)
-    # Those that move no others cost what they cost alone.
-    alone = model.penalty[tableau.outside] - tableau.gained
-    alone[moved] = np.inf
-    joined = [tableau.outside[moved], tableau.outside[[alone.argmin()]] if len(alone) else NONE]
-    rivals = [_with_newcomer(model, support, entry) for entry in np.concatenate(joined)]
-    free = replace(model, penalty=np.where(np.isfinite(penalty), 0.0, penalty))
-    whole = free.fit(~np.isposinf(penalty))
-    lost = np.zeros(len(penalty))
-    lost[whole.inside] = whole.fitted**2 / np.diag(whole.inverse)
-    for entry in fit.inside[np.isfinite(penalty[fit.inside])]:
-        # No law without it is cheaper than all other entries were, if they cost nothing.
-        goal = min((rival.value for rival in rivals), default=np.inf)
-        if whole.value + lost[entry] < goal:
-            without = _changed(support, entry, NONE)
-            rivals.append(_descend(model.priced(entry, np.inf), without, goal))
+    rivals = [_forced(model, support, k) for k in np.flatnonzero(np.isfinite(penalty)).tolist()]
     if not rivals:
         return np.inf, NONE, NONE
     rival = min(rivals, key=lambda rival: rival.value)
-    dropped, added = (
-        np.flatnonzero(changed) for changed in (support & ~rival.support, rival.support & ~support)
-    )
-    return rival.value - fit.value, dropped, added
+    dropped, added = support & ~rival.support, rival.support & ~support
+    return rival.value - model.fit(support).value, np.flatnonzero(dropped), np.flatnonzero(added)
 
 
 def minimiser(information: Floats, gradient: Floats, present: Floats, support: Bools) -> Floats:
@@ -181,6 +154,9 @@ class _Fit:
 class _Quadratic:
     """A share of a quadratic function, with penalties, its entries scaled to a unit diagonal.
 
+    It remembers of each support what holds for all shares: nine of ten that a search tries have
+    been tried at the share before.
+
     Everything is reckoned from the present point: with data that are nearly exact the function
     itself has more digits than a computer, its changes do not.
     """
@@ -191,6 +167,8 @@ class _Quadratic:
     present: Floats
     penalty: Floats
     share: float = 1.0
+    fits: dict[bytes, _Fit] = field(default_factory=dict)
+    tableaus: dict[bytes, _Tableau] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -200,21 +178,24 @@ class _Quadratic:
         matrix, scale = equilibrated(information)
         return cls(matrix, scale, gradient * scale, present / scale, penalty)
 
-    def priced(self, entry: int, price: float) -> _Quadratic:
-        """The same with another price of an entry: minus infinity keeps it in, infinity out."""
-        penalty = self.penalty.copy()
-        penalty[entry] = price
-        return replace(self, penalty=penalty)
-
     def paid(self, inside: Ints) -> float:
         """What entries cost, but for those that must be there."""
         return float(self.penalty[inside][np.isfinite(self.penalty[inside])].sum())
 
     def tableau(self, fit: _Fit) -> _Tableau:
         """What can be read off around a fit."""
-        return _Tableau.of(self, fit)
+        if (key := fit.support.tobytes()) not in self.tableaus:
+            self.tableaus[key] = _Tableau.of(self, fit)
+        return self.tableaus[key]
 
     def fit(self, support: Bools) -> _Fit:
+        """The minimum on a support, and its value for the share and the penalties."""
+        if (key := support.tobytes()) not in self.fits:
+            self.fits[key] = self._fitted(support)
+        fit = self.fits[key]
+        return replace(fit, value=self.paid(fit.inside) + self.share * fit.fall)
+
+    def _fitted(self, support: Bools) -> _Fit:
         inside = np.flatnonzero(support)
         block = self.matrix[inside[:, None], inside]
         inverse = np.asarray(np.linalg.inv(block), dtype=float)
@@ -226,27 +207,7 @@ class _Quadratic:
         step[inside] = moved
         left = self.gradient - self.matrix @ step
         fall, fitted = -float(step @ (left + self.gradient)), self.present[inside] + moved
-        value = self.paid(inside) + self.share * fall
-        return _Fit(support, inside, inverse, fitted, left, fall, value)
-
-
-@dataclass(frozen=True)
-class _Remembering(_Quadratic):
-    """The same, which remembers of each support what holds for all shares and penalties."""
-
-    fits: dict[bytes, _Fit] = field(default_factory=dict)
-    tableaus: dict[bytes, _Tableau] = field(default_factory=dict)
-
-    def fit(self, support: Bools) -> _Fit:
-        if (key := support.tobytes()) not in self.fits:
-            self.fits[key] = super().fit(support)
-        fit = self.fits[key]
-        return replace(fit, value=self.paid(fit.inside) + self.share * fit.fall)
-
-    def tableau(self, fit: _Fit) -> _Tableau:
-        if (key := fit.support.tobytes()) not in self.tableaus:
-            self.tableaus[key] = super().tableau(fit)
-        return self.tableaus[key]
+        return _Fit(support, inside, inverse, fitted, left, fall, np.nan)
 
 
 def _search(model: _Quadratic, start: Bools) -> _Fit:
@@ -261,16 +222,12 @@ def _search(model: _Quadratic, start: Bools) -> _Fit:
     return best
 
 
-def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
-    """Take the best of all drops, adds and swaps until none helps.
-
-    Or until as many changes like the best as there are entries would still not reach the goal.
-    """
+def _descend(model: _Quadratic, start: Bools) -> _Fit:
+    """Take the best of all drops, adds and swaps until none helps."""
     best = model.fit(start)
     for _ in range(MOST_CHANGES * len(start)):
-        changes = _single_changes(model, model.tableau(best))
-        change, dropped, added = min(changes, key=lambda item: item[0])
-        if not change < -PLATEAU or best.value + len(best.inside) * change > goal:
+        change, dropped, added = _best_change(model, model.tableau(best))
+        if not change < -PLATEAU:
             return best
         # Rounding may promise a fall that does not come: what counts is the value itself.
         fit = model.fit(_changed(best.support, dropped, added))
@@ -281,78 +238,30 @@ def _descend(model: _Quadratic, start: Bools, goal: float = np.inf) -> _Fit:
 
 
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
-    """A lower value reached by forcing one entry in, which may let several others go."""
+    """A lower value reached by forcing one entry in, which may let others go.
+
+    Of those with which one of the others is not worth its price any more, as an update of rank one
+    tells.
+    """
     tableau = model.tableau(best)
-    promising = _moved_by_newcomers(model, tableau)
-    for entry in tableau.outside[promising]:
-        trial = _with_newcomer(model, best.support, entry)
+    room, response = np.maximum(tableau.room, COLLINEAR)[:, None], tableau.response
+    fitted = tableau.fitted - response * (tableau.left[:, None] / room)
+    lost = model.share * fitted**2 / (tableau.spread + response**2 / room)
+    lets_go = (lost < model.penalty[tableau.inside]).any(axis=1)
+    for entry in tableau.outside[lets_go & ~np.isposinf(model.penalty[tableau.outside])].tolist():
+        trial = _forced(model, best.support, entry)
         if trial.value < best.value - PLATEAU:
             return _descend(model, trial.support)
     return None
 
 
-def _with_newcomer(model: _Quadratic, support: Bools, entry: int) -> _Fit:
-    """The fit that a descent reaches with an entry forced in, at its own price."""
-    trial = _descend(model.priced(entry, -np.inf), _changed(support, NONE, entry))
-    return replace(trial, value=trial.value + model.penalty[entry])
-
-
-def _moved_by_newcomers(model: _Quadratic, tableau: _Tableau) -> Bools:
-    """Which newcomers make a single drop, add or swap of the others worth its price, (outside,).
-
-    As rank-one updates of the tableau tell, for many newcomers at once: first axis. Those that are
-    combinations of the entries inside are among them: for these no update tells.
-    """
-    outside, inside, room, size = tableau.outside, tableau.inside, tableau.room, model.share**0.5
-    price, share = model.penalty[outside], np.maximum(room, COLLINEAR)[:, None]
-    shared = model.matrix[outside[:, None], inside]
-    common = model.matrix[outside[:, None], outside] - shared @ tableau.response.T
-    pull = size * tableau.left[:, None] / share
-    fitted, spread = size * tableau.fitted - tableau.response * pull, tableau.spread
-    spread = spread + tableau.response**2 / share
-    left, free = size * tableau.left - common * pull, room - common**2 / share
-    np.fill_diagonal(free, 0.0)  # the newcomer itself is in
-    loss = fitted**2 / spread - model.penalty[inside]
-    gain = _gain(left, free)
-    moved = (room <= COLLINEAR) | (loss < -PLATEAU).any(axis=1)
-    moved |= (price - gain < -PLATEAU).any(axis=1)
-    saved = gain - price + model.penalty[inside].max(initial=-np.inf)
-    lost = np.where(np.isfinite(model.penalty[inside]), fitted**2 / spread, np.inf)
-    swaps = _may_swap(tableau, common / share, spread, lost, free, gain, saved)
-    unsure = np.flatnonzero(~moved & swaps.any(axis=1))
-    for many in np.array_split(unsure, 1 + tableau.response.size * len(unsure) // BATCH):
-        response = tableau.response - (common / share)[many, :, None] * tableau.response[many, None]
-        swapped_left = left[many, :, None] + response * (fitted / spread)[many, None]
-        swapped_room = free[many, :, None] + response**2 / spread[many, None]
-        swapped_room[np.arange(len(many)), many] = 0.0
-        swap = loss[many, None] + price[:, None] - _gain(swapped_left, swapped_room)
-        moved[many] = (swap < -PLATEAU).any(axis=(1, 2))
-    return moved
-
-
-def _may_swap(
-    tableau: _Tableau,
-    common: Floats,
-    spread: Floats,
-    lost: Floats,
-    free: Floats,
-    gain: Floats,
-    saved: Floats,
-) -> Bools:
-    """Which of the others a newcomer may let take the place of an entry inside, two axes.
-
-    Few are enough alike. With the tangent ``k`` of what two have in common, for which there is a
-    bound, a swap pays only if ``sqrt(lost) < k sqrt(gain) + sqrt((1 + k^2) saved)``.
-    """
-    alike = np.abs(tableau.response / np.sqrt(tableau.spread)).max(axis=1, initial=0.0)
-    given = np.abs(tableau.response / np.sqrt(spread)).max(axis=1, initial=0.0)[:, None]
-    alike = (alike + np.abs(common) * given) / np.sqrt(np.maximum(free, COLLINEAR))
-    gain, saved = np.maximum(gain, 0.0), np.maximum(saved, 0.0)
-    most = alike * np.sqrt(gain) + np.sqrt((1 + alike**2) * saved)
-    pays = (saved > 0) & (np.sqrt(lost.min(axis=1, initial=np.inf))[:, None] <= most)
-    pays |= free <= COLLINEAR
-    np.fill_diagonal(pays, False)
-    return pays
+def _forced(model: _Quadratic, support: Bools, entry: int) -> _Fit:
+    """The fit that a descent reaches with an entry of a support forced out, or another one in."""
+    inside, penalty = support[entry], model.penalty.copy()
+    penalty[entry] = np.inf if inside else -np.inf
+    changed = _changed(support, entry, NONE) if inside else _changed(support, NONE, entry)
+    trial = _descend(replace(model, penalty=penalty), changed)
+    return trial if inside else replace(trial, value=trial.value + model.penalty[entry])
 
 
 def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
@@ -407,8 +316,8 @@ class _Tableau:
         return _gain(left, room)
 
 
-def _single_changes(model: _Quadratic, tableau: _Tableau) -> list[Change]:
-    """Best drop, add and swap."""
+def _best_change(model: _Quadratic, tableau: _Tableau) -> Change:
+    """The best of all drops, adds and swaps."""
     inside, outside, share = tableau.inside, tableau.outside, model.share
     lost, price = tableau.fitted**2 / tableau.spread, model.penalty[outside]
     loss = share * lost - model.penalty[inside]
@@ -423,7 +332,7 @@ def _single_changes(model: _Quadratic, tableau: _Tableau) -> list[Change]:
         swap -= share * tableau.gained_after
         add, drop = divmod(int(swap.argmin()), len(inside))
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
-    return changes
+    return min(changes, key=lambda change: change[0])
 
 
 def _gain(left: Floats, room: Floats) -> Floats:
@@ -450,7 +359,8 @@ def equilibrated(information: Floats, ridge: float = RIDGE) -> tuple[Floats, Flo
         ``scale[:, None] * information * scale``, plus the ridge.
     scale : ndarray, shape (m,)
     """
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), NOTHING))
+    # The inverse of so little information, even over the ridge, is still a number.
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-250))
     matrix = information * scale[:, None] * scale
     matrix[np.diag_indices_from(matrix)] += ridge
     return matrix, scale
@@ -471,7 +381,7 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
     left = gradient[own:] - gradient[:own] @ response
     whole = np.diag(information)[own:]
     apart = whole - (information[:own, own:] * response).sum(axis=0)
-    new = apart > DEPENDENT * whole
+    new = apart > 1e-9 * whole  # else the law has it already, but for rounding
     room = np.where(new, apart, 1.0)
     return np.where(new, left / room, 0.0), np.where(new, 1 / room, np.inf)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,11 +15,19 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, interp1d
 from scipy.special import comb as binomial
 
 from ..arrays import Bools, Floats, Ints
-from ..checks import check_array, check_instance, check_integer, check_number, check_times, shown
+from ..checks import (
+    check_array,
+    check_choice,
+    check_instance,
+    check_integer,
+    check_number,
+    check_times,
+    shown,
+)
 
 # --------------------------------------------------------------------------------------------------
 # The library: monomials of the state, and what a shift of the origin does to them (paper: Eq. 10).
@@ -26,11 +35,6 @@ from ..checks import check_array, check_instance, check_integer, check_number, c
 # A library that holds all divisors of its monomials is closed under a shift of the origin. Its
 # monomials may have functions of the state as further variables, after the coordinates, and after
 # these the slopes; such variables stay as they are when the origin is shifted.
-
-
-def variable_names(d: int) -> tuple[str, ...]:
-    """Default names of ``d`` state variables: x, y, z, w up to four, else x1, x2, ..."""
-    return tuple("xyzw"[:d]) if d <= 4 else tuple(f"x{i + 1}" for i in range(d))
 
 
 def velocity_names(names: Sequence[str]) -> tuple[str, ...]:
@@ -255,24 +259,25 @@ def shift_generators(exponents: Ints) -> Floats:
 # --------------------------------------------------------------------------------------------------
 # Measured inputs: known functions of the time, such as a force that somebody applies.
 
-BEYOND = 1e-6
-"""How far beyond its samples an input is known, over their length: further than rounding."""
+WAYWARD = 0.1
+"""Distance of a cubic through samples from a line, midway between two, over their standard
+deviation, beyond which it is a guess: a sine makes so much at six samples a period."""
 
 
 @dataclass(frozen=True, eq=False)
 class Input:
-    """A function of the time by its samples: a cubic spline through those of each trajectory.
+    """A function of the time by its samples, with a curve through those of each trajectory.
 
     Parameters
     ----------
-    pieces : tuple of CubicSpline
+    pieces : tuple of CubicSpline or interp1d
         One a trajectory.
     """
 
-    pieces: tuple[CubicSpline, ...]
+    pieces: tuple[CubicSpline | interp1d, ...]
 
     @classmethod
-    def of(cls, name: str, t: ArrayLike, values: ArrayLike) -> Input:
+    def of(cls, name: str, t: ArrayLike, values: ArrayLike, hold: str | None = None) -> Input:
         """An input from times and values (n,), or lists of such.
 
         Raises
@@ -289,7 +294,7 @@ class Input:
             raise ValueError(
                 f"inputs: {name} must be one per trajectory ({len(times)}), got {len(runs)}"
             )
-        pieces = [_spline(name, part, run) for part, run in zip(times, runs, strict=True)]
+        pieces = [_curve(name, part, run, hold) for part, run in zip(times, runs, strict=True)]
         ends = sorted((spline.x[0], spline.x[-1]) for spline in pieces)
         for (_, last), (first, _) in zip(ends[:-1], ends[1:], strict=True):
             if not last < first:
@@ -300,19 +305,19 @@ class Input:
         return cls(tuple(pieces))
 
     def __call__(self, t: Floats) -> Floats:
-        """The values at times (n,); NaN where it was not measured."""
+        """The values at times (n,); NaN where it was not measured, but for rounding at the ends."""
         t = np.asarray(t, dtype=float)
         values = np.full(t.shape, np.nan)
         for spline in self.pieces:
             low, high = spline.x[0], spline.x[-1]
-            slack = BEYOND * (high - low)
+            slack = 1e-6 * (high - low)
             inside = (t >= low - slack) & (t <= high + slack)
-            values[inside] = spline(t[inside])
+            values[inside] = spline(np.clip(t[inside], low, high))
         return values
 
 
-def _spline(name: str, t: Floats, values: Floats) -> CubicSpline:
-    """The spline through samples, which are checked."""
+def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> CubicSpline | interp1d:
+    """The curve through samples, which are checked."""
     t, values = check_times(t), check_array("inputs", values)
     if values.shape != t.shape:
         raise ValueError(f"inputs: {name} must have shape {t.shape}, as t has, got {values.shape}")
@@ -321,24 +326,50 @@ def _spline(name: str, t: Floats, values: Floats) -> CubicSpline:
     if not np.isfinite(values).all():
         first = t[np.argmin(np.isfinite(values))]
         raise ValueError(f"inputs: {name} must be finite, got NaN or infinity at t = {first:g}")
-    return CubicSpline(t, values)
+    curve, line = CubicSpline(t, values), interp1d(t, values)
+    if hold is None:
+        middles = (t[1:] + t[:-1]) / 2
+        apart = np.abs(curve(middles) - line(middles))
+        hold = "zero" if apart.max() > WAYWARD * values.std() else "cubic"
+        if hold == "zero":
+            warnings.warn(
+                f"inputs: {name} jumps, as at t = {t[1 + np.abs(np.diff(values)).argmax()]:g}, "
+                "where a cubic through its samples is a guess: the value of each holds until the "
+                "next. Say so by hold='zero', or what is true by 'linear' or 'cubic'",
+                stacklevel=2,
+            )
+    return {"zero": interp1d(t, values, "previous"), "linear": line, "cubic": curve}[hold]
+
+
+def jumps(value: Callable[[Floats], Floats], t: Floats, halvings: int = 30) -> Floats:
+    """Where a function of the time jumps between given times, (n,).
+
+    Of each interval the half in which it changes more, again and again: what is continuous changes
+    less and less.
+    """
+    low, high = t[:-1], t[1:]
+    below, above = value(low), value(high)
+    changes = []
+    for _ in range(halvings):
+        middle = (low + high) / 2
+        here = value(middle)
+        left = np.abs(here - below) > np.abs(above - here)
+        high, above = np.where(left, middle, high), np.where(left, here, above)
+        low, below = np.where(left, low, middle), np.where(left, below, here)
+        changes.append(np.abs(above - below))
+    least = 1e-9 * np.ptp(value(t))  # more than rounding
+    return high[(changes[-1] > changes[halvings // 2] / 2) & (changes[-1] > least)]
 
 
 # --------------------------------------------------------------------------------------------------
 # Libraries as values: which candidate terms a law may have, before any data are seen.
 #
 # A library is a sum of families: polynomials, harmonics of the coordinates, functions of one's
-# own. For given variables it becomes what `library` works with: functions of the state, and the
-# exponents of products of coordinates and functions.
+# own. For given variables it becomes functions of the state, and the exponents of products of
+# coordinates and functions.
 
-MOST_TERMS = 1000
-"""Most monomials of a law, of its denominators, or waves: a search among more would not end."""
-FAMILIES = "polynomial(degree), fourier(harmonics) and rational(degree)"
-"""What can be written as text."""
 OTHERS = "..."
 """All terms of an equation that are not named."""
-STEP = 1e-3
-"""Step of a difference, relative to the size of the coordinate."""
 
 
 @dataclass(frozen=True)
@@ -426,12 +457,14 @@ class Library:
         return cls(functions=tuple(functions.items()))
 
     @classmethod
-    def inputs(cls, t: ArrayLike, values: Mapping[str, ArrayLike]) -> Library:
+    def inputs(
+        cls, t: ArrayLike, values: Mapping[str, ArrayLike], hold: str | None = None
+    ) -> Library:
         """Measured inputs as terms: functions of the time that are known, whatever the state is.
 
-        Between the samples each is a cubic spline. A law with inputs is one of the state and the
-        time, as with `terms` of ``t``. Functions in `terms` may have inputs as arguments, as in
-        ``{"ux": lambda u, x: u * x}``.
+        A law with inputs is one of the state and the time, as with `terms` of ``t``. Functions in
+        `terms` may have inputs as arguments, as in ``{"ux": lambda u, x: u * x}``. Where an input
+        jumps, the slope of the path may.
 
         Parameters
         ----------
@@ -441,11 +474,20 @@ class Library:
             apart from each other: add a number to those of the second.
         values : mapping of str to array_like, shape (n,), or list of such
             Names and values; for several trajectories lists.
+        hold : {"zero", "linear", "cubic"}, optional
+            What an input is between its samples: the value of the last one (a relay, a controller),
+            a line, or a cubic spline; by default the spline, or, where it jumps, the value of the
+            last one, with a warning.
 
         Raises
         ------
         ValueError
             If a name is none, times or values are not such, or times of trajectories overlap.
+
+        Warns
+        -----
+        UserWarning
+            If an input jumps, and ``hold`` does not say what is between its samples.
 
         Examples
         --------
@@ -454,7 +496,9 @@ class Library:
         """
         if not isinstance(values, Mapping) or not values:
             raise ValueError(f"inputs: must map names to values at t, got {shown(values)}")
-        return cls.terms({name: Input.of(name, t, given) for name, given in values.items()})
+        if hold is not None:
+            check_choice("hold", hold, ("zero", "linear", "cubic"))
+        return cls.terms({name: Input.of(name, t, given, hold) for name, given in values.items()})
 
     def where(self, equations: Mapping[str, Mapping[str, float | None]]) -> Library:
         """The same terms, of which some are known, forbidden or alone allowed in an equation.
@@ -512,7 +556,10 @@ class Library:
         for part in families.split("+"):
             match = re.fullmatch(r"\s*(polynomial|fourier|rational)\s*\(\s*(\d+)\s*\)\s*", part)
             if match is None:
-                raise ValueError(f"library: must be a sum of {FAMILIES}, got {part.strip()!r}")
+                raise ValueError(
+                    f"library: must be a sum of polynomial(degree), "
+                    f"fourier(harmonics) and rational(degree), got {part.strip()!r}"
+                )
             total += getattr(cls, match[1])(int(match[2]))
         for equation in equations:
             name, _, listed = equation.partition(":")
@@ -616,19 +663,20 @@ class Library:
                 exponents = np.concatenate([exponents, rows])
         return exponents, tuple(functions)
 
-    def _check_size(self, states: int, measured: int) -> None:
-        """Refuse more terms than a search can try, before they are listed."""
+    def _check_size(self, states: int, measured: int, most: int = 1000) -> None:
+        """Refuse more terms than a search can try to an end, before they are listed."""
         counts = [
             ("monomials", comb(states + degree, states), f"of degree {degree}")
             for degree in (self.degree or 0, self.denominators)
         ]
         waves = 2 * self.harmonics * measured
-        counts += [("sines and cosines", waves, f"of {self.harmonics} multiples")]
-        for what, count, which in counts:
-            if count > MOST_TERMS:
+        for what, count, which in [
+            *counts, ("sines and cosines", waves, f"of {self.harmonics} multiples")
+        ]:  # fmt: skip
+            if count > most:
                 raise ValueError(
-                    f"library: must have at most {MOST_TERMS} {what}, got {count} {which} in "
-                    f"{states} variables"
+                    f"library: must have at most {most} {what}, got {count} {which} in {states} "
+                    "variables"
                 )
 
 
@@ -742,7 +790,7 @@ def _differences(value: Callable[[Floats], Floats], x: Floats, axes: Sequence[in
     result = np.zeros_like(x)
     for axis in axes:
         step = np.zeros(x.shape[1])
-        step[axis] = STEP * (np.abs(x[:, axis]).mean() or 1.0)
+        step[axis] = 1e-3 * (np.abs(x[:, axis]).mean() or 1.0)
         near = value(x + step) - value(x - step)
         far = value(x + 2 * step) - value(x - 2 * step)
         result[:, axis] = (8 * near - far) / (12 * step[axis])

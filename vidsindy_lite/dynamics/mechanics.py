@@ -12,12 +12,12 @@ from scipy.integrate import cumulative_simpson
 from scipy.interpolate import BSpline
 from scipy.optimize import least_squares
 
-from ..arrays import Bools, Floats
+from ..arrays import Floats
 from ..checks import check_array, check_vector, shown
 from .data import inflation
 from .l0 import LEAST
 from .library import extended
-from .model import PolynomialSystem, power_of_ten
+from .model import PolynomialSystem, with_error
 
 # --------------------------------------------------------------------------------------------------
 # What a law of motion says of a body: gravity and drag, or springs and periods; and its energy.
@@ -25,35 +25,12 @@ from .model import PolynomialSystem, power_of_ten
 # Each number is a function of the law's coefficients, and their covariance is carried through to
 # it to first order (the delta method).
 
-POINTS = 1001
-"""Points of each fitted curve at which forces and energy are looked at."""
-STEP = 1e-3
-"""Step of a derivative in a coefficient, in its standard errors."""
 FAINT = 1e-6
 """Share of the largest entry of a matrix below which an entry is rounding."""
-TWISTED = 0.05
-"""Curl of the forces, over their gradients, that errors of the coefficients do not make."""
-ALIKE = 3.0
-"""Standard errors between the drags along two directions that may be one."""
-KEPT = 1e-3
-"""Change of the energy, over the largest kinetic energy, that is none."""
-AROUND = 0.5
-"""How far outside the places that were seen a place of rest may be, over their range."""
-NEWTON = 20
-"""Most steps to a place of rest."""
-ROUNDING = 1e-12
-"""Step, over the extent of the motion, that is none."""
-NO_REST = (
-    "nothing holds it at a place near the motion, or a force jumps there: no spring constants and "
-    "no periods"
-)
-BESIDE = 0.01
-"""How far beside a place of rest forces are asked for, over the extent of the motion."""
-HEADLINES = ("g", "direction", "drag", "quadratic drag")
-"""What is not read off the equations, beside periods."""
+POINTS = 1001
+"""Points of a curve at which forces and energy are looked at."""
 
 Complexes = NDArray[np.complex128]
-Rule = Callable[[PolynomialSystem], dict[str, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +56,7 @@ class Quantity:
         return cls(name, np.asarray(value), error)
 
     def __str__(self) -> str:
-        error = float(self.error.max())
-        power = power_of_ten(max(float(np.abs(self.value).max()), error)) if error > 0 else 0
-        value, error = self.value / 10.0**power, error / 10.0**power
-        digits = int(np.clip(1 - np.floor(np.log10(error)), 0, 12)) if error > 0 else 0
-        form = f".{digits}f" if error > 0 else ".4g"
-        numbers = ", ".join(f"{number + 0.0:{form}}" for number in np.atleast_1d(value))
-        text = f"({numbers})" if self.value.ndim else numbers
-        text += f" ± {error:{form}}" if error > 0 else ""
+        text, power = with_error(self.value, float(self.error.max()), ".4g")
         return f"{self.name} = ({text})e{power}" if power else f"{self.name} = {text}"
 
 
@@ -126,8 +96,9 @@ class Physics:
     @property
     def headline(self) -> str:
         """In one line what is not read off the equations: gravity and drag, or periods."""
-        said = [str(q) for q in self.quantities if q.name.startswith(HEADLINES)]
-        if periods := [str(q) for q in self.quantities if q.name.startswith("period")]:
+        named = ("g", "direction", "drag", "quadratic drag")
+        said = [str(q) for q in self if q.name.startswith(named)]
+        if periods := [str(q) for q in self if q.name.startswith("period")]:
             said.append(f"of small swings: {'; '.join(periods)}")
         return "; ".join(said)
 
@@ -158,9 +129,8 @@ def physics_of(
     ValueError
         If ``down`` is no direction.
     """
-    m = law.d // law.order
     if down is not None:
-        down = check_vector("down", down, m)
+        down = check_vector("down", down, law.d // law.order)
         if not down.any():
             raise ValueError("down: must be a direction, got zeros only")
         down = down / np.linalg.norm(down)
@@ -172,11 +142,15 @@ def physics_of(
     paths = [curve(t) for curve, t in zip(curves, times, strict=True)]
     body = _Body(law, covariance, np.concatenate(paths))
     rest = None
-    if body.force(law, body.states)[1].any():
-        rest = body.rest()
-        said = [NO_REST] if rest is None else list(body.swing(rest))
-    else:
+    if not body.force(law, body.states)[1].any():
         said = list(body.flight(down))
+    elif (rest := body.rest()) is not None:
+        said = list(body.swing(rest))
+    else:
+        said = [
+            "nothing holds it at a place near the motion, or a force jumps there: no spring "
+            "constants and no periods"
+        ]
     energy = body.energies(times, paths, rest)
     return Physics(
         quantities=tuple(entry for entry in said if isinstance(entry, Quantity)),
@@ -244,7 +218,9 @@ class _Body:
         force, stiffness, damping = self.force(law, state)
         return force[0], stiffness[0], damping[0]
 
-    def carried(self, rule: Rule) -> dict[str, tuple[Floats, Floats]]:
+    def carried(
+        self, rule: Callable[[PolynomialSystem], dict[str, Floats]]
+    ) -> dict[str, tuple[Floats, Floats]]:
         """What a rule makes of the law: values, each with the covariance of its entries."""
         value, flat = rule(self.law), self.law.coefficients.T.ravel()
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
@@ -252,14 +228,13 @@ class _Body:
         rates = []
         for k in free.tolist():
             step = np.zeros(len(flat))
-            step[k] = max(STEP * errors[k], 1e-8 * abs(flat[k]))
+            step[k] = max(1e-3 * errors[k], 1e-8 * abs(flat[k]))
             above, below = (
                 rule(replace(self.law, coefficients=moved.reshape(self.law.d, -1).T))
                 for moved in (flat + step, flat - step)
             )
             rates.append({name: (above[name] - below[name]) / (2 * step[k]) for name in value})
-        covariance = self.covariance[np.ix_(free, free)]
-        found = {}
+        covariance, found = self.covariance[np.ix_(free, free)], {}
         for name in value:
             slope = np.array([rate[name] for rate in rates]).reshape(len(free), value[name].size)
             found[name] = value[name], slope.T @ covariance @ slope
@@ -292,14 +267,14 @@ class _Body:
         yield from self.drags("quadratic drag", *said["quadratic drag"])
 
     def drags(self, name: str, values: Floats, covariance: Floats) -> Iterator[Quantity]:
-        """The drags along all coordinates, (m,): one, if they are alike within their errors."""
+        """The drags along all coordinates, (m,): one, if they are alike within three errors."""
         variances = np.diag(covariance)
         if values.all():
             weights = 1 / variances if variances.all() else np.ones(self.m)
             weights /= weights.sum()
             apart = np.eye(self.m) - weights
             spread = np.sqrt(np.maximum(np.diag(apart @ covariance @ apart.T), 0.0))
-            if (np.abs(apart @ values) <= ALIKE * spread + FAINT * np.abs(values)).all():
+            if (np.abs(apart @ values) <= 3 * spread + FAINT * np.abs(values)).all():
                 yield Quantity.of(name, weights @ values, weights @ covariance @ weights)
                 return
         for j in np.flatnonzero(values).tolist():
@@ -307,37 +282,36 @@ class _Body:
 
     @np.errstate(divide="ignore", invalid="ignore")  # of functions that have no value there
     def settled(self, law: PolynomialSystem, place: Floats) -> Floats:
-        """Where no force acts on a body at rest, by Newton steps from a place."""
-        extent = np.ptp(self.states[:, : self.m], axis=0)
-        for _ in range(NEWTON):
+        """Where no force acts on a body at rest, by Newton steps from a place, at most 20."""
+        nothing = 1e-12 * np.ptp(self.states[:, : self.m], axis=0)
+        for _ in range(20):
             force, slope, _ = self.at_rest(law, place)
             if not np.isfinite(slope).all():
                 return np.full_like(place, np.nan)
             step = np.linalg.lstsq(slope, force, rcond=FAINT)[0]
             place = place - step
-            if (np.abs(step) < ROUNDING * extent).all():
+            if (np.abs(step) < nothing).all():
                 break
-        return np.where(np.abs(place) < ROUNDING * extent, 0.0, place)
+        return np.where(np.abs(place) < nothing, 0.0, place)
 
     def rest(self) -> Floats | None:
-        """Where, near the motion, forces pull the body back to; none if nowhere."""
+        """Where forces pull the body back to, no farther off than half of its range; else none."""
         places = self.states[:, : self.m]
         low, high = places.min(axis=0), places.max(axis=0)
-        margin = AROUND * (high - low)
+        margin = (high - low) / 2
         for start in (places.mean(axis=0), places[-1]):
             place = self.settled(self.law, start)
             near = (place > low - margin) & (place < high + margin)
-            if not near.all() or self.jumps(place):
-                continue
-            held = np.linalg.eigvals(-self.at_rest(self.law, place)[1]).real
-            if held.min() > FAINT * np.abs(held).max():
-                return place
+            if near.all() and not self.jumps(place):
+                held = np.linalg.eigvals(-self.at_rest(self.law, place)[1]).real
+                if held.min() > FAINT * np.abs(held).max():
+                    return place
         return None
 
     def jumps(self, place: Floats) -> bool:
         """Whether a force is another close by, as dry friction: its slope is of no small motion."""
         still = np.append(place, np.zeros(self.m))
-        beside = still + BESIDE * np.ptp(self.states[:, : 2 * self.m], axis=0)
+        beside = still + 0.01 * np.ptp(self.states[:, : 2 * self.m], axis=0)
         _, *slopes = self.force(self.law, np.stack([still, beside]))
         here, there = np.concatenate(slopes, axis=2)
         return not np.abs(there - here).max() < 0.5 * np.abs(here).max()
@@ -374,15 +348,17 @@ class _Body:
     def energies(
         self, times: Sequence[Floats], paths: Sequence[Floats], rest: Floats | None
     ) -> list[Floats]:
-        """Times and energies along paths; none if the forces at rest have no potential."""
+        """Times and energies along paths; none if the forces at rest have no potential.
+
+        Their curl is then a twentieth of their gradients, which errors of coefficients do not make.
+        """
 
         def still(places: Floats) -> tuple[Floats, Floats]:
-            states = np.hstack([places, np.zeros_like(places)])
-            return self.force(self.law, states)[:2]
+            return self.force(self.law, np.hstack([places, np.zeros_like(places)]))[:2]
 
         _, slopes = still(self.states[:, : self.m])
         twist = slopes - slopes.transpose(0, 2, 1)
-        if (twist**2).mean() > TWISTED**2 * (slopes**2).mean():
+        if (twist**2).mean() > 0.05**2 * (slopes**2).mean():
             return []
         found = []
         for t, path in zip(times, paths, strict=True):
@@ -390,8 +366,7 @@ class _Body:
             power = (still(places)[0] * velocity).sum(axis=1)
             stored = -cumulative_simpson(power, x=t, initial=0.0)
             if rest is not None:
-                away = places[0] - rest
-                share = np.linspace(0, 1, POINTS)
+                away, share = places[0] - rest, np.linspace(0, 1, POINTS)
                 pull = still(rest + share[:, None] * away)[0] @ away
                 stored -= cumulative_simpson(pull, x=share)[-1]
             found.append(np.stack([t, stored + (velocity**2).sum(axis=1) / 2], axis=1))
@@ -415,8 +390,8 @@ def _diagonal(matrix: Floats) -> bool:
     return bool((np.abs(beside) <= FAINT * np.abs(matrix).max()).all())
 
 
-def _balance(energy: Sequence[Floats], paths: Sequence[Floats]) -> str:
-    """How the energy changes along paths."""
+def _balance(energy: Sequence[Floats], paths: Sequence[Floats], kept: float = 1e-3) -> str:
+    """How the energy changes along paths, by more than a share that is none."""
     if not energy:
         return "the forces have no potential: no energy"
     most = max(float((path[:, path.shape[1] // 2 :] ** 2).sum(axis=1).max()) for path in paths) / 2
@@ -424,23 +399,17 @@ def _balance(energy: Sequence[Floats], paths: Sequence[Floats]) -> str:
     rise = max(float((level - np.minimum.accumulate(level)).max()) for level in levels)
     fall = max(float(level[0] - level[-1]) for level in levels)
     share = "of the largest kinetic energy"
-    if rise > KEPT:
+    if rise > kept:
         return f"the energy rises by {100 * rise:.3g} % {share}: something drives the motion"
-    if fall > KEPT:
+    if fall > kept:
         return f"the energy falls by {100 * fall:.3g} % {share}, and never rises"
-    return f"the energy is kept, to {100 * KEPT:g} % {share}"
+    return f"the energy is kept, to {100 * kept:g} % {share}"
 
 
 # --------------------------------------------------------------------------------------------------
 # Motion on a circle or a sphere: where it is, how large, and the angles that are its coordinates.
 #
 # A bob on a string has three coordinates and fewer freedoms: its angles, and these obey a law.
-
-ASIDE, ASTRAY = 0.1, 0.01
-"""Distance of a motion from what is round, over its radius, that doubts it: of single samples, and
-what neighbours have in common."""
-STRAIGHT = 0.3
-"""Standard error of a radius, over the radius, beyond which a motion may as well have none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -481,23 +450,21 @@ class Round:
     systematic: Floats | None = None
 
     @property
+    def shape(self) -> str:
+        """``"circle"`` or ``"sphere"``."""
+        return "circle" if len(self.axes) == 2 else "sphere"
+
+    @property
     def centre_errors(self) -> Floats:
         """Standard errors of the centre, shape (d,)."""
         return np.sqrt(np.diag(self.centre_covariance))
 
     def __str__(self) -> str:
-        shape = "circle" if len(self.axes) == 2 else "sphere"
-        centre, errors = (
-            ", ".join(f"{number:.{digits}g}" for number in numbers)
-            for numbers, digits in ((self.centre, 6), (self.centre_errors, 2))
-        )
-        return "\n".join(
-            [
-                f"{shape} of radius {self.radius:.6g} ± {self.radius_error:.2g} about ({centre}) ± "
-                f"({errors}), off by {self.distance:.2g}",
-                *(f"warning: {text}" for text in self.warnings),
-            ]
-        )
+        centre = ", ".join(f"{number:.6g}" for number in self.centre)
+        errors = ", ".join(f"{error:.2g}" for error in self.centre_errors)
+        radius = f"{self.shape} of radius {self.radius:.6g} ± {self.radius_error:.2g}"
+        said = f"{radius} about ({centre}) ± ({errors}), off by {self.distance:.2g}"
+        return "\n".join([said, *(f"warning: {text}" for text in self.warnings)])
 
     __repr__ = __str__
 
@@ -534,27 +501,7 @@ def on_circle(
     >>> swing = vl.on_circle(seen.x, zero=(0, 0, -1), systematic=seen.systematic)
     >>> print(swing.radius, swing.radius_error)
     """
-    return _with_shared(_circle, _positions(x, (2, 3)), zero, systematic)
-
-
-def _circle(x: Floats, zero: ArrayLike | None) -> Round:
-    """The circle of checked positions."""
-    seen = _seen(x)
-    middle, main = _principal(x[seen])
-    flat = (x[seen] - middle) @ main[:2].T
-    planar, covariance = _fitted(flat)
-    centre = middle + planar[:2] @ main[:2]
-    errors = main[:2].T @ covariance[:2, :2] @ main[:2]
-    off = np.linalg.norm(flat - planar[:2], axis=1)[:, None] - planar[2]
-    if x.shape[1] == 3:
-        height = (x[seen] - middle) @ main[2:].T
-        errors += _height_error(flat, height, planar[:2]) * main[2:].T * main[2:]
-        off = np.hstack([off, height])
-    axes = _axes(x[seen] - centre, zero, main[:2])[:2]
-    angle = np.full(len(x), np.nan)
-    right, up = axes @ (x[seen] - centre).T
-    angle[seen] = np.unwrap(np.arctan2(up, right))
-    return _round(centre, planar[2], errors, covariance, off, axes, angle)
+    return _with_shared(_checked(x, (2, 3)), zero, systematic, False)
 
 
 def on_sphere(
@@ -583,46 +530,34 @@ def on_sphere(
     ValueError
         If ``x`` or ``systematic`` has another shape or too few rows, or lies in a plane.
     """
-    return _with_shared(_sphere, _positions(x, (3,)), zero, systematic)
+    return _with_shared(_checked(x, (3,)), zero, systematic, True)
 
 
-def _sphere(x: Floats, zero: ArrayLike | None) -> Round:
-    """The sphere of checked positions."""
-    seen = _seen(x)
-    ball, covariance = _fitted(x[seen])
-    away = x[seen] - ball[:3]
-    off = np.linalg.norm(away, axis=1)[:, None] - ball[3]
-    axes = _axes(away, zero, np.eye(3))
-    a, b, c = axes @ away.T
-    angle = np.full((len(x), 2), np.nan)
-    angle[seen, 0] = np.unwrap(np.arctan2(b, a))
-    angle[seen, 1] = np.arctan2(c, np.hypot(a, b))
-    return _round(ball[:3], ball[3], covariance[:3, :3], covariance, off, axes, angle)
+def _checked(positions: ArrayLike, dimensions: tuple[int, ...]) -> Floats:
+    x = check_array("x", positions)
+    if x.ndim != 2 or x.shape[1] not in dimensions:
+        wanted = " or ".join(f"(n, {d})" for d in dimensions)
+        raise ValueError(f"x: must have shape {wanted}, got {x.shape}")
+    seen, fewest = np.isfinite(x).all(axis=1).sum(), x.shape[1] + 3
+    if seen < fewest:
+        raise ValueError(f"x: must hold at least {fewest} positions, got {seen}")
+    return x
 
 
 def _with_shared(
-    fit: Callable[[Floats, ArrayLike | None], Round],
-    x: Floats,
-    zero: ArrayLike | None,
-    systematic: ArrayLike | None,
+    x: Floats, zero: ArrayLike | None, systematic: ArrayLike | None, sphere: bool
 ) -> Round:
     """What is fitted to positions, and what each error that they share makes of it."""
-    found = fit(x, zero)
+    found, (n, d), seen = _round(x, zero, sphere), x.shape, np.isfinite(x).all(axis=1)
     if systematic is None:
         return found
     errors = check_array("systematic", systematic)
-    if (
-        errors.ndim != 3
-        or errors.shape[1:] != x.shape
-        or not np.isfinite(errors[:, _seen(x)]).all()
-    ):
-        raise ValueError(
-            f"systematic: must be finite, of shape (k, {len(x)}, {x.shape[1]}), got {errors.shape}"
-        )
-    moved = [fit(x + error, found.axes[0] if zero is None else zero) for error in errors]
-    shape = (len(moved), len(x), found.angle.size // len(x))
+    if errors.ndim != 3 or errors.shape[1:] != x.shape or not np.isfinite(errors[:, seen]).all():
+        raise ValueError(f"systematic: must be finite, of shape (k, {n}, {d}), got {errors.shape}")
+    moved = [_round(x + error, found.axes[0] if zero is None else zero, sphere) for error in errors]
+    shape = (len(moved), n, found.angle.size // n)
     turned = np.array([other.angle - found.angle for other in moved]).reshape(shape)
-    centres = np.array([other.centre - found.centre for other in moved]).reshape(-1, x.shape[1])
+    centres = np.array([other.centre - found.centre for other in moved]).reshape(-1, d)
     radii = np.array([other.radius - found.radius for other in moved])
     return replace(
         found,
@@ -632,61 +567,53 @@ def _with_shared(
     )
 
 
-def _round(
-    centre: Floats, radius: float, errors: Floats, covariance: Floats, off: Floats,
-    axes: Floats, angle: Floats,
-) -> Round:  # fmt: skip
-    distance = float(np.sqrt((off**2).sum(axis=1).mean()))
+def _round(x: Floats, zero: ArrayLike | None, sphere: bool) -> Round:
+    """The sphere of checked positions, or the circle in the plane of their main directions.
+
+    Doubted if it is a tenth of its radius off, or neighbours share a hundredth, or hardly bent.
+    """
+    seen = np.isfinite(x).all(axis=1)
+    middle = x[seen].mean(axis=0)
+    place, span, across = x[seen] - middle, np.eye(x.shape[1]), np.empty((0, x.shape[1]))
+    if not sphere:
+        spread, directions = np.linalg.eigh(np.cov(place.T))
+        if not spread[-2] > 1e-18 * spread[-1]:
+            raise ValueError("x: must not lie on a line: a line has no centre")
+        span, across = np.split(directions.T[::-1], [2])
+    flat, height = place @ span.T, place @ across.T
+    (*at, radius), covariance = _fitted(flat)
+    centre, errors = at @ span, span.T @ covariance[:-1, :-1] @ span
+    off = np.hstack([np.linalg.norm(flat - at, axis=1)[:, None] - radius, height])
+    if height.size:
+        errors += _height_error(flat, height, np.array(at)) * across.T * across
+    axes = _axes(place - centre, zero, span)
+    right, up, *above = axes @ (place - centre).T
+    angle = np.full((len(x), len(axes) - 1), np.nan)
+    angle[seen, 0] = np.unwrap(np.arctan2(up, right))
+    if sphere:
+        angle[seen, 1] = np.arctan2(above[0], np.hypot(right, up))
+    error, distance = (float(np.sqrt(e)) for e in (covariance[-1, -1], (off**2).sum(axis=1).mean()))
     shared = float(np.sqrt(max((off[1:] * off[:-1]).sum(axis=1).mean(), 0.0)))
-    shape = "circle" if len(axes) == 2 else "sphere"
-    doubts: list[str] = []
-    if distance > ASIDE * radius or shared > ASTRAY * radius:
+    doubts = []
+    if distance > 0.1 * radius or shared > 0.01 * radius:
         doubts.append(
-            f"the motion may be on no {shape}: it is off by {100 * distance / radius:.2g} % of the "
-            f"radius, of which neighbours share {100 * shared / radius:.2g} %"
+            f"it is off by {100 * distance / radius:.2g} % of the radius, of which neighbours "
+            f"share {100 * shared / radius:.2g} %"
         )
-    radius_error = float(np.sqrt(covariance[-1, -1]))
-    if radius_error > STRAIGHT * radius:
-        doubts.append(
-            f"the motion may be on no {shape}: it hardly bends, so that the radius is known to "
-            f"{100 * radius_error / radius:.0f} % alone"
-        )
+    if error > 0.3 * radius:
+        known = f"the radius is known to {100 * error / radius:.0f} % alone"
+        doubts.append(f"it hardly bends, so that {known}")
+    shape = "sphere" if sphere else "circle"
     return Round(
-        centre=centre,
+        centre=middle + centre,
         radius=float(radius),
         centre_covariance=errors,
-        radius_error=radius_error,
+        radius_error=error,
         distance=distance,
         axes=axes,
-        angle=angle,
-        warnings=tuple(doubts),
+        angle=angle if sphere else angle[:, 0],
+        warnings=tuple(f"the motion may be on no {shape}: {doubt}" for doubt in doubts),
     )
-
-
-def _seen(x: Floats) -> Bools:
-    """Which rows of positions were seen."""
-    return np.asarray(np.isfinite(x).all(axis=1))
-
-
-def _positions(x: ArrayLike, dimensions: tuple[int, ...]) -> Floats:
-    """Checked positions."""
-    x = check_array("x", x)
-    if x.ndim != 2 or x.shape[1] not in dimensions:
-        wanted = " or ".join(f"(n, {d})" for d in dimensions)
-        raise ValueError(f"x: must have shape {wanted}, got {x.shape}")
-    seen = _seen(x).sum()
-    if seen < x.shape[1] + 3:
-        raise ValueError(f"x: must hold at least {x.shape[1] + 3} positions, got {seen}")
-    return x
-
-
-def _principal(x: Floats) -> tuple[Floats, Floats]:
-    """The mean of points, and their principal directions (d, d), the widest first."""
-    middle = x.mean(axis=0)
-    spread, directions = np.linalg.eigh(np.cov((x - middle).T))
-    if not spread[-2] > 1e-18 * spread[-1]:
-        raise ValueError("x: must not lie on a line: a line has no centre")
-    return middle, directions.T[::-1]
 
 
 def _fitted(x: Floats) -> tuple[Floats, Floats]:

@@ -1,7 +1,7 @@
-"""A law as a model: its system of equations, its integration, the unknowns of a fit, and its form.
+"""A law as a model: its system of equations, its integration, and its form before a search.
 
 `PolynomialSystem` is a law, of the truth as well as of a discovery; `runge_kutta_4` follows it;
-`State` is a law and a curve that a fit moves; `Form` is what a law may look like before it is
+`Form` is what a law may look like before it is
 searched.
 """
 
@@ -53,14 +53,6 @@ STAGES = DOP853.n_stages
 STAGE_WEIGHTS = [row[:stage, None] for stage, row in enumerate(DOP853.A[:STAGES])]
 WEIGHTS, THIRD, FIFTH = (row[:STAGES, None] for row in (DOP853.B, DOP853.E3, DOP853.E5))
 """Coefficients of the step, and of its errors against steps of order 3 and 5."""
-MUCH_BETTER = 2.0**-9
-"""Error over tolerance below which a step of order 8 may be twice as long."""
-MOST_STEPS = 50_000
-"""Steps of a motion that gets nowhere; one that needs more is stiff, or as good as lost. ..."""
-STEPS_A_LENGTH = 1000
-"""... For each of its own sizes by which it moves on it has so many more: then it is just long."""
-SHORTEST_STEP = 1e-13
-"""Least step over the length of the whole motion."""
 
 
 def runge_kutta_4(
@@ -134,6 +126,7 @@ def integrate(
     x0: Floats,
     tolerance: float = 1e-11,
     farthest: float = np.inf,
+    most_steps: float = 50_000,
 ) -> tuple[Floats, str]:
     """Integrate with the Dormand-Prince method of order 8, its steps halved and doubled as needed.
 
@@ -149,6 +142,9 @@ def integrate(
         Error of a step, absolute and relative.
     farthest : float
         Largest coordinate; beyond it the motion is taken to blow up.
+    most_steps : float
+        Of a motion that gets nowhere; one that needs more is stiff, or as good as lost. For each of
+        its own sizes by which it moves on it has a thousand more: then it is just long.
 
     Returns
     -------
@@ -165,7 +161,7 @@ def integrate(
     path = np.full((len(t), len(x0)), np.nan)
     path[0] = x = x0
     step, span = float(np.diff(t[:2]).sum()), float(t[-1] - t[0])
-    steps, size = float(MOST_STEPS), float(np.abs(x0).max())
+    steps, size = most_steps, float(np.abs(x0).max())
     for row, (now, end) in enumerate(zip(t[:-1].tolist(), t[1:].tolist(), strict=True), start=1):
         while now < end:
             last = step >= end - now
@@ -177,15 +173,15 @@ def integrate(
                 moved, error = _step(rate, x, taken, tolerance)
             if not error < 1:
                 step = taken / 2
-                if step < SHORTEST_STEP * span:
+                if step < 1e-13 * span:
                     return path, "diverges"
                 continue
             size = max(size, float(np.abs(moved).max()))
-            steps += STEPS_A_LENGTH * float(np.abs(moved - x).max()) / (size or 1.0)
+            steps += 1000 * float(np.abs(moved - x).max()) / (size or 1.0)
             x, now = moved, end if last else now + taken
             if np.abs(x).max() > farthest:
                 return path, "diverges"
-            if error < MUCH_BETTER and not taken < step:
+            if error < 2.0**-9 and not taken < step:  # of a step of order 8
                 step = 2 * taken
         path[row] = x
     return path, ""
@@ -218,14 +214,20 @@ def _step(
 # the law in any other frame follows exactly (paper: Eq. 10) and is never typed by hand. A law may
 # be a polynomial in functions of the state, too: then its frame is that of the data.
 
-SMALLEST, LARGEST = -5, 6
-"""Numbers of fewer and of more digits are printed with a power of ten."""
 
+def with_error(values: Floats, error: float, known: str = "g") -> tuple[str, int]:
+    """Numbers with two digits of their error, over a power of ten; known ones in a format.
 
-def power_of_ten(largest: float) -> int:
-    """What numbers up to one are divided by where they are printed; 0 for those of few digits."""
+    The power is 0 for numbers of few digits.
+    """
+    largest = max(float(np.abs(values).max()), error)
     power = int(np.floor(np.log10(largest))) if largest > 0 else 0
-    return 0 if SMALLEST <= power < LARGEST else power
+    power = 0 if -5 <= power < 6 else power
+    digits = int(np.clip(1 - np.floor(np.log10(error / 10.0**power)), 0, 12)) if error > 0 else 0
+    form = f".{digits}f" if error > 0 else known
+    text = ", ".join(f"{value / 10.0**power + 0.0:{form}}" for value in np.ravel(values))
+    text = f"({text})" if np.ndim(values) else text
+    return f"{text} ± {error / 10.0**power:{form}}" if error > 0 else text, power
 
 
 @dataclass(frozen=True, eq=False)
@@ -567,11 +569,11 @@ class PolynomialSystem:
     def _right(self, j: int, terms: Sequence[str], digits: int, fraction: str, times: str) -> str:
         """The right-hand side of an equation, given terms without slopes and how it is written."""
         column = self.coefficients[:, j]
-        above = _sum_text(np.where(self.implicit, 0.0, column), terms, digits, times)
+        above = sum_text(np.where(self.implicit, 0.0, column), terms, digits, times)
         below = np.where(self.implicit, -column, 0.0)
         if not below.any():
             return above
-        return fraction.format(above, _sum_text(below, terms, digits, times, "1"))
+        return fraction.format(above, sum_text(below, terms, digits, times, "1"))
 
     def latex(self, digits: int = 4) -> str:
         """The equations as a LaTeX ``aligned`` block (without surrounding dollar signs)."""
@@ -631,7 +633,7 @@ def _term_text(exponents: Ints, names: tuple[str, ...], power: str, letters: int
     return text or "1"
 
 
-def _sum_text(
+def sum_text(
     coefficients: Floats, terms: Sequence[str], digits: int, times: str, text: str = ""
 ) -> str:
     """A sum of terms as text, after what comes before it."""
@@ -658,84 +660,11 @@ def spoken(law: PolynomialSystem, term: int, equation: int) -> str:
 
 
 # --------------------------------------------------------------------------------------------------
-# The unknowns of a fit: a curve, and a law with its origin.
-
-
-@dataclass(frozen=True)
-class State:
-    """A curve and a law.
-
-    Parameters
-    ----------
-    control_points : ndarray, shape (r, d)
-        ``P``; the curve is ``G P``.
-    coefficients : ndarray, shape (l, d)
-        ``Lambda``, in monomials of ``x - offset``.
-    active : ndarray of bool, shape (l, d)
-        Terms that may differ from zero.
-    offset : ndarray, shape (d,)
-        ``Delta``, the origin of the law.
-    moving : ndarray of bool, shape (d,)
-        Coordinates of the offset that are free.
-    shared : ndarray of int, shape (l d,), optional
-        Of each coefficient, equation by equation, whose value it has; its own by default.
-    """
-
-    control_points: Floats
-    coefficients: Floats
-    active: Bools
-    offset: Floats
-    moving: Bools
-    shared: Ints | None = None
-
-    def flat(self) -> Floats:
-        """Coefficients, equation by equation, then the offset."""
-        return np.concatenate([self.coefficients.T.ravel(), self.offset])
-
-    def free(self) -> Bools:
-        """Which entries of `flat` are unknowns: of those that share a value, the first."""
-        free = np.concatenate([self.active.T.ravel(), self.moving])
-        free[[entry for entry, _ in self.followers()]] = False
-        return free
-
-    def followers(self) -> list[tuple[int, int]]:
-        """Entries of `flat` that have the value of another, and which."""
-        if self.shared is None:
-            return []
-        entries = np.flatnonzero(self.shared != np.arange(len(self.shared)))
-        return [(int(entry), int(self.shared[entry])) for entry in entries]
-
-    def whole(self, active: Bools) -> Bools:
-        """Terms, (l, d), with all that share a value with one of them."""
-        if self.shared is None:
-            return active
-        count = np.bincount(self.shared, active.T.ravel(), len(self.shared))
-        return np.asarray(count[self.shared] > 0).reshape(active.T.shape).T
-
-    def moved(self, control_points: Floats, flat: Floats) -> State:
-        """The same terms with another curve and other entries of `flat`."""
-        l, d = self.coefficients.shape
-        values, offset = flat[: l * d], flat[l * d :]
-        coefficients = (values if self.shared is None else values[self.shared]).reshape(d, l).T
-        return replace(
-            self, control_points=control_points, coefficients=coefficients, offset=offset
-        )
-
-    def of_terms(self, active: Bools) -> State:
-        """The same with these terms, those that share a value with them, and no others."""
-        active = self.whole(active)
-        return replace(self, active=active, coefficients=np.where(active, self.coefficients, 0.0))
-
-
-# --------------------------------------------------------------------------------------------------
 # The form of a law before it is searched: its variables, its candidate terms, and what is known.
 #
 # A law of second order, ``x'' = f(x, x')``, is one of first order in positions and velocities. The
 # velocities are states that nobody has measured, and their half of the law is known: ``x' = v``.
 # So is the time, if there are inputs: a last state, with ``t' = 1``.
-
-SIZES, POINTS = (-3, 6), 64
-"""Decades of the sizes of points at which a function is asked whether it is none, and how many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -829,54 +758,38 @@ class Form:
 
         What is said of a term counts more than what is said of all others.
         """
-        if unknown := [equation for equation in equations if equation not in sought]:
-            raise ValueError(
-                f"library: must give terms of an equation of {', '.join(sought)}, "
-                f"got {unknown[0]!r}"
-            )
-        candidates, known = self.candidates.T.ravel(), self.known.T.ravel()
-        told: dict[int, float | None] = {}
-
-        def tell(entry: int, value: float | None) -> None:
-            tied = self.shared == self.shared[entry]
-            candidates[tied], known[tied] = value is None, value or 0.0
-
+        others: dict[int, float | None] = {}
+        named: dict[int, float | None] = {}
         for equation, terms in equations.items():
-            for entry in self._there(equation) if terms.get(OTHERS) is not None else ():
-                tell(entry, terms[OTHERS])
-        for equation, terms in equations.items():
-            for entry, value in self._named(equation, terms).items():
-                common = int(self.shared[entry])
-                if told.setdefault(common, value) != value:
-                    raise ValueError(
-                        "library: the directions of a vector have one coefficient, got "
-                        f"{told[common]} and {value} in the equation of {equation}"
-                    )
-                tell(entry, value)
-        shape = self.known.T.shape
-        return replace(self, candidates=candidates.reshape(shape).T, known=known.reshape(shape).T)
-
-    def _there(self, equation: str) -> list[int]:
-        """Places of an equation's candidates in the coefficients, equation by equation."""
-        j = self.names.index(equation)
-        return (j * len(self.known) + np.flatnonzero(self.candidates[:, j])).tolist()
-
-    def _named(self, equation: str, terms: dict[str, float | None]) -> dict[int, float | None]:
-        """What is said of the terms of an equation that are named, by their places."""
-        there, size = self._there(equation), len(self.known)
-        rows: dict[int, float | None] = {}
-        for term, value in terms.items():
-            row = self._row(term)
-            entry = self.names.index(equation) * size + (-1 if row is None else row)
-            if row is not None and entry in there:
-                rows[entry] = value
-            elif term != OTHERS:
-                names = self.law(self.known).terms
+            if equation not in sought:
                 raise ValueError(
-                    f"library: {term!r} is no term of the equation of {equation}, which has "
-                    f"{', '.join(names[entry % size] for entry in there)}"
+                    f"library: must give terms of an equation of {', '.join(sought)}, "
+                    f"got {equation!r}"
                 )
-        return rows
+            j = self.names.index(equation)
+            there = np.flatnonzero(self.candidates[:, j]).tolist()
+            common = self.shared.reshape(self.known.shape[::-1])[j]
+            if terms.get(OTHERS) is not None:
+                others |= dict.fromkeys(common[there].tolist(), terms[OTHERS])
+            for term, value in terms.items():
+                row = self._row(term)
+                if row in there:
+                    if named.setdefault(int(common[row]), value) != value:
+                        raise ValueError(
+                            "library: the directions of a vector have one coefficient, got "
+                            f"{named[int(common[row])]} and {value} in the equation of {equation}"
+                        )
+                elif term != OTHERS:
+                    names = ", ".join(self.law(self.known).terms[k] for k in there)
+                    raise ValueError(
+                        f"library: {term!r} is no term of the equation of {equation}, which has "
+                        f"{names}"
+                    )
+        candidates, known = self.candidates.T.copy(), self.known.T.copy()
+        for entry, value in (others | named).items():
+            tied = (self.shared == entry).reshape(known.shape)
+            candidates[tied], known[tied] = value is None, value or 0.0
+        return replace(self, candidates=candidates.T, known=known.T)
 
     def _row(self, term: str) -> int | None:
         """Where a term stands in the library; none if it is not there."""
@@ -919,5 +832,5 @@ class Form:
 def _vanishes(function: Function, d: int) -> bool:
     """Whether a function is zero at points of all sizes, as a vector along an axis of none."""
     rng = np.random.default_rng(0)
-    sizes = 10.0 ** rng.uniform(*SIZES, (POINTS, 1))
-    return not function.value(sizes * rng.standard_normal((POINTS, d))).any()
+    sizes = 10.0 ** rng.uniform(-3, 6, (64, 1))
+    return not function.value(sizes * rng.standard_normal((64, d))).any()

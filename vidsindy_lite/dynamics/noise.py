@@ -15,22 +15,13 @@ from scipy.linalg import cho_solve_banded
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
-from .collocation import CLEANEST, Collocation, Fit
+from .collocation import CLEANEST, Collocation, Fit, State
 from .data import CHANCE, autocovariances, inflation
 from .l0 import LEAST
-from .model import State
 from .problem import Problem, fit_curves, spread_to_unseen
 
 # --------------------------------------------------------------------------------------------------
 # How large the errors of the data are, as a fitted curve leaves them, and how long they last.
-
-ORDER = 40
-"""Most errors that foretell the next."""
-LARGE = 0.1
-"""Errors that last, relative to the spread of the data, beyond which a law's may well be meant."""
-REBOUND = 0.3
-"""Autocorrelation below zero from which on errors come back with the other sign, as a motion does:
-three standard errors of a hundred independent ones."""
 
 
 def residual_noise(fit: Fit) -> Floats:
@@ -106,15 +97,16 @@ def time_inflation(fit: Fit) -> float:
     return float(np.sqrt(ratio)) if ratio > 1 + CHANCE * np.sqrt(2 / len(residual)) else 1.0
 
 
-def prediction_gain(fit: Fit) -> Floats:
+def prediction_gain(fit: Fit, most: int = 40) -> Floats:
     """By how much the errors before it foretell an error: n times its log variance ratio, (d,).
 
     Minus twice the log likelihood of an autoregressive model of the residual over that of white
-    noise (Levinson's recursion; its order by the Bayesian information criterion).
+    noise (Levinson's recursion; its order, no more than ``most``, by the Bayesian information
+    criterion).
     """
     errors = [np.concatenate(pieces)[:, 0] for pieces in _errors_seen(fit)]
     fewest = min((len(e) for e in errors if len(e)), default=0)
-    lags = range(min(ORDER, fewest // 10) + 1)
+    lags = range(min(most, fewest // 10) + 1)
     covariances = [np.array([e[k:] @ e[: len(e) - k] for k in lags]) for e in errors]
     sizes = map(len, errors)
     return np.array([_levinson(c, n).min() for c, n in zip(covariances, sizes, strict=True)])
@@ -131,7 +123,9 @@ def passing(fit: Fit, tried: int) -> Bools:
     seen, errors = fit.collocation.counts > 0, _errors_seen(fit)
     counts = np.array([sum(independent(piece[:, 0]) for piece in pieces) for pieces in errors])
     lowest = np.concatenate([rebound(pieces) for pieces in errors])
-    forgotten = (counts > tried) & (lowest > -REBOUND) & (residual_noise(fit) < LARGE)
+    # An autocorrelation of -.3 is three standard errors of a hundred independent ones: errors come
+    # back with the other sign, as a motion does. A tenth of the spread may well be meant by a law.
+    forgotten = (counts > tried) & (lowest > -0.3) & (residual_noise(fit) < 0.1)
     return np.where(seen, forgotten, forgotten[seen].all())
 
 
@@ -175,22 +169,10 @@ def _levinson(covariance: Floats, n: int) -> Floats:
 
 GROSS = 6.0
 """Distance from the curve, in standard deviations of the noise there, that no noise reaches."""
-MOST_GROSS = 0.1
-"""Largest share of samples that may be wrong; if more are, the law is."""
-STRETCHES = 8
-"""Pieces of a trajectory that may have a noise of their own."""
 LIKELY = 20.0
 """Gain of the criterion from which on a noise is not taken to be even."""
 LARGEST_RATIO = 100.0
 """Precision of the best measurements over the typical one, at most."""
-UPDATES = 60
-"""Steps of the variance components: ten would do for most."""
-MEDIAN = 0.455
-"""Median of the square of a standard normal number."""
-LASTING = 1.5
-"""Inflation of the errors from which on they are no noise of single samples."""
-NOISELESS = 1e-4
-"""Errors as small as this are those of splines, not of measurements."""
 
 
 def smoother_weights(problem: Problem) -> Problem:
@@ -211,7 +193,7 @@ def smoother_weights(problem: Problem) -> Problem:
     causes = [(signal - problem.home) ** 2, speed**2]  # what the variance of the noise may follow
     spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(observed.sum(axis=0), 1))
     factors, noise = np.ones_like(residual), problem.noise.copy()
-    for j in np.flatnonzero(spread > NOISELESS):
+    for j in np.flatnonzero(spread > 1e-4):  # below are the errors of splines
         seen = observed[:, j]
         factors[seen, j] = _factors(residual[seen, j], [cause[seen, j] for cause in causes])
         left = (factors[seen, j] * residual[seen, j] ** 2).sum() / (factors[seen, j] > 0).sum()
@@ -230,15 +212,15 @@ def _factors(residual: Floats, causes: list[Floats]) -> Floats:
     """Precision of measurements over the typical one, (n,): 0 for what is no noise."""
     n = len(residual)
     even = np.ones(n)
-    pieces = np.arange(n) * STRETCHES // n
+    pieces = np.arange(n) * 8 // n  # eighths of a trajectory may have a noise of their own
     stretches = (pieces == np.unique(pieces)[:, None]).astype(float)
     models = [even[None], *([even, z] for z in causes), stretches]
     fits = [_variance(residual, np.array(model)) for model in models]
     cost, variance, gross = min(fits, key=lambda fit: fit[0])
     plain = n * np.log((residual**2).mean()) + n + np.log(n)
-    if not cost < plain - LIKELY or gross.mean() > MOST_GROSS:
+    if not cost < plain - LIKELY or gross.mean() > 0.1:  # if so many are wrong, the law is
         return even
-    if inflation([np.where(gross, 0.0, residual / np.sqrt(variance))[:, None]])[0] > LASTING:
+    if inflation([np.where(gross, 0.0, residual / np.sqrt(variance))[:, None]])[0] > 1.5:
         variance = even  # what lasts is no noise, but a single sample may still be wrong
     precision = np.minimum(np.median(variance) / variance, LARGEST_RATIO)
     return np.where(gross & _alone(residual), 0.0, precision)
@@ -250,18 +232,20 @@ def _alone(residual: Floats) -> Bools:
     return np.abs(residual) > 2 * np.abs(np.median(around, axis=0))
 
 
-def _variance(residual: Floats, causes: Floats) -> tuple[float, Floats, Bools]:
+def _variance(residual: Floats, causes: Floats, updates: int = 60) -> tuple[float, Floats, Bools]:
     """A variance that is a sum of causes, (k, n), each times an unknown size of at least 0.
 
     Its criterion, itself, (n,), and what is no noise. The sizes by an ascent of the likelihood
-    that keeps them positive; what is gross at present does not count.
+    that keeps them positive (ten ``updates`` would do for most); what is gross at present does not
+    count.
     """
     causes = causes / causes.mean(axis=1, keepdims=True)
     squares = residual**2
     variance = causes.sum(axis=0)
     least = (squares / variance).mean() / LARGEST_RATIO**2  # some residuals are exactly zero
-    sizes = np.full(len(causes), max(np.median(squares / variance) / MEDIAN, least))
-    for _ in range(UPDATES):
+    # .455 is the median of the square of a standard normal number.
+    sizes = np.full(len(causes), max(np.median(squares / variance) / 0.455, least))
+    for _ in range(updates):
         variance = np.maximum(sizes @ causes, least)
         noise = squares <= GROSS**2 * variance
         up = (causes * (noise * squares / variance**2)).sum(axis=1)
@@ -284,15 +268,10 @@ def _variance(residual: Floats, causes: Floats) -> tuple[float, Floats, Bools]:
 
 PROBES = 8
 """Random vectors of a trace (Hutchinson): they leave an error of a hundredth at 1,500 samples."""
-MOST_UPDATES, SETTLED = 20, 0.1
-"""Updates of the variances, and the change of a logarithm at which they end."""
 HARDEST = 1e8
 """Physics weight, relative to the misfit of a plain regression, that leaves no room for kicks."""
 OCTAVE = 8
 """Frequencies of the lowest band of a spectrum; each next one has twice as many."""
-UNLIKE, BLUR = 4.0, 0.15
-"""Distance between two spectra in standard errors from which on they differ, and the error of a
-band's logarithm that splines make by themselves."""
 
 
 def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
@@ -308,12 +287,13 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
         For the probes of traces.
     """
     segments = [
-        Segment.even(s.t, s.x, problem.spacing, s.trajectory) for s in fit.collocation.segments
+        Segment.even(s.t, s.x, problem.spacing, s.trajectory, s.kinks)
+        for s in fit.collocation.segments
     ]
     start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
     kicked = _balanced(problem, _hard_where_known(start, free), every, rng)
-    if unlike_kicks(kicked, free, rng) > UNLIKE:
+    if unlike_kicks(kicked, free, rng) > 4:  # standard errors
         return problem
     exact = _measured_badly(problem, fit, segments)
     newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
@@ -374,19 +354,24 @@ def _on_knots(collocation: Collocation, fit: Fit) -> State:
 
 
 def _balanced(
-    problem: Problem, collocation: Collocation, state: State, rng: np.random.Generator
+    problem: Problem,
+    collocation: Collocation,
+    state: State,
+    rng: np.random.Generator,
+    updates: int = 20,
 ) -> Fit:
     """The fit at the variances of noise and kicks that make the data most likely.
 
     Each is the sum of the squares of its residuals, over how many of these the curve and the terms
-    have not used up (MacKay's update). Noise that is given stays.
+    have not used up (MacKay's update). Noise that is given stays. At most so many ``updates``,
+    until no logarithm changes by more than a tenth.
     """
     free, told = _free(problem), problem.measured_errors
     grid, d = collocation.grid, collocation.d
     probes = rng.choice([-1.0, 1.0], (grid.r * d, PROBES))
     hardest = HARDEST * collocation.physics_weights
     unfitted = len(grid.node_weights) - state.active.sum(axis=0)
-    for _ in range(MOST_UPDATES):
+    for _ in range(updates):
         fit = collocation.solve(state, tolerance=1.0, max_steps=10)
         state, collocation = fit.state, fit.collocation
         factor, physics = collocation.factor(state)
@@ -404,7 +389,7 @@ def _balanced(
         data, law = np.minimum(data, CLEANEST**-2), np.minimum(law, hardest)
         change = np.log([data / collocation.data_weights, law / collocation.physics_weights])
         collocation = collocation.weighted(data, law)
-        if (np.abs(change) < SETTLED).all():
+        if (np.abs(change) < 0.1).all():
             break
     return collocation.solve(state, tolerance=1.0)
 
@@ -442,7 +427,8 @@ def unlike_kicks(fit: Fit, free: Bools, rng: np.random.Generator) -> float:
     expected = _bands(simulated.reshape(-1, d, PROBES))
     count = OCTAVE * 2.0 ** np.maximum(np.arange(len(found)) - 1, 0)
     distance = np.abs(np.log(np.maximum(found, LEAST) / np.maximum(expected, LEAST)))
-    return float((distance / np.sqrt(1 / count + BLUR**2)[:, None])[:, free].max())
+    # Splines by themselves blur the logarithm of a band by .15.
+    return float((distance / np.sqrt(1 / count + 0.15**2)[:, None])[:, free].max())
 
 
 def _bands(signal: Floats) -> Floats:

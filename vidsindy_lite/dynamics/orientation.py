@@ -2,8 +2,8 @@
 
 A rotation of the axes, like a shift of their origin, maps polynomials of one degree onto each
 other, exactly. So all terms are fitted once, and the estimate, with its covariance, is looked at
-in other axes, where the number of terms that differ from zero is minimised; see `origin`, which
-does the same for shifts.
+in other axes, where the number of terms that differ from zero is minimised, as `frames`
+does for shifts.
 """
 
 from __future__ import annotations
@@ -12,55 +12,33 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 from math import comb
+from operator import itemgetter
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Bools, Floats, Ints
 from ..checks import check_choice
-from .collocation import Fit, Linearisation
-from .data import (
-    Trajectory,
-)
-from .inference import with_errors
+from .collocation import Fit, Linearisation, State
+from .data import Trajectory, variable_names
 from .l0 import inverse
-from .library import (
-    Library,
-    monomial_gradients,
-    monomials,
-    variable_names,
-)
-from .model import Form, State
-from .path import (
-    FIRST_WEIGHTS,
-    History,
-    leaves_something_over,
-    tightened,
-    unpruned,
-)
+from .library import Library, monomial_gradients, monomials
+from .model import Form
+from .path import FIRST_WEIGHTS, History, leaves_something_over, tightened, unpruned
 from .problem import Problem, fit_curves
 from .result import Discovery
 
-STARTS = 20
-"""Random orientations from which the sparsest is sought."""
-KEPT = 3
-"""Most orientations that are worth a discovery."""
-COARSE, FINE = 0.1, 0.01
-"""Sizes of a standard coefficient at which it counts: while seeking, and at the end."""
-LEFT_OVER = 0.05
-"""Standard coefficients below this may be what axes that are not quite right leave."""
 ALIKE = np.deg2rad(2.0)
 """Orientations that differ by less are one."""
-MODES = 40
-"""Most directions of uncertainty that are looked at: the largest."""
-SLIGHTEST = 1e-10
-"""Least variance over the largest, in units of their own, that is no rounding."""
 POINTS = 3
 """Points at which two polynomials are compared, over the number of their terms."""
-CHOSEN = 1e-8
-"""Share of what a turn changes that a law's terms cannot make up for: if less, it is a choice."""
+
+Solved = tuple[Discovery, Problem, Fit]
+Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
+"""Trajectories, their systematic errors, and their standard errors if they are known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,14 +83,11 @@ class TurnedLaw:
     def _mapped(self, inward: Floats, origin: Floats, outward: Floats) -> TurnedLaw:
         """The law of ``outward f(inward y + origin)``, compared at points enough."""
         count, d = self.exponents.shape
+        origin = np.append(origin, np.zeros(d - len(origin)))  # velocities have none
         y = np.random.default_rng(0).uniform(-1, 1, (POINTS * count, d))
         values = monomials(y @ inward.T + origin, self.exponents) @ self.estimates @ outward.T
         fitted = np.linalg.pinv(monomials(y, self.exponents)) @ values
         return replace(self, estimates=fitted)
-
-    def _places(self, origin: Floats) -> Floats:
-        """An origin in space as one of the state: velocities have none."""
-        return np.append(origin, np.zeros(self.exponents.shape[1] - len(origin)))
 
     def seen(self, turn: Floats, origin: Floats) -> tuple[Floats, Floats]:
         """Coefficients and their variances, (l, m), in axes that are the rows of ``turn``, (m, m).
@@ -121,43 +96,47 @@ class TurnedLaw:
         """
         m = len(turn)
         copies = self.exponents.shape[1] // m
-        law = self._mapped(block_diag(*[turn.T] * copies), self._places(origin), turn)
+        law = self._mapped(block_diag(*[turn.T] * copies), origin, turn)
         return law.estimates[0], (law.estimates[1:] ** 2).sum(axis=0)
+
+    def _fitted(
+        self, scores: Callable[[Floats, Floats], Floats], turn: Floats, origin: Floats, **how: str
+    ) -> tuple[float, Floats, Floats]:
+        """Where near an orientation and origin scores of what is `seen` are least; how large."""
+        m = len(turn)
+
+        def moved(step: Floats) -> tuple[Floats, Floats]:
+            return turned(step[:-m], m) @ turn, origin + step[-m:]
+
+        start = np.zeros(m * (m - 1) // 2 + m)
+        best = least_squares(lambda s: scores(*self.seen(*moved(s))), start, max_nfev=60, **how)
+        return float(best.cost), *moved(best.x)
 
     def descended(self, turn: Floats, origin: Floats, size: float) -> tuple[float, Floats, Floats]:
         """The nearest orientation and origin with fewest terms, and their smoothed number.
 
         A coefficient counts ``log(1 + z^2)``, with ``z`` over its standard error and a size.
         """
-        m = len(turn)
-
-        def scores(step: Floats) -> Floats:
-            estimate, variance = self.seen(turned(step[:-m], m) @ turn, origin + step[-m:])
-            return (estimate / np.sqrt(variance + size**2)).ravel()
-
-        free = m * (m - 1) // 2 + m
-        best = least_squares(scores, np.zeros(free), loss="cauchy", max_nfev=60)
-        return float(best.cost), turned(best.x[:-m], m) @ turn, origin + best.x[-m:]
+        return self._fitted(
+            lambda estimate, variance: (estimate / np.sqrt(variance + size**2)).ravel(),
+            turn, origin, loss="cauchy",
+        )  # fmt: skip
 
     def freed(self, support: Bools) -> Floats:
         """The small turn, (m, m), after which only these terms, (l, m), are left, if they are all.
 
         The others are made as small as their covariance asks for, while the origin gives way.
         """
-        m, home = len(self.origin), self.origin
-        law = self._mapped(np.eye(self.exponents.shape[1]), self._places(home), np.eye(m))
-        others = ~support
-        directions = law.estimates[1:][:, others]
+        same = np.eye(len(self.origin))
+        law = self._mapped(np.eye(self.exponents.shape[1]), self.origin, same)
+        directions = law.estimates[1:][:, ~support]
         sizes = np.maximum(np.linalg.norm(directions, axis=0), np.finfo(float).tiny)
         values, axes = np.linalg.eigh((directions / sizes).T @ (directions / sizes))
-        whiten = axes / np.sqrt(np.maximum(values, SLIGHTEST * values[-1]))
-
-        def scores(step: Floats) -> Floats:
-            estimate, _ = self.seen(turned(step[:-m], m), home + step[-m:])
-            return (estimate[others] / sizes) @ whiten
-
-        best = least_squares(scores, np.zeros(m * (m - 1) // 2 + m), x_scale="jac", max_nfev=60)
-        return turned(best.x[:-m], m)
+        whiten = axes / np.sqrt(np.maximum(values, 1e-10 * values[-1]))  # less is rounding
+        return self._fitted(
+            lambda estimate, _: (estimate[~support] / sizes) @ whiten,
+            same, self.origin, x_scale="jac",
+        )[1]  # fmt: skip
 
 
 def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Floats]:
@@ -181,13 +160,14 @@ def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Float
 def refined(problem: Problem, fit: Fit) -> Floats:
     """The small turn, (m, m), after which the small terms of a law are not needed any more.
 
-    Axes that are off by a fraction of a degree leave small terms, which clean data tell. The law is
-    fitted without them, and the axes are those in which all that it lacks is nothing.
+    Axes that are off by a fraction of a degree leave small terms, which clean data tell: below .05
+    in standard units. The law is fitted without them, and the axes are those in which all that it
+    lacks is nothing.
     """
     state, units = fit.state, problem.units
     unit = replace(units, scale=_unit(problem))
     sizes = state.coefficients * units.factors(problem.exponents) / unit.factors(problem.exponents)
-    state, collocation = state.of_terms(state.active & (np.abs(sizes) > LEFT_OVER)), fit.collocation
+    state, collocation = state.of_terms(state.active & (np.abs(sizes) > 0.05)), fit.collocation
     if not state.active.any():
         return np.eye(problem.measured[0][1].shape[1])
     fit = tightened(problem, collocation, state)
@@ -195,12 +175,12 @@ def refined(problem: Problem, fit: Fit) -> Floats:
     return law.freed(fit.state.active[_rows(fit)][:, -len(law.origin) :])
 
 
-def with_turns(problem: Problem, fit: Fit) -> Linearisation:
+def with_turns(problem: Problem, fit: Fit, chosen: float = 1e-8) -> Linearisation:
     """The quadratic model around a fit, with small turns of its axes eliminated.
 
     Axes in which terms are absent were learned from these: so what a law with the same terms in
-    axes near by explains as well is not known. A turn that the law's own terms can make up for is
-    no unknown but a choice of axes, which stay.
+    axes near by explains as well is not known. A turn that the law's own terms can make up for, but
+    for such a share of what it changes, is no unknown but a choice of axes, which stay.
     """
     model = problem.model(fit)
     turns = _turns(problem, fit.state)[model.columns]
@@ -208,9 +188,9 @@ def with_turns(problem: Problem, fit: Fit) -> Linearisation:
     told = model.information @ turns
     gain = inverse(model.information[np.ix_(own, own)]) @ told[own]
     whole = turns.T @ told
-    least = CHOSEN * np.trace(whole) * np.eye(len(whole))  # turns that change nothing have a share
+    least = chosen * np.trace(whole) * np.eye(len(whole))  # turns that change nothing have a share
     shares, directions = eigh(whole - told[own].T @ gain, whole + least)
-    turns = turns @ directions[:, shares > CHOSEN]
+    turns = turns @ directions[:, shares > chosen]
     told = model.information @ turns
     share = told @ np.linalg.pinv(turns.T @ told, hermitian=True)
     return replace(
@@ -252,37 +232,38 @@ def _unit(problem: Problem) -> Floats:
     return np.repeat(np.sqrt(np.mean(scale.reshape(-1, m) ** 2, axis=1)), m)
 
 
-def turned(angles: Floats, m: int) -> Floats:
+def turned(angles: ArrayLike, m: int) -> Floats:
     """A rotation of m axes, (m, m), by an angle, or by a vector of three."""
     vector = angles if m == 3 else np.append([0, 0], angles)
     return Rotation.from_rotvec(vector).as_matrix()[:m, :m]
 
 
 def sparse_orientations(
-    law: TurnedLaw, known: Sequence[Floats], rng: np.random.Generator
+    law: TurnedLaw, known: Sequence[Floats], rng: np.random.Generator, most: int = 3
 ) -> list[Floats]:
     """Orientations, (m, m), in which a law has fewest terms, distinct, best first.
 
-    Sought from those that are known, from the data's own, and from random ones.
+    Sought from those that are known, from the data's own, and from 20 random ones; by the 40
+    largest directions of uncertainty.
     """
-    law, m = replace(law, estimates=law.estimates[: 1 + MODES]), law.estimates.shape[2]
-    home = np.zeros(m)
-    starts = [*known, np.eye(m), *(random_turn(m, rng) for _ in range(STARTS))]
-    coarse = sorted((law.descended(turn, home, COARSE) for turn in starts), key=lambda f: f[0])
+    law, m = replace(law, estimates=law.estimates[:41]), law.estimates.shape[2]
+    starts = [*known, np.eye(m), *(random_turn(m, rng) for _ in range(20))]
+    # A coefficient counts from a tenth of its standard size on, at the end from a hundredth.
+    coarse = sorted((law.descended(turn, np.zeros(m), 0.1) for turn in starts), key=itemgetter(0))
+    fine = [law.descended(turn, origin, 0.01) for _, turn, origin in coarse[: 2 * most]]
     found: list[Floats] = []
-    fine = [law.descended(turn, origin, FINE) for _, turn, origin in coarse[: 2 * KEPT]]
-    for _, turn, _ in sorted(fine, key=lambda f: f[0]):
+    for _, turn, _ in sorted(fine, key=itemgetter(0)):
         near = nearest(turn)
         if all(apart(near, other) > ALIKE for other in found):
             found.append(near)
-    return found[:KEPT]
+    return found[:most]
 
 
 def random_turn(m: int, rng: np.random.Generator) -> Floats:
     """A rotation of two or three axes, (m, m), any as likely."""
     if m == 3:
         return Rotation.random(random_state=rng).as_matrix()
-    return Rotation.from_euler("z", rng.uniform(0, 2 * np.pi)).as_matrix()[:2, :2]
+    return turned(rng.uniform(0, 2 * np.pi), m)
 
 
 def apart(turn: Floats, other: Floats) -> float:
@@ -299,14 +280,6 @@ def nearest(turn: Floats) -> Floats:
         for signs in product([1.0, -1.0], repeat=m)
     )
     return max((axes for axes in rows if np.linalg.det(axes) > 0), key=np.trace)
-
-
-MOST_TURNS = 3
-"""Most times that a discovery tells the axes better, in which the next is made."""
-
-Solved = tuple[Discovery, Problem, Fit]
-Measured = tuple[list[Trajectory], list[Floats], list[Floats] | None]
-"""Trajectories, their systematic errors, and their standard errors if they are known."""
 
 
 def check_orientation(orientation: str, library: Library, d: int, origin: str) -> None:
@@ -332,8 +305,8 @@ def in_sparsest_axes(
     pose: Callable[[Floats], Problem],
     solve: Callable[[Floats], Solved],
     rng: np.random.Generator,
-) -> Discovery:
-    """The law in the axes in which it has fewest terms: its own if no others have fewer.
+) -> Solved | None:
+    """The law in the axes in which it has fewest terms; none if in no others it has fewer.
 
     Parameters
     ----------
@@ -345,31 +318,27 @@ def in_sparsest_axes(
         For the starts of the search.
     """
     starts = rough_orientations(pose(np.eye(own.system.states // own.system.order)), rng)
-    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=own)
-    if _terms(best) < _terms(own):
-        return replace(best, note=own.note)
-    said = "orientation: the data's own axes, as the law has no fewer terms in any others"
-    return replace(own, note="; ".join(filter(None, (own.note, said))))
+    best = min((_settled(turn, solve) for turn in starts), key=_rank, default=None)
+    return best if best and _terms(best[0]) < _terms(own) else None
 
 
-def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Discovery:
+def _settled(turn: Floats, solve: Callable[[Floats], Solved]) -> Solved:
     """The law in the best axes near some; of laws alike, the one in the axes that were refined."""
-    found, problem, fit = solve(turn)
-    best = replace(found, orientation=turn), problem, fit
-    for _ in range(MOST_TURNS):
-        turn, before = refined(problem, fit) @ turn, _rank(found)
-        found, problem, fit = solve(turn)
-        if _rank(found) <= _rank(best[0]):
-            best = replace(found, orientation=turn), problem, fit
-        if _rank(found) >= before:
+    solved = best = solve(turn)
+    best = replace(best[0], orientation=turn), *best[1:]
+    for _ in range(3):  # each law tells the axes better, in which the next is made
+        turn, before = refined(*solved[1:]) @ turn, _rank(solved)
+        solved = solve(turn)
+        if _rank(solved) <= _rank(best):
+            best = replace(solved[0], orientation=turn), *solved[1:]
+        if _rank(solved) >= before:
             break
-    found, problem, fit = best
-    return with_errors(found, problem, fit, with_turns(problem, fit))
+    return best
 
 
-def _rank(found: Discovery) -> tuple[bool, int]:
+def _rank(solved: Solved) -> tuple[bool, int]:
     """What is to be smallest: no warnings, then few terms."""
-    return bool(found.warnings), _terms(found)
+    return bool(solved[0].warnings), _terms(solved[0])
 
 
 def _terms(found: Discovery) -> int:

@@ -30,11 +30,11 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
-from .collocation import Collocation, Fit, Status, WithCurve
+from .collocation import Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory
 from .frames import Origin, as_shifted, at_home, cheapest_at, closed, off_home, one_by_one, together
 from .l0 import PLATEAU, inverse, minimiser, subset_path, subset_search
-from .model import PolynomialSystem, State, runge_kutta_4
+from .model import PolynomialSystem, runge_kutta_4
 from .noise import effective_noise, errors_left, residual_noise, smoother_weights, time_inflation
 from .problem import COARSE, Problem, fit_curves
 from .result import Plateau, Step
@@ -45,19 +45,10 @@ those that make the motion."""
 SMOOTH = 0.1
 """Where errors are smooth, a plateau may begin here: terms below are as likely made by the errors.
 Independent errors average out, and whatever they do not explain is a term."""
-NOISELESS = 1e-4
-"""Errors as small as this are taken for smooth: no measurement is so good, a simulation may be."""
-LASTING = 2.0
-"""Errors are smooth if a signal is left so many times as uncertain as by independent ones."""
 LARGEST, STEP = 1.0, 0.1
 """Largest error on a path, that of no law at all; and decades between two laws of a path."""
 ROUNDS = 6
 """Most laws to which paths lead, each followed around the law before."""
-DEEPEST, DESCENT, RICHEST = 6, 3.0, 2.0
-"""Most laws at smaller errors; by what the tolerated error falls from one to the next; and most
-terms of each over those of the one before."""
-MOST_PLATEAUS = 4
-"""Most choices of plateaus that are fitted until a law has no pole on the curve."""
 CONSISTENT = 1.5
 """Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
 RESOLVED = 1e-2
@@ -68,8 +59,6 @@ WEIGHTS = (1e2, 1e4, 1e8)
 """Physics weights of a search."""
 FINAL_WEIGHT = WEIGHTS[-1]
 """Weight at which the law holds exactly for all that the data can tell."""
-NEEDLESS_START = 0.1
-"""Chance that a second start, from terms of all degrees, is made though the first left nothing."""
 ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
 """A first law is sought on so many samples and turns of the motion, if they are no more than that
 share of the data."""
@@ -77,11 +66,6 @@ LONGEST_SEARCH = 10
 """Most rounds of a subset search, and most moves of an origin."""
 EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
-SPLINE_ERROR = 3e-7
-"""Error of a coefficient, in standard units, that knots may leave in nearly exact data."""
-MOST_HALVINGS, MOST_CREEPING = 4, 2
-"""Most halvings of the knot spans, and those until a law must converge: a sharp turn that the first
-knots cannot follow takes two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +150,8 @@ def follow(problem: Problem, fit: Fit) -> Path:
     single = np.full(problem.d, own) if problem.kicked else residual_noise(fit)
     lasting = single if problem.kicked else effective_noise(fit)
     lowest = min(typical(single), LARGEST / 10**STEP)
-    smooth = bool((lasting > LASTING * single).any() or typical(single) <= NOISELESS)
+    # No measurement is as good as a ten-thousandth, but a simulation may be: its errors are smooth.
+    smooth = bool((lasting > 2 * single).any() or typical(single) <= 1e-4)
     level = max(lowest, time_inflation(fit) * typical(lasting), SMOOTH if smooth else 0.0)
     count = int(np.ceil(np.log10(LARGEST / lowest) / STEP))
     # What has to be tolerated is asked itself: a plateau may begin just below it.
@@ -174,15 +159,11 @@ def follow(problem: Problem, fit: Fit) -> Path:
     paths: list[list[Plateau]] = [[] for _ in range(problem.d)]
     lows, highs = levels[:-1].tolist(), levels[1:].tolist()
     shares = [(own / low) ** 2 for low in lows]
-    if problem.shared:
-        searched = []
-        for share in shares:
-            here = model.tolerating(share)
-            quadratic = here.information, here.gradient, present, prices
-            [support] = subset_path(*quadratic, support, [share])
-            searched.append(support)
-    else:
-        searched = subset_path(model.information, model.gradient, present, prices, support, shares)
+    tolerating = [model.tolerating(share) for share in shares]
+    functions = [
+        (m.information, m.gradient, share) for m, share in zip(tolerating, shares, strict=True)
+    ]
+    searched = subset_path(functions, present, prices, support)
     for low, high, support in zip(lows, highs, searched, strict=True):
         active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
         active.flat[problem.form.searched] = support[:terms_end]
@@ -287,14 +268,14 @@ def unpruned(
     return fits[-1]
 
 
-def leaves_something_over(problem: Problem, fit: Fit) -> bool:
+def leaves_something_over(problem: Problem, fit: Fit, chance: float = 0.1) -> bool:
     """Would the other terms together explain more of the data than chance does?"""
     searched = problem.form.searched
     left_out = len(searched) - int(fit.state.free()[searched].sum())
     if not left_out:
         return False
     _, gain = fit.collocation.linearise(fit.state, searched).newton()
-    return bool(gain > chi2.isf(NEEDLESS_START, left_out))
+    return bool(gain > chi2.isf(chance, left_out))
 
 
 def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
@@ -441,24 +422,27 @@ def has_terms(fit: Fit, goal: Sequence[Plateau]) -> bool:
     return all((p.terms == fit.state.active[:, p.equation]).all() for p in goal)
 
 
-def deepest(problem: Problem, path: Path, history: History) -> Path:
+def deepest(
+    problem: Problem, path: Path, history: History, most: int = 6, descent: float = 3.0
+) -> Path:
     """The path around the last of the richer laws that explain what the one before left over.
 
     A missing term leaves smooth errors, too, and only its own law tells: so the error that is
     tolerated is lowered as long as the errors of single samples fall with it. That smooth errors
-    fall alone is no sign: any term that lasts as long takes some of them.
+    fall alone is no sign: any term that lasts as long takes some of them. At ``most`` so many laws,
+    the error that is tolerated falling by ``descent`` from one to the next.
     """
-    for _ in range(DEEPEST):
+    for _ in range(most):
         errors = errors_left(problem, path.fit)
         if near(problem, path.fit, 0.0) or history.over:
             break
-        tolerant = replace(problem, noise=np.maximum(problem.noise, errors / DESCENT))
+        tolerant = replace(problem, noise=np.maximum(problem.noise, errors / descent))
         collocation = path.fit.collocation
         weighted = collocation.weighted(tolerant.noise**-2, collocation.physics_weights)
         start = replace(path.fit, collocation=weighted)
         fit = select(tolerant, start, FINAL_WEIGHT, "a smaller error", history)
         fit = at_own_errors(problem, framed(tolerant, fit, history))
-        richer = fit.state.active.sum() > RICHEST * path.fit.state.active.sum()
+        richer = fit.state.active.sum() > 2 * path.fit.state.active.sum()
         before, after = (typical(residual_noise(one)) for one in (path.fit, fit))
         explained = after < before / CONSISTENT
         if fit.status is not Status.CONVERGED or richer or not explained:
@@ -480,10 +464,13 @@ def at_own_errors(problem: Problem, fit: Fit) -> Fit:
     return fit
 
 
-def refit(problem: Problem, path: Path, history: History) -> Fit:
-    """The law of the widest plateaus of a path; where such a law has a pole, of the next ones."""
+def refit(problem: Problem, path: Path, history: History, most: int = 4) -> Fit:
+    """The law of the widest plateaus of a path; where such a law has a pole, of the next ones.
+
+    At ``most`` so many choices of plateaus are fitted.
+    """
     ranked = path.ranked()
-    for _ in range(MOST_PLATEAUS):
+    for _ in range(most):
         goal = [plateaus[0] for plateaus in ranked]
         fit = _refitted(problem, path, goal, history)
         if np.isfinite(fit.collocation.objective(fit.state)):
@@ -510,13 +497,17 @@ def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: Hi
     return framed(tolerant, trial, history)
 
 
-def polish(problem: Problem, fit: Fit, history: History) -> Fit:
-    """Refit with the law exact and at the errors it leaves, on finer knots until that is enough."""
+def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
+    """Refit with the law exact and at the errors it leaves, on finer knots until that is enough.
+
+    Knot spans are halved at ``most`` so often, twice until a law must converge: so much takes a
+    sharp turn that the first knots cannot follow.
+    """
     collocation = problem.along(fit.collocation, fit.state)
     fit = first = problem.weighted(collocation, FINAL_WEIGHT).solve(fit.state, EXACT)
     columns, creeps = np.flatnonzero(fit.state.free()), first.status is Status.MAX_STEPS
-    for halving in range(MOST_HALVINGS):
-        if creeps and halving == MOST_CREEPING:
+    for halving in range(most):
+        if creeps and halving == 2:
             fit = first
             break
         before = fit.state.flat()[columns]
@@ -528,9 +519,10 @@ def polish(problem: Problem, fit: Fit, history: History) -> Fit:
         creeps = creeps and fit.status is Status.MAX_STEPS
         information = fit.collocation.linearise(fit.state, columns).information
         spread = np.sqrt(np.diag(inverse(information)))
-        # Half the spacing, a sixteenth of the error: so much is left of what it just was.
+        # Half the spacing, a sixteenth of the error: so much is left of what it just was. Of nearly
+        # exact data an error of some ten-millionths is good enough.
         error = np.abs(fit.state.flat()[columns] - before) / 15
-        if (error < np.maximum(0.1 * spread, SPLINE_ERROR)).all():
+        if (error < np.maximum(0.1 * spread, 3e-7)).all():
             break
     history.add("polish", problem, fit, FINAL_WEIGHT)
     return fit
@@ -551,8 +543,9 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
     law = problem.law(fit.state).shift(fit.state.offset)
     splines = fit.collocation.grid.splines(fit.state.control_points)
     joined, curves = join(
-        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing
-    )
+        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing,
+        problem.jumps,
+    )  # fmt: skip
     bridged = problem.collocation(joined)
     start = replace(fit.state, control_points=fit_curves(bridged, curves))
     trial = tightened(problem, bridged, start)
@@ -574,12 +567,12 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
 # takes motion for noise, or gives the motion up and is flat. So terms are fitted at once, as many
 # as converge, and what they leave is the noise; each of the two noises has its law.
 
-FLAT = 0.9
-"""Errors, relative to the spread of the data, of a curve that has given the motion up."""
-
 
 def views(pose: Callable[..., Problem]) -> list[Problem]:
-    """A problem with the noise that its curves leave, and, if far less, with what terms leave.
+    """A problem with the noise that its curves leave, and others where that may be wrong.
+
+    Where the curves drop measurements, one with all of them; where terms leave far less than the
+    curves, one with what these leave.
 
     Parameters
     ----------
@@ -587,13 +580,16 @@ def views(pose: Callable[..., Problem]) -> list[Problem]:
         Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
         the samples, which serve where smoothed ones leave out a part of the motion.
     """
-    problem = smoother_weights(pose())
-    # A curve that has given up has no turns.
-    enough = problem.samples_a_turn > COARSE and problem.noise.max() < FLAT
-    if enough or problem.measured_errors or (problem.noise <= TOLERATED).all():
-        return [problem]
-    told = _by_terms(problem) or _by_terms(pose(True))
-    return [problem] if told is None else [problem, told]
+    whole = pose()
+    problem = smoother_weights(whole)
+    # What no smooth curve explains may still be the law's: a transient that a sample or two show.
+    found = [problem] if (problem.counts == whole.counts).all() else [problem, whole]
+    # A curve that has given the motion up, and leaves nearly all of its spread, has no turns.
+    enough = problem.samples_a_turn > COARSE and problem.noise.max() < 0.9
+    if not (enough or problem.measured_errors or (problem.noise <= TOLERATED).all()):
+        told = _by_terms(problem) or _by_terms(pose(True))
+        found += [] if told is None else [told]
+    return found
 
 
 def _by_terms(problem: Problem) -> Problem | None:
@@ -614,7 +610,8 @@ def _by_terms(problem: Problem) -> Problem | None:
 def evidence(problem: Problem, fit: Fit) -> float:
     """What a law costs whose noise is its own: n log variance, and the price of its terms.
 
-    The lower, the better (Bayesian information criterion); of laws of the same data.
+    The lower, the better (Bayesian information criterion); of laws of the same data. Measurements
+    that are dropped are as likely anywhere in the spread of the data.
     """
     counts = fit.collocation.counts
     seen = counts > 0
@@ -709,6 +706,7 @@ def join(
     trajectories: Sequence[Trajectory],
     law: PolynomialSystem,
     spacing: float,
+    jumps: Sequence[Floats] | None = None,
 ) -> tuple[list[Segment], list[BSpline | Joined]]:
     """Join segments across the named gaps.
 
@@ -724,6 +722,8 @@ def join(
         The law, in the frame of the trajectories.
     spacing : float
         Length of a knot span.
+    jumps : sequence of ndarray, optional
+        Times of each trajectory at which a slope may jump.
 
     Returns
     -------
@@ -747,7 +747,8 @@ def join(
             continue
         t, x = trajectories[first.trajectory]
         inside = (t >= first.t[0]) & (t <= last.t[-1])
-        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory))
+        kinks = None if jumps is None else jumps[first.trajectory]
+        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory, kinks))
         curves.append(Joined([splines[i] for i in group], law))
     return joined, curves
 

@@ -17,19 +17,13 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.stats import chi2
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, Segment, basis, clamped_knots, normal_band
-from .collocation import CLEANEST, Collocation, Fit, WithCurve
+from .bspline import DEGREE, WIDTH, Segment, basis, normal_band
+from .collocation import CLEANEST, Collocation, Fit, State, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
-from .library import Function, extended, law_variables, monomials
-from .model import Form, PolynomialSystem, State
+from .library import Function, extended, jumps, law_variables, monomials
+from .model import Form, PolynomialSystem
 from .smoothing import PENALTIES, smooth
-
-# --------------------------------------------------------------------------------------------------
-# The problem that a discovery solves: the data in standard units, and what is known before a law.
-#
-# In standard units every coordinate has mean 0 and variance 1, and time runs so that the root-
-# mean-square speed is 1. `posing` makes it from data.
 
 FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where laws of the zoo have
@@ -41,8 +35,6 @@ OFFSET_PENALTY = 0.95
 """Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 COARSE = 20
 """Samples a turn from which on a curve tells the noise to a tenth, and kicks from a drive."""
-NOISY, WIDE, NARROW = 0.02, 1 / 5, 1 / 16
-"""Knot spacing in time scales: wide where the noise is above this, narrow elsewhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +176,11 @@ class Problem:
         return float(OFFSET_PENALTY * self.penalties[0])
 
     @property
+    def counts(self) -> Ints:
+        """How many measurements of each coordinate count, (d,)."""
+        return sum(np.count_nonzero(precision, axis=0) for precision in self.precision)
+
+    @property
     def turns(self) -> float:
         """Turns of the motion that the data cover."""
         return float(sum(t[-1] - t[0] for t, _ in self.trajectories) / (2 * np.pi))
@@ -196,12 +193,22 @@ class Problem:
 
     @property
     def spacing(self) -> float:
-        """Length of a knot span."""
-        return WIDE if self.noise.max() > NOISY else NARROW
+        """Length of a knot span, in time scales: wide where the noise is."""
+        return 1 / 5 if self.noise.max() > 0.02 else 1 / 16
 
     def segments(self) -> list[Segment]:
         """The stretches with their first knots."""
-        return [Segment.even(t, x, self.spacing, i) for i, (t, x) in self.stretches]
+        return [Segment.even(t, x, self.spacing, i, self.jumps[i]) for i, (t, x) in self.stretches]
+
+    @cached_property
+    def jumps(self) -> list[Floats]:
+        """Times at which an input of the law jumps, of each trajectory: there its slope does."""
+        at = np.eye(self.d)[-1]  # the time is the last state
+        inputs = [lambda t, f=f: f.value(t[:, None] * at) for f in self.functions if f.of_time]
+        return [
+            np.unique(np.concatenate([np.zeros(0), *(jumps(one, t) for one in inputs)]))
+            for t, _ in self.trajectories
+        ]
 
     def collocation(self, segments: Sequence[Segment], noise: Floats | None = None) -> Collocation:
         """Data and physics loss on segments; by default for the noise of the smoothing."""
@@ -263,7 +270,7 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
     for segment, curve in zip(collocation.segments, curves, strict=True):
         b = segment.breakpoints
         dense = np.append((b[:-1, None] + np.diff(b)[:, None] * np.arange(4) / 4).ravel(), b[-1])
-        rows = basis([clamped_knots(b)], np.array([0, len(b) + 2]), [dense])
+        rows = basis([segment.knots], np.array([0, len(segment.knots) - WIDTH]), [dense])
         factor = cholesky_banded(normal_band(rows), lower=True)
         control.append(cho_solve_banded((factor, True), rows.T @ curve(dense)))
     return np.concatenate(control)
@@ -432,10 +439,6 @@ def _with_states(
 
 GAP = 0.4
 """A pause longer than this fraction of the time scale of the motion is a gap."""
-SHORTEST_STRETCH = 4
-"""Stretches of fewer samples tell less than their initial conditions cost."""
-DEPENDENT, INVOLVED = 1e-10, 1e-3
-"""Least singular value over the largest at which terms depend on each other, and least share."""
 
 
 def pose(
@@ -597,11 +600,11 @@ def _check_independent(form: Form, terms: Floats) -> None:
         flat = columns.reshape(-1, len(unknowns))
         flat /= np.maximum(np.linalg.norm(flat, axis=0), LEAST)
         _, sizes, shares = np.linalg.svd(flat, full_matrices=False)
-        if len(terms) >= len(sizes) and sizes[-1] < DEPENDENT * sizes[0]:
+        if len(terms) >= len(sizes) and sizes[-1] < 1e-10 * sizes[0]:  # as far as rounding tells
             names = np.array(form.law(form.known).terms)[unknowns % l]
             raise ValueError(
                 "library: its terms must not depend on each other, got "
-                + ", ".join(dict.fromkeys(names[np.abs(shares[-1]) > INVOLVED]))
+                + ", ".join(dict.fromkeys(names[np.abs(shares[-1]) > 1e-3]))
             )
 
 
@@ -633,7 +636,8 @@ def _stretches(
     longest = max(len(t) for _, (t, _) in pieces)
     if longest < 2:
         raise ValueError("x: must hold all coordinates at about the same times, got none")
-    return [piece for piece in pieces if len(piece[1][0]) >= min(SHORTEST_STRETCH, longest)]
+    # Fewer than four samples tell less than their initial conditions cost.
+    return [piece for piece in pieces if len(piece[1][0]) >= min(4, longest)]
 
 
 def _rms_speed(splines: Sequence[BSpline]) -> float:

@@ -23,18 +23,11 @@ from ..values import built, decoded, encoded
 from .data import Trajectory
 from .library import Function, Library, extended, harmonic
 from .mechanics import Physics, Quantity, Round, on_circle, physics_of
-from .model import PolynomialSystem, place, power_of_ten
+from .model import PolynomialSystem, place, with_error
 from .smoothing import smooth
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-# --------------------------------------------------------------------------------------------------
-# The result of a discovery: the law in two frames, its uncertainty, and whether to trust it.
-
-SHOWN = 3
-"""Most absent terms that are printed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +141,7 @@ class Discovery:
     absent : ndarray, shape (l, d, 2)
         Of each candidate term of ``native`` that the law has not, the 95 % interval of what it
         would be if it alone were added, all else fitted again; NaN for what is in the law or no
-        candidate. See `intervals` of the module ``absent`` for the formula.
+        candidate. See `intervals` of the module ``inference`` for the formula.
     note : str
         Which order the law has and why, where both were looked for.
     orientation : ndarray, shape (m, m), optional
@@ -310,8 +303,27 @@ class Discovery:
         matplotlib.figure.Figure
             One panel an equation. The law is drawn broad: it should be the widest plateau by far.
         """
+        import matplotlib.pyplot as plt
+        from matplotlib.ticker import MaxNLocator
 
-        return draw_path(self.path, self.native.support, self.system.sides())
+        sides = self.system.sides()
+        figure, panels = plt.subplots(
+            1, len(sides), figsize=(2.9 * len(sides), 2.8), sharex=True, sharey=True,
+            squeeze=False, layout="constrained",
+        )  # fmt: skip
+        for axes, (j, side) in zip(panels[0], sides.items(), strict=True):
+            edges = [self.path[j][0].low, *(plateau.high for plateau in self.path[j])]
+            counts = [int(plateau.terms.sum()) for plateau in self.path[j]]
+            axes.stairs(counts, edges, color="0.4", baseline=None, label="all laws")
+            for own in (p for p in self.path[j] if (p.terms == self.native.support[:, j]).all()):
+                axes.hlines(own.terms.sum(), own.low, own.high, color="C1", lw=5, label="the law")
+            axes.set(xscale="log", xlabel="tolerated error / spread", title=side)
+            axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        panels[0, 0].set(ylabel="terms", ylim=(0, None))
+        drawn = [axes.get_legend_handles_labels() for axes in panels[0]]
+        shown = {label: one for pair in drawn for one, label in zip(*pair, strict=True)}
+        figure.legend(shown.values(), shown, loc="outside upper center", ncols=2)
+        return figure
 
     def save(self, path: str | os.PathLike) -> None:
         """Write everything to a text file (JSON), with all digits; `load` reads it.
@@ -321,8 +333,13 @@ class Discovery:
         ValueError
             If the file cannot be there: it is a folder, or its folder does not exist.
         """
-
-        write(self, path)
+        file = check_output("path", path)
+        content = {
+            "format": FORMAT,
+            "functions": encoded(_values(self), str),
+            "discovery": encoded(self, attrgetter("__name__"), (Function,)),
+        }
+        write_file(file, f"{json.dumps(content, indent=1)}\n".encode())
 
     @staticmethod
     def load(path: str | os.PathLike, library: Library | None = None) -> Discovery:
@@ -343,8 +360,26 @@ class Discovery:
         ValueError
             If the file holds none, or the library not all functions of the law, or others.
         """
-
-        return read(path, library)
+        file = check_file("path", path, "file of a discovery")
+        content = read_tree("path", file, ".json")
+        message = f"path: must be a file that Discovery.save has written, got '{file}'"
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise ValueError(f"{message}, whose format is not {FORMAT!r}")
+        try:
+            found = decoded(content["discovery"], _built)
+            values = decoded(content.get("functions"), _built)
+            if values is not None:
+                values = check_array("functions", values)
+            _check_shapes(found)
+        except MALFORMED as error:
+            raise ValueError(f"{message}: {shown(error)}") from error
+        found = _with_functions(found, library)
+        if values is not None:  # of a file of today
+            _check_alike(found, values)
+        if found.swing is None:
+            return found
+        swung = _with_functions(found.swing.law, None)
+        return replace(found, swing=replace(found.swing, law=swung))
 
     def statement(self) -> str:
         """The law as text, and what was found out beside it: all but the warnings."""
@@ -359,10 +394,10 @@ class Discovery:
             lines.append(said)
         if terms := list(unseen(self.native, self.offset, self.curves, self.absent)):
             frame = "in its own frame, " if self.offset.any() else ""
-            more = f" and {len(terms) - SHOWN} more" if len(terms) > SHOWN else ""
+            more = f" and {len(terms) - 3} more" if len(terms) > 3 else ""
             lines.append(
                 f"not seen, though they may be as large as terms of the law: {frame}"
-                f"{', '.join(terms[:SHOWN])}{more}"
+                f"{', '.join(terms[:3])}{more}"
             )
         if self.orientation is not None:
             lines.append(f"axes: {self.axes}; the error bars hold theirs")
@@ -381,13 +416,8 @@ def _errors(covariance: Floats, law: PolynomialSystem) -> Floats:
 
 def _with_error(value: float, error: float, term: str) -> str:
     """A term of an equation with two digits of its error; one that is known has none."""
-    power = power_of_ten(max(abs(value), error))
-    size, spread = abs(value) / 10.0**power, error / 10.0**power
-    number = f"{size:g}"
-    if error > 0:
-        digits = int(np.clip(1 - np.floor(np.log10(spread)), 0, 12))
-        number = f"({size:.{digits}f} ± {spread:.{digits}f})"
-    number += f"e{power}" if power else ""
+    number, power = with_error(np.abs(value), error)
+    number = (f"({number})" if error > 0 else number) + (f"e{power}" if power else "")
     return f"{'-' if value < 0 else '+'} {number}" + ("" if term == "1" else f" {term}")
 
 
@@ -418,14 +448,10 @@ def unseen(
 # the one that is free. Of a bob on a string it obeys angle'' = -(g / L) sin(angle) - ..., with the
 # angle counted from where the bob would rest.
 
-LIBRARY = Library.polynomial(1) + Library.fourier(1)
-"""What may pull at an angle: a push, a spring, friction, and gravity in any direction."""
+LIBRARY = (Library.polynomial(1) + Library.fourier(1)).where({"vangle": {"angle": 0}})
+"""What may pull at an angle and is the same after a full turn: a push, friction, and gravity in any
+direction."""
 NAME = "angle"
-SUPPOSED = "if all its mass is at that radius and all axes have the same scale"
-TURNS = 3
-"""Most laws of an angle, each of which tells better where it is zero."""
-OVER = 4 * 2 * np.pi
-"""Most that a run goes round: beside an angle that grows on and on, what pulls at it is small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -459,10 +485,11 @@ class Swing:
 
     def __str__(self) -> str:
         radius, g = f"{self.circle.radius:.6g} ± {self.circle.radius_error:.2g}", self.g
-        pulled = "" if g is None else f"; {g}, {SUPPOSED}"
-        doubts = (f"doubt: {text}" for text in (*self.circle.warnings, *self.law.warnings))
+        supposed = "if all its mass is at that radius and all axes have the same scale"
+        pulled = "" if g is None else f"; {g}, {supposed}"
         law = f"on a circle of radius {radius}: {self.law.equations()}{pulled}"
-        return "\n".join([law, *doubts])
+        doubts = (*self.circle.warnings, *self.law.warnings)
+        return "\n".join([law, *(f"doubt: {text}" for text in doubts)])
 
 
 def swinging(
@@ -489,7 +516,7 @@ def swinging(
     x = np.concatenate([values for _, values in runs])
     modes = np.moveaxis(np.concatenate(list(shared)), -1, 0)
     own, zero = on_circle(x).centre_covariance, None
-    for _ in range(TURNS):
+    for _ in range(3):  # each law tells better where the angle is zero
         circle = on_circle(x, zero, modes)
         law = solve(*_samples(circle, own, runs))
         rest = _rest(law)
@@ -519,25 +546,23 @@ def _samples(
         curve = smooth([angles[-1]], rng).splines[0](t[seen])
         across = np.hstack([np.sin(curve), -np.cos(curve)]) @ moves
         errors.append(np.hstack([known[seen], across])[:, None])
-    parts = [
-        ((t[part], angle[part] - _bottom(angle[part])), error[part])
-        for (t, angle), error in zip(angles, errors, strict=True)
-        for part in _rounds(angle[:, 0])
-    ]
+    parts = []
+    for (t, angle), error in zip(angles, errors, strict=True):
+        for part in _rounds(angle[:, 0]):
+            turn = 2 * np.pi * np.round(angle[part].mean() / (2 * np.pi))  # nearest to its middle
+            parts.append(((t[part], angle[part] - turn), error[part]))
     return [run for run, _ in parts], [error for _, error in parts]
 
 
-def _rounds(angle: Floats) -> list[Bools]:
-    """Which samples are a run of its own, of a few turns at most; the law is that of each turn."""
+def _rounds(angle: Floats, most: float = 4 * 2 * np.pi) -> list[Bools]:
+    """Which samples are a run of its own, of a few turns at most; the law is that of each turn.
+
+    Beside an angle that grows on and on, what pulls at it is small.
+    """
     gone = np.maximum.accumulate(np.abs(angle - angle[0]))
-    number = max(int(np.ceil(gone[-1] / OVER)), 1)
-    part = np.minimum(number * gone / max(gone[-1], OVER), number - 0.5).astype(int)
+    number = max(int(np.ceil(gone[-1] / most)), 1)
+    part = np.minimum(number * gone / max(gone[-1], most), number - 0.5).astype(int)
     return [part == k for k in range(number)]
-
-
-def _bottom(angle: Floats) -> float:
-    """The full turns nearest to the middle of a motion."""
-    return float(2 * np.pi * np.round(angle.mean() / (2 * np.pi)))
 
 
 def _rest(law: Discovery) -> float:
@@ -558,87 +583,22 @@ def _rest(law: Discovery) -> float:
 # --------------------------------------------------------------------------------------------------
 # A discovery as a text file: JSON in which every number keeps all its digits.
 
-POINTS = 20
-"""Places on the curve where a file holds the values of the law's functions."""
-ALIKE = 1e-6
-"""Difference of such values, over the largest, by which a function is still the same."""
 FORMAT = "vidsindy_lite discovery, version 1"
 TYPES: dict[str, Any] = {
     kind.__name__: kind for kind in (Discovery, PolynomialSystem, Plateau, Step, Swing, Round)
 }
 
 
-def write(found: Discovery, path: str | os.PathLike) -> None:
-    """Write a discovery to a file."""
-    file = check_output("path", path)
-    content = {
-        "format": FORMAT,
-        "functions": encoded(_values(found), str),
-        "discovery": encoded(found, attrgetter("__name__"), (Function,)),
-    }
-    text = json.dumps(content, indent=1)
-    write_file(file, f"{text}\n".encode())
-
-
-def read(path: str | os.PathLike, library: Library | None = None) -> Discovery:
-    """Read a discovery from a file that `write` has made.
-
-    Functions of one's own are those of the library: a file holds their names, and a few values
-    by which another function of that name is told.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If the file holds none, or the library not all functions of the law, or others.
-    """
-    file = check_file("path", path, "file of a discovery")
-    content = read_tree("path", file, ".json")
-    message = f"path: must be a file that Discovery.save has written, got '{file}'"
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise ValueError(f"{message}, whose format is not {FORMAT!r}")
-    try:
-        found = decoded(content["discovery"], _built)
-        values = decoded(content.get("functions"), _built)
-        if values is not None:
-            values = check_array("functions", values)
-        _check_shapes(found)
-    except MALFORMED as error:
-        raise ValueError(f"{message}: {shown(error)}") from error
-    found = _with_functions(found, library)
-    if values is not None:  # of a file of today
-        _check_alike(found, values)
-    if found.swing is None:
-        return found
-    return replace(found, swing=replace(found.swing, law=_with_functions(found.swing.law, None)))
-
-
 def _with_functions(found: Discovery, library: Library | None) -> Discovery:
-    """A discovery with the functions of which a file holds the names."""
-    system, native = found.system, found.native
+    """A discovery with the functions of which a file holds the names.
+
+    One's own, if the law uses them, are those of a library that holds them.
+    """
+    system, names = found.system, found.system.names
+    _, held = (library or Library()).resolve(names, system.d // system.order)
+    known, functions = {function.name: function for function in held}, []
     written = cast("tuple[str, ...]", system.functions)
-    measured, used = system.d // system.order, _used(found)
-    functions = _restored(system.names, measured, written, used, library)
-    return replace(
-        found,
-        system=replace(system, functions=functions),
-        native=replace(native, functions=functions),
-    )
-
-
-def _restored(
-    names: tuple[str, ...],
-    measured: int,
-    written: Sequence[str],
-    used: Bools,
-    library: Library | None,
-) -> tuple[Function, ...]:
-    """Functions by their names; one's own, if the law uses them, from a library that holds them."""
-    _, held = (library or Library()).resolve(names, measured)
-    known = {function.name: function for function in held}
-    functions = []
-    for name, needed in zip(written, used, strict=True):
+    for name, needed in zip(written, _used(found), strict=True):
         match = re.fullmatch(r"(sin|cos)\((?:(\d+) )?(\w+)\)", name)
         if name in known:
             functions.append(known[name])
@@ -651,7 +611,8 @@ def _restored(
                 f"library: must hold the function {name!r} of the law, as a file holds its name "
                 f"alone; got {library or 'none'}"
             )
-    return tuple(functions)
+    own, native = (replace(law, functions=tuple(functions)) for law in (system, found.native))
+    return replace(found, system=own, native=native)
 
 
 def _used(found: Discovery) -> Bools:
@@ -662,9 +623,9 @@ def _used(found: Discovery) -> Bools:
 
 
 def _values(found: Discovery) -> Floats:
-    """What the functions of a law are at a few places on its curve, (n, k)."""
+    """What the functions of a law are at 20 places on its curve, (n, k)."""
     d, knots = found.system.d, np.concatenate([curve.t for curve in found.curves])
-    x = found.curve(np.quantile(knots, np.linspace(0, 1, POINTS), method="nearest"))
+    x = found.curve(np.quantile(knots, np.linspace(0, 1, 20), method="nearest"))
     return extended(x, found.system.functions)[:, d:]
 
 
@@ -672,7 +633,7 @@ def _check_alike(found: Discovery, written: Floats) -> None:
     """Refuse functions that have other values than when the law was written."""
     values = np.where(_used(found), _values(found), written)
     size = np.where(np.isfinite(written), np.abs(written), 0.0).max(axis=0)
-    alike = np.isclose(values, written, rtol=0, atol=ALIKE * size, equal_nan=True).all(axis=0)
+    alike = np.isclose(values, written, rtol=0, atol=1e-6 * size, equal_nan=True).all(axis=0)
     if not alike.all():
         name = found.system.functions[int(alike.argmin())].name
         raise ValueError(
@@ -702,32 +663,3 @@ def _check_shapes(found: Any) -> None:
             raise ValueError(f"{name} must have shape {shape}, got {getattr(found, name).shape}")
     if not found.curves or found.native.d != d:
         raise ValueError(f"it must hold curves, and two laws of {d} variables")
-
-
-# --------------------------------------------------------------------------------------------------
-# The path of laws as a picture: what a reader looks at before believing a law.
-
-
-def draw_path(path: Sequence[Sequence[Plateau]], support: Bools, sides: dict[int, str]) -> Figure:
-    """Number of terms of each equation over the error that is tolerated; see `plot_path`."""
-    import matplotlib.pyplot as plt
-    from matplotlib.ticker import MaxNLocator
-
-    figure, panels = plt.subplots(
-        1, len(sides), figsize=(2.9 * len(sides), 2.8), sharex=True, sharey=True, squeeze=False,
-        layout="constrained",
-    )  # fmt: skip
-    for axes, (j, side) in zip(panels[0], sides.items(), strict=True):
-        plateaus = path[j]
-        edges = [plateaus[0].low, *(plateau.high for plateau in plateaus)]
-        counts = [int(plateau.terms.sum()) for plateau in plateaus]
-        axes.stairs(counts, edges, color="0.4", baseline=None, label="all laws")
-        for own in (p for p in plateaus if (p.terms == support[:, j]).all()):
-            axes.hlines(own.terms.sum(), own.low, own.high, color="C1", lw=5, label="the law")
-        axes.set(xscale="log", xlabel="tolerated error / spread", title=side)
-        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    panels[0, 0].set(ylabel="terms", ylim=(0, None))
-    drawn = [axes.get_legend_handles_labels() for axes in panels[0]]
-    shown = {label: one for pair in drawn for one, label in zip(*pair, strict=True)}
-    figure.legend(shown.values(), shown, loc="outside upper center", ncols=2)
-    return figure

@@ -3,7 +3,7 @@
 The objective is the paper's (Eqs. 8-9): data loss of a cubic B-spline, physics loss at collocation
 points, a price per term. What differs is how it is minimised: banded Gauss-Newton steps with the
 curve eliminated (`collocation`), a search over supports in the small algebra that remains
-(`selection`), the offset as the origin in which the law is sparsest (`frames`), a physics weight
+(`l0`), the offset as the origin in which the law is sparsest (`frames`), a physics weight
 that is raised until the law holds exactly, and an error that is tolerated (`path`). Nothing is set
 by hand per system.
 """
@@ -20,10 +20,10 @@ from typing import cast
 import numpy as np
 from scipy.interpolate import BSpline
 from threadpoolctl import OpenBLASController, threadpool_limits
-from tqdm import tqdm
 
 from ..arrays import Floats
 from ..checks import check_array, check_choice, check_integer, check_number, check_positive, shown
+from ..progress import bar
 from .bspline import DEGREE, WIDTH
 from .collocation import Fit
 from .data import (
@@ -35,7 +35,7 @@ from .data import (
     coordinate_names,
 )
 from .diagnostics import diagnose, is_on_circle
-from .inference import infer
+from .inference import infer, with_errors
 from .library import (
     Library,
     check_library,
@@ -44,7 +44,14 @@ from .library import (
 )
 from .model import Form, PolynomialSystem
 from .noise import rebalanced, smoother_weights, with_process_noise
-from .orientation import Measured, Solved, check_orientation, in_axes, in_sparsest_axes
+from .orientation import (
+    Measured,
+    Solved,
+    check_orientation,
+    in_axes,
+    in_sparsest_axes,
+    with_turns,
+)
 from .path import (
     ROUNDS,
     TOLERATED,
@@ -60,8 +67,6 @@ from .problem import Problem, pose
 from .result import LIBRARY, NAME, Discovery, Swing, swinging
 from .smoothing import smooth
 
-DROWNED = 0.5
-"""Errors, relative to the spread of the data, beyond which a curve shows no accelerations."""
 MOST_LAWS = 3
 """Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
 
@@ -96,14 +101,14 @@ def discover(
     x: Floats | None = None,
     degree: int | None = None,
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
     systematic: Floats | Sequence[Floats] | None = None,
     order: int | str = "auto",
     library: Library | None = None,
     sigma: float | Floats | Sequence[float | Floats] | None = None,
     origin: str = "learn",
     orientation: str = "data",
-    time_limit: float | None = None,
+    time_limit: float | None = 60.0,
 ) -> Discovery:
     """Discover the law of a measured trajectory (paper: Eqs. 7-10).
 
@@ -120,8 +125,9 @@ def discover(
         by default.
     seed : int
         For the random probes of the noise estimate.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Whether a progress bar is shown; by default after two seconds, if a person watches (a
+        terminal, a notebook).
     systematic : array_like, shape (k, n, d), optional
         Errors that all samples share, such as those of a scale: what k independent causes, each
         off by one standard error, add to ``x``; smooth like the path, and below its noise. One
@@ -149,7 +155,7 @@ def discover(
         which a coordinate was not seen do not count.
     time_limit : float, optional
         Seconds after which no further round begins: then the best law so far comes back, and a
-        warning says so. One fit may last longer.
+        warning says so. One fit may last longer. Without a limit if None.
 
     Returns
     -------
@@ -198,7 +204,7 @@ class _Task:
     library: Library
     origin: str
     seed: int
-    progress: bool
+    progress: bool | None
     end: float
     turned: bool = False
     """Whether the axes are a guess: a wrong one looks like an origin that is a little off."""
@@ -220,7 +226,12 @@ def _oriented(task: _Task, found: Discovery) -> Discovery:
     def solved(turn: Floats) -> Solved:
         return _solved(replace(task, measured=in_axes(task.measured, turn), turned=True), form)
 
-    return in_sparsest_axes(found, posed, solved, np.random.default_rng(task.seed))
+    best = in_sparsest_axes(found, posed, solved, np.random.default_rng(task.seed))
+    if best is None:
+        said = "orientation: the data's own axes, as the law has no fewer terms in any others"
+        return replace(found, note="; ".join(filter(None, (found.note, said))))
+    law, problem, fit = best
+    return with_errors(replace(law, note=found.note), problem, fit, with_turns(problem, fit))
 
 
 def _of_order(task: _Task, order: int | str) -> Discovery:
@@ -231,7 +242,7 @@ def _of_order(task: _Task, order: int | str) -> Discovery:
     if order == 1 or task.library.given or not found.warnings:
         return found
     swing = _swing(task, problem)
-    drowned = problem.noise.max() > DROWNED
+    drowned = problem.noise.max() > 0.5  # a curve shows no accelerations
     if swing or order == 2 or drowned:
         return replace(found, swing=swing)
     # With inputs a place is passed with several velocities, whatever the order is.
@@ -275,15 +286,15 @@ def _solved(task: _Task, form: Form) -> Solved:
     probes = np.random.default_rng(task.seed)
     problems = views(lambda *how: pose(trajectories, shared, form, probes, sigma, *how))
     rounds = MOST_LAWS * (1 + ROUNDS) * len(problems)
-    with tqdm(total=rounds, disable=not task.progress, desc="discover", leave=False) as bar:
-        history = History(end=task.end, bar=bar)
+    with bar(task.progress, "discover", total=rounds, leave=False) as shown_bar:
+        history = History(end=task.end, bar=shown_bar)
         laws = [_law(problem, probes, history, not task.turned) for problem in problems]
-        bar.update(rounds - bar.n)
+        shown_bar.update(rounds - shown_bar.n)
     problem, fit, path = min(laws, key=lambda law: evidence(*law[:2]))
     model = path.model if path.fit is fit else problem.model(fit)
     found = infer(problem, fit, model, path, history)
     doubts = diagnose(problem, fit, model, path, found.system)
-    return replace(found, warnings=(*doubts, *history.warnings)), problem, fit
+    return replace(found, warnings=(*history.warnings, *doubts)), problem, fit
 
 
 def _law(
@@ -296,10 +307,10 @@ def _law(
     """
     fit = first_law(problem, history)
     asked = not near(problem, fit, TOLERATED)
-    if asked:
+    if asked and not history.over:
         problem, fit = _kicked(problem, fit, probes, history)
     fit, path, persists = persistent(problem, fit, history, free)
-    if not asked and not near(problem, fit, 0.0):
+    if not (asked or history.over or near(problem, fit, 0.0)):
         kicked, law = _kicked(problem, fit, probes, history)
         if kicked.kicked:
             return kicked, *persistent(kicked, law, history, free)[:2]
@@ -333,20 +344,6 @@ def _kicked(
 # no law of first order holds; but its acceleration is nearly a linear function of where it is and
 # how it moves. In the flows that people write down as x' = f(x) it is not.
 
-LINEAR = 0.15
-"""Share of the accelerations' squares that no linear law explains, below which they may be those of
-a body. Clean flows of first order leave .26 to .64, springs and throws up to .06."""
-AMBIGUOUS = 0.5
-"""Share of the slopes' squares that no cubic law of first order explains, above which a place is
-passed with several velocities. Flows of first order leave up to .15, with noise of 40 %."""
-PASSED = 0.005
-"""The same share, below which every place is passed with one velocity, so that nothing speaks for
-a second order. Flows of first order outside the library leave up to .002, throws .02."""
-MISFIT = 1.5
-"""Errors that one law leaves over those of another, from which on it misses the data."""
-DENSITY = 10
-"""Points per time scale of the motion at which accelerations are looked at."""
-
 
 def check_order(order: object, origin: str, library: Library) -> None:
     """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
@@ -359,12 +356,14 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     """Whether smoothed curves look like those of a law of second order.
 
     The slope is no function of the place; or hardly one, and the second derivative is nearly linear
-    in both.
+    in both. Flows of first order leave up to .15 of the slopes' squares to no cubic law, with noise
+    of 40 %, outside the library up to .002; throws .02. Of the accelerations' squares clean flows
+    leave .26 to .64 to no linear law, springs and throws up to .06.
     """
     places, slopes, bends = [], [], []
     for curve in curves:
         low, high = curve.t[DEGREE + 1], curve.t[-DEGREE - 2]  # the outermost spans bend by chance
-        t = np.arange(low, high, 1 / DENSITY)
+        t = np.arange(low, high, 1 / 10)
         places.append(curve(t))
         slopes.append(curve(t, 1))
         bends.append(curve(t, 2))
@@ -372,7 +371,7 @@ def accelerated(curves: Sequence[BSpline]) -> bool:
     linear = np.hstack([np.ones((len(x), 1)), x, v])
     cubic = monomials(x, monomial_exponents(x.shape[1], 3))
     several = unexplained(cubic, v)
-    return several > AMBIGUOUS or (several > PASSED and unexplained(linear, a) < LINEAR)
+    return several > 0.5 or (several > 0.005 and unexplained(linear, a) < 0.15)
 
 
 def unexplained(terms: Floats, values: Floats) -> float:
@@ -397,7 +396,7 @@ def better(first: Discovery, second: Discovery) -> Discovery:
         int(native.support[:, begin : begin + m].sum())
         for native, begin in ((first.native, 0), (second.native, m))
     )
-    if (first.noise[:m] > MISFIT * second.noise[:m]).any():
+    if (first.noise[:m] > 1.5 * second.noise[:m]).any():
         return replace(second, note="order 2: the law of order 1 misses the data")
     if not second.warnings and others <= terms:
         cause = f"the law of order 1 is doubtful and has {terms} terms, not {others}"

@@ -13,7 +13,7 @@
   tables, the paper's own optimiser.
 * `asking`: where the law is asked for, and what that does to it.
 * `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
-* `metrics`, `tables`: how good a law is, and many of them side by side.
+* `metrics`, `cramer_rao`, `tables`: how good a law is, could be, and many of them side by side.
 * `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
 * `ablation`: our solver without each of its mechanisms.
 * `published`, `audit`: the paper's numbers, and whether they agree with each other.

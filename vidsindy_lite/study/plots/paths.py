@@ -96,9 +96,9 @@ def plot_path(t: Floats, x: Floats, curve: Floats) -> Figure:
     ----------
     t : ndarray, shape (n,)
         Time units.
-    x : ndarray, shape (n, 3)
+    x : ndarray, shape (n, 3) or (n, 2)
         Reconstructed positions, scene units; NaN where missing.
-    curve : ndarray, shape (n, 3)
+    curve : ndarray, shape (n, 3) or (n, 2)
         The fitted curve; NaN outside its stretches.
     """
     curves = {
@@ -193,12 +193,13 @@ def _over_time_and_in_space(
     measured = curves.get("reconstructed")
     missing = np.isnan(measured[0]).any(axis=1) if measured else np.zeros(len(t), dtype=bool)
     figure = plt.figure(figsize=(10.5, 4.7))
+    names = "xyz"[: next(iter(curves.values()))[0].shape[1]]
     panels = figure.subplot_mosaic(
-        [["x", "space"], ["y", "space"], ["z", "space"]],
-        per_subplot_kw={"space": SPACE}, width_ratios=(1.1, 1),
+        [[name, "space"] for name in names], width_ratios=(1.1, 1),
+        per_subplot_kw={"space": SPACE if len(names) == 3 else {"aspect": "equal"}},
     )  # fmt: skip
     space = panels["space"]
-    for i, name in enumerate("xyz"):
+    for i, name in enumerate(names):
         axes = panels[name]
         axes.fill_between(
             t, 0, 1, where=missing, color="0.85", step="mid", transform=axes.get_xaxis_transform()
@@ -207,11 +208,12 @@ def _over_time_and_in_space(
             axes.plot(t, curve[:, i], **style)
         axes.set_ylabel(name)
         axes.label_outer()
-    panels["z"].set_xlabel(f"time ({unit}); x, y, z in scene units")
+    panels[names[-1]].set_xlabel(f"time ({unit}); {', '.join(names)} in scene units")
     for label, (curve, style) in curves.items():
         space.plot(*curve.T, label=label, **style)
     if word:
         space.plot([], [], color="0.85", lw=8, label=word)
-    finish_space(space, azimuth=-60, elevation=25, zoom=0.85)
+    if len(names) == 3:
+        finish_space(space, azimuth=-60, elevation=25, zoom=0.85)
     figure.legend(*space.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure

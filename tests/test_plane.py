@@ -1,0 +1,377 @@
+"""One camera, motion in a plane: the scale and its error, and laws that are the same everywhere."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from helpers import real
+from phones import write_at
+from scipy.integrate import solve_ivp
+
+import vidsindy_lite as vl
+from vidsindy_lite import plane
+from vidsindy_lite.__main__ import main
+from vidsindy_lite.dynamics import homogeneous
+from vidsindy_lite.vision import Track
+from vidsindy_lite.vision.rendering import render
+
+SCALE = 250.0  # pixels in a metre
+STICK = (100.0, 600.0, 100.0, 600.0 - SCALE / 2, 0.5)
+
+
+def flight(velocity=(1.5, 5.0), drag=0.0, samples=34):
+    """Places in metres at 30 a second, under g and a drag."""
+    t = np.arange(samples) / 30
+    first = -np.expm1(-drag * t) / drag if drag else t
+    second = (t - first) / drag if drag else t**2 / 2
+    return t, np.outer(first, velocity) + np.outer(second, (0, -9.81))
+
+
+def swung(t, length, drag):
+    """Places of a pendulum in metres, from its rest."""
+
+    def pull(t, y):
+        return [y[1], -9.81 / length * np.sin(y[0]) - drag * y[1]]
+
+    angle = solve_ivp(pull, (0, t[-1]), [0.6, 0], t_eval=t, rtol=1e-9, atol=1e-9).y[0]
+    return length * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
+
+
+def noisy(x, seed, error=4e-4):
+    return x + np.random.default_rng(seed).normal(0, error, x.shape)
+
+
+def filmed(monkeypatch, pixels, fps=30.0):
+    """As if a film showed the target there."""
+    found = Track(np.asarray(pixels), np.ones(len(pixels)), "motion")
+    monkeypatch.setattr(plane, "track", lambda *what: found)
+    monkeypatch.setattr(plane, "frame_clock", lambda path: np.arange(len(pixels), dtype=float))
+    monkeypatch.setattr(
+        plane, "video_info", lambda path: SimpleNamespace(fps=fps, size=(1280, 720))
+    )
+
+
+def pixels_of(x):
+    return np.column_stack([640 + SCALE * x[:, 0], 500 - SCALE * x[:, 1]])
+
+
+# ------------------------------------------------------------ laws that are the same at every place
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_throw_is_a_constant_force(seed):
+    rng = np.random.default_rng(seed)
+    t, x = flight((rng.uniform(-2, 2), rng.uniform(4, 6)))
+    found = homogeneous(t, noisy(x, seed), ("x", "y"))
+    g = found.physics()["g"]
+    assert found.system.support.sum() == 2 + 1  # x' = vx, y' = vy, y'' = -g
+    assert abs(g.value - 9.81) < min(3 * g.error, 0.02)
+    assert found.status == "ok"
+    assert "same everywhere" in found.note
+    np.testing.assert_allclose(found.curve(t)[:, :2], x, atol=1e-3)
+
+
+def test_where_drag_is_plain_it_is_given_with_one_coefficient():
+    t, x = flight(drag=0.6)
+    found = homogeneous(t, noisy(x, 0), ("x", "y"))
+    said = found.physics()
+    assert abs(said["drag"].value - 0.6) < 3 * said["drag"].error < 0.05
+    assert abs(said["g"].value - 9.81) < 3 * said["g"].error < 0.05
+    assert found.status == "ok"
+
+
+def test_a_drag_that_hardly_shows_is_a_doubt_and_in_the_error_of_g():
+    t, x = flight(drag=0.05)
+    found = homogeneous(t, noisy(x, 0), ("x", "y"))
+    g = found.physics()["g"]
+    assert not any(quantity.name == "drag" for quantity in found.physics())
+    assert abs(g.value - 9.81) < 2 * g.error < 0.4
+    (doubt,) = found.warnings
+    assert doubt.startswith("one flight hardly tells its law")
+    assert "(drag" in doubt
+
+
+def test_what_comes_nearer_is_told():
+    t, x = flight()
+    found = homogeneous(t, noisy(x / (1 - 0.1 * t)[:, None], 0), ("x", "y"))
+    assert not any(quantity.name == "drag" for quantity in found.physics())
+    assert any("it comes nearer, or the plane lies askew" in doubt for doubt in found.warnings)
+
+
+def test_without_a_force_it_goes_straight_on():
+    t = np.arange(40) / 30
+    found = homogeneous(t, noisy(np.outer(t, (0.5, 0.2)), 0), ("x", "y"))
+    assert found.equations() == "x'' = 0\ny'' = 0"
+
+
+def test_what_swings_has_no_such_law():
+    t = np.arange(60) / 30
+    x = np.column_stack([0.1 * np.sin(4 * t), 0.2 * np.cos(6 * t)])
+    assert homogeneous(t, noisy(x, 0), ("x", "y")) is None
+
+
+def test_too_few_places_are_refused():
+    t, x = flight(samples=5)
+    with pytest.raises(ValueError, match="x: must hold at least 6 places, got 5"):
+        homogeneous(t, x, ("x", "y"))
+
+
+# ------------------------------------------------------------------------- from pixels to the plane
+
+
+def placed(pixels, length=None, up=None, corners=None, size=(1280, 720)):
+    """Where pixels are in the plane."""
+    marks, places, _ = plane.four_places(length, up, corners, size)
+    return plane.mapped(plane.homography_of(marks, places), np.array(pixels))
+
+
+def test_two_marks_and_a_length():
+    marks = [[100.0, 600], [100, 600 - SCALE], [100 + SCALE, 600]]
+    np.testing.assert_allclose(placed(marks, STICK), [[0, 0], [0, 1], [1, 0]], atol=1e-9)
+
+
+def test_without_a_length_places_are_pixels_from_the_lower_left():
+    np.testing.assert_allclose(placed([[3.0, 719 - 4]]), [[3, 4]], atol=1e-9)
+
+
+@pytest.mark.parametrize("up", [(1, 0), (10, 5, 30, 5)])
+def test_a_camera_that_lies_on_its_side(up):
+    np.testing.assert_allclose(placed([[2.0, 3]], (0, 0, 10, 0, 10), up), [[3, 2]], atol=1e-9)
+
+
+def test_four_marks_of_a_rectangle_that_is_seen_askew():
+    askew = np.array([[200.0, 20, 300], [-10, -180, 600], [0.05, 0.02, 1]])
+    places = np.array([[0.0, 0], [2, 0], [2, 1], [0, 1], [0.7, 0.4]])
+    marks = plane.mapped(askew, places)
+    np.testing.assert_allclose(placed(marks, corners=(*marks[:4].ravel(), 2, 1)), places, atol=1e-9)
+    leans = plane.mapped(askew, np.array([[1.0, 0.5], [1.001, 0.501]]))  # at 45 degrees
+    turned = placed(marks, corners=(*marks[:4].ravel(), 2, 1), up=np.diff(leans, axis=0)[0])
+    np.testing.assert_allclose(turned[1], [np.sqrt(2), np.sqrt(2)], atol=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"length": (1, 2, 3, 4)}, "length: must be"),
+        ({"length": (1, 2, 1, 2, 1)}, "length: must be two marks apart"),
+        ({"length": (1, 2, 90, 2, -1)}, "length: must be two marks apart"),
+        ({"up": (0, 0)}, "up: must be a direction"),
+        ({"up": (0, 0, 1)}, "up: must be a direction"),
+        ({"corners": (0, 0, 1, 0, 1, 9, 0, 9, 1, 1)}, "corners: must be lower left"),
+        ({"corners": (0, 9, 9, 9, 9, 0, 0, 0, 1, 0)}, "corners: must be .* two sides above 0"),
+        ({"length": (4000, 9, 4000, 5, 1)}, "length: marks must lie in the picture, .*4000"),
+        ({"corners": (0, 90, 90, 90, 90, 0, 0, -1, 1, 1)}, "corners: marks must lie in the"),
+        ({"corners": 3}, "corners: must be 10 finite numbers"),
+        ({"length": STICK, "corners": 3}, "corners: must not be given with length"),
+        ({"length_error": 2}, "length_error: must be a share"),
+        ({"fps": 0}, "fps: must be positive"),
+    ],
+)
+def test_what_is_no_scale_is_refused(monkeypatch, given, message):
+    filmed(monkeypatch, pixels_of(flight()[1]))
+    with pytest.raises(ValueError, match=message):
+        vl.discover_from_video("throw.mp4", **given)
+
+
+def test_a_film_without_a_rate_needs_one(monkeypatch):
+    filmed(monkeypatch, pixels_of(flight()[1]), fps=0.0)
+    with pytest.raises(ValueError, match="fps: must be given"):
+        vl.discover_from_video("throw.mp4", STICK)
+
+
+# ---------------------------------------------------------------------------------------- the whole
+
+
+def test_the_error_of_the_length_is_that_of_g(monkeypatch):
+    monkeypatch.setattr(plane, "TILTED", 0.0)
+    filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
+    found = vl.discover_from_video("throw.mp4", STICK, length_error=0.03)
+    assert found.status == "ok"
+    error = found.rig.cameras[0].scale_error
+    assert error == pytest.approx(np.hypot(0.03, np.sqrt(2) / (SCALE / 2)))
+    assert found.g.error == pytest.approx(error * 9.81, rel=0.1)
+    assert found.period is None
+    np.testing.assert_allclose(found.rig.cameras[0].project(found.x), found.tracks[0])
+    np.testing.assert_allclose(found.fitted, found.x, atol=0.01)
+
+
+def test_a_wrong_length_and_a_wrong_vertical_are_told(monkeypatch):
+    filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
+    found = vl.discover_from_video("throw.mp4", (*STICK[:4], 0.7), up=(0.3, -1))
+    scale, vertical = found.warnings
+    assert "the marks may be 0.714 times as far apart as is given" in scale
+    assert "degrees off the vertical" in vertical
+
+
+def test_the_command_writes_g_with_its_error(monkeypatch, tmp_path, capsys):
+    film = tmp_path / "throw.avi"
+    frames = (np.full((720, 1280, 3), 90, np.uint8) for _ in range(2))
+    vl.write_video(film, frames, fps=30, codec="MJPG")
+    filmed(monkeypatch, pixels_of(noisy(flight()[1], 0)))
+    length = ",".join(map(str, STICK))
+    given = ["discover", str(film), "--length", length, "--out", str(tmp_path / "law")]
+    assert main(given) == 0
+    assert "status: ok" in capsys.readouterr().out
+    data = json.loads((tmp_path / "law" / "result.json").read_text("utf-8"))
+    assert abs(data["g"]["value"] - 9.81) < 2 * data["g"]["error"] < 0.8
+    assert data["period"] is None
+    assert "<img" in (tmp_path / "law" / "report.html").read_text("utf-8")
+    assert main(given) == 0  # an earlier report is replaced
+
+
+def test_the_command_draws_the_track_of_what_has_no_law(monkeypatch, tmp_path, capsys):
+    film = vl.write_video(tmp_path / "a.mov", np.full((5, 90, 120, 3), 90, np.uint8))
+    filmed(monkeypatch, pixels_of(flight(samples=5)[1]))
+    assert main(["discover", str(film), "--out", str(tmp_path / "law")]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "at least 6 places, got 5; likely causes, in this order: the tracker" in said
+    assert "the rig" not in said
+    assert (tmp_path / "law" / "report.html").is_file()
+
+
+def test_an_interruption_keeps_the_track(monkeypatch, tmp_path, capsys):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    film = vl.write_video(tmp_path / "a.mov", np.full((34, 90, 120, 3), 90, np.uint8))
+    filmed(monkeypatch, pixels_of(flight()[1]))
+    monkeypatch.setattr(plane, "homogeneous", interrupted)
+    folder = tmp_path / "law"
+    assert main(["discover", str(film), "--out", str(folder)]) == 130
+    kept = f"stopped; the tracks are kept beside {folder / 'report.html'}"
+    assert capsys.readouterr().err.splitlines()[-1] == kept
+    assert len((folder / "tracks.csv").read_text().splitlines()) == 1 + 34
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--targets", "2"], "targets: must be given with --rig, got 2"),
+        (
+            ["--up", "0,-1", "--rig", "rig.toml"],
+            "up: must not be given with --rig, got [0.0, -1.0]",
+        ),
+    ],
+)
+def test_what_does_not_go_together_is_refused(tmp_path, monkeypatch, capsys, given, message):
+    monkeypatch.chdir(tmp_path)
+    assert main(["rig-template", "--output", "rig.toml"]) == 0
+    assert main(["discover", "a.mov", *given]) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_what_moves_along_a_line_has_one_coordinate(monkeypatch):
+    t = np.arange(90) / 30
+    up = 0.3 * np.exp(-0.1 * t) * np.cos(6 * t)
+    filmed(monkeypatch, pixels_of(noisy(np.column_stack([0 * t, up]), 0)))
+    found = vl.discover_from_video("spring.mp4")
+    assert found.unit == "px"
+    assert found.discovery.system.states == 2
+    assert float(found.period.value) == pytest.approx(2 * np.pi / 6, abs=1e-3)
+    np.testing.assert_allclose(found.fitted, found.x, atol=1)
+
+
+@pytest.mark.slow
+def test_a_swing_on_its_circle(monkeypatch):
+    t = np.arange(90) / 30
+    x = swung(t, 0.6, 0.05)
+    filmed(monkeypatch, pixels_of(noisy(x, 0)))
+    found = vl.discover_from_video("swing.mp4", STICK)
+    assert found.swing is not None
+    assert str(found).startswith("on a circle of radius ")
+    assert f"; {found.g}" in str(found)
+    assert abs(found.g.value - 9.81) < 2 * found.g.error < 1.2
+    assert float(found.period.value) == pytest.approx(2 * np.pi * np.sqrt(0.6 / 9.81), rel=0.01)
+    np.testing.assert_allclose(found.fitted, found.x, atol=0.01)
+
+
+# ----------------------------------------------------------------------------------- rendered films
+
+
+def telephone(path, motion, seconds, size=(480, 360), fps=30.0, roll=0.0, pan=0.0, codec=None):
+    """A film of a motion in a plane 2.5 m away, and two marks there, half a metre apart.
+
+    The camera is rolled by so much, and the plane turned about its vertical, in radians. Without a
+    codec it is H.264, as telephones write it.
+    """
+
+    def seen(x):
+        x = np.asarray(x)
+        across, depth = x[:, 0] * np.cos(pan), 2.5 - x[:, 0] * np.sin(pan)
+        flat = np.column_stack([across, -x[:, 1]]) / depth[:, None] * max(size)
+        c, s = np.cos(roll), np.sin(roll)
+        return np.array(size) / 2 + flat @ np.array([[c, s], [-s, c]])
+
+    t = np.arange(round(seconds * fps)) / fps
+    scene = vl.Scene("wood", size=16, image_size=size, noise_variance=0.0005)
+    frames = render(seen(motion(t)), scene, 0)
+    if codec is None:
+        write_at(path, t, frames, "libx264", "yuv420p", crf="24")
+    else:
+        vl.write_video(path, frames, fps, codec)
+    return vl.discover_from_video(path, (*seen([[-0.3, -0.2], [-0.3, 0.3]]).ravel(), 0.5))
+
+
+def thrown(t):
+    return np.column_stack([0.8 * (t - 0.3), -0.3 + 2.8 * t - 9.81 * t**2 / 2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("roll", [0.0, 0.04])
+def test_a_film_of_a_throw(tmp_path, roll):
+    found = telephone(tmp_path / "film.mp4", thrown, 0.6, (480, 640), roll=roll)
+    direction = found.discovery.physics()["direction"].value
+    assert found.status == "ok"
+    assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.5
+    assert np.arctan2(direction[0], -direction[1]) == pytest.approx(-roll, abs=0.005)
+
+
+@pytest.mark.slow
+def test_a_film_of_a_spring(tmp_path):
+    def sprung(t):
+        return np.column_stack([0 * t, 0.2 * np.exp(-0.1 * t) * np.cos(5.3 * t)])
+
+    found = telephone(tmp_path / "film.mp4", sprung, 3, fps=24.0, roll=0.03, codec="mp4v")
+    said = found.discovery.physics()
+    assert found.status == "ok"
+    assert found.discovery.system.support.sum() == 1 + 3  # x' = vx, x'' = rest, spring, drag
+    assert abs(found.period.value - 2 * np.pi / 5.3) < 3 * found.period.error < 0.001
+    assert abs(said["damping"].value - 2 * 0.1) < 3 * said["damping"].error < 0.01
+
+
+@pytest.mark.slow
+def test_a_film_of_a_swing(tmp_path):
+    found = telephone(tmp_path / "film.mp4", lambda t: swung(t, 0.5, 0.1) - [0, 0.1], 3)
+    law = found.discovery
+    assert [law.terms[row] for row in np.flatnonzero(law.system.support[:, 1])] == [
+        "vangle", "sin(angle)"
+    ]  # fmt: skip
+    assert abs(found.g.value - 9.81) < 2 * found.g.error < 0.6
+    assert float(found.period.value) == pytest.approx(2 * np.pi / np.sqrt(9.81 / 0.5), rel=2e-3)
+
+
+@pytest.mark.slow
+def test_a_film_of_a_plane_that_lies_askew_is_doubted(tmp_path):
+    found = telephone(tmp_path / "film.mp4", thrown, 0.6, pan=0.6)
+    assert found.status == "suspect"
+    assert any("the plane lies askew" in doubt for doubt in found.warnings)
+
+
+# --------------------------------------------------------------------------------------- real clips
+
+
+def test_the_toss():
+    found = vl.discover_from_video(real("toss"), (272.2, 446.1, 273.2, 47.4, 1.0), fps=15.15)
+    assert 9.6 < found.g.value < 10.4
+    assert abs(found.g.value - 9.9) < 2 * found.g.error
+    assert found.discovery.equations().startswith("x'' = 0\ny'' = - (10.")
+    assert any("one flight hardly tells its law" in doubt for doubt in found.warnings)
+
+
+@pytest.mark.slow
+def test_the_can():
+    found = vl.discover_from_video(real("can_1"), fps=1)  # in frames
+    assert found.unit == "px"
+    assert abs(found.period.value - 40.2) < 0.3

@@ -1,0 +1,218 @@
+"""Laws that are the same at every place: no force, a constant one, drag along the velocity.
+
+Of one throw, coordinates and velocities are affine in one function of the time, so that many laws
+fit it alike. What sets one of them apart is that no place is special to it. Candidates are nested
+by what they are invariant under, each class holding those before it: rest, a straight flight, a
+constant force, drag along the velocity, and all other laws. Each leaves the less error the richer
+it is; a class is the right one from the errors that it leaves up to those that the class before it
+leaves, and of all classes the one that is so over the widest range of errors is taken, as
+`path` takes one of the laws of a path.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.optimize import least_squares
+from scipy.special import exprel
+from scipy.stats import chi2
+
+from ..arrays import Bools, Floats, Ints
+from .data import inflation
+from .library import monomial_exponents, velocity_names
+from .model import PolynomialSystem
+from .problem import FALSE_ALARM
+from .result import Discovery, Plateau
+from .smoothing import smooth
+
+FEWEST = 6
+"""Samples below which nothing is left over of a throw with drag."""
+STEEP = 5.0
+"""Largest drag, over one through the duration: with more, the velocity is lost at once."""
+POINTS = 201
+"""Points through which the curve of a law is drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """The flight that fits best under a force ``f + k v`` that is the same at every place.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (3 m + 1,)
+        Place, velocity and f at time 0, and k: below zero a drag.
+    free : ndarray of bool, shape (3 m + 1,)
+        Which of these were sought; the others are zero.
+    covariance : ndarray, shape (3 m + 1, 3 m + 1)
+        The errors of neighbours taken as not independent.
+    left : ndarray, shape (n, m)
+        What is left of the samples.
+    """
+
+    theta: Floats
+    free: Bools
+    covariance: Floats
+    left: Floats
+
+    @classmethod
+    def fitted(cls, t: Floats, x: Floats, free: Bools) -> Flight:
+        """By least squares to samples (n, m), as many as ``free`` tells."""
+        most = STEEP / np.ptp(t)
+
+        def whole(values: Floats) -> Floats:
+            theta = np.zeros(len(free))
+            theta[free] = values
+            return theta
+
+        def left(values: Floats) -> Floats:
+            return (x - places(t, whole(values))).ravel()
+
+        bound = np.where(np.arange(len(free)) < len(free) - 1, np.inf, most)[free]
+        found = least_squares(left, np.zeros(free.sum()), "3-point", (-bound, bound), x_scale="jac")
+        errors = found.fun.reshape(x.shape)
+        size = (errors**2).sum() / max(errors.size - free.sum(), 1) * inflation([errors]).max()
+        covariance = np.zeros((len(free),) * 2)
+        covariance[np.ix_(free, free)] = np.linalg.pinv(found.jac.T @ found.jac) * size
+        return cls(whole(found.x), free, covariance, errors)
+
+    @property
+    def force(self) -> Floats:
+        """The constant force, (m,)."""
+        return np.split(self.theta[:-1], 3)[2]
+
+    @property
+    def error(self) -> float:
+        """Standard deviation of single samples about it."""
+        return float(np.sqrt((self.left**2).sum() / max(self.left.size - self.free.sum(), 1)))
+
+
+def places(t: Floats, theta: Floats, slope: bool = False) -> Floats:
+    """Where a flight of these numbers is, (n, m), or how fast."""
+    start, velocity, force = np.split(theta[:-1], 3)
+    z = theta[-1] * t
+    first = t * exprel(z)  # the integral of exp(k t)
+    if slope:
+        return np.outer(np.exp(z), velocity) + np.outer(first, force)
+    near = np.abs(z) < 1e-4  # there the difference has lost its digits, and the series has not
+    second = t**2 * np.where(near, 0.5 + z / 6, (exprel(z) - 1) / np.where(near, 1.0, z))
+    return start + np.outer(first, velocity) + np.outer(second, force)
+
+
+def coefficients_of(theta: Floats, exponents: Ints) -> Floats:
+    """The law of a flight in terms of these exponents, (l, 2 m)."""
+    force = np.split(theta[:-1], 3)[2]
+    velocities = exponents[:, len(force) :]
+    pull = np.outer(exponents.sum(axis=1) == 0, force) + theta[-1] * velocities
+    return np.hstack([velocities, pull])
+
+
+def homogeneous(
+    t: Floats, x: Floats, names: tuple[str, ...], systematic: Floats | None = None
+) -> Discovery | None:
+    """The law of a flight, where one that is the same at every place is to be preferred.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Increasing times.
+    x : ndarray, shape (n, m)
+        Places. One standard error goes for all coordinates.
+    names : tuple of str
+        Of the coordinates.
+    systematic : ndarray, shape (k, n, m), optional
+        Errors that all places share, see `discover`.
+
+    Returns
+    -------
+    Discovery or None
+        Its errors hold how far the next richer law would be from it, and a warning tells where that
+        fits better. None where other laws are right over a wider range of errors.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than six samples.
+    """
+    if len(x) < FEWEST:
+        raise ValueError(f"x: must hold at least {FEWEST} places, got {len(x)}")
+    m, middle = x.shape[1], (t[0] + t[-1]) / 2
+    since, numbers = t - middle, np.arange(3 * m + 1)
+    classes = [Flight.fitted(since, x, numbers < count) for count in (m, 2 * m, 3 * m, 3 * m + 1)]
+    noise = float(np.sqrt((smooth([(t, x)], np.random.default_rng(0)).noise ** 2).mean()))
+    bounds = np.array([*(max(one.error, noise) for one in classes), noise])
+    best = 1 + int(np.argmax(bounds[:-1] / bounds[1:]))
+    if best == len(classes):  # all other laws
+        return None
+    if classes[best].theta[-1] > 0:  # no drag: it comes nearer; the constant force is doubted
+        best -= 1
+    flight, richer = classes[best], classes[min(best + 1, len(classes) - 1)]
+    covariance, departure = flight.covariance, _departure(flight, richer)
+    wanted = numbers >= 2 * m  # force and drag
+    if np.diag(departure)[wanted].sum() > np.diag(covariance)[wanted].sum():
+        covariance = departure
+    price = chi2.isf(FALSE_ALARM / (2 * m), df=1)
+    kept = flight.free & ((flight.theta**2 > price * np.diag(covariance)) | (numbers < 2 * m))
+    law = Flight.fitted(since, x, kept)
+    for mode in () if systematic is None else systematic:
+        moved = Flight.fitted(since, x + mode, kept).theta - law.theta
+        covariance = covariance + np.outer(moved, moved)
+    found = _told(law, covariance * np.outer(kept, kept), t, names)
+    spread, classes[best] = np.linalg.norm(x.std(axis=0)), law
+    supports = [coefficients_of(one.theta, found.system.exponents) != 0 for one in classes]
+    path = tuple(
+        tuple(
+            Plateau(j, bounds[k] / spread, bounds[k - 1] / spread, supports[k][:, j])
+            for k in range(len(classes) - 1, 0, -1)
+            if bounds[k] < bounds[k - 1]
+        )
+        for j in range(found.system.d)
+    )
+    return replace(found, warnings=_doubt(flight, richer, price), path=path)
+
+
+def _departure(flight: Flight, richer: Flight) -> Floats:
+    """Mean products of what the numbers of a richer law are off those of a flight."""
+    away = richer.theta - flight.theta
+    return (richer.covariance + np.outer(away, away)) * np.outer(flight.free, flight.free)
+
+
+def _doubt(flight: Flight, richer: Flight, price: float) -> tuple[str, ...]:
+    """Whether the next richer law fits better, and what it would be."""
+    gained = (flight.left**2).sum() - (richer.left**2).sum()
+    if richer is flight or gained < price * richer.error**2 * inflation([richer.left]).max():
+        return ()
+    pull, left, k = np.linalg.norm(richer.force), richer.error / flight.error, richer.theta[-1]
+    if not k:
+        return (f"a constant force of {pull:.4g} would leave {100 * left:.0f} % of the errors",)
+    cause = "drag" if k < 0 else "it comes nearer, or the plane lies askew"
+    return (
+        f"one flight hardly tells its law: velocities that change by {100 * k:+.3g} % in a unit of "
+        f"time, beside a pull of {pull:.4g}, would leave {100 * left:.0f} % of the errors "
+        f"({cause}, or the lens bends the picture); the law that is the same at every place and "
+        "holds over the widest range of errors is given, its error bars hold the other",
+    )
+
+
+def _told(law: Flight, covariance: Floats, t: Floats, names: tuple[str, ...]) -> Discovery:
+    """The law of a flight as a discovery."""
+    exponents = monomial_exponents(2 * len(names), 1)
+    coefficients = coefficients_of(law.theta, exponents)
+    system = PolynomialSystem(names + velocity_names(names), exponents, coefficients)
+    still = coefficients_of(0 * law.theta, exponents)
+    rates = [(coefficients_of(one, exponents) - still).T.ravel() for one in np.eye(len(law.theta))]
+    spread = np.transpose(rates) @ covariance @ rates
+    shown = np.linspace(t[0], t[-1], POINTS)
+    since = shown - (t[0] + t[-1]) / 2
+    states = np.hstack([places(since, law.theta, slope) for slope in (False, True)])
+    noise = np.append(np.sqrt((law.left**2).mean(axis=0)), np.full(len(names), np.nan))
+    nothing = np.zeros(system.d)
+    return Discovery(
+        system=system, native=system, offset=nothing, covariance=spread, native_covariance=spread,
+        offset_errors=nothing, noise=noise, model_error=nothing, warnings=(), path=(), history=(),
+        curves=(make_interp_spline(shown, states, k=3),),
+        absent=np.full((*coefficients.shape, 2), np.nan),
+        note="order 2: of laws that one flight cannot tell apart, the one that is the same "
+        "everywhere",
+    )  # fmt: skip

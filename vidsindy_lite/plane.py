@@ -1,0 +1,360 @@
+"""From the film of one camera to the law of a motion in a plane that faces it, or is marked out.
+
+The camera is known by what it sees of the plane z = 0: from two marks and the distance between
+them, or from the corners of a rectangle. Of nested laws, each class with fewer symmetries than the
+one before it, the simplest is taken that the data bear: forces that are the same everywhere
+(`homogeneous`), forces linear in place and velocity, a swing on a circle.
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from .arrays import Floats
+from .cameras import Lags, OrthographicCamera, Rig
+from .checks import (
+    check_array,
+    check_integer,
+    check_number,
+    check_positive,
+    check_vector,
+    shown,
+)
+from .dynamics import (
+    Discovery,
+    Round,
+    Swing,
+    check_library,
+    check_order,
+    discover,
+    homogeneous,
+    on_circle,
+    smooth,
+)
+from .pipeline import VideoDiscovery
+from .refusal import refusing
+from .vision import Hint, check_detector, frame_clock, track, video_info
+
+MARK = 1.0
+"""Standard error of a mark that is set by hand, in pixels."""
+EARTH, ELSEWHERE = 9.81, 0.03
+"""What pulls at all bodies, in metres a second squared, and by how much it differs on earth."""
+SURE = 3.0
+"""Standard errors from which on a difference is one."""
+TILTED = np.deg2rad(2.0)
+"""Standard error of a direction that is set by hand: of a vertical, and of where a camera looks."""
+FOCAL = 0.75
+"""Focal length of a telephone over the longer side of its picture."""
+ASIDE = 5.0
+"""Spread across a line, over the noise, up to which a motion is one along it."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlaneCamera(OrthographicCamera):
+    """A camera of which is known how it sees the plane z = 0, and its scale between the marks.
+
+    Parameters
+    ----------
+    homography : ndarray, shape (3, 3)
+        From pixels to the plane, homogeneous.
+    position, normal, scale, angle, scale_error, image_size
+        See `Camera`.
+    """
+
+    model: ClassVar[str] = "plane"
+
+    homography: Floats
+
+    def image(self, x: Floats) -> Floats:
+        """Pixels at which points of the plane are seen, (n, 2)."""
+        return mapped(np.asarray(np.linalg.inv(self.homography), float), x[:, :2])
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneDiscovery(VideoDiscovery):
+    """A motion in the plane z = 0 of one camera, x rightwards and y upwards, and its law.
+
+    Parameters
+    ----------
+    unit : {"m", "px"}
+        Of places.
+    circle : Round, optional
+        Where the target swings on a circle; then the law is that of the angle. That of what moves
+        along a line is the law of one coordinate, see `Discovery.orientation`.
+    """
+
+    unit: str
+    circle: Round | None = None
+
+    @property
+    def swing(self) -> Swing | None:
+        """The circle and the law of the angle on it, if the target swings on one."""
+        return None if self.circle is None else Swing(self.circle, self.discovery)
+
+    @property
+    def fitted(self) -> Floats:
+        """The path that obeys the law, in the shape of ``x``; NaN before and after it."""
+        if self.circle is None:
+            return super().fitted
+        angle = self.discovery.curve(self.t)[:, :1]
+        away = np.hstack([np.cos(angle), np.sin(angle)]) @ self.circle.axes
+        return _in_space(self.circle.centre + self.circle.radius * away)
+
+    def __str__(self) -> str:
+        told = super().__str__()
+        if self.circle is None:
+            return told
+        radius = f"{self.circle.radius:.4g} ± {self.circle.radius_error:.2g} {self.unit}"
+        return f"on a circle of radius {radius}{'' if self.g is None else f'; {self.g}'}\n{told}"
+
+
+def discover_from_video(
+    path: str | os.PathLike,
+    length: Sequence[float] | None = None,
+    up: Sequence[float] | None = None,
+    fps: float | None = None,
+    *,
+    corners: Sequence[float] | None = None,
+    length_error: float = 0.01,
+    hint: Hint | None = None,
+    detector: str | os.PathLike = "auto",
+    degree: int | None = None,
+    order: int | str = "auto",
+    seed: int = 0,
+    progress: bool | None = None,
+) -> PlaneDiscovery:
+    """Discover the law of a motion in a plane from the film of one camera.
+
+    Parameters
+    ----------
+    path : path
+        A film, see `track`. Marks are in pixels of its first frame.
+    length : (u1, v1, u2, v2, metres), optional
+        Two marks, and how far they are apart in the plane of the motion; the first is its origin.
+        Without it, and without corners, places are in pixels from the lower left of the picture.
+    up : (du, dv) or (u1, v1, u2, v2), optional
+        The vertical, as a direction in the picture or by two marks, the lower one first; by default
+        that of the picture.
+    fps : float, optional
+        Frames in one second, where the file does not say so: slow motion.
+    corners : (u1, v1, ..., u4, v4, width, height), optional
+        For a plane that is seen askew: the corners of a rectangle in it, lower left, lower right,
+        upper right, upper left, and its sides in metres. The lower left is the origin.
+    length_error : float
+        Standard error of the length or of the sides, as a share of them. That of marks, a pixel
+        each, comes on top.
+    hint, detector
+        See ``target`` and ``detector`` of `track`.
+    degree, order, seed, progress
+        See `discover`. By default, of nested laws the simplest that the data bear: forces that are
+        the same at every place, linear ones, a swing on a circle.
+
+    Returns
+    -------
+    PlaneDiscovery
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If marks or numbers are no such, or as `track` and `discover` do.
+
+    Examples
+    --------
+    >>> found = vl.discover_from_video("throw.mp4", length=(272, 446, 273, 47, 1.0))
+    >>> print(found, found.g)
+    """
+    check_detector(detector)
+    check_order(order, "learn", check_library(degree, None))
+    check_integer("seed", seed)
+    share = check_number("length_error", length_error)
+    if not 0 <= share < 1:
+        raise ValueError(f"length_error: must be a share of the length, 0 to 1, got {share}")
+    shot, name = video_info(path), Path(path).name
+    if fps is None and not shot.fps:
+        raise ValueError(f"fps: must be given, as {name} states no frame rate")
+    rate = shot.fps if fps is None else check_positive("fps", fps)
+    marks, places, pixels = four_places(length, up, corners, shot.size)
+    to_plane = homography_of(marks, places)
+    error = float(np.hypot(share, np.sqrt(2) * MARK / pixels)) if pixels else 0.0
+    unit, scale = ("m", f", their scale known to {100 * error:.2g} %") if pixels else ("px", "")
+    middle, centre = marks.mean(axis=0), (np.array(shot.size) - 1) / 2
+    across = complex(*np.diff(mapped(to_plane, middle + [[0.0, 0], [1, 0]]), axis=0)[0])
+    camera = PlaneCamera(
+        homography=to_plane, position=_in_space(mapped(to_plane, centre[None]))[0],
+        normal=np.array([0, 0, 1]), scale=abs(across), angle=-float(np.angle(across)),
+        scale_error=error, image_size=shot.size,
+    )  # fmt: skip
+    rig = Rig((camera,), note=f"the plane of the motion, places in {unit}{scale}")
+    seen = track(path, detector, hint)
+    t, x = frame_clock(path) / rate, mapped(to_plane, seen.pixels)
+    known = slice(3 if corners is None else 1) if pixels else slice(0)
+    modes = np.stack([error * x, *_tilts(camera, seen.pixels, middle)])[known]
+    with refusing("law", [seen.pixels], [name]):
+        law = _law(t, x, modes, degree, order, seed, progress)
+    swing = law.swing
+    doubts = law.warnings if swing is None else (*swing.circle.warnings, *swing.law.warnings)
+    found = PlaneDiscovery(
+        tracks=(seen.pixels,), rig=rig, lags=Lags(np.zeros(1), np.ones(1), np.zeros(1), 0.0),
+        t=t, x=_in_space(x), systematic=np.pad(modes, ((0, 0), (0, 0), (0, 1))),
+        warnings=(), discovery=law if swing is None else swing.law,
+        unit=unit, circle=None if swing is None else swing.circle,
+    )  # fmt: skip
+    contradicted = _contradicted(found, up is not None or corners is not None)
+    return replace(found, warnings=(*seen.warnings, *doubts, *contradicted))
+
+
+def _in_space(places: Floats) -> Floats:
+    """Places of the plane, (n, 2), in space, (n, 3)."""
+    return np.column_stack([places, np.where(np.isnan(places[:, 0]), np.nan, 0.0)])
+
+
+def four_places(
+    length: Sequence[float] | None,
+    up: Sequence[float] | None,
+    corners: Sequence[float] | None,
+    size: tuple[int, int],
+) -> tuple[Floats, Floats, float]:
+    """Four pixels and where they are in the plane, (4, 2) each.
+
+    And the pixels that their distances were measured on, 0 if there are none.
+    """
+    upwards, square = _upwards(up), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    if corners is not None:
+        if length is not None:
+            raise ValueError("corners: must not be given with length, got both")
+        given = check_vector("corners", corners, 10)
+        marks, places = _in_picture("corners", given[:8], size), square * given[8:]
+        edges = np.roll(marks, -1, axis=0) - marks
+        turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
+        if not ((turns < 0).all() and given[8:].min() > 0):  # v points down
+            raise ValueError(
+                "corners: must be lower left, lower right, upper right, upper left of a rectangle "
+                f"and two sides above 0, got {given.tolist()}"
+            )
+        if up is not None:  # of the plane, as it is seen at the middle of the rectangle
+            seen = mapped(homography_of(marks, places), marks.mean(axis=0) + [0 * upwards, upwards])
+            s, c = (seen[1] - seen[0]) / np.hypot(*(seen[1] - seen[0]))
+            places = places @ np.array([[c, s], [-s, c]])
+        return marks, places, float(np.hypot(*edges.T).min())
+    origin, metres, pixels = np.array([0.0, size[1] - 1.0]), 1.0, 0.0
+    if length is not None:
+        told = check_vector("length", length, 5)
+        ends, metres = _in_picture("length", told[:4], size), float(told[4])
+        origin, pixels = ends[0], float(np.hypot(*(ends[1] - ends[0])))
+        if not (pixels > 2 * MARK and metres > 0):
+            raise ValueError(
+                "length: must be two marks apart from each other and a distance above 0, "
+                f"got {tuple(length)}"
+            )
+    axes = np.array([[-upwards[1], upwards[0]], upwards])
+    return origin + (pixels or 1.0) * square @ axes, metres * square, pixels
+
+
+def _in_picture(name: str, given: Floats, size: tuple[int, int]) -> Floats:
+    """Marks, (n, 2), which are checked to lie in the picture."""
+    marks = given.reshape(-1, 2)
+    if not ((marks >= 0) & (marks <= size)).all():
+        raise ValueError(
+            f"{name}: marks must lie in the picture, {size[0]} x {size[1]}, got {marks.tolist()}"
+        )
+    return marks
+
+
+def _upwards(up: Sequence[float] | None) -> Floats:
+    """The unit vector of the vertical in the picture, (u right, v down)."""
+    marks = check_array("up", (0, -1) if up is None else up)
+    away = marks[-2:] - (marks[:2] if marks.shape == (4,) else 0.0)
+    if marks.shape not in ((2,), (4,)) or not (np.isfinite(away).all() and away.any()):
+        raise ValueError(
+            f"up: must be a direction (du, dv) or two marks apart (u1, v1, u2, v2), got {shown(up)}"
+        )
+    return away / np.hypot(*away)
+
+
+def homography_of(marks: Floats, places: Floats) -> Floats:
+    """The homography, (3, 3), that takes four pixels to places, (4, 2) each."""
+    ones = np.column_stack([marks, np.ones(4)])
+    rows = [
+        np.hstack([np.kron(np.eye(2)[axis], ones), -places[:, axis, None] * marks])
+        for axis in (0, 1)
+    ]
+    return np.append(np.linalg.solve(np.vstack(rows), places.T.ravel()), 1.0).reshape(3, 3)
+
+
+def mapped(homography: Floats, places: Floats) -> Floats:
+    """Places, (n, 2), where a homography takes them."""
+    there = np.column_stack([places, np.ones(len(places))]) @ homography.T
+    return there[:, :2] / there[:, 2:]
+
+
+def _tilts(camera: PlaneCamera, pixels: Floats, middle: Floats) -> list[Floats]:
+    """By how much places are off, (n, 2), where the camera looks askew by one standard error.
+
+    To the side, and upwards. Lengths between the marks are right, what is seen beside their middle
+    is nearer to the camera or farther away.
+    """
+    away = pixels - middle
+    nearer = TILTED * away / (FOCAL * max(camera.image_size))
+    x = mapped(camera.homography, pixels)
+    return [mapped(camera.homography, pixels + nearer[:, [j]] * away) - x for j in (0, 1)]
+
+
+def _law(
+    t: Floats, x: Floats, modes: Floats, degree: int | None, order: int | str, seed: int,
+    progress: bool | None,
+) -> Discovery:  # fmt: skip
+    """The law of places: of nested ones the simplest that the data bear, or the one asked for.
+
+    A plane that lies askew bends a path a little as other forces would: laws are told from each
+    other without its modes, which are in the error bars of what flies and of what swings round.
+    """
+    there, axes = np.isfinite(x[:, 0]), np.eye(2)
+    if degree is None and order == "auto":
+        flight = homogeneous(t[there], x[there], ("x", "y"), modes[:, there])
+        if flight is not None:
+            return flight
+        degree, order, axes = 1, 2, _axes(t[there], x[there])
+    law = discover(t, x @ axes.T, degree, seed, progress, modes[:1] @ axes.T, order)
+    if law.swing is not None:
+        circle = on_circle(x, law.swing.circle.axes[0], modes)
+        law = replace(law, swing=replace(law.swing, circle=circle))
+    if len(axes) == 1:
+        law = replace(law, orientation=np.pad(axes, ((0, 0), (0, 1))))
+    return law
+
+
+def _axes(t: Floats, x: Floats) -> Floats:
+    """Those of the plane, or the one along which a path moves that is a line within its noise."""
+    middle = x.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(x - middle, full_matrices=False)
+    noise = smooth([(t, (x - middle) @ axes.T)], np.random.default_rng(0)).noise
+    if sizes[1] > ASIDE * noise[1] * np.sqrt(len(x)):
+        return np.eye(2)
+    return axes[:1] * np.sign(axes[0, np.abs(axes[0]).argmax()])
+
+
+def _contradicted(found: PlaneDiscovery, vertical: bool) -> list[str]:
+    """What the law says against scale, frame rate and vertical."""
+    doubts, g = [], found.g
+    if found.unit == "m" and g is not None:
+        times = float(g.value) / EARTH
+        if abs(times - 1) * EARTH > SURE * np.hypot(float(g.error), ELSEWHERE):
+            wrong = (
+                f"the marks may be {1 / times:.3g} times as far apart as is given, or the frames "
+                f"a second {1 / np.sqrt(times):.3g} times as many, or the plane may lie askew"
+                if times > 0
+                else "it does not hang there, or the plane lies askew"
+            )
+            doubts.append(f"length: {g} is not the {EARTH} of what flies or swings freely: {wrong}")
+    if vertical and found.circle is None and g is not None:
+        pull = found.discovery.physics()["direction"]
+        tilt = np.arctan2(pull.value[0], -pull.value[1])
+        if abs(tilt) > SURE * np.hypot(float(pull.error[0]), TILTED):
+            doubts.append(
+                f"up: the pull is {np.rad2deg(tilt):.3g} degrees off the vertical that was given"
+            )
+    return doubts
