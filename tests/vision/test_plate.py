@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.plate import Plate, _masked_median, noise_of, tolerance
+from vidsindy_lite.vision.plate import Plate, _masked_median, lights_of, noise_of, tolerance
 
 WIDTH, HEIGHT, FRAMES = 160, 120, 12
 RNG = np.random.default_rng(0)
@@ -68,7 +68,11 @@ def test_a_median_is_that_of_the_samples_that_show_a_place():
     samples = list(rng.integers(0, 256, (7, 150, 40, 3), np.uint8))
     moves = [np.array([[1, 0, 5 * k], [0, 1, 11 * k % 6], [0, 0, 1.0]]) for k in range(7)]
     median, count = _masked_median(
-        samples, [np.full((150, 40), 255, np.uint8)] * 7, moves, (74, 157)
+        samples,
+        [np.full((150, 40), 255, np.uint8)] * 7,
+        moves,
+        np.ones((7, 3), np.float32),
+        (74, 157),
     )
     canvas = np.full((7, 157, 74, 3), np.nan)
     for k, sample in enumerate(samples):
@@ -118,6 +122,27 @@ def test_ground_that_a_target_hides_is_what_is_seen_of_it_or_what_is_around_it(p
     assert shown.all()
     assert view.min() >= 148
     assert view.max() <= 165
+
+
+@pytest.mark.parametrize("pan", [0, 4])
+def test_a_plate_is_of_one_light_though_the_exposure_changes(pan):
+    rng = np.random.default_rng(0)
+    ground = cv2.resize(rng.integers(60, 160, (12, 20, 3)).astype(np.uint8), (200, 120))
+    exposure = np.linspace(0.7, 1.4, 15)
+    samples = np.array([(a * ground[:, pan * k :][:, :140]).round().astype(np.uint8)
+                        for k, a in enumerate(exposure)])  # fmt: skip
+    maps = np.array([[[1, 0, pan * k], [0, 1, 0], [0, 0, 1.0]] for k in range(15)])
+    known = np.ones(15, bool)
+    lights = lights_of(samples, maps, known)
+    ratio = lights / exposure[:, None]
+    np.testing.assert_allclose(ratio / ratio[7], 1, atol=0.04)
+    plain = Plate(samples, maps, known)
+    even = Plate(samples, maps, known, lights=lights)
+    shown, _ = even.seen_from(maps[7], np.zeros(2), (140, 120))
+    light = shown / ground[:, 7 * pan :][:, :140]
+    assert light.std() < 0.01 * light.mean()
+    if pan:  # else each place is shown in all lights
+        assert noise_of(samples, maps, plain) > 2 * noise_of(samples, maps, even)
 
 
 @pytest.mark.parametrize(("noise", "least"), [(0.5, 8), (3, 15), (30, 60)])

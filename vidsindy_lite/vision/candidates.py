@@ -20,7 +20,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .background import light
-from .pixels import lengths, relit
+from .pixels import changes, lengths
 from .plate import Plate, tolerance
 from .steadying import carry
 
@@ -86,7 +86,7 @@ def candidates(
             allowed = cv2.warpPerspective(bound, back, (width, height), borderValue=1e3)
         lit = light(frame, ground, known)
         lights.append(lit)
-        differs = lengths(frame - relit(ground, lit))
+        differs = lengths(changes(frame, ground, lit))
         if plate.unsure is not None:  # a guess says nothing of what is within its error
             unsure = plate.unsure
             if plate.moves:
@@ -131,7 +131,7 @@ def _from_neighbours(frame: Image, others: list[tuple[Image, Floats]], moves: bo
                 other, move, frame.shape[1::-1], frame.copy(), borderMode=cv2.BORDER_TRANSPARENT
             )
         lit = (bright / (np.array(cv2.mean(other)[:3]) + 1)).astype(np.float32)
-        least = np.minimum(least, lengths(frame - relit(other, lit)))
+        least = np.minimum(least, lengths(changes(frame, other, lit)))
     return least
 
 

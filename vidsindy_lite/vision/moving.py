@@ -24,7 +24,7 @@ from .camera import LOOSE, camera_motion
 from .candidates import Candidates, candidates, uncommon
 from .hints import Hint
 from .occluders import hidden
-from .plate import Plate, noise_of
+from .plate import Plate, lights_of, noise_of
 from .reducing import ReducedFrames, reduce, reduced
 from .refining import Lens, View, entire, fitting, scatter, swapped
 from .steadying import CameraMotion, at_rest, carry
@@ -48,7 +48,7 @@ class Followed(NamedTuple):
 class Film(NamedTuple):
     """What is known of a film before its target: `small`, `maps` and `plate` are of reduced frames.
 
-    `sure` is whether its camera is known to be at rest, or to move as `motion` says.
+    `lights` (m, 3) say how much brighter each of its samples is than most. `sure` is whether its camera is known to be at rest, or to move as `motion` says.
     """
 
     frames: ReducedFrames
@@ -56,6 +56,7 @@ class Film(NamedTuple):
     maps: Floats
     small: Image
     sampled: Ints
+    lights: Floats32
     sure: bool
 
     @property
@@ -73,7 +74,9 @@ class Film(NamedTuple):
         if not rests:
             motion, sure = camera_motion(frames, small, numbers)
         numbers = np.minimum(numbers, len(motion.maps) - 1)
-        return cls(frames, motion, reduced(motion.maps, factor), small, numbers, sure)
+        maps, known = reduced(motion.maps, factor), np.isfinite(motion.errors)
+        lights = lights_of(small, maps[numbers], known[numbers])
+        return cls(frames, motion, maps, small, numbers, lights, sure)
 
     def plate(self, samples: Image, maps: Floats, boxes: Floats | None = None) -> Plate:
         """The ground, without what is in boxes (n, 4) of the frames."""
@@ -81,7 +84,7 @@ class Film(NamedTuple):
         hide = None if boxes is None else boxes[self.sampled]
         if hide is not None:  # in the others it may be anywhere
             known &= np.isfinite(hide[:, 0])
-        return Plate(samples, maps[self.sampled], known, hide)
+        return Plate(samples, maps[self.sampled], known, hide, self.lights)
 
 
 class Ways(NamedTuple):

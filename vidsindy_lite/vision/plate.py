@@ -1,7 +1,8 @@
 """The ground before which things move: a median of frames without the camera's motion.
 
 The *plate* is the background as no single frame shows it: the median over frames spread through the
-clip, each carried into the first frame by the camera's motion. A target that covers the same ground
+clip, each carried into the first frame by the camera's motion and, where the light or the exposure
+changes, brought into the same light. A target that covers the same ground
 in most of the frames is a part of that median; once its places are known, they are left out of it,
 and ground that no frame shows continues what is around it.
 """
@@ -13,7 +14,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
 from .background import light, median_image
-from .pixels import relit
+from .pixels import changes
 from .steadying import carry
 
 _SHOWN = 3  # samples that must show a place of the plate
@@ -32,17 +33,26 @@ class Plate:
         Which of the maps can be trusted.
     hidden : sequence of ndarray, shape (4,), optional
         What of each sample is not the ground: left, top, width, height; NaN for nothing.
+    lights : ndarray, shape (m, 3), optional
+        How much brighter each sample is, see `lights_of`; by default all are in the same light.
     """
 
     def __init__(
-        self, samples: Image, maps: Floats, known: Bools, hidden: Sequence[Floats] | None = None
+        self,
+        samples: Image,
+        maps: Floats,
+        known: Bools,
+        hidden: Sequence[Floats] | None = None,
+        lights: Floats32 | None = None,
     ) -> None:
         size = np.array(samples.shape[2:0:-1])
         self.size = size
         self.moves = not np.allclose(maps, np.eye(3))
         self.shift = np.eye(3)
         self.unsure: Floats32 | None = None
-        if not self.moves and hidden is None:
+        if lights is None:
+            lights = np.ones((len(samples), 3), np.float32)
+        if not self.moves and hidden is None and (lights == 1).all():
             self.image = median_image(samples)
             self.valid = np.full(self.image.shape[:2], 255, np.uint8)
             return
@@ -65,7 +75,9 @@ class Plate:
         use = np.flatnonzero(known)
         moves = [self.shift @ maps[i] for i in use]
         shown = [samples[i] for i in use]  # views: copies would fill the memory
-        self.image, count = _masked_median(shown, [shows[i] for i in use], moves, (width, height))
+        self.image, count = _masked_median(
+            shown, [shows[i] for i in use], moves, np.reciprocal(lights[use]), (width, height)
+        )
         self.valid = np.where(count >= _SHOWN, 255, 0).astype(np.uint8)
         if hidden is not None:
             self._continue([shows[i] for i in use], moves, count)
@@ -120,8 +132,9 @@ def _without(shows: Image, box: Floats) -> Image:
 
 
 def _masked_median(
-    samples: Sequence[Image], shows: Sequence[Image], moves: Sequence[Floats], size: tuple[int, int]
-) -> tuple[Image, Image]:
+    samples: Sequence[Image], shows: Sequence[Image], moves: Sequence[Floats], gains: Floats32,
+    size: tuple[int, int],
+) -> tuple[Image, Image]:  # fmt: skip
     """The median of the samples that show each pixel of a canvas, by how many it is shown.
 
     Strip by strip, as the samples that are carried there would fill the memory. Where a sample
@@ -136,7 +149,8 @@ def _masked_median(
         layers = np.empty((len(samples), strip[1], width, 3), np.uint8)
         here = np.zeros((strip[1], width), np.uint8)
         for k, (sample, full, move) in enumerate(zip(samples, shows, moves, strict=True)):
-            layers[k] = cv2.warpPerspective(sample, up @ move, strip)
+            there = cv2.warpPerspective(sample, up @ move, strip)
+            layers[k] = cv2.multiply(there, (*gains[k].tolist(), 0))
             shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST) > 0
             missing = k - here  # samples before it that show nothing
             layers[k][~shown] = np.where(missing[~shown] % 2, 255, 0)[:, None]
@@ -144,6 +158,14 @@ def _masked_median(
         result[top : top + strip[1]] = median_image(layers)
         count[top : top + strip[1]] = here
     return result, count
+
+
+def lights_of(samples: Image, maps: Floats, known: Bools) -> Floats32:
+    """How much brighter (m, 3) each of the samples of a film is than most of them."""
+    plate = Plate(samples, maps, known)
+    size = samples.shape[2], samples.shape[1]
+    return np.array([light(sample, *plate.seen_from(here, np.zeros(2), size))
+                     for sample, here in zip(samples, maps, strict=True)])  # fmt: skip
 
 
 def tolerance(plate: Plate, noise: float) -> Floats32:
@@ -166,7 +188,6 @@ def noise_of(samples: Image, maps: Floats, plate: Plate) -> float:
         then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1], step)
         now = sample[::step, ::step]
         if known.any():
-            found.append(
-                1.4826 * np.median(np.abs(now - relit(then, light(now, then, known)))[known])
-            )
+            differs = changes(now, then, light(now, then, known))[known]
+            found.append(1.4826 * np.median(np.abs(differs)))
     return float(np.median(found)) if found else 0.0

@@ -12,7 +12,7 @@ from scipy.stats import trim_mean
 
 from ..arrays import Bools, Floats, Floats32, Image
 from .background import light
-from .pixels import lengths, relit
+from .pixels import changes, lengths
 from .plate import Plate
 from .steadying import displacement
 
@@ -67,7 +67,7 @@ def _seen(plate: Plate, here: Floats) -> tuple[Image, Bools]:
 
 def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
     """Grey levels by which the parts (12, 12) of a frame differ from the ground; NaN if unknown."""
-    change = frame - relit(ground, light(frame, ground, known))
+    change = changes(frame, ground, light(frame, ground, known))
     # Reduced pixels: noise is not what frames are compared by.
     smooth = cv2.GaussianBlur(change, (0, 0), 2.0)
     # Grey levels that a pixel can differ by: a few that differ by more say no more.
