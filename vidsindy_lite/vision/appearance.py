@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Floats32, Image, Ints
 from .candidates import Candidates
@@ -95,15 +96,17 @@ class Appearance:
         fine = cv2.warpAffine(frame, m, (k, k), flags=flags, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(cv2.resize(fine, (_SIDE, _SIDE), interpolation=cv2.INTER_AREA), np.uint8)
 
-    def _features(self, patch: Image) -> Floats:
+    def _features(self, patch: Image) -> NDArray[np.complex128]:
         """Fourier transforms of eight gradients and three colours."""
         grey = cv2.cvtColor(patch, cv2.COLOR_BGR2GRAY).astype(np.float32)
         gx, gy = cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)
         norm = cv2.blur(cv2.magnitude(gx, gy), (9, 9)) + 8
-        gx, gy = gx / norm, gy / norm
-        maps = [np.maximum(gx * np.cos(a) + gy * np.sin(a), 0) for a in np.arange(8) * np.pi / 4]
+        x, y = np.asarray(gx / norm), np.asarray(gy / norm)
+        maps = [np.maximum(x * np.cos(a) + y * np.sin(a), 0) for a in np.arange(8) * np.pi / 4]
         lab = cv2.cvtColor(patch, cv2.COLOR_BGR2LAB).astype(np.float32)
-        maps += [(x - x.mean()) / s for x, s in zip(cv2.split(lab), (60, 25, 25), strict=True)]
+        maps += [
+            (one - one.mean()) / s for one, s in zip(cv2.split(lab), (60, 25, 25), strict=True)
+        ]
         return np.fft.rfft2(np.array(maps) * self._hann)
 
 

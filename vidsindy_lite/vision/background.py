@@ -271,9 +271,10 @@ class BackgroundModel:
         if self.colour is None:
             return False
         contrast = np.sqrt(np.median(self.coarse_square))
-        alike = lengths(self.coarse_background - self.colour) < 0.3 * contrast
+        alike = lengths(self.background - self.colour) < 0.3 * contrast
         found = _largest_component(alike)
-        return found is not None and _COARSE**2 * found[1][cv2.CC_STAT_AREA] > 0.2 * self.area
+        # So small a part of it makes its views unlike.
+        return found is not None and found[1][cv2.CC_STAT_AREA] > self.area / 40
 
     def _window(self, centre: Floats, half: float) -> tuple[Ints, Ints, Window]:
         """First pixel, the one after the last, and the slices, of the square around a place."""

@@ -13,7 +13,7 @@ All of this happens on reduced frames, see `reducing`.
 from collections import deque
 from collections.abc import Iterable, Iterator
 from itertools import chain, repeat
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -53,9 +53,10 @@ class Candidates(NamedTuple):
         """Side of a square of the same area."""
         return np.asarray(np.sqrt(self.area))
 
-    def only(self, rows: Ints | Bools) -> Self:
+    def only(self, rows: Ints | Bools | slice) -> Self:
         """Some of the rows."""
-        return self._make(column[rows] for column in self)
+        columns: list[Any] = [column[rows] for column in self]
+        return type(self)(*columns)
 
     @classmethod
     def joined(cls, parts: Iterable["Candidates"]) -> "Candidates":
@@ -83,14 +84,16 @@ def candidates(
         allowed = bound
         if plate.moves:
             back = np.linalg.inv(plate.shift @ here)
-            allowed = cv2.warpPerspective(bound, back, (width, height), borderValue=1e3)
+            there = cv2.warpPerspective(bound, back, (width, height), borderValue=1e3)
+            allowed = np.asarray(there, np.float32)
         lit = light(frame, ground, known)
         lights.append(lit)
         differs = lengths(changes(frame, ground, lit))
         if plate.unsure is not None:  # a guess says nothing of what is within its error
             unsure = plate.unsure
             if plate.moves:
-                unsure = cv2.warpPerspective(unsure, back, (width, height))
+                there = cv2.warpPerspective(unsure, back, (width, height))
+                unsure = np.asarray(there, np.float32)
             differs = np.maximum(differs - unsure, 0)
         strengths = [differs / allowed * known]
         if others:
@@ -127,9 +130,10 @@ def _from_neighbours(frame: Image, others: list[tuple[Image, Floats]], moves: bo
     bright = np.array(cv2.mean(frame)[:3]) + 1
     for other, move in others:
         if moves:
-            other = cv2.warpPerspective(
+            moved = cv2.warpPerspective(
                 other, move, frame.shape[1::-1], frame.copy(), borderMode=cv2.BORDER_TRANSPARENT
             )
+            other = np.asarray(moved, np.uint8)
         lit = (bright / (np.array(cv2.mean(other)[:3]) + 1)).astype(np.float32)
         least = np.minimum(least, lengths(changes(frame, other, lit)))
     return least

@@ -48,7 +48,8 @@ class Followed(NamedTuple):
 class Film(NamedTuple):
     """What is known of a film before its target: `small`, `maps` and `plate` are of reduced frames.
 
-    `lights` (m, 3) say how much brighter each of its samples is than most. `sure` is whether its camera is known to be at rest, or to move as `motion` says.
+    `lights` (m, 3) say how much brighter each of its samples is than most. `sure` is whether its
+    camera is known to be at rest, or to move as `motion` says.
     """
 
     frames: ReducedFrames

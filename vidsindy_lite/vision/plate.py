@@ -7,7 +7,7 @@ in most of the frames is a part of that median; once its places are known, they 
 and ground that no frame shows continues what is around it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import cv2
 import numpy as np
@@ -31,7 +31,7 @@ class Plate:
         Where each lies in the first frame.
     known : ndarray, shape (m,), bool
         Which of the maps can be trusted.
-    hidden : sequence of ndarray, shape (4,), optional
+    hidden : ndarray, shape (m, 4), optional
         What of each sample is not the ground: left, top, width, height; NaN for nothing.
     lights : ndarray, shape (m, 3), optional
         How much brighter each sample is, see `lights_of`; by default all are in the same light.
@@ -42,7 +42,7 @@ class Plate:
         samples: Image,
         maps: Floats,
         known: Bools,
-        hidden: Sequence[Floats] | None = None,
+        hidden: Iterable[Floats] | None = None,
         lights: Floats32 | None = None,
     ) -> None:
         size = np.array(samples.shape[2:0:-1])
@@ -90,7 +90,8 @@ class Plate:
         size = self.image.shape[1::-1]
         covered = np.zeros(self.valid.shape, np.uint8)
         for one, move in zip(shows, moves, strict=True):
-            covered |= cv2.warpPerspective(255 - one, move, size, flags=cv2.INTER_NEAREST)
+            there = cv2.warpPerspective(255 - one, move, size, flags=cv2.INTER_NEAREST)
+            covered |= np.asarray(there, np.uint8)
         self.valid |= covered
         never = ((count == 0) & (covered > 0)).astype(np.uint8)
         left, top, width, height = cv2.boundingRect(never)
@@ -150,7 +151,7 @@ def _masked_median(
         here = np.zeros((strip[1], width), np.uint8)
         for k, (sample, full, move) in enumerate(zip(samples, shows, moves, strict=True)):
             there = cv2.warpPerspective(sample, up @ move, strip)
-            layers[k] = cv2.multiply(there, (*gains[k].tolist(), 0))
+            layers[k] = cv2.multiply(there, np.array([*gains[k], 0.0]))
             shown = cv2.warpPerspective(full, up @ move, strip, flags=cv2.INTER_NEAREST) > 0
             missing = k - here  # samples before it that show nothing
             layers[k][~shown] = np.where(missing[~shown] % 2, 255, 0)[:, None]
