@@ -10,8 +10,7 @@ import vidsindy_lite as vl
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.problem import pose
-from vidsindy_lite.vision.candidates import Candidate
-from vidsindy_lite.vision.linking import Sightings
+from vidsindy_lite.vision.candidates import Candidates
 
 REAL = Path(vl.__file__).parents[2] / "shared" / "real"
 
@@ -170,11 +169,11 @@ def aligned_error(found, x):
 def one_a_frame(places, qualities):
     """One candidate in each frame, all alike but for their places and qualities."""
     places = np.asarray(places, float)
-    found = [
-        [Candidate(place, np.array([*place - 4, 9, 9]), 60.0, np.array([30.0, 30, 200]), quality)]
-        for place, quality in zip(places, qualities, strict=True)
-    ]
-    return Sightings.of(found, list(places[:, None]), 1000.0)
+    n = len(places)
+    box = np.column_stack([places - 4, np.full((n, 2), 9.0)])
+    colour = np.tile([30.0, 30, 200], (n, 1))
+    return Candidates(np.arange(n), places, places, box, np.full(n, 60.0), colour,
+                      np.full((n, 3), 100.0), np.asarray(qualities, float))  # fmt: skip
 
 
 class TinyRepository:

@@ -489,3 +489,16 @@ def test_a_target_is_looked_for_where_its_motion_leads():
         still = number == 1  # one frame shows no motion
         np.testing.assert_allclose(centre, model.motion[0 if still else number])
         assert half == pytest.approx(2 * 5 + 8 + (0 if still else 0.5 * 3))
+
+
+@pytest.mark.parametrize(("reach", "shows"), [(3, True), (7, True), (30, False)])
+def test_a_part_of_a_target_that_is_in_the_background_shows(reach, shows):
+    """A disc that turns around a place: all of its views cover what is within 9 - `reach` of it."""
+    samples = np.full((21, 90, 120, 3), 150, np.uint8)
+    for k, sample in enumerate(samples):
+        place = [60 + reach * np.cos(2.4 * k), 45 + reach * np.sin(2.4 * k)]
+        cv2.circle(sample, tuple(np.rint(16 * np.array(place)).astype(int)), 16 * 9, (20, 30, 220),
+                   -1, cv2.LINE_AA, 4)  # fmt: skip
+    model = BackgroundModel(samples)
+    model.learn_target(samples)
+    assert model.shows_target() == shows

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import track, write_video
-from vidsindy_lite.vision.colours import whole
+from vidsindy_lite.vision.refining import whole
 from vidsindy_lite.vision.scenery import BACKGROUNDS
 
 SIZE = 200, 150

@@ -1,9 +1,12 @@
 """What a user says of the target, by hand or in a rig file."""
 
+import re
+
+import numpy as np
 import pytest
 
 import vidsindy_lite
-from vidsindy_lite import Hint
+from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision.hints import load_hints
 
 
@@ -46,3 +49,54 @@ def test_the_least_that_a_hint_may_be():
     for wrong in ({"frame": 0, "box": (1, 2, 2, 1.9)}, {"colour": (-0.1, 0, 0)}):
         with pytest.raises(ValueError, match="must be two pixels wide|must be red, green, blue"):
             Hint(**wrong)
+
+
+@pytest.mark.parametrize("box", [(-80, 20, 30, 30), (20, -40, 30, 30), (190, 20, 30, 30)])
+def test_a_box_outside_the_image_is_refused_as_it_was_given(box):
+    said = re.escape(f"box: must have its middle in the image of 200 x 120 pixels, got {box}")
+    with pytest.raises(ValueError, match=said):
+        Hint(0, box).boxed((200, 120), 2, 4)
+    assert Hint(0, (180, 20, 30, 30)).boxed((200, 120), 2, 4) is not None
+
+
+def test_a_hint_is_for_auto_and_must_be_one(tmp_path):
+    with pytest.raises(ValueError, match="target: may be given for detector='auto'"):
+        track(tmp_path / "a.mov", "learned", Hint(colour=(1, 2, 3)))
+    with pytest.raises(ValueError, match="target: must be of type Hint"):
+        track(tmp_path / "a.mov", target=(1, 2, 3, 4))
+    with pytest.raises(ValueError, match="target: its frame must be one of 2, got 2"):
+        Hint(2, (36, 46, 9, 9)).boxed((200, 120), 2, 1)
+
+
+def test_a_box_in_a_reduced_film_is_where_its_pixels_are_reduced_to():
+    frame, middle, sides = Hint(3, (40, 20, 10, 6)).boxed((200, 120), 5, 2)
+    assert frame == 3
+    np.testing.assert_array_equal(middle, [22, 11])  # pixels 40 to 49 are 20 to 24 there
+    np.testing.assert_array_equal(sides, [5, 3])
+    assert Hint(colour=(1, 2, 3)).boxed((200, 120), 5, 2) is None
+
+
+def test_a_colour_that_was_told_is_held_against_what_is_followed():
+    hint = Hint(colour=(200, 30, 20))
+    assert hint.unlike(np.array([170.0, 40, 30])) == ()  # in less light
+    (doubt,) = hint.unlike(np.array([30.0, 120, 200]))
+    assert doubt == "what is followed has the colour (30, 120, 200), not (200, 30, 20) as told"
+    assert Hint(0, (36, 46, 9, 9)).unlike(np.array([30.0, 120, 200])) == ()
+
+
+def test_a_colour_that_its_ground_is_mixed_with_is_like_it():
+    hint, ground = Hint(colour=(40, 230, 110)), np.array([[120.0, 120, 120]])
+    told = np.array([[110.0, 230, 40]])  # blue-green-red
+    for share, least in ((1.0, 0.99), (0.7, 0.9), (0.3, 0.9)):
+        assert hint.likeness(ground + share * (told - ground), ground) >= least
+    assert hint.likeness(np.array([[30.0, 30, 200]]), ground) < 0.2
+
+
+def test_a_track_of_another_colour_than_was_told_is_doubted(tmp_path):
+    frames = np.full((40, 120, 200, 3), 90, np.uint8)
+    for i, frame in enumerate(frames):
+        frame[40 + i : 52 + i, 20 + 4 * i : 32 + 4 * i] = (200, 90, 40)
+    path = write_video(tmp_path / "a.mov", iter(frames))
+    for told, doubted in (((40, 90, 200), False), ((40, 150, 160), True)):
+        warnings = track(path, target=Hint(colour=told)).warnings
+        assert any("has the colour (40, 90, 200)" in warning for warning in warnings) == doubted

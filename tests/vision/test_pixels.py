@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.pixels import dot, hull, lengths, relit
+from vidsindy_lite.vision.pixels import changes, dot, hull, lengths, relit
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -29,3 +29,18 @@ def test_an_image_in_another_light():
     image = np.random.default_rng(0).integers(0, 256, (4, 5, 3), np.uint8)
     factor = np.array([0.5, 1.25, 2], np.float32)
     np.testing.assert_allclose(relit(image, factor), image * factor)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 1.5])
+def test_what_is_saturated_differs_from_what_is_darker_only(factor):
+    light = np.full(3, factor, np.float32)
+    ground = np.full((1, 4, 3), 255, np.uint8)
+    grey = np.array([255.0, 200, 130, 20])
+    frame = grey.astype(np.uint8)[None, :, None].repeat(3, axis=2)
+    found = changes(frame, ground, light)[0, :, 0]
+    least = min(255 * factor, 255)  # the least that the ground may be in that light
+    np.testing.assert_allclose(found, np.minimum(grey - least, 0), atol=1e-3)
+    # What is not saturated differs from what is brighter, too, as far as a frame shows that.
+    wall = np.full((1, 4, 3), 200, np.uint8)
+    found = changes(frame, wall, light)[0, :, 0]
+    np.testing.assert_allclose(found, grey - min(200 * factor, 255), atol=1e-3)

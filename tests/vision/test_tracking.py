@@ -19,7 +19,7 @@ from vidsindy_lite.vision.detector import LEAST, Detection
 from vidsindy_lite.vision.rendering import coverage, render, render_restless, render_video
 from vidsindy_lite.vision.scenery import BACKGROUNDS
 from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
-from vidsindy_lite.vision.tracking import check_detector, link, track
+from vidsindy_lite.vision.tracking import Track, check_detector, link, track
 from vidsindy_lite.vision.video import write_video
 
 SIZE = (256, 192)
@@ -408,6 +408,12 @@ def test_confidence_is_that_the_target_is_seen_whole(tmp_path):
     assert (found.confidence[40:50] == 0).all()
     assert (np.delete(found.confidence, np.s_[40:50]) > np.exp(-1)).all()
     assert found.confidence.max() <= 1
+
+
+def test_a_track_is_an_array_of_its_pixels():
+    found = Track(np.array([[3.0, 4.0], [np.nan, np.nan]]), np.array([1.0, 0.0]), "motion")
+    np.testing.assert_array_equal(np.asarray(found), found.pixels)
+    assert np.asarray(found, np.float32).dtype == np.float32
 
 
 @pytest.mark.parametrize("detector", ["yolo", "model.pt", 3, None, np.zeros(2)])

@@ -8,9 +8,9 @@
   background      what differs from a background at rest (the most exact)
   moving          what moves most plainly, if camera and background are not: steadying takes out the
                   camera's motion (aligning: by all pixels, where corners are few), candidates are
-                  what differs (lingering: also what hardly leaves its place), linking joins,
-                  refining measures; with a hint (hints), pointing says which candidate it means,
-                  and recalling where the target is that shows only in part
+                  what differs from the ground (plate) or from other frames, association finds the
+                  path through them, appearance learns what is on it and follows its looks, or those
+                  of what a hint points at (hints), refining measures
   several     track_targets: the same for several targets, each where it is apart from the others
   detector        what looks like a target in a single frame: our network, or any YOLO-v8
   network     that network, in PyTorch; training trained it, on frames that are drawn here

@@ -14,15 +14,9 @@ import numpy as np
 from ..arrays import Floats, Floats32, Image, Ints
 
 _RIM = 2  # pixels of each level that depend on what lies beyond the image
-_LEVELS = 4  # of the pyramid, the first of half the size
 _BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
-_ITERATIONS = 6
-_CLOSE = 0.01  # pixels of a level of a step that is no longer worth another
 _LOOSE, _FIRM = 40.0, 3.0  # grey levels, and deviations, from which on a pixel is left aside
 _STEP, _TURN = 8.0, 0.03  # pixels and radians by which the guess may be wrong
-_FAIR = 4.0  # times what a usual block tells, that one block may tell at most
-_WIDELY = 0.1  # share of the blocks that must tell: what few of them tell may move on its own
-_FAINT = 0.3  # grey levels; a deviation without any noise
 _BLOCKS = 12  # into which each side is cut: errors within one may be the same
 
 
@@ -46,7 +40,8 @@ class Ground(NamedTuple):
         v = (np.arange(height, dtype=np.float32) - np.float32((height - 1) / 2))[:, None]
         slopes = _slopes(grey, u, v)
         power = _by_blocks(slopes[0] ** 2 + slopes[1] ** 2)
-        fair = np.minimum(1, _FAIR * np.median(power) / np.maximum(power, 1e-9))
+        # Times what a usual block tells, that one block may tell at most.
+        fair = np.minimum(1, 4.0 * np.median(power) / np.maximum(power, 1e-9))
         share = cv2.resize(fair, (width, height), interpolation=cv2.INTER_LINEAR)
         return cls(grey, slopes, np.asarray(share, np.float32), u, v)
 
@@ -61,7 +56,8 @@ class Aligned(NamedTuple):
 def pyramid(small: Image) -> list[Floats32]:
     """Grey levels of an image at a half, a quarter, ... of its size."""
     levels = [cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)]
-    while len(levels) <= _LEVELS and min(levels[-1].shape) >= 32:
+    # Of the pyramid, the first of half the size.
+    while len(levels) <= 4 and min(levels[-1].shape) >= 32:
         levels.append(np.asarray(cv2.pyrDown(levels[-1]), np.float32))
     # So soft that linear interpolation neither shifts nor softens them (OpenCV's cubic one shifts).
     return [np.asarray(cv2.GaussianBlur(level, (0, 0), 1), np.float32) for level in levels[1:]]
@@ -128,7 +124,7 @@ def _fit(
     inner = np.s_[_RIM:-_RIM, _RIM:-_RIM]
     framed[inner] = view[inner]
     within = framed >= 0
-    for step in range(_ITERATIONS):
+    for step in range(6):
         shown = _moved(framed, here[:2])
         known = within & (shown >= 0)
         if np.count_nonzero(known) < 0.3 * known.size:
@@ -137,7 +133,8 @@ def _fit(
         if step == 0:
             offset = _middle(miss[known])
             miss -= offset
-        spread = max(1.4826 * _middle(np.abs(miss[known])), _FAINT)
+        # Grey levels; a deviation without any noise.
+        spread = max(1.4826 * _middle(np.abs(miss[known])), 0.3)
         bound = max(_FIRM * spread, loose / 2**step)
         weight = share * known / (1 + (miss / bound) ** 2) ** 2
         heavy = steep * weight.ravel()
@@ -148,7 +145,8 @@ def _fit(
         )
         here = here @ middle @ np.linalg.inv(shift) @ to_middle
         gain, offset = float(gain + delta[4]), float(offset + delta[5])
-        if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < _CLOSE:
+        # Pixels of a level of a step that is no longer worth another.
+        if np.hypot(delta[0], delta[1]) + np.hypot(delta[2], delta[3]) * width / 2 < 0.01:
             break
     if loose:  # a finer level says how sure the map is
         return Aligned(here, np.inf)
@@ -159,7 +157,8 @@ def _fit(
     information = (direction * np.maximum(value, 0)) @ direction.T / spread**2 + prior
     telling = _by_blocks(weight * (seen[0] * slopes[0] + seen[1] * slopes[1]))
     # Blocks of mere noise tell as much for the map as against it.
-    if telling.mean() <= np.sqrt(_WIDELY * (telling**2).mean()):
+    # Share of the blocks that must tell: what few of them tell may move on its own.
+    if telling.mean() <= np.sqrt(0.1 * (telling**2).mean()):
         return Aligned(here, np.inf)
     return Aligned(here, _error(slopes, weight * miss / spread**2, information, (u, v)))
 

@@ -29,24 +29,14 @@ from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .pixels import dot, lengths
 from .reducing import ReducedFrames, reduce
 
-_SAMPLES = 21  # frames whose median is the background
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
-_DENSE = 640  # pixels in a row, of every third of which the noise is known well
 _STRIP = 32  # rows of an image that are sorted at once
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
 _BORDER = 3  # coarse pixels around a place that show how its surroundings continue
 _OFTEN = 0.1  # share of the samples that must differ to cast doubt on a place of the background
 _NEAR = 16  # coarse pixels, within which several things that differ may be one target
-_SOMETHING = 4  # coarse pixels in one place that are more than noise
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
-_FLICKERS = 0.02  # change of the light above which it is not steady
 _TOO_LARGE = 0.25  # share of the image that no target fills
-_ROUNDING = 0.05  # grey levels squared; variance of coarse differences without any noise
-_QUIET = 2.0  # grey levels; above this noise the difference is smoothed before it is thresholded
-_SEVERAL_COLOURS = 0.2  # share of the target that is of another colour, if it has several
-_BLIND = 0.1  # share of the target's outline that may lie on background of the same colour
-_ALIKE = 0.6  # pixels; divided by the target's width: distance of the shapes of two whole views
-_VIEWS = 200  # views among which the commonest one is sought
 
 _DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RING + 1, 2 * _RING + 1))
 
@@ -58,8 +48,8 @@ _Look = tuple[Floats, float, float]
 
 
 def sampled(frames: int) -> Ints:
-    """The numbers of about `_SAMPLES` frames spread evenly over a clip of so many."""
-    return np.unique(np.linspace(0, frames - 1, _SAMPLES).round().astype(int))
+    """The numbers of about 21 frames spread evenly over a clip of so many."""
+    return np.unique(np.linspace(0, frames - 1, 21).round().astype(int))
 
 
 def sample_frames(frames: ReducedFrames) -> NDArray[np.uint8]:
@@ -141,9 +131,10 @@ def _others(changes: list[Floats32], floor: float) -> float:
         ]
         differs[near] = False
         other = _largest_component(differs)
+        # Coarse pixels in one place that are more than noise.
         found.append(
             area > _TOO_LARGE * differs.size
-            or (other is not None and other[1][cv2.CC_STAT_AREA] >= _SOMETHING)
+            or (other is not None and other[1][cv2.CC_STAT_AREA] >= 4)
         )
     return float(np.mean(found)) if found else 0.0
 
@@ -162,7 +153,8 @@ def camera_motion(background: Floats32, changes: list[Floats32], floor: float) -
             continue
         use = calm.repeat(3)
         g, d = slope * use, change.ravel() * use
-        variance = d[use].var() + _ROUNDING
+        # Grey levels squared; variance of coarse differences without any noise.
+        variance = d[use].var() + 0.05
         information = g @ g.T / variance + np.eye(2)
         displacement = np.linalg.solve(information, g @ d / variance)
         error = np.sqrt(np.trace(np.linalg.inv(information)))
@@ -201,7 +193,8 @@ def _unrest(
         )
     everywhere = np.ones(background.shape[:2], bool)
     lights = [np.abs(light(background + change, background, everywhere) - 1) for change in changes]
-    if max(map(np.max, lights)) > _FLICKERS:
+    # Change of the light above which it is not steady.
+    if max(map(np.max, lights)) > 0.02:
         doubts.append(f"the light changes, by up to {100 * np.max(lights):.0f} %")
     others = _others(changes, floor)
     if others > _OFTEN:
@@ -238,7 +231,8 @@ class BackgroundModel:
 
     def __init__(self, samples: Image) -> None:
         self.background = median_image(samples)
-        step = 3 * max(1, samples.shape[2] // _DENSE)
+        # Pixels in a row, of every third of which the noise is known well.
+        step = 3 * max(1, samples.shape[2] // 640)
         few, calm = samples[:, ::step, ::step], self.background[::step, ::step]
         self.noise = 1.4826 * float(np.median(np.maximum(few, calm) - np.minimum(few, calm)))
         self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
@@ -251,7 +245,8 @@ class BackgroundModel:
         self.camera_rests = bool(displaced.max(initial=0.0) <= _SHAKY)
         self.unrest = _unrest(self.coarse_background, changes, displaced, self.coarse_floor)
         # The difference is smoothed over about the width of the ring: noise falls to a quarter.
-        self.blur = 1.2 if self.noise > _QUIET else 0.0
+        # Grey levels; above this noise the difference is smoothed before it is thresholded.
+        self.blur = 1.2 if self.noise > 2.0 else 0.0
         remaining = self.noise / (2 * np.sqrt(np.pi) * self.blur) if self.blur else self.noise
         self.floor = max(5 * remaining, 12.0)
         self.colour: Floats32 | None = None
@@ -265,10 +260,21 @@ class BackgroundModel:
             return
         self.colour = np.median([look[0] for look in seen], axis=0).astype(np.float32)
         self.area = float(np.median([look[1] for look in seen]))
-        self.several_colours = bool(np.median([look[2] for look in seen]) > _SEVERAL_COLOURS)
+        # Share of the target that is of another colour, if it has several.
+        self.several_colours = bool(np.median([look[2] for look in seen]) > 0.2)
         self.coarse_contrast = self.colour - self.coarse_background
         self.coarse_square = dot(self.coarse_contrast, self.coarse_contrast)
         self.blind = max(self.floor**2, 0.1 * float(np.median(self.coarse_square)))
+
+    def shows_target(self) -> bool:
+        """Is the target a part of the background, as it covers the same ground for too long?"""
+        if self.colour is None:
+            return False
+        contrast = np.sqrt(np.median(self.coarse_square))
+        alike = lengths(self.background - self.colour) < 0.3 * contrast
+        found = _largest_component(alike)
+        # So small a part of it makes its views unlike.
+        return found is not None and found[1][cv2.CC_STAT_AREA] > self.area / 40
 
     def _window(self, centre: Floats, half: float) -> tuple[Ints, Ints, Window]:
         """First pixel, the one after the last, and the slices, of the square around a place."""
@@ -338,7 +344,8 @@ class BackgroundModel:
         inside = bool((first > 0).all() and (last < self.size - 1).all())
         # A background that contains the target hides how far it goes, or makes coverages absurd:
         # as they lie in [0, 1], their squares (with some noise) cannot sum up to more than they do.
-        blind = (square[near & (label == 0)] < self.blind).mean() > _BLIND
+        # Share of the target's outline that may lie on background of the same colour.
+        blind = (square[near & (label == 0)] < self.blind).mean() > 0.1
         sound = not blind and (alpha**2).sum() < 1.2 * area
         shape = _shape(alpha, u - centre[0], v - centre[1]) if sound else None
         softness = float((alpha * (1 - alpha)).sum() / np.sqrt(area))
@@ -419,9 +426,11 @@ def view_distances(blobs: Sequence[Blob | None]) -> Floats:
     found = np.full(len(blobs), np.inf)
     if len(sound) > quarter:
         frames, areas, shapes = (np.array(column) for column in zip(*sound, strict=True))
-        apart = cdist(shapes[:: 1 + len(shapes) // _VIEWS], shapes)
+        # Views among which the commonest one is sought.
+        apart = cdist(shapes[:: 1 + len(shapes) // 200], shapes)
         radius = np.partition(apart, quarter, axis=1)[:, quarter]
-        alike = _ALIKE / np.sqrt(areas)
+        # Pixels; divided by the target's width: distance of the shapes of two whole views.
+        alike = 0.6 / np.sqrt(areas)
         odd_shape = apart[radius.argmin()] / np.maximum(alike, 6 * radius.min())
         size = np.abs(np.log(areas / np.median(areas[odd_shape < 1])))
         odd_size = size / np.maximum(alike, 10 * np.median(size[odd_shape < 1]))

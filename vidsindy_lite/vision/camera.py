@@ -20,8 +20,6 @@ from .steadying import (
 from .trembling import trembling
 
 LOOSE = 1.0  # pixels (reduced ones if it is to be used at all) to which a camera's motion is known
-_TOLD_OFTEN = 0.5  # share of the frames that tell of the camera's motion, if it is known
-_PUSHED = 0.95  # of the frames, the last of which show it if the camera moves at all
 
 
 def camera_motion(frames: ReducedFrames, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
@@ -74,7 +72,9 @@ def _steadied(frames: ReducedFrames, small: Image, sampled: Ints) -> CameraMotio
 def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:
     """Does a camera move by far more than the errors of its maps, and are these small?"""
     told = motion.errors[1:] < factor * LOOSE
-    if told.mean() < _TOLD_OFTEN:
+    # Share of the frames that tell of the camera's motion, if it is known.
+    if told.mean() < 0.5:
         return False
     sure = displacement(motion.maps[1:], size) / np.maximum(motion.errors[1:], 1e-3)
-    return bool(np.quantile(sure, _PUSHED) > PLAINLY)
+    # Of the frames, the last of which show it if the camera moves at all.
+    return bool(np.quantile(sure, 0.95) > PLAINLY)

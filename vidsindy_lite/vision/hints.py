@@ -6,6 +6,9 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
+import numpy as np
+
+from ..arrays import Floats
 from ..checks import check_integer, check_number, shown
 from ..reading import check_file, read_tree
 
@@ -51,6 +54,59 @@ class Hint:
             if not 0 <= min(colour) <= max(colour) <= 255:
                 raise ValueError(f"colour: must be red, green, blue, 0 to 255 each, got {colour}")
             object.__setattr__(self, "colour", colour)
+
+    def boxed(
+        self, size: tuple[int, int], frames: int, factor: int
+    ) -> tuple[int, Floats, Floats] | None:
+        """Frame, middle and sides of the box, in frames reduced by a factor; None without a box.
+
+        Raises
+        ------
+        ValueError
+            If the film has no such frame, or the middle of the box is not in its image.
+        """
+        if self.box is None or self.frame is None:
+            return None
+        if self.frame >= frames:
+            raise ValueError(f"target: its frame must be one of {frames}, got {self.frame}")
+        low, sides = np.array(self.box[:2]), np.array(self.box[2:])
+        middle = low + (sides - 1) / 2  # it begins at its first pixel
+        if (middle < 0).any() or (middle >= size).any():
+            raise ValueError(
+                f"box: must have its middle in the image of {size[0]} x {size[1]} pixels, "
+                f"got {_told(self.box)}"
+            )
+        return self.frame, (middle - (factor - 1) / 2) / factor, sides / factor
+
+    def likeness(self, colours: Floats, grounds: Floats) -> Floats:
+        """How like the colour that is told things (m, 3) are before grounds (m, 3), from 0 to 1.
+
+        Also in other light, and where blur mixes them with their ground. All are blue-green-red.
+        """
+        told = np.array(self.colour or (0, 0, 0), float)[::-1]
+        mixed = told - grounds
+        share = ((colours - grounds) * mixed).sum(axis=1) / np.maximum((mixed**2).sum(axis=1), 1)
+        ways = told, grounds + np.clip(share, 0.25, 1)[:, None] * mixed
+        return np.maximum(*(_alike(colours, way) for way in ways))
+
+    def unlike(self, colour: Floats) -> tuple[str, ...]:
+        """Has what is followed, of this red, green and blue, another colour than is told?"""
+        if self.colour is None or _alike(colour[None], np.array(self.colour, float))[0] > 0.5:
+            return ()
+        here = _told(colour.round().tolist())
+        return (f"what is followed has the colour {here}, not {_told(self.colour)} as told",)
+
+
+def _told(numbers: Sequence[float]) -> str:
+    """Numbers as a user writes them."""
+    return f"({', '.join(f'{number:g}' for number in numbers)})"
+
+
+def _alike(colours: Floats, told: Floats) -> Floats:
+    """How alike colours (m, 3) are to others, from 0 to 1, also in another light."""
+    shade = (colours * told).sum(axis=1) / np.maximum((colours**2).sum(axis=1), 1)
+    off = np.clip(shade, 0.7, 1.4)[:, None] * colours - told
+    return np.asarray(np.exp(-((off**2).sum(axis=1) / 70.0**2)))
 
 
 def _numbers(name: str, values: object, count: int, what: str) -> tuple[float, ...]:

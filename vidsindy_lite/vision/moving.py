@@ -1,101 +1,36 @@
 """What moves before a background that is steadied: the tracker for films that people make.
 
-Candidates of all frames (`candidates`) are linked to paths (`linking`); the plainest path is the
-target's, and its places are refined in whole frames (`refining`). The camera's motion (`steadying`)
-is taken out, so that tracks come in the first frame's pixels.
+::
+
+  camera        its motion is taken out, so that tracks come in the first frame's pixels
+  candidates    all that differs from the ground or from other frames
+  association   the best path through them
+  appearance    what lies on it is learned and followed by its looks, too
+  association   again, with both kinds of evidence
+  refining      its places to a fraction of a pixel, in whole frames; doubts
+
+Somebody who points at the target in one frame decides where its looks are learned.
 """
 
-from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .background import light, sampled
+from .appearance import Looks, followed
+from .association import TOLD, Path, best_path, plainest_paths
+from .background import sampled
 from .camera import LOOSE, camera_motion
-from .candidates import (
-    Candidate,
-    Difference,
-    Plate,
-    tolerance,
-    uncommon,
-)
-from .crossing import rejoined
+from .candidates import Candidates, candidates, uncommon
 from .hints import Hint
-from .lingering import Place, lingering, uncover
-from .linking import TOLD, Sightings, best_path, worth
 from .occluders import hidden
-from .pixels import relit
-from .pointing import Pointer, alike
-from .recalling import recalled
+from .plate import Plate, lights_of, noise_of
 from .reducing import ReducedFrames, reduce, reduced
 from .refining import Lens, View, entire, fitting, scatter, swapped
 from .steadying import CameraMotion, at_rest, carry
 
-_PATHS = 5  # paths among which the target's is chosen
 _SHORTEST = 5  # frames of a path
-_AS_PLAIN = 0.5  # rating of another path, relative to the best, above which there is doubt
-_AS_OFTEN = 0.5  # share of its sightings, from which on another is rated by how plain each is
-_BEYOND = 3  # frames by which a path is carried on at its ends
-_PLAIN = 0.2  # quality of the candidates of a path that is worth anything
-_SWINGS = 0.1  # of its size, by which what lingers in its place moves at least
-_SCARCE = 0.05  # share of the frames in which a target must be seen
-_RECALLED = 2.0  # pixels, about, to which a target is recalled that is not seen whole
-_DENSE = 640  # pixels in a row of which the noise is known well
-_RARELY = 0.5  # share of the views before ground of about the target's colour, which are of parts
-_LARGE = 0.01  # share of the image that a target hardly fills
-_RESTLESS = 0.03  # of their length, by which the sides of a target hardly change in a frame
-_PIXELS = 2  # of each side that change with where its two ends lie between pixels
-
-
-class Rated(NamedTuple):
-    """A path: rows of the sightings, how plainly it is a target's."""
-
-    rows: Ints
-    rating: float
-
-
-def rate(seen: Sightings, rows: Ints, value: float) -> float:
-    """How plainly a path is that of a target: something that travels and stays what it is.
-
-    What stands still, flickers or is a part of something larger that changes is worth little, and
-    so is what changes its outline from frame to frame, as people do who walk.
-    """
-    centre, size = seen.centre[rows], np.median(seen.size[rows])
-    low, high = np.percentile(centre, [5, 95], axis=0)
-    extent = float(np.linalg.norm(high - low) / size)
-    colour = seen.colour[rows]
-    recolour = np.median(np.linalg.norm(colour - np.median(colour, axis=0), axis=1))
-    speed = np.diff(centre, axis=0) / np.diff(seen.frame[rows])[:, None]
-    turn = np.median(np.linalg.norm(np.diff(speed, axis=0), axis=1))
-    jitter = turn / (np.median(np.linalg.norm(speed, axis=1)) + 0.5)
-    large = size**2 / seen.diagonal**2
-    sides = seen.box[rows, 2:]
-    change = np.maximum(np.abs(np.diff(sides, axis=0)) - _PIXELS, 0) / sides[1:]
-    restless = np.median(change.sum(axis=1))
-    doubts = (1 + recolour / 30) * (1 + jitter) * (1 + large / _LARGE)
-    doubts *= 1 + restless / _RESTLESS
-    return float(value * extent / (extent + 2) / doubts)
-
-
-def plainest_paths(seen: Sightings, most: int = _PATHS) -> list[Rated]:
-    """Several paths that have nothing in common, the plainest first."""
-    left, found, boxes = np.arange(len(seen.frame)), [], seen.box
-    for _ in range(most):
-        rows = left[best_path(seen.only(left))[0]]
-        if len(rows) < _SHORTEST:
-            break
-        found.append(rows)
-        around = np.full((seen.frame[-1] + 1, 4), np.nan)
-        around[seen.frame[rows]] = boxes[rows]
-        low = around[seen.frame[left], :2]
-        middle = boxes[left, :2] + boxes[left, 2:] / 2
-        with np.errstate(invalid="ignore"):
-            part = ((middle >= low) & (middle <= low + around[seen.frame[left], 2:])).all(axis=1)
-        left = left[~part & ~np.isin(left, rows)]
-    found = [rows for rows in rejoined(seen, found) if len(rows) >= _SHORTEST]
-    rated = [Rated(rows, rate(seen, rows, worth(seen, rows))) for rows in found]
-    return sorted(rated, key=lambda path: -path.rating)
+_ROUGHLY = 2.0  # pixels, about, to which a target is known that is not seen whole
 
 
 class Followed(NamedTuple):
@@ -110,119 +45,19 @@ class Followed(NamedTuple):
     doubts: tuple[str, ...]
 
 
-def _noise(samples: Image, maps: Floats, plate: Plate) -> float:
-    """Of a pixel, in grey levels: of the quieter samples, which differ from the plate by that."""
-    found = []
-    step = max(3, samples.shape[2] // _DENSE)
-    for sample, here in zip(samples, maps, strict=True):
-        then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1], step)
-        now = sample[::step, ::step]
-        if known.any():
-            found.append(
-                1.4826 * np.median(np.abs(now - relit(then, light(now, then, known)))[known])
-            )
-    return float(np.median(found)) if found else 0.0
-
-
-def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> Followed:
-    """Track what moves in a film, the target if there is a hint which it is.
-
-    `samples` are frames spread evenly over the film, see `sample_frames`.
-    """
-    film = Film.of(frames, samples)
-    found, lights = sighted(film)
-    lens = lens_of(samples, film)
-    if hint is None:
-        return _followed(film, lens, found, lights)
-    pointer = Pointer.of(hint, found, film.factor, frames.reel.path)
-    if pointer.one is not None:  # the plainest path may be the one that is meant
-        plain = _followed(film, lens, found, lights, hinted=True)
-        if not pointer.missed(plain.pixels, plain.maps):
-            return plain
-    followed = _followed(film, lens, found, lights, hinted=True, pointer=pointer)
-    missed = pointer.missed(followed.pixels, followed.maps)
-    return followed._replace(doubts=followed.doubts + missed)
-
-
-def _followed(
-    film: "Film", lens: Lens, found: list[list[Candidate]],
-    lights: list[Floats32], *, hinted: bool = False, pointer: Pointer | None = None,
-) -> Followed:  # fmt: skip
-    """What moves most plainly, of that at which a hint points, its gaps filled."""
-    seen, paths = linked(pointer.like(found) if pointer else found, film, pointer)
-    doubts: tuple[str, ...] = ()
-    if pointer is None and paths:
-        paths = paths if _travels(seen, paths[0].rows, film.places) else []
-        doubts = _rivals(seen, paths, film) if paths and not hinted else ()
-    if not paths:
-        return nothing(film.motion, len(found))
-    # What the target looks like is known by now, which tells it from what it meets.
-    first = paths[0].rows
-    learned = _learned(found, seen, first)
-    if pointer is not None:
-        learned = pointer.kept(learned, seen.frame[first], seen.which[first])
-    seen, paths = linked(learned, film, pointer)
-    if not paths:
-        return nothing(film.motion, len(found))
-    if not film.sure:
-        doubts += ("the background is too plain to tell whether the camera moves: if so, its "
-                   "motion is part of the track",)  # fmt: skip
-    rows = max(paths, key=lambda path: np.isin(path.rows, first).sum()).rows
-    views = viewed(film, lens, expected(seen, rows, film, len(found)), lights)
-    if pointer is not None and any(views):
-        doubts += pointer.unlike(np.median([view.colour for view in views if view], axis=0))
-    followed = finished(views, film.motion, doubts)
-    start, last = seen.frame[rows[[0, -1]]]
-    sure = np.s_[start : last + 1]
-    return remembered(film, lens, lights, followed, views, sure, told=hinted)
-
-
-def linked(
-    found: list[list[Candidate]], film: "Film", pointer: Pointer | None = None, most: int = _PATHS
-) -> tuple[Sightings, list[Rated]]:
-    """The candidates as a table, and the paths through them, the plainest first.
-
-    If somebody points at one of them, only those through that.
-    """
-    if pointer is not None:
-        found = pointer.pinned(found)
-    places = [
-        carry(film.maps[i], np.array([c.centre for c in f])) for i, f in enumerate(found) if f
-    ]
-    seen = Sightings.of(found, places, float(np.hypot(*film.plate.size)))
-    paths = plainest_paths(seen, most)
-    if pointer is not None and pointer.one is not None:
-        paths = [path for path in paths if (seen.quality[path.rows] >= TOLD).any()]
-    return seen, paths
-
-
-def _learned(found: list[list[Candidate]], seen: Sightings, rows: Ints) -> list[list[Candidate]]:
-    """Candidates as far as they have the colour of a path.
-
-    What is as plain as the target usually is, is worth all: else a faint one would be left wherever
-    its size and colour waver.
-    """
-    colour = np.median(seen.colour[rows], axis=0)
-    usual = float(np.median(seen.quality[rows]))
-    return [
-        [replace(c, quality=min(c.quality / usual, 1.0) * alike(c.colour, colour)) for c in f]
-        for f in found
-    ]
-
-
 class Film(NamedTuple):
-    """What is known of a film before its target: `maps` and `plate` are of reduced frames.
+    """What is known of a film before its target: `small`, `maps` and `plate` are of reduced frames.
 
-    `sure` is whether its camera is known to be at rest, or to move as `motion` says.
+    `lights` (m, 3) say how much brighter each of its samples is than most. `sure` is whether its
+    camera is known to be at rest, or to move as `motion` says.
     """
 
     frames: ReducedFrames
     motion: CameraMotion
     maps: Floats
-    plate: Plate
-    noise: float
+    small: Image
     sampled: Ints
-    places: list[Place]
+    lights: Floats32
     sure: bool
 
     @property
@@ -231,7 +66,7 @@ class Film(NamedTuple):
         return self.frames.factor
 
     @classmethod
-    def of(cls, frames: ReducedFrames, samples: Image, rests: bool = False) -> "Film":
+    def of(cls, frames: ReducedFrames, samples: Image, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
         info, factor = frames.reel.info, frames.factor
         numbers = sampled(info.frames)[: len(samples)]
@@ -240,45 +75,212 @@ class Film(NamedTuple):
         if not rests:
             motion, sure = camera_motion(frames, small, numbers)
         numbers = np.minimum(numbers, len(motion.maps) - 1)
-        maps = reduced(motion.maps, factor)
-        known = np.isfinite(motion.errors[numbers])
-        plate = Plate(small, maps[numbers], known)
-        noise = _noise(small, maps[numbers], plate)
-        places = lingering(plate, small, maps[numbers], known, tolerance(plate, noise))
-        uncover(plate, small, maps[numbers], known, places)
-        return cls(frames, motion, maps, plate, noise, numbers, places, sure)
+        maps, known = reduced(motion.maps, factor), np.isfinite(motion.errors)
+        lights = lights_of(small, maps[numbers], known[numbers])
+        return cls(frames, motion, maps, small, numbers, lights, sure)
+
+    def plate(self, samples: Image, maps: Floats, boxes: Floats | None = None) -> Plate:
+        """The ground, without what is in boxes (n, 4) of the frames."""
+        known = np.isfinite(self.motion.errors[self.sampled])
+        hide = None if boxes is None else boxes[self.sampled]
+        if hide is not None:  # in the others it may be anywhere
+            known &= np.isfinite(hide[:, 0])
+        return Plate(samples, maps[self.sampled], known, hide, self.lights)
 
 
-def sighted(film: Film, targets: int = 1) -> tuple[list[list[Candidate]], list[Floats32]]:
+class Ways(NamedTuple):
+    """Where to look in each frame, in its own pixels: centre (n, 2), box (n, 4), colour (n, 3)."""
+
+    centre: Floats
+    box: Floats
+    colour: Floats
+
+
+def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> Followed:
+    """Track what moves in a film, the target if there is a hint which it is.
+
+    `samples` are frames spread evenly over the film, see `sample_frames`.
+    """
+    film = Film.of(frames, samples)
+    shape = frames.reel.info.size, len(film.maps), film.factor
+    seed = None if hint is None else hint.boxed(*shape)
+    n, boxes = len(film.maps), None
+    for _ in range(4):  # of a target that covers its own ground, until the ground is without it
+        seen, lights = sighted(film, boxes)
+        n = min(n, len(lights))
+        if seed is not None and boxes is None:
+            seed = _tightened(seen, seed)
+        paths = _paths(seen, hint, seed)
+        if not paths and seed is None:
+            return nothing(film.motion, n)
+        rows = paths[0].rows if paths else np.zeros(0, int)
+        covered = _covering(seen, rows, n, seed, rims=boxes is None)
+        if covered is None or (boxes is not None and _same(covered, boxes)):
+            break
+        boxes = covered
+    if seed is None and boxes is not None and _turns_only(seen, rows):
+        return nothing(film.motion, n)
+    guide = np.full((n, 2), np.nan)
+    guide[seen.frame[rows]] = seen.centre[rows]
+    start = seed or _plainest(seen, rows)
+    looks = followed(frames, film.maps[:n], seen, start, guide)
+    both = _together(seen, looks, film.maps, start[0], told=seed is not None)
+    rows, _ = best_path(both)
+    if len(rows) < _SHORTEST:
+        return nothing(film.motion, n)
+    doubts = _doubts(film, seen, paths, hint)
+    ways = expected(both, rows, film, n)
+    lens = lens_of(samples, film, ways)
+    views = viewed(film, lens, ways, lights)
+    if hint is not None and hint.colour is not None and any(views):
+        colour = np.median([view.colour for view in views if view], axis=0)
+        doubts += hint.unlike(colour[::-1])
+    found = finished(views, film.motion, doubts)
+    return _filled(found, film, views, looks, ways, seed)
+
+
+def sighted(
+    film: Film, boxes: Floats | None = None, targets: int = 1
+) -> tuple[Candidates, list[Floats32]]:
     """What may be the target in each frame, and how bright the frame is."""
-    difference = Difference(film.plate, film.noise)
-    found = [
-        difference.candidates(frame, here)
-        for frame, here in zip(film.frames, film.maps, strict=False)
-    ]
-    kept = [
-        difference.travelling(uncommon(some, targets), here)
-        for some, here in zip(found, film.maps, strict=False)
-    ]
-    return kept, difference.lights
+    plate = film.plate(film.small, film.maps, boxes)
+    noise = noise_of(film.small, film.maps[film.sampled], plate)
+    found, lights = candidates(film.frames, film.maps, plate, noise)
+    return uncommon(found, targets), lights
 
 
-def lens_of(samples: Image, film: Film) -> Lens:
+def _paths(
+    seen: Candidates, hint: Hint | None, seed: tuple[int, Floats, Floats] | None
+) -> list[Path]:
+    """The plainest paths, of what a hint allows."""
+    if seed is not None:
+        frame, centre, size = seed
+        here = seen.frame == frame
+        near = (np.abs(seen.centre - centre) < size / 2).all(axis=1)
+        alike = np.abs(np.log(seen.area / (0.7 * size.prod()))) < 0.9
+        if not (here & near & alike).any():
+            return []
+        quality = np.where(here, np.where(near & alike, seen.quality + TOLD, -TOLD), seen.quality)
+        return [Path(best_path(seen._replace(quality=quality))[0], np.inf)]
+    liked = seen
+    if hint is not None and hint.colour is not None:
+        liked = seen._replace(quality=seen.quality * hint.likeness(seen.colour, seen.behind))
+    # Of less, noise is made.
+    return [path for path in plainest_paths(liked) if np.median(seen.quality[path.rows]) > 0.2]
+
+
+def _tightened(seen: Candidates, seed: tuple[int, Floats, Floats]) -> tuple[int, Floats, Floats]:
+    """A box that is drawn loosely around one plain thing, close around it."""
+    frame, centre, size = seed
+    here = (seen.frame == frame) & (np.abs(seen.centre - centre) < size / 4).all(axis=1)
+    inside = np.flatnonzero(here & (seen.box[:, 2:] < size).all(axis=1) & (seen.quality > 0.8))
+    if not len(inside):
+        return seed
+    best = inside[seen.area[inside].argmax()]
+    loose = seen.area[best] < 0.4 * 0.7 * size.prod()
+    return (frame, seen.centre[best], np.maximum(seen.box[best, 2:], 4)) if loose else seed
+
+
+def _plainest(seen: Candidates, rows: Ints) -> tuple[int, Floats, Floats]:
+    """Frame, centre and size of the plainest view on a path, of about the usual size."""
+    usual = np.median(seen.area[rows])
+    worth = seen.quality[rows] - 0.5 * np.abs(np.log(seen.area[rows] / usual))
+    best = rows[np.argmax(worth)]
+    return int(seen.frame[best]), seen.centre[best], np.maximum(seen.box[best, 2:], 4)
+
+
+def _covering(
+    seen: Candidates, rows: Ints, n: int, seed: tuple[int, Floats, Floats] | None, *, rims: bool
+) -> Floats | None:
+    """Boxes (n, 4) of a target that covers its own ground in many frames, None if it does not.
+
+    Of one that hardly leaves its place a plate with it shows the `rims` only: all that differs
+    there is the target's place.
+    """
+    if not len(rows):
+        return None
+    centre, size = seen.centre[rows], seen.box[rows, 2:]
+    inside = (np.abs(centre[:, None] - centre) < size / 2).all(axis=2).mean(axis=1)
+    if inside.max() < 0.35:
+        return None
+    low = np.percentile(seen.box[rows, :2], 5, axis=0)
+    high = np.percentile(seen.box[rows, :2] + seen.box[rows, 2:], 95, axis=0)
+    if rims and ((high - low) < 2 * np.median(size, axis=0) + 4).all():
+        beside = (np.abs(seen.centre - (low + high) / 2) < (high - low) / 2 + 2).all(axis=1)
+        beside &= seen.area < 2 * (high - low).prod()
+        low = np.minimum(low, np.percentile(seen.box[beside, :2], 5, axis=0))
+        high = np.maximum(
+            high, np.percentile((seen.box[:, :2] + seen.box[:, 2:])[beside], 95, axis=0)
+        )
+        return np.tile([*low, *(high - low)], (n, 1))
+    boxes = np.full((n, 4), np.nan)
+    boxes[seen.frame[rows]] = seen.box[rows]
+    if seed is not None:  # its size is told
+        boxes[seen.frame[rows]] = np.column_stack([centre - seed[2] / 2, 0 * centre + seed[2]])
+    return boxes
+
+
+def _same(one: Floats, other: Floats) -> bool:
+    """Are most boxes (n, 4) those of before, by a tenth of their size?"""
+    apart = np.abs(one - other).max(axis=1) / other[:, 2:].mean(axis=1)
+    known = np.isfinite(apart)
+    return bool(known.any() and np.median(apart[known]) < 0.1)
+
+
+def _turns_only(seen: Candidates, rows: Ints) -> bool:
+    """Does a thing that covers its own ground leave its place by less than a tenth of its size?"""
+    low, high = np.percentile(seen.place[rows], [5, 95], axis=0)
+    return bool(np.linalg.norm(high - low) < 0.1 * np.median(seen.size[rows]))
+
+
+def _together(
+    seen: Candidates, looks: Looks, maps: Floats, first: int, *, told: bool
+) -> Candidates:
+    """Candidates of both kinds: what differs, worth what its colours say, and what looks alike."""
+    quality = seen.quality * (0.25 + 0.75 * looks.like)
+    at = np.flatnonzero(np.isfinite(looks.box[:, 0]))
+    box, area = looks.box[at], 0.7 * looks.box[at, 2:].prod(axis=1)
+    centre, worth = box[:, :2], np.clip(1.2 * looks.fit[at], 0.25, 0.8)
+    colour, behind = (np.tile(np.median(x, axis=0), (len(at), 1)) if len(x) else
+                      np.zeros((len(at), 3)) for x in (seen.colour, seen.behind))  # fmt: skip
+    bounds = np.searchsorted(seen.frame, np.arange(len(maps) + 1))
+    for k, i in enumerate(at.tolist()):
+        here = np.arange(bounds[i], bounds[i + 1])
+        apart = np.linalg.norm(seen.centre[here] - centre[k], axis=1)
+        near = here[(apart < 0.35 * np.sqrt(area[k]) + 1)
+                    & (np.abs(np.log(seen.area[here] / area[k])) < 0.8)]  # fmt: skip
+        if len(near):
+            best = near[quality[near].argmax()]
+            colour[k], behind[k] = seen.colour[best], seen.behind[best]
+            worth[k] += 0.5 * quality[best]
+            quality[near] += 0.5 * looks.fit[i]
+    place = carry(maps[at], centre)
+    alike = Candidates(at, place, centre, np.column_stack([centre - box[:, 2:] / 2, box[:, 2:]]),
+                       area, colour, behind, worth)  # fmt: skip
+    alike.quality[at == first] += TOLD
+    kept = (seen.frame != first) | (not told)
+    return Candidates.joined([seen._replace(quality=quality).only(kept), alike])
+
+
+def lens_of(samples: Image, film: Film, *ways: Ways) -> Lens:
     """What looks at targets in whole frames, of which these are samples."""
-    known = np.isfinite(film.motion.errors[film.sampled])
-    maps = film.motion.maps[film.sampled]
-    plate = Plate(samples, maps, known)
-    lens = Lens(plate, _noise(samples, maps, plate))
-    uncover(plate, samples, maps, known, film.places, film.factor)
-    return lens
+    boxes = None
+    for way in ways:
+        centre, size = way.centre[film.sampled], way.box[film.sampled, 2:]
+        with np.errstate(invalid="ignore"):
+            inside = (np.abs(centre[:, None] - centre) < size / 2).all(axis=2)
+        if inside.mean(axis=1).max() > 0.25:
+            boxes = way.box
+    plate = film.plate(samples, film.motion.maps, boxes)
+    return Lens(plate, noise_of(samples, film.motion.maps[film.sampled], plate))
 
 
-def viewed(film: Film, lens: Lens, ways: "Ways", lights: list[Floats32]) -> list[View | None]:
+def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
     views = []
     for i, (frame, here) in enumerate(zip(film.frames.reel, film.motion.maps, strict=False)):
         view = None
-        if np.isfinite(ways.centre[i, 0]):
+        if i < len(ways.centre) and np.isfinite(ways.centre[i, 0]):
             view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])
         views.append(view)
     return views
@@ -290,46 +292,26 @@ def nothing(motion: CameraMotion, n: int) -> Followed:
     return Followed(np.full((n, 2), np.nan), np.full(n, np.inf), motion.maps[:n], (none,))
 
 
-def _travels(seen: Sightings, rows: Ints, places: list[Place]) -> bool:
-    """Does a path leave its place, or turn in one that is known, and is it worth its candidates?"""
-    extent = float(np.linalg.norm(np.ptp(seen.centre[rows], axis=0)))
-    lingers = any(place.holds(np.median(seen.centre[rows], axis=0)) for place in places)
-    least = (_SWINGS if lingers else 1.0) * np.median(seen.size[rows])
-    return bool(extent > least and np.median(seen.quality[rows]) > _PLAIN)
+def _doubts(film: Film, seen: Candidates, paths: list[Path], hint: Hint | None) -> tuple[str, ...]:
+    """What else moves about as plainly, and whether the camera is known."""
+    doubts: tuple[str, ...] = ()
+    others = [p for p in paths[1:] if p.rating > 0.5 * paths[0].rating]
+    if others and hint is None:
+        row = others[0].rows[len(others[0].rows) // 2]
+        u, v = film.factor * seen.centre[row]
+        doubts += (f"something else moves about as plainly, e.g. in frame {seen.frame[row]} at "
+                   f"({u:.0f}, {v:.0f}): if that is the target, say so, "
+                   "target=Hint(frame=, box=)",)  # fmt: skip
+    if not film.sure:
+        doubts += ("the background is too plain to tell whether the camera moves: if so, its "
+                   "motion is part of the track",)  # fmt: skip
+    return doubts
 
 
-def _rivals(seen: Sightings, paths: list[Rated], film: "Film") -> tuple[str, ...]:
-    """What else moves about as plainly."""
-    whole = len(paths[0].rows)
-    often = [max(len(p.rows), _AS_OFTEN * whole) for p in paths[1:]]  # what is rare is not plain
-    plain = [
-        p
-        for p, count in zip(paths[1:], often, strict=True)
-        if p.rating * max(whole / count, 1) > _AS_PLAIN * paths[0].rating
-    ]
-    others = [p for p in plain if _travels(seen, p.rows, film.places)]
-    if not others:
-        return ()
-    row = others[0].rows[len(others[0].rows) // 2]
-    u, v = film.factor * seen.centre[row]
-    return (
-        f"something else moves about as plainly, e.g. in frame {seen.frame[row]} at "
-        f"({u:.0f}, {v:.0f}): if that is the target, say so, target=Hint(frame=, box=)",
-    )
-
-
-class Ways(NamedTuple):
-    """Where to look in each frame, in its own pixels: centre (n, 2), box (n, 4), colour (n, 3)."""
-
-    centre: Floats
-    box: Floats
-    colour: Floats
-
-
-def expected(seen: Sightings, rows: Ints, film: Film, n: int) -> Ways:
+def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     """Where a path leads in all frames from its first to its last, and a little beyond."""
-    at, place = seen.frame[rows], seen.centre[rows]
-    frames = np.arange(max(at[0] - _BEYOND, 0), min(at[-1] + _BEYOND, n - 1) + 1)
+    at, place = seen.frame[rows], seen.place[rows]
+    frames = np.arange(max(at[0] - 3, 0), min(at[-1] + 3, n - 1) + 1)
     along = np.column_stack([np.interp(frames, at, x) for x in place.T])
     for outside, end in ((frames < at[0], slice(0, 4)), (frames > at[-1], slice(-4, None))):
         if outside.any():
@@ -364,38 +346,86 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     alone = np.array([view.whole is not None and view.whole.area == view.area for view in shown])
     inside &= ~hidden(outlines, steady, areas, alone)
     faint = np.array([view.faint for view in shown])
-    if faint.mean() < _RARELY:  # else it is so everywhere
+    if faint.mean() < 0.5:  # else it is so everywhere
         inside &= ~faint
     good = fitting(at, steady, areas, inside, alone)
     untold = at[~np.isfinite(motion.errors[at])]
     if len(untold):
         doubts += (f"in {len(untold)} frames of {n} the target is seen, but not how the camera "
                    f"moved, from {untold[0]} to {untold[-1]}: they are left out",)  # fmt: skip
-    if good.sum() < max(_SHORTEST, _SCARCE * n):
+    if good.sum() < max(_SHORTEST, 0.05 * n):
         return nothing(motion, n)
     if (first := swapped(at[good], areas[good])) is not None:
         doubts += (f"from frame {at[good][first]} on, what is followed has another size at once: "
                    "perhaps it is something else",)  # fmt: skip
     pixels[at[good]] = steady[good]
-    errors[at[good]] = np.hypot(scatter(at[good], steady[good]), motion.errors[at[good]])
+    # What is missing of a view is missing on one side of it.
+    side = np.sqrt(np.median(areas[good]))
+    torn = scatter(at[good], np.log(np.maximum(areas[good], 1))[:, None]) * side / 2
+    rough = np.hypot(scatter(at[good], steady[good]), torn if np.isfinite(torn) else 0.0)
+    errors[at[good]] = np.hypot(rough, motion.errors[at[good]])
+    if np.isfinite(torn) and torn > max(LOOSE, 0.02 * side):
+        doubts += (f"the outline of the target changes from frame to frame: its place is known to "
+                   f"{torn:.1f} px only",)  # fmt: skip
     if np.median(motion.errors[at[good]]) > LOOSE:
         error = np.median(motion.errors[at[good]])
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
     return Followed(pixels, errors, motion.maps[:n], doubts)
 
 
-def remembered(
-    film: Film, lens: Lens, lights: list[Floats32], found: Followed,
-    views: list[View | None], sure: slice, *, told: bool,
+def _filled(
+    found: Followed, film: Film, views: list[View | None], looks: Looks, ways: Ways,
+    seed: tuple[int, Floats, Floats] | None,
 ) -> Followed:  # fmt: skip
-    """A track with its gaps filled; if somebody told the target, carried on beyond its ends."""
+    """A track with its gaps filled: where its motion leads, or where it is by its looks.
+
+    Where only a part of it shows, its motion is surer, if that is known; else the looks, which are
+    off by the same as in the frames around.
+    """
+    n = len(found.pixels)
     pixels, errors = found.pixels.copy(), found.errors.copy()
-    inside = np.full_like(pixels, np.nan)
-    inside[sure] = pixels[sure]
-    if np.isfinite(inside[:, 0]).any():
-        places = recalled(
-            film.frames.reel, lens, lights, inside, found.maps, entire(views)[0], told=told
-        )
-        known = np.isfinite(places[:, 0])
-        pixels[known], errors[known] = places[known], _RECALLED
+    k = film.factor
+    alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
+    side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
+    expects = carry(film.motion.maps[:n], ways.centre)
+    with np.errstate(invalid="ignore"):
+        on = np.linalg.norm(alike - expects, axis=1) < 0.6 * side + 2
+    if seed is not None:  # of what somebody points at, no view is of something else
+        stray = np.linalg.norm(pixels - alike, axis=1) > 0.5 * side + 2
+        pixels[stray], errors[stray] = np.nan, np.inf
+    good = np.isfinite(pixels[:, 0])
+    usual = np.median(looks.fit[good & on]) if (good & on).any() else 0.5
+    at = np.flatnonzero(good)
+    told = seed is not None
+    for i in np.flatnonzero(~good & np.isfinite(ways.centre[:, 0])).tolist():
+        if not told and not (len(at) and at[0] < i < at[-1]):
+            continue
+        size, view = ways.box[i, 2:].mean(), views[i]
+        beside = np.concatenate([at[at < i][-4:], at[at > i][:4]])
+        if len(beside) == 8 and np.ptp(beside) < 40:
+            way, rough = (_curve(beside - i, pixels[beside], degree) for degree in (3, 2))
+            known = np.linalg.norm(way - rough) < (0.25 * size if told else min(0.25 * size, 2))
+            there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
+            part = np.linalg.norm(there - way) < 0.75 * size
+            if known and (part or (on[i] and looks.fit[i] > 0.5 * usual)):
+                pixels[i], errors[i] = way, _ROUGHLY
+                continue
+        if not told and view is not None:  # what hides a part of it draws its looks aside
+            continue
+        pointed = seed is not None and i == seed[0]
+        if not pointed and not (on[i] and looks.fit[i] > (0.5 if told else 0.7) * usual):
+            continue
+        near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
+        near = near[on[near]]
+        shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
+        pixels[i], errors[i] = alike[i] + shift, _ROUGHLY
+    if not len(at) and np.isfinite(pixels[:, 0]).any():
+        looks_only = "no view tells it from its ground: it is followed by its looks alone"
+        return Followed(pixels, errors, found.maps, (looks_only,))
     return found._replace(pixels=pixels, errors=errors)
+
+
+def _curve(frames: Ints, places: Floats, degree: int) -> Floats:
+    """Where a polynomial of the time through places (m, 2) is at the time 0."""
+    powers = np.vander(frames / 10, degree + 1)
+    return np.asarray(np.linalg.lstsq(powers, places)[0][-1])

@@ -16,13 +16,8 @@ from ..arrays import Bools, Floats, Image
 from .pixels import hull
 
 _CELLS = 32  # into which the side of a target is cut
-_LARGEST = 2000  # cells of the longer side of a chart
 _REACH = 1.5  # sides of the target from its middle that its usual outline may have
-_USUAL = 0.75  # share of the views that show a place of the usual outline
-_INNER = 0.9  # of that outline, within which a target is to be seen
-_AROUND = 19  # views around one that say how large it would be if it were whole
 _TOUCHING = np.ones((7, 7), np.uint8)  # cells around a place that is missed: its edge is there
-_OFTEN = 2  # views that miss the target in a place where it is hidden
 
 
 def hidden(
@@ -46,19 +41,23 @@ def hidden(
     points = np.concatenate(outlines)
     low = points.min(axis=0) - _REACH * sides.max()
     extent = np.ptp(points, axis=0) + 2 * _REACH * sides.max()
-    cell = max(float(np.median(sides)) / _CELLS, float(extent.max()) / _LARGEST, 1.0)
+    # Cells of the longer side of a chart.
+    cell = max(float(np.median(sides)) / _CELLS, float(extent.max()) / 2000, 1.0)
     shape = np.ceil(extent[::-1] / cell).astype(int) + 1
     chart, missed = np.zeros(shape, np.uint8), np.zeros(shape, np.uint16)
     for outline in outlines:
         patch, window = _drawn((outline - low) / cell)
         chart[window] |= patch
     unseen = np.asarray(cv2.dilate(chart, np.ones((3, 3), np.uint8)) == 0)
-    whole = np.maximum(sides, median_filter(sides, _AROUND))
+    # Views around one that say how large it would be if it were whole.
+    whole = np.maximum(sides, median_filter(sides, 19))
     usual = whole[:, None, None] * _usual(outlines, centres, sides)
     for centre, reach in zip(centres[telling], usual[telling], strict=True):
-        patch, window = _drawn((centre + _INNER * reach - low) / cell)
+        # Of that outline, within which a target is to be seen.
+        patch, window = _drawn((centre + 0.9 * reach - low) / cell)
         missed[window] += patch & unseen[window]
-    never = np.asarray(cv2.dilate((missed >= _OFTEN).astype(np.uint8), _TOUCHING), np.uint8)
+    # Views that miss the target in a place where it is hidden.
+    never = np.asarray(cv2.dilate((missed >= 2).astype(np.uint8), _TOUCHING), np.uint8)
     found = np.zeros(len(centres), bool)
     for i, (outline, centre, reach) in enumerate(zip(outlines, centres, usual, strict=True)):
         for reached in (outline, centre + reach):
@@ -75,7 +74,8 @@ def _usual(outlines: Sequence[Floats], centres: Floats, sides: Floats) -> Floats
         around = np.clip((outline - centre) / size, -_REACH, _REACH)
         patch, window = _drawn((around + _REACH) * _CELLS)
         count[window] += patch
-    usual = hull(count >= min(_USUAL * len(outlines), count.max()))
+    # Share of the views that show a place of the usual outline.
+    usual = hull(count >= min(0.75 * len(outlines), count.max()))
     return np.asarray(usual / _CELLS - _REACH, float)
 
 

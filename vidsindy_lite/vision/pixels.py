@@ -5,6 +5,8 @@ import numpy as np
 
 from ..arrays import Bools, Floats32, Image, Ints
 
+_SATURATED = 250  # 255, but for compression
+
 
 def dot(a: Floats32, b: Floats32) -> Floats32:
     """Scalar product of the colours of each pixel."""
@@ -20,6 +22,17 @@ def relit(image: Image, factor: Floats32) -> Floats32:
     """An image as it is where each colour is brighter by a factor (3,)."""
     rows = image.reshape(len(image), -1) * np.tile(factor, image.shape[1])
     return np.asarray(rows.reshape(image.shape), np.float32)
+
+
+def changes(frame: Image, ground: Image, factor: Floats32) -> Floats32:
+    """By what the colours of a frame differ from a ground that is brighter by a factor (3,).
+
+    What is saturated is at least so bright: what is brighter than that is no difference.
+    """
+    then = relit(ground, factor)
+    if factor.min() < 1:
+        np.maximum(then, frame, out=then, where=ground >= _SATURATED)
+    return np.asarray(frame - (np.minimum(then, 255) if factor.max() > 1 else then), np.float32)
 
 
 def hull(mask: Bools) -> Ints:

@@ -63,6 +63,13 @@ class ReducedFrames:
         else:
             yield from (small for _, small in self._both())
 
+    def some(self, numbers: Sequence[int]) -> Iterator[Image]:
+        """The reduced frames of these increasing numbers, as far as the film holds them."""
+        if self._kept is not None:
+            yield from (self._kept[i] for i in numbers if i < len(self._kept))
+        else:
+            yield from (reduce(frame, self.factor) for frame in self.reel.pick(numbers))
+
     def _both(self) -> Iterator[tuple[Image, Image]]:
         """All frames, whole and reduced; of these few are kept."""
         kept: list[Image] = []

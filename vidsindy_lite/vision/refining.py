@@ -8,30 +8,25 @@ in one, and is left out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .candidates import Plate
-from .colours import shadowed, whole
 from .pixels import dot, hull, lengths, relit
+from .plate import Plate
 
 _EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
 _LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
-_GROW = 0.5  # of its size, by which a window exceeds the target; and
-_ROOM = 8  # pixels more
 _FAINT, _RIM = 2.0, 0.9  # tolerances by which a ground differs from the target; share of its rim
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
-_SOME_OF = 0.9  # share of the whole that one colour covers at most, if there are several
-_TURNS = 0.1  # of its radius, by which the middle of one colour goes about that of the whole
-_SIZE = 1.5  # factor by which its area differs from those around it at most, if it is whole
 _MOSTLY = 0.8  # share of the views that must show it whole
 _JOINED = 2.0  # factor by which the area grows at once where a target meets something like it
-_ASTRAY = 0.3  # of its size, by which a view may be off the way
 _BESIDE = 5  # views before and after such a meeting, which show how large it was and is
+_CORE = np.ones((5, 5), np.uint8)  # a rim of two pixels
 
 
 @dataclass(frozen=True)
@@ -78,7 +73,8 @@ class Lens:
         gain: Floats32,
     ) -> View | None:
         """The target near a box (left, top, width, height) around `centre`, if it is there."""
-        spare = _GROW * box[2:].max() + _ROOM
+        # By half of its size and eight pixels a window exceeds the target.
+        spare = 0.5 * box[2:].max() + 8
         low = np.clip(np.floor(box[:2] - spare), 0, self.plate.size - 1).astype(int)
         high = np.clip(np.ceil(box[:2] + box[2:] + spare), low + 1, self.plate.size).astype(int)
         then, known = self.plate.seen_from(here, low, tuple(high - low))
@@ -121,9 +117,9 @@ class Lens:
         now: Floats32,
     ) -> View:  # fmt: skip
         """Centroid and area of one connected part; `bound` tells what differs from the ground."""
-        near = cv2.dilate(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        near = cv2.dilate(label.astype(np.uint8), _CORE) > 0
         rim = near & ~label
-        core = cv2.erode(label.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        core = cv2.erode(label.astype(np.uint8), _CORE) > 0
         square = dot(contrast, contrast)
         alpha = dot(change, contrast) / np.maximum(square, self.least**2)
         alpha = np.clip(alpha, 0, 1)
@@ -176,11 +172,14 @@ def entire(views: Sequence[View | None]) -> tuple[list[View | None], tuple[str, 
     count = sum(one is not None for one in views)
     if not len(offset) or len(both) < _MOSTLY * count:
         return parts, ()
-    turns = np.linalg.norm(offset - np.median(offset, axis=0), axis=1).mean() > _TURNS
-    if not turns or np.median(areas[:, 0] / areas[:, 1]) > _SOME_OF:
+    # Of its radius, by which the middle of one colour goes about that of the whole.
+    turns = np.linalg.norm(offset - np.median(offset, axis=0), axis=1).mean() > 0.1
+    # Share of the whole that one colour covers at most, if there are several.
+    if not turns or np.median(areas[:, 0] / areas[:, 1]) > 0.9:
         return parts, ()
     size = np.log(areas[:, 1])
-    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(_SIZE)
+    # Factor by which its area differs from those around it at most, if it is whole.
+    keeps = np.abs(size - median_filter(size, _AROUND)) < np.log(1.5)
     if keeps.mean() > _MOSTLY:
         return [one and (one.whole or one) for one in views], ()
     return parts, ("the target has several colours, or touches other things: perhaps only a part "
@@ -206,7 +205,8 @@ def fitting(
             return good & telling
         usual = np.interp(frames, frames[use], median_filter(logs[use], _AROUND, mode="mirror"))
         good = inside & (np.abs(logs - usual) < np.log(_WHOLE))
-    room = np.where(telling, _ASTRAY * np.sqrt(areas), 0)
+    # Of its size, by which a view may be off the way.
+    room = np.where(telling, 0.3 * np.sqrt(areas), 0)
     while (use := np.flatnonzero(good)).size >= 7:
         known = np.flatnonzero(good & telling)
         told = [_leave_out(frames, places, i, known) for i in use.tolist()]
@@ -286,3 +286,48 @@ def scatter(frames: Ints, places: Floats) -> float:
         return float("inf")
     fourth = sum(c * places[runs + k] for k, c in enumerate((1, -4, 6, -4, 1)))
     return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70))
+
+
+class Whole(NamedTuple):
+    """All that differs from the background in one piece with what has the target's colour.
+
+    `label` (h, w) is where; `colours` (h, w, 3) are those inside it, continued to its edge; `plain`
+    is whether there is hardly another colour.
+    """
+
+    label: Bools
+    colours: Floats32
+    plain: bool
+
+
+def shadowed(now: Floats32, ground: Floats32) -> Bools:
+    """Where (h, w) the same surface is seen in less light: darker by the same in all colours."""
+    ratio = cv2.split((now + 4) / (ground + 4))
+    mean = sum(ratio) / 3
+    apart = np.maximum.reduce(ratio) - np.minimum.reduce(ratio)
+    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < 0.12 * mean))
+
+
+def whole(
+    own: Bools, differs: Bools, other: Bools, now: Floats32, ground: Floats32
+) -> Whole | None:
+    """The whole of which `own` is a part, None if it is not one compact thing.
+
+    Not all that `differs` has an `other` colour: what lies between ground and target is its blur.
+    """
+    shadow = shadowed(now, ground)
+    mask = (own | (differs & ~shadow)).astype(np.uint8)
+    _, labels = cv2.connectedComponents(np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, _CORE)))
+    inside = np.bincount(labels[own], minlength=2)
+    label = labels == 1 + int(inside[1:].argmax()) if inside[1:].any() else own
+    core = cv2.erode(label.astype(np.uint8), _CORE) > 0
+    outline = cv2.fillConvexPoly(np.zeros(label.shape, np.uint8), hull(label), 1)
+    if not core.any() or label.sum() < 0.85 * outline.sum():
+        return None
+    _, nearest = cv2.distanceTransformWithLabels(
+        (~core).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    colours = np.zeros((1 + np.count_nonzero(core), 3), np.float32)
+    colours[nearest[core]] = now[core]
+    plain = (label & other & ~shadow).sum() < 0.15 * label.sum()
+    return Whole(label, colours[nearest], bool(plain))

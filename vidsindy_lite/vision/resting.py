@@ -11,18 +11,13 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
 from .background import light
-from .candidates import Plate
-from .pixels import lengths, relit
+from .pixels import changes, lengths
+from .plate import Plate
 from .steadying import displacement
 
 _PARTS = 12  # into which each side of an image is cut
-_SMOOTH = 2.0  # reduced pixels: noise is not what frames are compared by
 _FAINT = 0.1  # grey levels; a difference without any noise
-_MOST = 20.0  # grey levels that a pixel can differ by: a few that differ by more say no more
 _RIM = np.ones((9, 9), np.uint8)  # around what is not known, where smoothing is wrong
-_ASIDE = 0.2  # share of the parts that what moves on its own may be in
-_CHANCE = 0.04  # of a gain: the noise of a median of 21 frames adds that, and maps smooth it
-_NEARLY = 0.9  # share of the frames that say so, if the camera is at rest
 
 
 def explains(samples: Image, maps: Floats, known: Bools) -> bool:
@@ -41,7 +36,8 @@ def explains(samples: Image, maps: Floats, known: Bools) -> bool:
         _gain(_misses(sample, *_seen(plates[0], here)), _misses(sample, *_seen(plates[1], there)))
         for sample, here, there in zip(samples, maps, rest, strict=True)
     ]
-    return bool(weights @ gains > _CHANCE * weights.sum())
+    # Of a gain: the noise of a median of 21 frames adds that, and maps smooth it.
+    return bool(weights @ gains > 0.04 * weights.sum())
 
 
 def rests(samples: Image) -> bool:
@@ -59,7 +55,8 @@ def rests(samples: Image) -> bool:
         here = _misses(sample, plate, everywhere)
         off = [_misses(sample, np.asarray(one, np.uint8), everywhere) for one in beside]
         least.append(min(_gain(here, there) for there in off))
-    return bool(np.mean(np.array(least) > 0) >= _NEARLY)
+    # Share of the frames that say so, if the camera is at rest.
+    return bool(np.mean(np.array(least) > 0) >= 0.9)
 
 
 def _seen(plate: Plate, here: Floats) -> tuple[Image, Bools]:
@@ -69,9 +66,11 @@ def _seen(plate: Plate, here: Floats) -> tuple[Image, Bools]:
 
 def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
     """Grey levels by which the parts (12, 12) of a frame differ from the ground; NaN if unknown."""
-    change = frame - relit(ground, light(frame, ground, known))
-    smooth = cv2.GaussianBlur(change, (0, 0), _SMOOTH)
-    apart = np.minimum(lengths(np.asarray(smooth, np.float32)), _MOST)
+    change = changes(frame, ground, light(frame, ground, known))
+    # Reduced pixels: noise is not what frames are compared by.
+    smooth = cv2.GaussianBlur(change, (0, 0), 2.0)
+    # Grey levels that a pixel can differ by: a few that differ by more say no more.
+    apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
     use = cv2.erode(known.astype(np.uint8), _RIM).astype(np.float32)
     parts, share = (
         cv2.resize(x, (_PARTS, _PARTS), interpolation=cv2.INTER_AREA) for x in (apart * use, use)
@@ -89,5 +88,5 @@ def _gain(one: Floats32, other: Floats32) -> float:
     if not both.any():
         return 0.0
     ratios = np.sort(np.log((other[both] + _FAINT) / (one[both] + _FAINT)))
-    aside = int(_ASIDE * len(ratios))
+    aside = int(0.2 * len(ratios))  # the share of the parts that what moves on its own may be in
     return float(ratios[aside : len(ratios) - aside].mean())

@@ -12,28 +12,13 @@ import numpy as np
 
 from ..arrays import Bools
 from ..checks import check_integer
+from .association import Path as Motion
+from .association import plainest_paths
 from .background import BackgroundModel, sample_frames
-from .linking import Sightings
-from .moving import (
-    Film,
-    Rated,
-    Ways,
-    expected,
-    finished,
-    lens_of,
-    linked,
-    nothing,
-    sighted,
-    viewed,
-)
+from .candidates import Candidates
+from .moving import Film, Ways, expected, finished, lens_of, nothing, sighted, viewed
 from .reducing import ReducedFrames
 from .tracking import Track
-
-_MEETINGS = 8  # paths of a target that may follow each other
-_AS_PLAIN = 0.4  # worth of a candidate of a path, relative to those of the plainest
-_APART = 1.3  # sizes between two targets that do not touch
-_ROOM = 2.0  # pixels more
-_STRANGE = 0.2  # share of the frames in which one more thing moves, above which there is doubt
 
 
 def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
@@ -62,32 +47,35 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     samples = sample_frames(frames)
     # Before a plain background, all that could tell of a camera's motion may be the targets.
     film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
-    found, lights = sighted(film, count)
-    seen, paths = linked(found, film, most=count * _MEETINGS)
+    seen, lights = sighted(film, targets=count)
+    n = len(lights)
+    # Paths of a target that may follow each other.
+    paths = plainest_paths(seen, most=count * 8)
     lanes, strange = _lanes(seen, paths, count)
-    ways = [_joined([expected(seen, p.rows, film, len(found)) for p in lane]) for lane in lanes]
+    ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
     touching = _touching(ways)
-    doubts = _doubts(seen, strange, film.factor, len(found), Path(path).name)
+    doubts = _doubts(seen, strange, film.factor, n, Path(path).name)
     tracks = []
-    lens = lens_of(samples, film)
+    lens = lens_of(samples, film, *ways)
     for way, hidden in zip(ways, touching, strict=True):
         way.centre[hidden] = np.nan
         followed = finished(viewed(film, lens, way, lights), film.motion, doubts)
         tracks.append(Track.of_motion(followed))
         doubts = ()
-    missing = Track.of_motion(nothing(film.motion, len(found)))
+    missing = Track.of_motion(nothing(film.motion, n))
     return (*tracks, *[missing] * (count - len(tracks)))
 
 
 def _lanes(
-    seen: Sightings, paths: list[Rated], count: int
-) -> tuple[list[list[Rated]], list[Rated]]:
+    seen: Candidates, paths: list[Motion], count: int
+) -> tuple[list[list[Motion]], list[Motion]]:
     """The paths of each target, one after the other in time; and paths for which none is left."""
-    lanes: list[list[Rated]] = []
+    lanes: list[list[Motion]] = []
     left = []
     plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
     for path in sorted(paths, key=lambda path: -len(path.rows)):
-        if path.rating / len(path.rows) < _AS_PLAIN * plainest:
+        # Worth of a candidate of a path, relative to those of the plainest.
+        if path.rating / len(path.rows) < 0.4 * plainest:
             continue
         free = [lane for lane in lanes if not any(_overlap(seen, path, other) for other in lane)]
         if free:
@@ -99,7 +87,7 @@ def _lanes(
     return lanes, left
 
 
-def _overlap(seen: Sightings, one: Rated, other: Rated) -> bool:
+def _overlap(seen: Candidates, one: Motion, other: Motion) -> bool:
     """Do two paths share any of the time from their first frames to their last?"""
     (a, b), (c, d) = (seen.frame[path.rows[[0, -1]]] for path in (one, other))
     return bool(a <= d and c <= b)
@@ -122,21 +110,23 @@ def _touching(ways: list[Ways]) -> list[Bools]:
             apart = np.linalg.norm(one.centre - other.centre, axis=1)
             sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
             with np.errstate(invalid="ignore"):
-                met = apart < _APART * sizes + _ROOM
+                # Sizes, and pixels more, between two targets that do not touch.
+                met = apart < 1.3 * sizes + 2.0
             found[i] |= met
             found[j] |= met
     return found
 
 
 def _doubts(
-    seen: Sightings, strange: list[Rated], factor: int, frames: int, name: str
+    seen: Candidates, strange: list[Motion], factor: int, frames: int, name: str
 ) -> tuple[str, ...]:
     """Does one thing more move than there are targets?"""
     longest = max(strange, key=lambda path: len(path.rows), default=None)
-    if longest is None or len(longest.rows) < _STRANGE * frames:
+    # Share of the frames in which one more thing moves, above which there is doubt.
+    if longest is None or len(longest.rows) < 0.2 * frames:
         return ()
     row = longest.rows[len(longest.rows) // 2]
-    u, v = factor * seen.centre[row]
+    u, v = factor * seen.place[row]
     return (
         f"{name}: one thing more moves than there are targets, e.g. in frame {seen.frame[row]} at "
         f"({u:.0f}, {v:.0f})",

@@ -21,21 +21,14 @@ from .aligning import Aligned, Ground, align, grounds, pyramid
 _PARTS = 12  # parts into which each side of the image is cut; one corner is followed in each
 _WIDTH = 21  # reduced pixels: what is smoother than this is light
 _CONTRAST, _DARK = 250.0, 20.0  # of the relief; grey levels below which all is dark
-_FLAT = 2.0  # smallest eigenvalue of the gradient's covariance in a corner, grey levels squared
 _EXACT = 1.0  # reduced pixels by which a corner may miss its place
 _STILL = 0.25  # reduced pixels by which a corner at rest may seem to move
 _VAGUE = 3.0  # reduced pixels: a map that is known no better is not known
-_AS_SURE = 3.0  # times the error of another map that is about as good
 PLAINLY = 10.0  # standard errors of a displacement that is one
 _FEWEST = 8  # corners for a map of four numbers: shift, turn and scale
 _SOME, _MANY = 20, 60  # corners that are worth a look; that need no other witness
-_EXACTLY = 0.05  # reduced pixels: corners that tell a map no better need another witness, too
-_TELLING = 10  # corners that must share a motion, if it is to be the camera's
 _AGREE = 0.25  # share of the corners that must do so: of those of mere noise, 0.15 to 0.24 agree
 _WIDE = 0.6  # times the image's own spread, that of corners that tell the camera's motion at least
-# Share of a key frame that is left, below which there must be a new one. Each adds its error to all
-# that follow, so late: a little above the 0.3 that `align` needs. From 0.3 to 0.6 nothing changes.
-_LEFT = 0.4
 
 
 class CameraMotion(NamedTuple):
@@ -91,7 +84,8 @@ def _corners(grey: Image) -> Floats:
     best = parts.argmax(axis=1)
     row, column = np.divmod(np.arange(_PARTS**2), _PARTS)
     found = np.column_stack([column * width + best % width, row * height + best // width])
-    return found[parts.max(axis=1) > _FLAT / 255**2].astype(float)
+    # Smallest eigenvalue of the gradient's covariance in a corner, grey levels squared.
+    return found[parts.max(axis=1) > 2.0 / 255**2].astype(float)
 
 
 def _follow(before: Image, after: Image, points: Floats, guess: Floats) -> tuple[Floats, Bools]:
@@ -145,7 +139,8 @@ def _moved(before: _Relief, after: _Relief) -> bool | None:
     still = np.linalg.norm(b - a, axis=1) < _STILL
     share = np.linalg.norm(carry(similar, a) - b, axis=1) < _STILL
     moves = bool(still.sum() < 0.7 * share.sum())
-    few = share.sum() < max(_TELLING, moves * _AGREE * len(a))
+    # Corners that must share a motion, if it is to be the camera's.
+    few = share.sum() < max(10, moves * _AGREE * len(a))
     if few or (moves and not _widespread(a[share], before.fine.shape)):
         return _drifted(before, after)
     return moves
@@ -192,7 +187,8 @@ class _ByCorners(NamedTuple):
     @property
     def alone(self) -> bool:
         """Need they no other witness?"""
-        return self.found is not None and self.agreeing >= _MANY and self.found.error < _EXACTLY
+        # Reduced pixels: corners that tell a map no better need another witness, too.
+        return self.found is not None and self.agreeing >= _MANY and self.found.error < 0.05
 
 
 def _by_corners(before: _Relief, points: Floats, after: _Relief, last: Floats) -> _ByCorners:
@@ -240,7 +236,8 @@ class Steadying:
         direct = align(self.grounds, relief.levels, self.last)
         both = [one for one in (told.found, direct) if one is not None and one.error < _VAGUE]
         best = min((one.error for one in both), default=0.0)
-        good = [one for one in both if one.error <= _AS_SURE * best]
+        # Times the error of another map that is about as good.
+        good = [one for one in both if one.error <= 3.0 * best]
         return min(good, key=lambda one: self._step(one.map), default=None)
 
     def _step(self, here: Floats) -> float:
@@ -278,7 +275,9 @@ class Steadying:
         self.maps.append(self.base @ np.linalg.inv(self.last))
         self.errors.append(float(np.hypot(self.drift, located.error)))
         self.before = relief, self.maps[-1], self.errors[-1]
-        if self._shared(self.last) < _LEFT:
+        # Share of a key frame that is left, below which there must be a new one. Each adds its
+        # error to all that follow, so late: a little above the 0.3 that `align` needs.
+        if self._shared(self.last) < 0.4:
             self._start(*self.before)
 
     def motion(self) -> CameraMotion:

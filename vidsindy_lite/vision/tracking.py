@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats, Image
 from ..checks import check_instance, shown
@@ -33,10 +34,6 @@ from .video import read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
 
-_KEPT = 0.5  # share of the frames below which many of them are lost
-_SOFT = 1.0  # of a sharp outline it is 0.6, see `Blob`
-_FEW = 0.95  # share of views that are whole, below which a blurred outline cannot be trusted
-_ROUGH = 1.0  # pixels that a track may scatter about a smooth motion
 _GAIN = 0.15  # of confidence, that a sighting has to exceed to be worth anything
 _GAP = 1.0  # price of a gap, in units of confidence: what is seen for a single frame is an error
 _JUMP = 2.0  # price of a jump
@@ -46,7 +43,7 @@ _MEMORY = 25  # frames after which the target may be anywhere
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The target in each frame of a video.
+    """The target in each frame of a video; `np.asarray` of it is its pixels.
 
     Parameters
     ----------
@@ -77,6 +74,9 @@ class Track:
         confidence = np.where(seen, np.exp(-found.errors / 3), 0.0)
         moves = not np.array_equal(found.maps, np.broadcast_to(np.eye(3), found.maps.shape))
         return cls(found.pixels, confidence, "motion", found.doubts, found.maps if moves else None)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray:
+        return np.array(self.pixels, dtype, copy=copy)
 
     @property
     def in_frames(self) -> Floats:
@@ -153,13 +153,23 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     found, blurred = _track_blobs(frames.reel, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return _follow(frames, samples, target)
-    return replace(found, warnings=model.unrest)
+    found = replace(found, warnings=model.unrest)
+    if detector == "auto" and _seen(found) < 0.75 and model.shows_target():
+        other = _follow(frames, samples, target)
+        return other if _seen(other) > _seen(found) + 0.1 else found
+    return found
+
+
+def _seen(found: Track) -> float:
+    """Share of the frames in which the target is seen."""
+    return float(np.isfinite(found.pixels[:, 0]).mean())
 
 
 def _lost(found: Track) -> tuple[str, ...]:
     """Is the target lost in many of the frames from its first to its last?"""
     at = np.flatnonzero(np.isfinite(found.pixels[:, 0]))
-    if not len(at) or len(at) >= _KEPT * (between := at[-1] - at[0] + 1):
+    # Share of the frames below which many of them are lost.
+    if not len(at) or len(at) >= 0.5 * (between := at[-1] - at[0] + 1):
         return ()
     lost = between - len(at)
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
@@ -177,7 +187,8 @@ def _plausible(found: Track, hint: Hint | None) -> bool:
         return False
     if hint is None:
         rough = scatter(at, found.pixels[at])
-        return not np.isfinite(rough) or rough < _ROUGH
+        # Pixels that a track may scatter about a smooth motion.
+        return not np.isfinite(rough) or rough < 1.0
     if hint.box is None or hint.frame not in at:
         return False
     middle = np.array(hint.box[:2]) + (np.array(hint.box[2:]) - 1) / 2
@@ -216,7 +227,9 @@ def _track_blobs(reel: Reel, model: BackgroundModel) -> tuple[Track, bool]:
     centroids[~whole] = np.nan
     inside = np.array([b is not None and b.inside for b in blobs])
     soft = [b.softness for b in blobs if b is not None and b.inside]
-    blurred = bool(inside.any() and np.median(soft) > _SOFT and whole[inside].mean() < _FEW)
+    # Of a sharp outline it is 0.6, see `Blob`.
+    # Share of views that are whole, below which a blurred outline cannot be trusted.
+    blurred = bool(inside.any() and np.median(soft) > 1.0 and whole[inside].mean() < 0.95)
     return Track(centroids, np.exp(-distance), "background"), blurred
 
 

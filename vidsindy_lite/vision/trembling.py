@@ -16,31 +16,31 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
 from .aligning import Aligned, Ground, align, grounds, pyramid
-from .candidates import Plate
+from .plate import Plate
 from .reducing import ReducedFrames, enlarged
 from .steadying import CameraMotion, carry, displacement
 
-_PLATES = 2  # each of the samples as they were laid on the one before
 _RIM = np.ones((5, 5), np.uint8)  # around what a plate does not show
-_KNOWN = 0.5  # reduced pixels to which a motion must be known
-_FAR = 8.0  # reduced pixels: what moves farther blurs the first plate too much
-_ALIKE = 0.5  # correlation of what two halves of an image tell, if both move alike
 
 
 def trembling(frames: ReducedFrames, samples: Image) -> CameraMotion | None:
     """The motion of a camera that trembles, None if that is not sure; `samples` are reduced."""
     views = [pyramid(sample) for sample in samples]
     maps = np.tile(np.eye(3), (len(samples), 1, 1))
-    for _ in range(_PLATES):
+    # Each of the samples as they were laid on the one before.
+    for _ in range(2):
         ground = _ground(Plate(samples, maps, np.ones(len(samples), bool)))
         laid = [_laid(ground, view, here) for view, here in zip(views, maps, strict=True)]
-        if np.median([one.error for one in laid]) > _KNOWN:
+        # Reduced pixels to which a motion must be known.
+        if np.median([one.error for one in laid]) > 0.5:
             return None
         maps = _maps(laid)
-        if displacement(maps, samples.shape[2:0:-1]).max() > _FAR:
+        # Reduced pixels: what moves farther blurs the first plate too much.
+        if displacement(maps, samples.shape[2:0:-1]).max() > 8.0:
             return None
     alike, error = _halves(ground, views, maps)
-    if alike < _ALIKE:
+    # Correlation of what two halves of an image tell, if both move alike.
+    if alike < 0.5:
         return None
     usual = np.sqrt(np.mean([one.error**2 for one in laid if np.isfinite(one.error)]))
     return _motion(ground, frames, max(error / usual, 1.0))

@@ -1,0 +1,178 @@
+"""The ground: what frames show together, what a target hides, how exactly it is known."""
+
+import tracemalloc
+
+import cv2
+import numpy as np
+import pytest
+
+from vidsindy_lite.vision.plate import Plate, _masked_median, lights_of, noise_of, tolerance
+
+WIDTH, HEIGHT, FRAMES = 160, 120, 12
+RNG = np.random.default_rng(0)
+SCENE = RNG.integers(90, 110, (HEIGHT + 40, WIDTH + 40, 1)).astype(np.uint8).repeat(3, axis=2)
+
+
+def test_a_plate_makes_no_copies_of_its_samples():
+    samples = np.random.default_rng(0).integers(0, 256, (21, 3000, 40, 3), np.uint8)
+    maps = np.array([[[1, 0, k % 3], [0, 1, k % 2], [0, 0, 1.0]] for k in range(21)])
+    tracemalloc.start()
+    Plate(samples, maps, np.ones(21, bool))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < samples.nbytes / 2
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_every_third_pixel_of_a_plate_is_that_of_the_whole(moves):
+    frames = np.array([SCENE[:HEIGHT, moves * k :][:, :WIDTH] for k in range(FRAMES)])
+    maps = np.array([[[1, 0, moves * k], [0, 1, 0], [0, 0, 1.0]] for k in range(FRAMES)])
+    plate = Plate(frames, maps, np.ones(FRAMES, bool))
+    whole, thin = (plate.seen_from(maps[4], [5, 2], (70, 50), step) for step in (1, 3))
+    assert thin[0].shape == (17, 24, 3)
+    for one, other in zip(whole, thin, strict=True):
+        np.testing.assert_array_equal(one[::3, ::3], other)
+
+
+def panned(u, v, size=(48, 36)):
+    """A plate of 21 frames (width, height) of a camera that pans by (u, v) pixels in each."""
+    maps = np.array([[[1, 0, u * k], [0, 1, v * k], [0, 0, 1.0]] for k in range(21)])
+    samples = np.full((21, *size[::-1], 3), 100, np.uint8)
+    return Plate(samples, maps, np.ones(21, bool))
+
+
+def test_a_plate_reaches_as_far_as_all_frames_but_the_outermost_do():
+    # From the second of 21 to the last but one: 54 pixels more than a frame, and 36.
+    plate = panned(3, -2)
+    assert plate.image.shape == (36 + 36, 48 + 54, 3)
+    np.testing.assert_array_equal(plate.shift @ [3, -38, 1], [0, 0, 1])
+    # In its corners it is shown by less than three frames.
+    assert plate.valid[40, 50] == 255
+    assert plate.valid[0, 0] == plate.valid[-1, -1] == 0
+
+
+@pytest.mark.parametrize("pan", [(20, 0), (0, -15)])
+def test_a_plate_of_a_camera_that_turns_far_shows_what_is_around_the_middle_of_its_way(pan):
+    plate = panned(*pan)
+    along = int(np.argmax(np.abs(pan)))
+    size, frame = plate.image.shape[1::-1], (48, 36)
+    assert 2.2 * frame[along] < size[along] < 2.6 * frame[along]
+    assert size[1 - along] == frame[1 - along]
+    middle = 10 * np.array(pan) + [23.5, 17.5]
+    found = (np.array(size) - 1) / 2 - plate.shift[:2, 2]
+    np.testing.assert_allclose(found, middle, atol=1)
+
+
+def test_a_median_is_that_of_the_samples_that_show_a_place():
+    rng = np.random.default_rng(0)
+    samples = list(rng.integers(0, 256, (7, 150, 40, 3), np.uint8))
+    moves = [np.array([[1, 0, 5 * k], [0, 1, 11 * k % 6], [0, 0, 1.0]]) for k in range(7)]
+    median, count = _masked_median(
+        samples,
+        [np.full((150, 40), 255, np.uint8)] * 7,
+        moves,
+        np.ones((7, 3), np.float32),
+        (74, 157),
+    )
+    canvas = np.full((7, 157, 74, 3), np.nan)
+    for k, sample in enumerate(samples):
+        canvas[k, 11 * k % 6 :][:150, 5 * k : 5 * k + 40] = sample
+    shown = np.isfinite(canvas[..., 0]).sum(axis=0)
+    np.testing.assert_array_equal(count, shown)
+    odd = shown % 2 == 1  # else the upper or the lower of the two in the middle
+    assert odd.mean() > 0.3
+    np.testing.assert_array_equal(median[odd], np.nanmedian(canvas[:, odd], axis=0))
+
+
+def test_the_plate_of_a_moving_camera():
+    rng = np.random.default_rng(0)
+    scene = cv2.GaussianBlur(rng.uniform(0, 255, (200, 300, 3)).astype(np.float32), (0, 0), 3)
+    scene = np.clip(128 + 5 * (scene - 128), 0, 255).astype(np.uint8)
+    maps = np.array([[[1, 0, 4.0 * k], [0, 1, 0], [0, 0, 1]] for k in range(9)])
+    samples = np.array([scene[20:120, 20 + 4 * k : 140 + 4 * k] for k in range(9)])
+    samples[4, 40:60, 40:60] = 0  # the target, once
+    plate = Plate(samples, maps, np.ones(9, bool))
+    for sample, here in zip(samples[[0, 4, 8]], maps[[0, 4, 8]], strict=True):
+        view, known = plate.seen_from(here, np.zeros(2), (120, 100))
+        difference = np.abs(view.astype(int) - sample)[known]
+        assert known.mean() > 0.8
+        assert np.median(difference) == 0
+    assert plate.seen_from(maps[4], np.array([40, 40]), (20, 20))[0].min() > 0
+
+
+@pytest.mark.parametrize("pan", [0, 2])
+def test_ground_that_a_target_hides_is_what_is_seen_of_it_or_what_is_around_it(pan):
+    """A dark disc that turns about its place, whose middle hides its ground in all frames."""
+    ground = np.full((80, 140, 3), 150, np.uint8)
+    ground[:, 70:] = 160
+    maps = np.array([[[1, 0, pan * k], [0, 1, 0], [0, 0, 1.0]] for k in range(9)])
+    at = np.array([[70 + 5 * np.cos(k), 40 + 5 * np.sin(k)] for k in range(9)])
+    samples = []
+    for k, place in enumerate(at):
+        scene = ground.copy()
+        cv2.circle(scene, tuple(np.rint(16 * place).astype(int)), 16 * 10, 0, -1, cv2.LINE_AA, 4)
+        samples.append(scene[:, pan * k : pan * k + 120])
+    boxes = np.column_stack([at - [pan, 0] * np.arange(9)[:, None] - 10, np.full((9, 2), 21.0)])
+    known = np.ones(9, bool)
+    covered = Plate(np.array(samples), maps, known)
+    view, _ = covered.seen_from(maps[4], np.array([60 - 4 * pan, 30]), (20, 20))
+    assert view.min() < 50
+    bare = Plate(np.array(samples), maps, known, boxes)
+    view, shown = bare.seen_from(maps[4], np.array([50 - 4 * pan, 20]), (40, 40))
+    assert shown.all()
+    assert view.min() >= 148
+    assert view.max() <= 165
+
+
+@pytest.mark.parametrize("pan", [0, 4])
+def test_a_plate_is_of_one_light_though_the_exposure_changes(pan):
+    rng = np.random.default_rng(0)
+    ground = cv2.resize(rng.integers(60, 160, (12, 20, 3)).astype(np.uint8), (200, 120))
+    exposure = np.linspace(0.7, 1.4, 15)
+    samples = np.array([(a * ground[:, pan * k :][:, :140]).round().astype(np.uint8)
+                        for k, a in enumerate(exposure)])  # fmt: skip
+    maps = np.array([[[1, 0, pan * k], [0, 1, 0], [0, 0, 1.0]] for k in range(15)])
+    known = np.ones(15, bool)
+    lights = lights_of(samples, maps, known)
+    ratio = lights / exposure[:, None]
+    np.testing.assert_allclose(ratio / ratio[7], 1, atol=0.04)
+    plain = Plate(samples, maps, known)
+    even = Plate(samples, maps, known, lights=lights)
+    shown, _ = even.seen_from(maps[7], np.zeros(2), (140, 120))
+    light = shown / ground[:, 7 * pan :][:, :140]
+    assert light.std() < 0.01 * light.mean()
+    if pan:  # else each place is shown in all lights
+        assert noise_of(samples, maps, plain) > 2 * noise_of(samples, maps, even)
+
+
+@pytest.mark.parametrize(("noise", "least"), [(0.5, 8), (3, 15), (30, 60)])
+@pytest.mark.parametrize(("pan", "edge"), [(0, 0.12), (1, 0.5)])
+def test_the_tolerance_is_five_times_the_noise_and_what_a_displaced_edge_does(
+    noise, least, pan, edge
+):
+    scene = np.full((30, 50, 3), 100, np.uint8)
+    scene[:, 25:] = 150
+    samples = np.array([scene[:, pan * k : pan * k + 40] for k in range(5)])
+    maps = np.array([[[1, 0, pan * k], [0, 1, 0], [0, 0, 1.0]] for k in range(5)])
+    plate = Plate(samples, maps, np.ones(5, bool))
+    found = tolerance(plate, noise)[15]
+    step = int(np.argmax(plate.image[15, :, 0] > 125))
+    known = plate.valid[15] > 0
+    at = np.arange(len(found))
+    near = (at == step) | (at == step - 1)
+    np.testing.assert_allclose(found[near & known], least + 50 * edge, rtol=1e-6)
+    np.testing.assert_allclose(found[~near & known], least, rtol=1e-6)
+    assert (found[~known] > 255).all()
+    assert (~known).any() == (pan > 0)
+
+
+@pytest.mark.parametrize("light", [1.0, 0.8])
+def test_the_noise_of_a_film_is_that_of_its_samples(light):
+    rng = np.random.default_rng(0)
+    ground = rng.uniform(80, 200, (90, 120, 3))
+    samples = light ** (np.arange(21) % 2)[:, None, None, None] * ground
+    samples = (samples + rng.normal(0, 6, samples.shape)).round().astype(np.uint8)
+    maps = np.array([np.eye(3)] * 21)
+    plate = Plate(samples, maps, np.ones(21, bool))
+    plate.image = ground.round().astype(np.uint8)
+    assert noise_of(samples, maps, plate) == pytest.approx(6, rel=0.1)
