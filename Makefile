@@ -38,6 +38,7 @@ $(READY): requirements.txt pyproject.toml
 figures: $(READY)
 	$(BIN)/python -m vidsindy_lite run $(ONLY) --profile $(if $(QUICK),quick,full) $(if $(FORCE),--force)
 	$(if $(QUICK),,@$(BIN)/python tests/claims.py)
+	$(if $(QUICK),,@$(BIN)/python tests/exercises.py $(if $(FORCE),--force))
 
 test: $(READY)
 	$(BIN)/python -m pytest $(SPREAD)

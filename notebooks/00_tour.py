@@ -303,60 +303,8 @@ save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "eq
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) How few samples are enough? Discover from every second, fourth and eighth of the points in
-# `found.x`.
-
-# %% tags=["hide-cell"]
-from vidsindy_lite import discover
-
-for step in (2, 4, 8):
-    fewer = discover(found.t[::step], found.x[::step])
-    scored = score(fewer, shot.truth)
-    print(step, scored, *fewer.warnings, sep="\n")
-    assert scored.exact or fewer.warnings
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# From the 1,500 frames of the full profile, even every eighth point, 12 in a period, gives exactly
-# the true terms. Where the points are too few for that, as in a shorter record, a warning says so.
-# </details>
-#
-# **2.** (Implement.) Follow the found law yourself, with the classical Runge-Kutta method of order four, for a tenth of the
-# record, and compare with `found.discovery.simulate`.
-
-# %% tags=["hide-cell"]
-slope, times = found.discovery.predict, found.t[: frames // 10]
-states = [found.discovery.curve(times[:1])[0]]
-for h in np.diff(times):
-    k1 = slope(states[-1])
-    k2 = slope(states[-1] + h / 2 * k1)
-    k3 = slope(states[-1] + h / 2 * k2)
-    k4 = slope(states[-1] + h * k3)
-    states.append(states[-1] + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
-simulated = found.discovery.simulate(states[0], times)
-off = np.abs(states - simulated.x).max() / np.ptp(simulated.x)
-print(f"{simulated.status}; one step a frame is off by {off:.0e} of the attractor")
-assert off < 0.01
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Four slopes, averaged with the weights of Simpson's rule. `simulate` takes as many steps as its tolerance
-# asks for, where this takes one a frame; on a chaotic path the small difference grows with time.
-# </details>
-#
-# **3.** (Prove.) The law has a frame of its own in which it is shortest. Show that a polynomial law of degree $p$
-# keeps its degree under any shift of the origin, and that its terms of degree $p$ do not change at all.
-#
-# <details><summary>Solution</summary>
-#
-# Put $\mathbf x=\mathbf y+\boldsymbol\Delta$ into a monomial and multiply out: $\prod_i(y_i+\Delta_i)^{p_i}$
-# is $\prod_iy_i^{p_i}$ plus monomials of a lower degree. A term of the highest degree gets nothing from any other,
-# as there is none above it. In Lorenz' law, the quadratic terms $xz$ and $xy$ are the same in every frame.
-# </details>
+# [Three exercises](exercises/00_tour.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/00_tour.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

@@ -370,61 +370,8 @@ save_slider("projection_walk", figures, caption=caption, numbers={"degrees": lis
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Prove.) R is not the only rotation that takes $\mathbf n$ to $\mathbf e_z$. Which are the others, and
-# what do they do to a camera?
-#
-# <details><summary>Solution</summary>
-#
-# All $\mathbf R_z(\varphi)\mathbf R$, with a turn about $\mathbf e_z$ afterwards. The in-plane
-# coordinates and the offset turn by $\varphi$ together, so
-# $s\,\mathcal T(\vartheta)\mathbf x_c+\Delta_c=\mathbf R^-\mathbf x$ still holds with
-# $\vartheta$ changed by $\varphi$. The convention is free, but every part of a program has to share
-# one: the learned angle means nothing without it.
-# </details>
-#
-# **2.** (Explore.) Two cameras look down with normals $(\pm 10^{-6}, 0, -1)$, nearly the same. How far apart are
-# their matrices R? And that of $(0, 10^{-6}, -1)$?
-
-# %% tags=["hide-cell"]
-down = {tilt: cameras.rotation_to_z([*tilt, -1.0]) for tilt in ((1e-6, 0), (-1e-6, 0), (0, 1e-6))}
-one, opposite, aside = down.values()
-print(np.abs(one - opposite).max(), np.abs(one - aside).max())
-assert np.abs(one - opposite).max() < 1e-5
-assert np.abs(one - aside).max() > 1
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# The first two are nearly the same: both turn about the y axis, by nearly $\pi$, in opposite directions. But
-# the third turns about the x axis, and its X' and Y' have the opposite sign. So near
-# $-\mathbf e_z$ the in-plane angle of a camera jumps as its normal moves; learn the angle with the
-# normal at hand, do not carry it over.
-# </details>
-#
-# **3.** (Implement.) Write Rodrigues' formula for the rotation that takes $\mathbf n$ to $\mathbf e_z$ in three lines
-# of numpy, and compare it with the package.
-
-# %% tags=["hide-cell"]
-def rodrigues(n):
-    v, c = np.cross(n, (0, 0, 1)), n[2]
-    K = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
-    return np.eye(3) + K + K @ K / (1 + c)
-
-
-n = np.array([0.48, -0.6, 0.64])
-assert np.allclose(rodrigues(n), cameras.rotation_to_z(n), atol=1e-12)
-assert np.allclose(rodrigues(n) @ n, (0, 0, 1), atol=1e-12)
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# With $\mathbf v=\mathbf n\times\mathbf e_z=\sin\beta\,\mathbf k$, the formula
-# $\mathbf I+\sin\beta\,\mathbf K_k+(1-\cos\beta)\mathbf K_k^2$ becomes
-# $\mathbf I+\mathbf K_v+\mathbf K_v^2/(1+\cos\beta)$, as $(1-c)/s^2=1/(1+c)$. It fails at $\mathbf n=-\mathbf e_z$
-# alone, where any axis in the plane would do.
-# </details>
+# [Three exercises](exercises/01_projection_proofs.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/01_projection_proofs.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

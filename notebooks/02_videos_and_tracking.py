@@ -537,86 +537,8 @@ save_figure("figure_S3", fig, caption=caption, numbers={"t": shot.t, "x": x, "tr
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) A target of 8 px or one of 40 px: which is tracked better when there is noise?
-
-# %% tags=["hide-cell"]
-rms_of = {}
-for size in (8, 16, 40):
-    grainy = replace(scene, size=size, noise_variance=noise_variance)
-    rms_of[size] = np.sqrt(np.nanmean(errors_of(grainy, seed) ** 2))
-print({size: f"{rms:.2f} px" for size, rms in rms_of.items()})
-assert rms_of[8] > 1.5 * rms_of[40]
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# The larger one. Noise enters at the rim (inside, the coverage is
-# one), in about $R$ pixels at the distance $R$, so the variance of the centroid goes as
-# $R\cdot R^2/(R^2)^2=1/R$.
-# </details>
-#
-# **2.** (Explore.) What if the target hardly moves? Track it on circles with a radius of 0.3 and of 0.7 times its width.
-
-# %% tags=["hide-cell"]
-angle = np.linspace(0, 20, frames)
-for share in (0.3, 0.7):
-    circle = 256 + share * scene.size * np.column_stack([np.cos(angle), np.sin(angle)])
-    off = errors_of(scene, seed, circle)
-    print(f"radius {share * scene.size:.1f} px: seen in {np.isfinite(off).mean():.0%} of the frames, off by "
-          f"{np.sqrt(np.nanmean(off**2)):.3f} px (rms)")  # fmt: skip
-    assert np.nanmax(off) < {0.3: 1.0, 0.7: 0.05}[share]
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# The target never leaves its place on the smaller circle: the median takes its middle for
-# background, and what differs from that are slivers. `track` notices, puts the ground that is seen around the
-# place beneath it, and follows what then differs; as that ground is a guess, it is off by some hundredths of a pixel,
-# or tenths. On the larger circle every frame is as exact as ever.
-# </details>
-#
-# **3.** (Prove.) The centroid of a disc is exact if its coverage of every pixel is. Why, and what does
-# an 8-bit colour do to it?
-#
-# <details><summary>Solution</summary>
-#
-# The coverage of a pixel is the area of the disc within it, so that
-# $\sum_i c_i=\pi R^2$; and $\sum_i c_i\mathbf p_i$ with pixel centres $\mathbf p_i$ differs from $\int\mathbf x\,dA$
-# only in the pixels of the rim, where the centre of the covered part is not that of the pixel. These differences
-# have opposite signs at opposite ends of the disc and nearly cancel. Rounding to 1/255 of the contrast adds
-# independent errors of $1/(255\sqrt{12})$ in the $2\pi R$ pixels of the rim, a few ten-thousandths of a pixel together.
-# </details>
-#
-# **4.** (Implement.) One step of the Runge-Kutta method, and how its error falls with the step.
-
-# %% tags=["hide-cell"]
-def advance(law, x, h):
-    k1 = law(x)
-    k2 = law(x + h / 2 * k1)
-    k3 = law(x + h / 2 * k2)
-    return x + h / 6 * (k1 + 2 * k2 + 2 * k3 + law(x + h * k3))
-
-
-# %% tags=["hide-cell"]
-lorenz = SYSTEMS["Lorenz"]
-begin, span = np.array(lorenz.x0), np.array([0, lorenz.period / 50])
-exact, off = lorenz.simulate(span, begin)[-1], []
-for steps in (1, 2, 4):
-    end = begin
-    for _ in range(steps):
-        end = advance(lorenz, end, span[1] / steps)
-    assert np.allclose(end, dynamics.runge_kutta_4(lorenz, span, begin, substeps=steps)[-1])
-    off.append(np.linalg.norm(end - exact))
-print("each half of the step divides the error by", (np.array(off[:-1]) / off[1:]).round(1))
-assert (np.array(off[:-1]) > 10 * np.array(off[1:])).all()
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# By about 16, as the error of a fixed time is of the fourth order in the step.
-# </details>
+# [Four exercises](exercises/02_videos_and_tracking.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/02_videos_and_tracking.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

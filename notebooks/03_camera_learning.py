@@ -518,71 +518,8 @@ assert law_error[3, 128] > 2 * law_error[3, 1024]
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) The normal of camera 3 was measured one degree wrong. Do the residuals tell?
-
-# %% tags=["hide-cell"]
-tilt = np.deg2rad(1) * truth.cameras[2].rows[0]
-wrong = replace(start.cameras[2], normal=start.cameras[2].normal + tilt)
-tilted = learn_cameras(rounded, Rig([*start.cameras[:2], wrong]))
-missed, right = (np.hstack(residuals(rounded, rig)) for rig in (tilted, learn_cameras(rounded, start)))
-print([f"{np.sqrt(np.mean(r**2)):.1f} px" for r in (missed, right)])
-assert np.mean(missed**2) > 25 * np.mean(right**2)
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Yes: they are many times larger than those of whole pixels alone. Look
-# at the residuals before anything else.
-# </details>
-#
-# **2.** (Explore.) Are two cameras enough, one of them calibrated?
-
-# %% tags=["hide-cell"]
-pair = learn_cameras(rounded[:2], Rig(start.cameras[:2]))
-two = np.sqrt(np.mean((reconstruct(rounded[:2], pair) - x) ** 2, axis=0)) / pixel
-print(f"two cameras: {two.round(2)} px, three: {rmse.round(2)} px")
-assert two.max() < 3 * rmse.max()
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Yes. Two views leave one condition per frame, the epipolar one, and with it two unknowns against
-# hundreds of equations. The path is somewhat less exact, and
-# only one number of four per frame is left to raise an alarm.
-# </details>
-#
-# **3.** (Prove.) Why can no number of frames tell the scale of all cameras at once?
-#
-# <details><summary>Solution</summary>
-#
-# If $\mathbf x$ and the cameras fit the pixels, so do $\lambda\mathbf x$, the positions times $\lambda$ and the scales
-# times $\lambda$: $s\,\mathcal T\mathbf x_c+\Delta_c=\mathbf R^-\mathbf x$ is linear in all of them. Here the measured
-# positions would betray it, if they were exact; the one calibrated camera settles it without them.
-# </details>
-#
-# **4.** (Implement.) Solve Eq. (4) for cameras 2 and 3 by one call of `np.linalg.lstsq`.
-
-# %% tags=["hide-cell"]
-known, *unknown = start.cameras
-inverse = known.rows @ np.linalg.pinv(np.vstack([camera.rows for camera in unknown]))
-blocks, target = [], known.plane_coordinates(rounded[0])
-for camera, track, part in zip(unknown, rounded[1:], (inverse[:, :2], inverse[:, 2:]), strict=True):
-    X, Y = camera.centred(track).T
-    blocks.append(part @ np.array([[X, Y], [Y, -X]]).transpose(2, 0, 1))
-    target = target - part @ camera.offset
-c2, s2, c3, s3 = np.linalg.lstsq(np.concatenate(blocks, axis=2).reshape(-1, 4), target.ravel())[0]
-packaged = cameras.learn_cameras_eq4(rounded, start).cameras[1:]
-assert np.allclose(np.hypot([c2, c3], [s2, s3]), [camera.scale for camera in packaged])
-assert np.allclose(np.exp(1j * np.arctan2([s2, s3], [c2, c3])), np.exp(1j * np.array([camera.angle for camera in packaged])))
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Two rows a frame, four columns, and what is known on the right: the pixels of camera 1 in its plane, less what the offsets of
-# the others predict. The scales are the lengths of $(s\cos\vartheta,s\sin\vartheta)$, the angles their directions.
-# </details>
+# [Four exercises](exercises/03_camera_learning.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/03_camera_learning.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

@@ -1115,73 +1115,8 @@ save_table("solver_pendulum", rows, caption=caption)
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) Lorenz' law has one more origin with 7 terms. Where, and why does the solver not end up there?
-
-# %% tags=["hide-cell"]
-other = native.shift((0, 0, -28))
-print(other.text())
-assert other.support.sum() == native.support.sum()
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# At z = 28 the term 28 x in dy/dt is absorbed by xz, and a constant appears in dz/dt. The number of
-# terms is the same, so the data alone cannot decide. The solver penalises every axis along which the origin
-# is moved nearly as much as a term, and the one that leaves z alone wins.
-# </details>
-#
-# **2.** (Explore.) The pendulum's law from one record with 1 % noise had a term $xy^2$. Where does the term
-# come from? Give records on several orbits.
-
-# %% tags=["hide-cell"]
-def swing(start):
-    times = np.linspace(0, 50, 800)
-    y = solve_ivp(lambda _, s: (s[1], -np.sin(s[0])), (0, 50), (start, 0), t_eval=times, rtol=1e-9).y
-    return times, add_noise(y.T, 0.01, np.random.default_rng(int(start)))
-
-
-three = [swing(3.0), swing(2.0), swing(1.0)]
-cubic, quintic = discover(three), discover(three, degree=5)
-print(cubic, quintic, sep="\n\n")
-assert cubic.status == "suspect"
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# The energy $E=y^2/2-\cos x$ is the same all along a record, so $xy^2=2x\,(E+\cos x)$ there: different
-# functions in space, the same one on the orbit. Records on several orbits tell them apart. With degree 3 the curve then
-# misses the data, and says so. With degree 5 the series of the sine appears:
-# about $x-0.16\,x^3+0.006\,x^5$, with what the cut-off series leaves over.
-# </details>
-#
-# **3.** (Implement.) Repeat the step above until it changes nothing. How many does it take, and where does it end?
-
-# %% tags=["hide-cell"]
-path = [whole]
-while not (step(path[-1]) == path[-1]).all():
-    path.append(step(path[-1]))
-print(f"{len(path) - 1} steps, terms: {[int(kept.sum()) for kept in path]}")
-assert np.isclose(priced(path[-1]), priced(support))
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Terms go one by one, and it ends at the package's support. The package gets the cost of every change from one
-# inverse, by formulas like the $z^2$ of a drop, in place of a fit for each; and it starts from nothing as well, as a
-# descent may stop early.
-# </details>
-#
-# **4.** (Prove.) Show that a fit without one term loses $z^2$, the square of its coefficient over its standard error.
-#
-# <details><summary>Solution</summary>
-#
-# Minimise $(\boldsymbol\lambda-\mathbf c)^T\mathbf S(\boldsymbol\lambda-\mathbf c)$ under $\lambda_k=0$. With a multiplier $\mu$,
-# $\mathbf S(\boldsymbol\lambda-\mathbf c)=\mu\,\mathbf e_k$, so $\boldsymbol\lambda-\mathbf c=\mu\,\mathbf S^{-1}\mathbf e_k$. Row $k$ says
-# $-c_k=\mu\,(\mathbf S^{-1})_{kk}$, and the loss is $\mu^2(\mathbf S^{-1})_{kk}=c_k^2/(\mathbf S^{-1})_{kk}$. As $\mathbf S^{-1}$ is the
-# covariance, $(\mathbf S^{-1})_{kk}$ is the square of the standard error.
-# </details>
+# [Four exercises](exercises/04_spline_ado.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/04_spline_ado.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

@@ -38,7 +38,6 @@
 # %% tags=["parameters"]
 profile: str = "full"  # full or quick
 seed: int = 0  # number of the first trial: seeds the scenes in the videos
-noise: float = 0.05  # of the path in the second exercise, over its spread
 jobs: int = 2  # films or trials at a time
 
 # %%
@@ -460,81 +459,8 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) The paper's law for Tsucs2 has 0.63 in place of 1 as the coefficient of x in dy/dt. How
-# much of this does the relative $\ell_2$ error show?
-
-# %% tags=["hide-cell"]
-from vidsindy_lite.study import score
-
-truth = SYSTEMS["Tsucs2"].shift(REFERENCE_OFFSET)
-wrong = truth.coefficients.copy()
-wrong[truth.terms.index("x"), 1] = 0.63
-scored = score(replace(truth, coefficients=wrong), truth)
-print(f"l2 {scored.l2:.4f}, worst coefficient {scored.max_coefficient_error:.0%}")
-assert scored.l2 < 0.002
-assert round(scored.max_coefficient_error, 2) == 0.37
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Hardly anything. The constant 210
-# that the shift creates dominates the norm. Hence the column "worst coefficient".
-# </details>
-#
-# **2.** (Explore.) Add noise to the path of the first system, 5 % of its spread, and compare the methods again.
-
-# %% tags=["hide-cell"]
-from vidsindy_lite.study import Trial
-
-under = {m: run_trial(Trial(names[0], "noise", noise, seed, m, "path", frames)).score for m in METHODS}
-print(*(f"{method}: {scored}" for method, scored in under.items()), sep="\n")
-assert under["Gauss-Newton"].exact
-if full:  # with few frames all methods may be exact
-    assert not all(scored.exact for scored in under.values())
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# A twentieth of the spread is enough to tell the methods apart: Gauss-Newton keeps exactly the true terms, some of the
-# others find a false one or lose a true one.
-# </details>
-#
-# **3.** (Prove.) Which terms does a shift of the origin add to Lorenz' law, axis by axis?
-#
-# <details><summary>Solution</summary>
-#
-# With $\mathbf x=\mathbf y+\boldsymbol\Delta$ the term $xz$ gives $\Delta_xz+\Delta_zx$ beside itself, and $xy$ gives
-# $\Delta_xy+\Delta_yx$. So $\Delta_x\neq0$ adds $z$ to dy/dt and $y$ to dz/dt, $\Delta_y\neq0$ adds $x$ to dz/dt, and
-# $\Delta_z$ changes the coefficient of $x$ in dy/dt, which may even vanish. Constants come with every shift but
-# those along which the law does not move.
-# </details>
-#
-# **4.** (Implement.) Compute precision, recall and the relative $\ell_2$ error of a law from its table of coefficients.
-
-# %% tags=["hide-cell"]
-law, truth = found[names[0]], first[names[0]].truth
-terms = sorted({*law.terms, *truth.terms})
-
-
-def table(one):
-    rows = dict(zip(one.terms, one.coefficients, strict=True))
-    return np.array([rows.get(term, np.zeros(3)) for term in terms])
-
-
-ours, true = table(law), table(truth)
-right = np.sum((ours != 0) & (true != 0))
-by_hand = right / np.sum(ours != 0), right / np.sum(true != 0), np.linalg.norm(ours - true) / np.linalg.norm(true)
-scored = score(law, truth)
-assert np.allclose(by_hand, (scored.precision, scored.recall, scored.l2))
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Precision is the share of the found terms that are true, recall that of the true terms that are found. The error is
-# that of all coefficients as one vector, so the largest of them decides.
-# </details>
+# [Four exercises](exercises/05_discovery.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/05_discovery.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

@@ -707,68 +707,8 @@ for row in rows:
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) Gaps *and* noise: hide 20 % of SprottF in blocks, with 10 % noise. Does it still work?
-
-# %% tags=["hide-cell"]
-from vidsindy_lite import discover
-from vidsindy_lite.study import add_noise, drop_blocks, score
-
-draws = np.random.default_rng(seed)
-film = films_of["SprottF"][0]
-both = discover(film.t, drop_blocks(add_noise(film.x, 0.1, draws), 0.2, draws), systematic=film.systematic)
-print(both, score(both, film.truth), sep="\n")
-assert score(both, film.truth).exact or not full
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# It does: the gaps take a fifth of the samples, and with them some of the accuracy, as any fifth would.
-# </details>
-#
-# **2.** (Implement.) Model-A yourself: smooth SprottF with 10 % noise by a spline, regress its slopes on the library, and cut
-# small coefficients until none is left. How much closer is the law if curve and law are fitted together?
-
-# %% tags=["hide-cell"]
-from scipy.interpolate import make_smoothing_spline
-
-from vidsindy_lite import PolynomialSystem
-
-noisy = add_noise(film.x, 0.1, np.random.default_rng(seed))
-curves = [make_smoothing_spline(film.t, column) for column in noisy.T]
-path, slope = (np.stack([curve(film.t, order) for curve in curves], axis=1) for order in (0, 1))
-exponents = dynamics.monomial_exponents(3, 3)
-library = dynamics.monomials(path, exponents)
-regressed = np.linalg.lstsq(library, slope)[0]
-for _ in range(10):
-    regressed[np.abs(regressed) < 0.1] = 0
-    for j, kept in enumerate(regressed.T != 0):
-        regressed[kept, j] = np.linalg.lstsq(library[:, kept], slope[:, j])[0]
-apart = PolynomialSystem(film.truth.names, exponents, regressed)
-
-# %% tags=["hide-cell"]
-together = discover(film.t, noisy, systematic=film.systematic)
-print("apart:", score(apart, film.truth), "together:", score(together, film.truth), sep="\n")
-assert score(together, film.truth).max_coefficient_error < score(apart, film.truth).max_coefficient_error
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# The spline follows some of the noise, most of all at the ends, and its slopes follow more of it. Fitted together, every
-# sample takes part in every slope; the threshold, which who knows the truth may choose, is gone as well.
-# </details>
-#
-# **3.** (Prove.) Why does noise of 10 % cost a method that takes differences of neighbours so much more than one that
-# fits a curve?
-#
-# <details><summary>Solution</summary>
-#
-# A central difference over $2h$ of samples with errors $\sigma$ errs by $\sigma/(\sqrt2\,h)$, which grows as the frame
-# rate does: more samples make each of them worse, and their number makes up for only a part. A curve with $m$ free
-# numbers in a record of $n$ samples errs by about $\sigma\sqrt{m/n}$ in its values, and its slope by that over the
-# distance of its knots, which does not grow with the frame rate.
-# </details>
+# [Three exercises](exercises/06_robustness_and_ablation.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/06_robustness_and_ablation.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

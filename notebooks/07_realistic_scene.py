@@ -303,56 +303,8 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) How much of the error comes from the learned cameras? Reconstruct with the true ones.
-
-# %% tags=["hide-cell"]
-from vidsindy_lite import Rig, discover, reconstruct
-from vidsindy_lite.study import score
-
-known = discover(first.t, reconstruct(tracks, Rig.around(first.x)))
-print(first.score, score(known, first.truth), sep="\n")
-assert score(known, first.truth).exact
-assert max(first.score.l2, score(known, first.truth).l2) < (1e-3 if full else 1e-2)
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# None that matters: from learned and from true cameras the error of the law is below a thousandth, and which is the smaller one
-# is chance. What is left is the tracker's.
-# </details>
-#
-# **2.** (Implement.) An orthographic camera is an affine map, $\mathbf x_c=\mathbf A\mathbf x+\mathbf b$. Read $\mathbf A$ and $\mathbf b$ off
-# `camera.project`, and find the path from the tracks by least squares, without `reconstruct`.
-
-# %% tags=["hide-cell"]
-rig = Rig.around(first.x)
-b = np.hstack([camera.project(np.zeros((1, 3))) for camera in rig.cameras])
-A = np.hstack([camera.project(np.eye(3)) for camera in rig.cameras]) - b
-seen = np.isfinite(np.hstack(tracks)).all(axis=1)
-by_hand = np.linalg.lstsq(A.T, (np.hstack(tracks)[seen] - b).T)[0].T
-apart = np.abs(by_hand - reconstruct(tracks, rig)[seen]).max() / np.ptp(first.x)
-print(f"{seen.mean():.0%} of the frames are seen by all; by hand and by the package agree")
-assert apart < 1e-6
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# The image of the origin is $\mathbf b$, those of the three unit points, less $\mathbf b$, are the columns of $\mathbf A$. Six
-# equations for three unknowns, one such problem a frame, and all frames share the matrix. `reconstruct` does the same,
-# and uses frames that only two cameras see, too.
-# </details>
-#
-# **3.** (Prove.) Behind a tree the tracker sees a part of the target. Which way is the centre of that part off, and why
-# does `track` leave such frames out rather than correct them?
-#
-# <details><summary>Solution</summary>
-#
-# Away from the tree: the visible part lies on the free side. The error is up to half the width of the target, always
-# in the same direction along a pass, so that it does not average out; it would bend the path, and a smooth bend looks like a law.
-# A correction would need the target's full shape in that frame, and it tumbles. A frame that is left out costs one sample.
-# </details>
+# [Three exercises](exercises/07_realistic_scene.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/07_realistic_scene.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

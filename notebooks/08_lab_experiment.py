@@ -442,64 +442,8 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) Roll a ball of 57.15 mm instead. How much does the size of the ball matter?
-
-# %% tags=["hide-cell"]
-larger = [camera.ball_image(x, 57.15 / 2)[0] for camera in truth.cameras]
-error = rms(reconstruct(larger, learn_cameras(larger, start)) - x)
-print(f"{error:.3f} mm rms")
-assert error < 0.1
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Hardly. The shift of the centroid, and the error with it, grows with
-# the square of the radius.
-# </details>
-#
-# **2.** (Explore.) Are two perspective cameras enough, one of them calibrated?
-
-# %% tags=["hide-cell"]
-pair = learn_cameras(rounded[:2], Rig(start.cameras[:2]))
-print(f"{rms(reconstruct(rounded[:2], pair) - x):.2f} mm rms from whole pixels")
-assert rms(reconstruct(rounded[:2], pair) - x) < 3
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Yes, nearly as good as with three. But
-# with one condition per frame left, little would tell that a camera was measured wrong.
-# </details>
-#
-# **3.** (Prove.) The image of a ball is an ellipse. Which way is its centre off the image of the ball's centre?
-#
-# <details><summary>Solution</summary>
-#
-# The outline is where a cone about the ball meets the sensor. Its axis leads to the ball's centre, at an angle $\beta$ to
-# the optical axis; its sides leave at $\beta\pm\rho$ with $\sin\rho=r/d$, and meet the sensor at $f\tan(\beta\pm\rho)$. As the
-# tangent bends upwards, their middle lies farther out than $f\tan\beta$, by about
-# $f\rho^2\tan\beta/\cos^2\beta$: outwards, and growing with the square of the radius.
-# </details>
-#
-# **4.** (Implement.) Project the path into a camera by the pinhole equation above.
-
-# %% tags=["hide-cell"]
-one = truth.cameras[camera - 1]
-depth = (one.position - x) @ one.normal
-cos, sin = np.cos(one.angle), np.sin(one.angle)
-X, Y = np.array([[cos, -sin], [sin, cos]]) @ (one.rows @ (x - one.position).T) / (one.scale * depth)
-width, height = one.image_size
-by_hand = np.column_stack([(width - 1) / 2 + X, (height - 1) / 2 - Y])
-assert np.allclose(by_hand, one.project(x))
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# $\mathcal T(\vartheta)$ has orthonormal columns, so its inverse is its transpose; and the image counts from its upper left
-# pixel, with $v$ downwards.
-# </details>
+# [Four exercises](exercises/08_lab_experiment.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/08_lab_experiment.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

@@ -615,50 +615,8 @@ assert max(lost) > 0
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Prove.) A ball on a turntable is filmed. Why can the lags of its videos not be told, and does it matter?
-#
-# <details><summary>Solution</summary>
-#
-# The motion repeats itself: one turn more or less fits as well, and a warning says so. For the law it does
-# not matter as long as every turn is like the other: the views agree at each of these lags.
-# </details>
-#
-# **2.** (Explore.) Take away the positions of cameras 1 and 2 instead of that of camera 3. What happens?
-
-# %% tags=["hide-cell"]
-try:
-    learn_cameras(tracks, Rig([replace(c, position=None) for c in (first, second)] + [third]))
-    raise AssertionError("not refused")
-except ValueError as refusal:
-    print(refusal)
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# It is refused: one position is left, and the scene could be moved along the line of view of that camera
-# without any change in the images, if the two others are moved with it.
-# </details>
-#
-# **3.** (Implement.) The law of the two weights is linear. Solve it by a matrix exponential; how fast does the motion die away?
-
-# %% tags=["hide-cell"]
-from scipy.linalg import expm
-
-joined, x0, *_ = pair["springs"]
-A = np.array([joined(unit) for unit in np.eye(len(x0))]).T
-assert np.allclose(expm(3 * A) @ x0, joined.simulate(np.array([0.0, 3.0]), x0)[-1], atol=1e-6)
-print("by a factor e in", np.unique((-1 / np.linalg.eigvals(A).real).round(6)), "time units")
-assert np.allclose(np.linalg.eigvals(A).real, -0.1 / 2)
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# $\dot{\mathbf y}=\mathbf A\mathbf y$ has the solution $e^{\mathbf At}\mathbf y(0)$, and the columns of $\mathbf A$ are the law at
-# unit states. Every mode obeys $\lambda^2+0.1\lambda+\kappa=0$ with a stiffness $\kappa$ of its own, so all of them swing at their own pace and
-# die at the same one, half the drag.
-# </details>
+# [Three exercises](exercises/09_your_own_videos.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/09_your_own_videos.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

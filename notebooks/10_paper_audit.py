@@ -788,60 +788,8 @@ save_table("audit", findings, caption=caption)
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Implement.) Which numbers of true and false terms give a printed precision and recall? Try all of them for the
-# row of RayleighBenard, WeakSINDy. How many false positives would have made it consistent?
-
-# %% tags=["hide-cell"]
-def printed_as(hits, false, true_terms=11):
-    return f"{hits / true_terms:.2%}", f"{hits / (hits + false):.2%}"
-
-
-row = SCORES["Table S3", "WeakSINDy", "RayleighBenard"]
-asked = f"{row.recall:.2%}", f"{row.precision:.2%}"
-possible = [(hits, false) for hits in range(1, 12) for false in range(50) if printed_as(hits, false) == asked]
-print(f"printed: {row.false_positives} false; possible, as (true, false): {possible}")
-assert possible == audit.counts_behind(row, 11)
-assert not audit.could_be(row, 11)
-assert audit.could_be(replace(row, false_positives=10), 11)
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Ten: $11/(11+10)=52.38\,\%$. Printed are nine, for which P would be 55 %. With recall 100 % in every one of
-# five trials, no average helps.
-# </details>
-#
-# **2.** (Explore.) `fit_coordinates` has six free numbers. Give it a law with one coefficient that is really wrong, say a
-# half of $-10z$ in NoseHoover's dy/dt. What does it make of it?
-
-# %% tags=["hide-cell"]
-whole = truths["NoseHoover"]
-values = whole.coefficients.copy()
-values[whole.terms.index("z"), 1] *= 0.5
-halved = replace(whole, coefficients=values)
-fit = audit.fit_coordinates(halved, SYSTEMS["NoseHoover"], REFERENCE_OFFSET)
-taken, beyond = fit.misfit / score(halved, whole).l2, fit.misfit / audit.rounding_reach(halved, whole)
-print(f"misfit: {taken:.2f} of l2, {beyond:.0f} times what rounding explains; scales {fit.scale}")
-assert taken < 0.2
-assert beyond > 10
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# It takes most of $\ell_2$ away, by stretching z to the double. That is why a small misfit alone proves
-# nothing: this one is many times what rounding explains. Only a misfit below rounding is evidence.
-# </details>
-#
-# **3.** (Prove.) A table prints precision 100 % and one false positive for a mean of five trials. Can both be true?
-#
-# <details><summary>Solution</summary>
-#
-# If the mean of the precisions is 100 %, each of them is, as none can be more; then no trial has a false term, and
-# their mean number is 0. A number rounded up to 1 would need a mean of at least $\tfrac12$, three false terms in five trials, and each of
-# these trials has a precision below one. So no.
-# </details>
+# [Three exercises](exercises/10_paper_audit.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/10_paper_audit.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

@@ -49,7 +49,6 @@ from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     CONTESTANTS,
     ERRORS,
-    FLOWS,
     LORENZ_GRID,
     MOTIONS,
     ODEBENCH,
@@ -59,10 +58,8 @@ from vidsindy_lite.study import (
     FlowContest,
     LorenzContest,
     OdeContest,
-    corruption,
     plots,
     run_contest,
-    score,
     standings,
     sweep,
     term_errors,
@@ -393,51 +390,8 @@ if full:
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Explore.) How coarse may an integrator be before the law of a flow is lost?
-
-# %% tags=["hide-cell"]
-flow = FLOWS["Roessler"]
-t = flow.times(1500 if full else 400)
-for rtol in (1e-6, 1e-4, 1e-2):
-    path = corruption.coarse_path(flow, t, flow.x0, "RK45", rtol, rtol)
-    told = discover(t, path)
-    print(f"{rtol:g}: {score(told, flow)}; {told.status}")
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# The plateau of the law begins where the error of the integrator ends, and there is room for an error of about a
-# hundredth. Beyond it, the integrator's error is as large as the smallest terms.
-# </details>
-#
-# **2.** (Prove.) A clock that is wrong by $\tau(t)$ turns $\dot{\mathbf x}=\mathbf f(\mathbf x)$ into what law? For which
-# $\tau$ are the terms the same?
-#
-# <details><summary>Solution</summary>
-#
-# With $\mathbf y(t)=\mathbf x(t+\tau(t))$, $\dot{\mathbf y}=(1+\dot\tau)\,\mathbf f(\mathbf y)$. A constant $\dot\tau$
-# scales all coefficients alike and leaves the terms as they are; any other makes the law depend on time.
-# </details>
-#
-# **3.** (Implement.) Add a kind of error of your own, a dead zone: changes smaller than 1 % of the range are not seen.
-
-# %% tags=["hide-cell"]
-t, clean = flow.trajectory(1500 if full else 400)
-held = clean.copy()
-for k in range(1, len(held)):
-    small = np.abs(clean[k] - held[k - 1]) < 0.01 * np.ptp(clean, axis=0)
-    held[k, small] = held[k - 1, small]
-told = discover(t, held)
-print(f"{score(told, flow)}; {told.status}")
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Such an error lags behind the motion and depends on where that turns: it is neither white nor a function of the
-# place. Compare with `corruption.quantise` at the same size.
-# </details>
+# [Three exercises](exercises/11_scoreboard.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/11_scoreboard.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

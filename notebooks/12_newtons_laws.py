@@ -485,63 +485,8 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 # %% [markdown]
 # ## Exercises
 #
-# Each solution is folded: its code, which has run with this notebook, and what to see in it.
-#
-# **1.** (Prove.) Show that along one throw with linear drag $\ddot y=-g-c\,\dot y$ can be written as
-# $\ddot y=-a\,\dot x$ on the path.
-#
-# <details><summary>Solution</summary>
-#
-# $\dot x=\dot x_0e^{-ct}$ and $\dot y=-g/c+(\dot y_0+g/c)e^{-ct}$, so
-# $\ddot y=-c(\dot y_0+g/c)e^{-ct}=-\frac{c\,\dot y_0+g}{\dot x_0}\,\dot x$. The constant $a$ depends on the
-# throw: two throws refute it.
-# </details>
-#
-# **2.** (Explore.) Throw twice. Is that enough?
-
-# %% tags=["hide-cell"]
-two = discover(runs[:2], degree=2, order=2)
-print(two)
-assert (two.system.support == fallen.system.support).all()
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# The law is right, with error bars that are wider.
-# </details>
-#
-# **3.** (Implement.) Let the order be found, by leaving `order` out: what is said of the throws, and why?
-
-# %% tags=["hide-cell"]
-open_order = discover(runs, degree=2)
-print(open_order.note)
-assert open_order.system.names == fallen.system.names
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# Order 2: no law of order 1 does as well.
-# </details>
-#
-# **4.** (Explore.) Let the pendulum hang in a wind that pushes with $0.5\cos\theta$. Is the push found beside the
-# sine, and what does a start at 0.1 rad say of it?
-
-# %% tags=["hide-cell"]
-pushed = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -0.1, "cos(x)": 0.5}}
-windy_law = PolynomialSystem.from_terms(pushed, library=sines)
-laws_of = {}
-for angle in (1.5, 0.1):
-    clean = windy_law.simulate(u, np.array([angle, 0.0]))[:, :1]
-    noisy = clean + 0.01 * clean.std() * rng.standard_normal(clean.shape)
-    print(laws_of.setdefault(angle, discover(u, noisy, order=2, library=sines)))
-assert (laws_of[1.5].system.support == windy_law.support).all()
-
-# %% [markdown]
-# <details><summary>Solution</summary>
-#
-# At 1.5 rad it is. At 0.1 rad the pendulum is a spring about another point: a line is as good as a sine, and a
-# constant as a cosine. The first is said in a warning.
-# </details>
+# [Four exercises](exercises/12_newtons_laws.ipynb), each with a blank cell and a check that says *right* or fails. Their
+# [solutions](solutions/12_newtons_laws.ipynb) lie apart.
 
 # %% [markdown]
 # ## Run time and versions

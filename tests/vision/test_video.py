@@ -42,7 +42,9 @@ def test_lossless_files_are_exact(tmp_path, name, codec, size):
     assert video_info(path) == (5, pytest.approx(30), size)
 
 
-@pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mp4v"), ("a.avi", "MJPG")])
+@pytest.mark.parametrize(
+    ("name", "codec"), [("a.mp4", "mp4v"), ("a.avi", "MJPG"), ("a.mp4", "H264")]
+)
 def test_lossy_files_are_close(tmp_path, name, codec):
     frames = list(render(np.full((4, 2), 45.0), Scene("sky", image_size=SMALL)))
     back = list(read_video(write_video(tmp_path / name, frames, codec=codec)))
@@ -231,6 +233,7 @@ ALL = [
     ("a.mp4", "mp4v"),
     ("a.avi", "MJPG"),
     ("a.mkv", "MJPG"),
+    ("a.mp4", "H264"),
 ]
 
 

@@ -53,6 +53,7 @@ CODECS = {
     "qtrle": _Codec((".mov",), "qtrle", "rgb24"),
     "FFV1": _Codec((".mkv", ".avi"), "ffv1", "bgr0"),
     "mp4v": _Codec((".mp4",), "mpeg4", "yuv420p", 1),
+    "H264": _Codec((".mp4", ".mkv"), "libx264", "yuv420p"),
     "MJPG": _Codec((".avi", ".mkv"), "mjpeg", "yuvj420p", 3),
 }
 
@@ -92,13 +93,13 @@ def write_video(
     Parameters
     ----------
     path : path
-        .mov (qtrle) or .mkv (FFV1), both lossless; .mp4 only with the lossy codec "mp4v".
+        .mov (qtrle) or .mkv (FFV1), both lossless; .mp4 only with a lossy codec.
     frames : iterable of ndarray, shape (height, width, 3), uint8
         Blue-green-red, all of one size.
     fps : float or Fraction
         Frames per second, in [0.01, 10000]; at most 1000 in .mkv, whose clock counts milliseconds.
-    codec : {"qtrle", "FFV1", "mp4v", "MJPG"}, optional
-        Lossless by default; "mp4v" and "MJPG" are lossy.
+    codec : {"qtrle", "FFV1", "mp4v", "MJPG", "H264"}, optional
+        Lossless by default; "mp4v", "MJPG" and "H264", which phones write, are lossy.
 
     Returns
     -------

@@ -1,0 +1,74 @@
+"""Exercises, made of their solutions, which lie apart: notebooks/solutions/ is the source.
+
+A cell with the tag `solution` is not in the exercise: text is left out, code becomes a blank cell.
+What stands behind a blank cell is a check, which says whether what was written there is right.
+
+    python tests/exercises.py             what has changed
+    python tests/exercises.py --force     all solutions executed again
+"""
+
+import copy
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import jupytext
+import nbformat
+from nbformat import NotebookNode
+
+from vidsindy_lite.companion.compare import same_notebook
+from vidsindy_lite.companion.run import execute, tidy
+from vidsindy_lite.repository import PACKAGE, write_file
+
+NOTEBOOKS = PACKAGE.parent / "notebooks"
+SOLUTIONS = sorted((NOTEBOOKS / "solutions").glob("*.py"))
+BLANK = "# Your code here."
+
+
+def exercise(solutions: Path) -> NotebookNode:
+    """The notebook with blank cells, from the source half of its solutions."""
+    source = jupytext.read(solutions)
+    cells = []
+    for cell in copy.deepcopy(source.cells):
+        if "solution" in cell.metadata.pop("tags", []):
+            if cell.cell_type == "markdown":
+                continue
+            cell.source = BLANK
+        cell.id = f"cell-{len(cells):02d}"
+        cell.source = cell.source.replace("# Solutions: ", "# Exercises: ", 1)
+        cells.append(cell)
+    metadata = {key: source.metadata[key] for key in source.metadata if key == "kernelspec"}
+    metadata["jupytext"] = {"formats": "ipynb"}  # or JupyterLab writes a .py half beside it
+    return nbformat.v4.new_notebook(cells=cells, metadata=metadata)
+
+
+def executed(solutions: Path) -> NotebookNode:
+    """Solutions with their outputs."""
+    with TemporaryDirectory() as folder:
+        return tidy(execute(solutions, {}, folder), jupytext.read(solutions))
+
+
+def is_new(solutions: Path) -> bool:
+    """Whether the executed half is not of this source."""
+    half = solutions.with_suffix(".ipynb")
+    if not half.exists():
+        return True
+    ours, theirs = jupytext.read(solutions).cells, nbformat.read(half, 4).cells
+    return [cell.source for cell in ours] != [cell.source for cell in theirs]
+
+
+def write(half: Path, notebook: NotebookNode) -> None:
+    """Put a notebook into a file."""
+    half.parent.mkdir(exist_ok=True)
+    write_file(half, (nbformat.writes(notebook) + "\n").encode())
+
+
+if __name__ == "__main__":
+    for path in SOLUTIONS:
+        write(NOTEBOOKS / "exercises" / f"{path.stem}.ipynb", exercise(path))
+        half = path.with_suffix(".ipynb")
+        if "--force" in sys.argv or is_new(path):
+            notebook = executed(path)
+            if not half.exists() or not same_notebook(nbformat.read(half, 4), notebook):
+                write(half, notebook)
+                print(half.relative_to(NOTEBOOKS), flush=True)

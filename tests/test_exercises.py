@@ -1,0 +1,141 @@
+"""Exercises and their solutions: the pair agrees, checks hold for these and for no blank."""
+
+import ast
+import re
+
+import jupytext
+import nbformat
+import pytest
+from exercises import BLANK, NOTEBOOKS, SOLUTIONS, exercise
+from test_notebooks import LONGEST, count_lines, execution_problems, hash_problems, pair_problems
+
+SOURCES = sorted(NOTEBOOKS.glob("*.py"))
+KINDS = r"^\*\*(\d)\.\*\* \((?:Explore|Implement|Prove)\.\)"
+
+
+def check_problems(path):
+    """Exercises without a blank cell, and checks that look at nothing of what it made."""
+    notebook, problems, made, asked = jupytext.read(path), [], None, []
+    for cell in notebook.cells:
+        tags = cell.metadata.get("tags", [])
+        if cell.cell_type == "markdown":
+            asked += re.findall(KINDS, cell.source, re.MULTILINE)
+        elif "solution" in tags:
+            made = (made or set()) | names(cell.source, ast.Store)
+        elif made is not None:
+            if not made & names(cell.source, ast.Load) or 'print("right")' not in cell.source:
+                problems.append(f"exercise {asked[-1]}: its check sees nothing of the answer")
+            made, asked = None, asked[:-1]
+    problems += [f"exercise {number}: no check" for number in asked]
+    wanted = [f"cell {i}" for i, c in enumerate(notebook.cells) if count_cell(c) > LONGEST]
+    return problems + [f"{cell}: more than {LONGEST} lines" for cell in wanted]
+
+
+def names(source, context):
+    """Names that a cell sets or reads, also by def."""
+    nodes = list(ast.walk(ast.parse(source)))
+    found = {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, context)}
+    defined = {n.name for n in nodes if isinstance(n, ast.FunctionDef)}
+    return found | (defined if context is ast.Store else set())
+
+
+def count_cell(cell):
+    return count_lines(cell.source) if cell.cell_type == "code" else 0
+
+
+def run_cells(notebook, seed):
+    """All code cells in one namespace, from another seed."""
+    space = {"__name__": "__main__"}
+    for index, cell in enumerate(notebook.cells):
+        if cell.cell_type == "code":
+            source = re.sub(r"^seed: int = 0", f"seed: int = {seed}", cell.source)
+            exec(compile(source, f"cell {index}", "exec"), space)
+
+
+# ------------------------------------------------------------------------------- our exercises pass
+
+
+def test_every_notebook_has_exercises():
+    assert [path.stem for path in SOLUTIONS] == [path.stem for path in SOURCES]
+    made = {path.stem for path in (NOTEBOOKS / "exercises").glob("*.ipynb")}
+    assert made == {path.stem for path in SOURCES}
+
+
+@pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("gate", [check_problems, pair_problems, execution_problems, hash_problems])
+def test_solutions_pass(path, gate):
+    assert gate(path) == []
+
+
+@pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
+def test_exercises_are_their_solutions_with_blank_cells(path):
+    committed = nbformat.read(NOTEBOOKS / "exercises" / f"{path.stem}.ipynb", 4)
+    assert committed == exercise(path), "python tests/exercises.py makes them"
+    questions = sum(len(re.findall(KINDS, c.source, re.MULTILINE)) for c in committed.cells)
+    assert 2 <= questions <= 4
+    assert sum(cell.source == BLANK for cell in committed.cells) == questions
+
+
+@pytest.mark.notebooks
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
+def test_solutions_are_right(path, seed):
+    run_cells(jupytext.read(path), seed)
+
+
+@pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
+def test_a_wrong_letter_is_not_right(path):
+    """Of the checks that know an answer by its checksum."""
+    for cell in jupytext.read(path).cells:
+        for check in re.findall(r"^assert crc32\(f.*\{answer\}.*$", cell.source, re.MULTILINE):
+            with pytest.raises(AssertionError, match="not yet"):
+                exec(f"from zlib import crc32\nanswer = 'wrong'\n{check}", {})
+
+
+# ------------------------------------------------------------------------------ each gate can fail
+
+CELLS = """\
+# %% [markdown]
+# **1.** (Prove.) One and one?
+
+# %% tags=["solution"]
+answer = 2
+
+# %%
+assert answer == 2
+print("right")
+
+# %% [markdown] tags=["solution"]
+# Two.
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("answer = 2", "answer = 3", None),
+        ("assert answer == 2", "assert 1 + 1 == 2", "sees nothing"),
+        ('print("right")', 'print("done")', "sees nothing"),
+        ('assert answer == 2\nprint("right")', "", "sees nothing"),
+        ('# %% tags=["solution"]', "# %%", "no check"),
+        ("answer = 2", "answer = 2\n" * 16, "more than 15 lines"),
+    ],
+)
+def test_check_gate_fails(tmp_path, old, new, problem):
+    path = tmp_path / "01_first.py"
+    assert old in CELLS
+    path.write_text(CELLS)
+    assert check_problems(path) == []
+    path.write_text(CELLS.replace(old, new))
+    assert all(problem in found for found in check_problems(path))
+    assert bool(check_problems(path)) == bool(problem)
+
+
+def test_an_answer_that_is_wrong_is_seen(tmp_path):
+    path = tmp_path / "01_first.py"
+    path.write_text(CELLS.replace("answer = 2", "answer = 3"))
+    with pytest.raises(AssertionError):
+        run_cells(jupytext.read(path), 0)
+    path.write_text(CELLS)
+    with pytest.raises(NameError, match="answer"):
+        run_cells(exercise(path), 0)
