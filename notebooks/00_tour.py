@@ -252,8 +252,13 @@ good = int(np.argmax(apart)) if apart.any() else len(t)
 print(f"good for {t[good - 1] / period:.1f} periods; the videos last {shot.t[-1] / period:.1f}")
 assert t[good - 1] > (4 if noise_variance == 0 else 1) * period
 
-# %%
-fig = plots.plot_attractors({system: (truth[:2000], forecast[:2000])})
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(6.5, 5), subplot_kw=plots.SPACE)
+axes.plot(*truth[:2000].T, color="0.75", lw=3, label="truth")
+axes.plot(*forecast[:2000].T, color="C0", lw=0.8, label="discovered law")
+axes.set_title(system, loc="center")
+plots.finish_space(axes, azimuth=-60, elevation=20, zoom=0.9)
+fig.legend(loc="outside upper center", ncols=2)
 caption = "Five periods of the discovered law (blue) on the true one (grey), from one start."
 numbers = {"t": t[:2000:5], "truth": truth[:2000:5], "discovered": forecast[:2000:5]}
 save_figure("tour_attractor", fig, caption=caption, numbers=numbers)
@@ -308,7 +313,7 @@ save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "eq
 # **1.** (Explore.) How few samples are enough? Discover from every second, fourth and eighth of the points in
 # `found.x`.
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 from vidsindy_lite import discover
 
 for step in (2, 4, 8):
@@ -327,7 +332,7 @@ for step in (2, 4, 8):
 # **2.** (Implement.) Follow the found law yourself, with the classical Runge-Kutta method of order four, for a tenth of the
 # record, and compare with `found.discovery.simulate`.
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 slope, times = found.discovery.predict, found.t[: frames // 10]
 states = [found.discovery.curve(times[:1])[0]]
 for h in np.diff(times):

@@ -245,8 +245,17 @@ errors = {name: errors_of(method, pixel_noise, trials) for method, name in names
 spread = {name: error.std(axis=0).max(axis=0) for name, error in errors.items()}
 assert (spread["joint fit"] < spread["Eq. (4)"]).all()
 
-# %%
-fig = plots.plot_calibration_errors(errors)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(1, 2, figsize=(9, 4.2), sharex=True, sharey=True)
+for i, axes in enumerate(panels):
+    axes.axhline(0, color="k", lw=0.6)
+    axes.axvline(0, color="k", lw=0.6)
+    for (name, error), marker in zip(errors.items(), "so", strict=True):
+        scale, angle = error[:, i].T
+        axes.plot(100 * scale, 1e3 * angle, marker, ms=4, alpha=0.7, mec="none", label=name)
+    axes.set(title=f"camera {i + 2}", xlabel="error of scale (%)")
+panels[0].set_ylabel("error of angle (mrad)")
+fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
 caption = (
     f"Errors of the learned cameras in repeated trials with {pixel_noise:g} px noise: the joint fit is closer."
 )
@@ -274,8 +283,20 @@ scale_errors = {
 bias = {name: error[-1].mean() for name, error in scale_errors.items()}
 assert abs(bias["joint fit"]) < abs(bias["Eq. (4)"])
 
-# %%
-fig = plots.plot_scale_error(noise, scale_errors)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
+for (name, error), style in zip(scale_errors.items(), ("s-", "o-"), strict=True):
+    left.loglog(noise, 100 * np.sqrt(np.mean(error**2, axis=1)), style, label=name)
+    deviation = error.std(axis=1) / np.sqrt(repeats)
+    right.errorbar(noise, 100 * error.mean(axis=1), 200 * deviation, fmt=style, label=name)
+right.axhline(0, color="k", lw=0.6)
+left.set(title="rms error", ylabel="rms error of scale (%)")
+right.set(title="bias", ylabel="mean error of scale (%)", xscale="log")
+for axes in (left, right):
+    axes.set_xlabel("noise per pixel coordinate (px)")
+    axes.set_xticks(noise, [f"{value:g}" for value in noise])
+    axes.minorticks_off()
+right.legend(loc="lower left")
 caption = (
     "Scale of camera 3: rms and mean error over repeated trials; Eq. (4) shrinks it with noise."
 )
@@ -522,7 +543,7 @@ assert law_error[3, 128] > 2 * law_error[3, 1024]
 #
 # **1.** (Explore.) The normal of camera 3 was measured one degree wrong. Do the residuals tell?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 tilt = np.deg2rad(1) * truth.cameras[2].rows[0]
 wrong = replace(start.cameras[2], normal=start.cameras[2].normal + tilt)
 tilted = learn_cameras(rounded, Rig([*start.cameras[:2], wrong]))
@@ -539,7 +560,7 @@ assert np.mean(missed**2) > 25 * np.mean(right**2)
 #
 # **2.** (Explore.) Are two cameras enough, one of them calibrated?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 pair = learn_cameras(rounded[:2], Rig(start.cameras[:2]))
 two = np.sqrt(np.mean((reconstruct(rounded[:2], pair) - x) ** 2, axis=0)) / pixel
 print(f"two cameras: {two.round(2)} px, three: {rmse.round(2)} px")
@@ -564,7 +585,7 @@ assert two.max() < 3 * rmse.max()
 #
 # **4.** (Implement.) Solve Eq. (4) for cameras 2 and 3 by one call of `np.linalg.lstsq`.
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 known, *unknown = start.cameras
 inverse = known.rows @ np.linalg.pinv(np.vstack([camera.rows for camera in unknown]))
 blocks, target = [], known.plane_coordinates(rounded[0])

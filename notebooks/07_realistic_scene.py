@@ -136,10 +136,15 @@ print(*told, sep="\n")
 assert all("the target is lost in" in doubt for doubt in told)
 assert len(told) <= len(runs) // 2
 
-# %%
-fig = plots.plot_confidence(
-    [view.visible for view in first.views], [view.track.confidence for view in first.views]
-)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(3, 1, figsize=(9, 4.6), sharex=True, sharey=True)
+for axes, title, view in zip(panels, titles, first.views, strict=True):
+    share = view.visible
+    axes.fill_between(np.arange(len(share)), share, color="0.85", step="mid", label="visible share")
+    axes.plot(view.track.confidence, color="C0", lw=1, label="confidence of the tracker")
+    axes.set(ylabel=title, ylim=(0, 1.05))
+panels[-1].set(xlabel="frame", xlim=(0, len(share) - 1))
+fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
 caption = "How much of the target can be seen, and how sure the tracker is."
 numbers = {title: view.track.confidence for title, view in zip(titles, first.views, strict=True)}
 save_figure("scene_confidence", fig, caption=caption, numbers=numbers)
@@ -206,7 +211,8 @@ assert 0 < gap.mean() < np.mean(alone)
 assert (error < 0.01 * first.x.std(axis=0)).all()
 
 # %%
-fig = plots.plot_gaps(first.t, first.path, first.x)
+both = {"truth": first.x, "reconstructed": first.path}
+fig = plots.plot_path(first.t, both, "hidden", plots.DASHED, "time units")
 caption = "The reconstructed path of the realistic scene; shaded: fewer than two cameras see it."
 save_figure(
     "fig_4b", fig, caption=caption, numbers={"t": first.t, "path": first.path, "truth": first.x}
@@ -307,7 +313,7 @@ assert all(trial.score.l2 <= 1e-2 for trial in runs)
 #
 # **1.** (Explore.) How much of the error comes from the learned cameras? Reconstruct with the true ones.
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 from vidsindy_lite import Rig, discover, reconstruct
 from vidsindy_lite.study import score
 
@@ -326,7 +332,7 @@ assert max(first.score.l2, score(known, first.truth).l2) < (1e-3 if full else 1e
 # **2.** (Implement.) An orthographic camera is an affine map, $\mathbf x_c=\mathbf A\mathbf x+\mathbf b$. Read $\mathbf A$ and $\mathbf b$ off
 # `camera.project`, and find the path from the tracks by least squares, without `reconstruct`.
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 rig = Rig.around(first.x)
 b = np.hstack([camera.project(np.zeros((1, 3))) for camera in rig.cameras])
 A = np.hstack([camera.project(np.eye(3)) for camera in rig.cameras]) - b

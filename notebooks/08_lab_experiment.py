@@ -48,6 +48,7 @@ from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import LogLocator
 
 from vidsindy_lite import (
     Rig,
@@ -202,9 +203,25 @@ assert np.isclose(measured_rms[0], rms(error), rtol=0.05)  # from pixels as from
 # %%
 by_path = length(error).reshape(3, -1), length(predicted).reshape(3, -1)
 by_distance = {"measured": np.array(measured_rms), "first order": np.array(predicted_rms)}
-fig = plots.plot_orthographic_error(
-    np.arange(frames) / lab.FPS, *by_path, np.array(ratio), by_distance
-)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+seconds = np.arange(frames) / lab.FPS
+for k, (measured, expected) in enumerate(zip(*by_path, strict=True)):
+    left.plot(seconds, measured, f"C{k}", label=f"path {k + 1}")
+    left.plot(seconds, expected, "--k", lw=1)
+left.plot([], [], "--k", lw=1, label="first order")
+left.set(title="along the paths", xlabel="time (s)", ylabel="error (mm)", ylim=(0, None))
+left.legend()
+for (name, values), style in zip(by_distance.items(), ("oC1", "--k"), strict=True):
+    right.loglog(ratio, values, style, label=name)
+right.set(title="as the cameras move away", ylabel="rms error (mm)")
+right.set_xticks(ratio, [f"{value:.2g}" for value in ratio])
+right.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+right.yaxis.set_major_formatter("{x:g}")
+right.minorticks_off()
+right.set_xlabel("depth range / distance")
+right.legend()
 caption = "Error of orthographic cameras: along the paths, and against depth range over distance."
 numbers = {"measured": by_path[0], "first order": by_path[1], "ratio": ratio, **by_distance}
 save_figure("lab_orthographic_error", fig, caption=caption, numbers=numbers)
@@ -240,8 +257,12 @@ low, middle, high = np.quantile(anywhere, (0.05, 0.5, 0.95))
 print(f"median {middle:.1f} mm, nine of ten between {low:.1f} and {high:.1f} mm")
 assert low < published < high
 
-# %%
-fig = plots.plot_anywhere(anywhere, published)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7, 3.8))
+axes.ecdf(anywhere, color="C1", label="orthographic cameras, somewhere around the table")
+axes.axvline(published, color="k", ls="--", lw=1.2, label=f"the paper's, {published:.2f} mm")
+axes.set(xlabel="error at the marked point (mm)", ylabel="share of rigs below", xlim=(0, None))
+fig.legend(loc="outside upper center", ncols=2)
 caption = "Error at the marked point for rigs put up at random: the paper's is an ordinary one."
 save_figure("lab_anywhere", fig, caption=caption, numbers={"error": anywhere})
 
@@ -283,7 +304,33 @@ assert rms(by_pinhole - x) < 0.1
 models = {"orthographic": by_flat, "perspective": by_pinhole}
 points = {"marked point": lab.MARKED, "the paper's result for it": lab.IDENTIFIED}
 found = {name: values.reshape(paths.shape) for name, values in models.items()}
-fig = plots.plot_table(truth, paths, found, points)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig = plt.figure(figsize=(10.5, 4.2), layout="compressed")
+panels = fig.subplot_mosaic(
+    [["above", "space"]], width_ratios=(1, 1.15), per_subplot_kw={"space": plots.SPACE}
+)
+above, space = panels["above"], panels["space"]
+for path in paths:
+    space.plot(*path.T, color="k", lw=1.2)
+for i, camera in enumerate(truth.cameras, start=1):
+    place = np.array(camera.position)
+    looked_at = place - camera.normal * length(place - x.mean(axis=0))
+    space.plot(*np.transpose([place, looked_at]), "s:", color="0.4", ms=8, lw=1, markevery=2)
+    space.text(*place + [0, 0, 130], f"$C_{i}$", ha="center")
+space.plot([0, 750, 750, 0, 0], [0, 0, 750, 750, 0], 0, color="0.6", lw=0.8)
+space.set_zlim3d(0, space.get_zlim3d()[1])
+plots.finish_space(space, azimuth=-65, elevation=25, zoom=1.12, unit="mm")
+space.locator_params(nbins=3)
+drawn = {"truth": (paths, {"color": "0.75", "lw": 5})}
+drawn |= {name: (found[name], {"color": f"C{1 - i}", "lw": 1.3}) for i, name in enumerate(found)}
+for name, (lines, style) in drawn.items():
+    for k, path in enumerate(lines):
+        above.plot(*path[:, :2].T, label=name if k == 0 else None, **style)
+for (name, point), style in zip(points.items(), ("*k", "*C4"), strict=True):
+    above.plot(*point[:2], style, ms=12, mec="white", mew=0.6, ls="", label=name)
+above.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+fig.legend(*above.get_legend_handles_labels(), loc="outside upper center", ncols=5)
 caption = "The paths from above: true, by orthographic and by perspective cameras; and the scene."
 save_figure("lab_table", fig, caption=caption, numbers={"truth": paths, **found})
 
@@ -354,7 +401,14 @@ save_table("lab_models", rows, caption=caption, tolerance=loose)
 
 # %%
 lengths = {name: length(path - x) for name, (_, path) in results.items()}
-fig = plots.plot_model_errors(lengths)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(8, 4))
+for (name, error), colour, style in zip(lengths.items(), (1, 0, 2, 3), ("-", "--", "-.", ":"), strict=True):
+    axes.ecdf(error, color=f"C{colour}", ls=style, label=name)
+axes.axvline(1, color="0.6", lw=0.8)
+axes.set(xscale="log", xlabel="error in space (mm)", ylabel="share of frames below")
+fig.legend(loc="outside upper center", ncols=2)
 caption = "Error in space by the model of the cameras; the vertical line is one millimetre."
 save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 
@@ -446,7 +500,7 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 #
 # **1.** (Explore.) Roll a ball of 57.15 mm instead. How much does the size of the ball matter?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 larger = [camera.ball_image(x, 57.15 / 2)[0] for camera in truth.cameras]
 error = rms(reconstruct(larger, learn_cameras(larger, start)) - x)
 print(f"{error:.3f} mm rms")
@@ -461,7 +515,7 @@ assert error < 0.1
 #
 # **2.** (Explore.) Are two perspective cameras enough, one of them calibrated?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 pair = learn_cameras(rounded[:2], Rig(start.cameras[:2]))
 print(f"{rms(reconstruct(rounded[:2], pair) - x):.2f} mm rms from whole pixels")
 assert rms(reconstruct(rounded[:2], pair) - x) < 3
@@ -485,7 +539,7 @@ assert rms(reconstruct(rounded[:2], pair) - x) < 3
 #
 # **4.** (Implement.) Project the path into a camera by the pinhole equation above.
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 one = truth.cameras[camera - 1]
 depth = (one.position - x) @ one.normal
 cos, sin = np.cos(one.angle), np.sin(one.angle)

@@ -365,7 +365,20 @@ assert as_z["difference / rounding"] < 1
 # %%
 differences = {f"{row['system']}, {row['method']}": row["difference / rounding"] for row in rows}
 differences["WangSun, PySINDy, 82.27 as z"] = as_z["difference / rounding"]
-fig = plots.plot_recomputed(differences)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7.5, 0.32 * len(differences) + 1.1))
+heights = np.arange(len(differences))[::-1]
+values = np.maximum(list(differences.values()), 1e-3)
+within = values <= 1
+axes.axvspan(0.8e-3, 1, color="0.92", zorder=0)
+axes.plot(values[within], heights[within], "o", label="within the rounding of the print")
+axes.plot(values[~within], heights[~within], "s", label="not explained by rounding")
+axes.set(xscale="log", xlim=(0.8e-3, 1e2), ylim=(-0.7, len(heights) - 0.3))
+axes.set_yticks(heights, list(differences))
+axes.set_xlabel("|recomputed - printed| / largest effect of rounding")
+axes.grid(axis="y", visible=False)
+fig.legend(loc="outside upper center", ncols=2)
 caption = "Printed against recomputed l2 errors of Table 1, in units of what rounding can explain."
 save_figure("audit_l2_figure", fig, caption=caption, numbers=differences)
 
@@ -503,8 +516,25 @@ for name, law in (("NoseHoover", LAWS["PySINDy", "NoseHoover"]), ("WangSun", men
     }
     ratios[name] = {key: audit.coefficient_ratios(fit, truths[name]) for key, fit in fits.items()}
 
-# %%
-fig = plots.plot_ratios(ratios)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+counts = [len(series["Table S2"]) for series in ratios.values()]
+fig, panels = plt.subplots(
+    len(ratios), 1, figsize=(7.5, 0.23 * sum(counts) + 2), sharex=True, height_ratios=counts
+)
+for axes, (name, series), count in zip(panels, ratios.items(), counts, strict=True):
+    heights = np.arange(count)[::-1]
+    for value in (1, 10):
+        axes.axvline(value, color="k", lw=0.8, ls=":")
+    for (label, by_term), marker in zip(series.items(), "so^", strict=True):
+        values = np.array(list(by_term.values()))
+        axes.plot(np.where(values > 0, values, np.nan), heights, marker, mfc="none", label=label)
+    axes.set(xscale="log", xlim=(0.4, 20), title=name, ylim=(-0.7, count - 0.3))
+    axes.set_yticks(heights, list(by_term))
+    axes.set_xticks((0.5, 1, 2, 5, 10, 20), ("0.5", "1", "2", "5", "10", "20"))
+    axes.minorticks_off()
+    axes.grid(axis="y", visible=False)
+axes.set_xlabel("coefficient / true coefficient")
+fig.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
 caption = "PySINDy's coefficients over the true ones (no symbol: not found): printed with a wrong clock."
 save_figure("audit_factor_ten", fig, caption=caption, numbers=ratios)
 
@@ -692,8 +722,17 @@ for name, truth in truths.items():
     constant = squares[truth.terms.index("1")] / squares.sum()
     shares[name] = {"constants": constant, "all other terms": 1 - constant}
 
-# %%
-fig = plots.plot_what_l2_sees(shares)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7.5, 3.2))
+left = np.zeros(len(shares))
+for kind, colour in (("constants", "C0"), ("all other terms", "C4")):
+    values = np.array([parts[kind] for parts in shares.values()])
+    axes.barh(list(shares), values, left=left, color=colour, label=kind)
+    left += values
+axes.invert_yaxis()
+axes.set(xlim=(0, 1), xlabel="share of the squared norm")
+axes.grid(axis="y", visible=False)
+fig.legend(loc="outside upper center", ncols=3)
 caption = "Share of the constants in the squared norm of each ground truth of Table S2."
 save_figure("audit_norm", fig, caption=caption, numbers=shares)
 
@@ -793,7 +832,7 @@ save_table("audit", findings, caption=caption)
 # **1.** (Implement.) Which numbers of true and false terms give a printed precision and recall? Try all of them for the
 # row of RayleighBenard, WeakSINDy. How many false positives would have made it consistent?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 def printed_as(hits, false, true_terms=11):
     return f"{hits / true_terms:.2%}", f"{hits / (hits + false):.2%}"
 
@@ -816,7 +855,7 @@ assert audit.could_be(replace(row, false_positives=10), 11)
 # **2.** (Explore.) `fit_coordinates` has six free numbers. Give it a law with one coefficient that is really wrong, say a
 # half of $-10z$ in NoseHoover's dy/dt. What does it make of it?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 whole = truths["NoseHoover"]
 values = whole.coefficients.copy()
 values[whole.terms.index("z"), 1] *= 0.5

@@ -257,7 +257,23 @@ shape = shown.sum(), len(lengths), len(draws)
 exact, given = (table.exact.to_numpy(float).reshape(shape).mean(axis=2) for table in (lorenz, told))
 theirs = LORENZ_GRID.rates[shown][:, np.isin(LORENZ_GRID.lengths, lengths)]
 grids = {f"Gauss-Newton, {len(draws)} draws": exact, f"{LORENZ_GRID.method}, published": theirs}
-fig = plots.plot_lorenz_grids(grids, LORENZ_GRID.levels[shown], lengths)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+levels = LORENZ_GRID.levels[shown]
+size = (4.1 * len(grids), 0.42 * len(levels) + 1.2)
+fig, panels = plt.subplots(1, len(grids), figsize=size, sharey=True)
+for axes, (method, rates) in zip(panels, grids.items(), strict=True):
+    axes.imshow(100 * rates, vmin=0, vmax=100, cmap="Blues", aspect="auto")
+    for (row, column), share in np.ndenumerate(rates):
+        style = {"ha": "center", "va": "center", "color": "white" if share > 0.6 else "black"}
+        axes.text(column, row, f"{100 * share:.0f}", size=9, **style)
+    axes.set_xticks(range(len(lengths)), [f"{length:g}" for length in lengths])
+    axes.set_yticks(range(len(levels)), [f"{100 * level:g}" for level in levels])
+    axes.set(title=method, xlabel="length (time units)")
+    axes.tick_params(length=0)
+    axes.grid(False)
+    axes.spines[:].set_visible(False)
+panels[0].set_ylabel("noise (% of the spread)")
 caption = "Share of exact Lorenz laws in percent, over noise and length: Gauss-Newton beside the published."
 save_figure("score_lorenz", fig, caption=caption, numbers=grids)
 
@@ -310,7 +326,24 @@ save_table("score_errors", count(flow_table), caption=f"Exact laws of {len(flows
 
 # %%
 rate_flows = shares(flow_table)
-fig = plots.plot_standings({"ODEBench": rate, "chaotic flows": rate_flows})
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+boards = {"ODEBench": rate, "chaotic flows": rate_flows}
+heights = [len(board) + 1.5 for board in boards.values()]
+fig, panels = plt.subplots(
+    2, 1, figsize=(7.5, 0.34 * sum(heights) + 1), sharex=True, height_ratios=heights
+)
+for axes, (title, board) in zip(panels, boards.items(), strict=True):
+    places = np.arange(len(board))[::-1]
+    # Later ones lie on top: Gauss-Newton is drawn last, and the others a little apart.
+    for k, method in reversed(list(enumerate(board))):
+        style = plots.METHOD_STYLES[method] | {"ls": "", "ms": 8, "clip_on": False, "label": method}
+        axes.plot(100 * board[method], places + 0.11 * (k - (board.shape[1] - 1) / 2), **style)
+    axes.set_yticks(places, board.index)
+    axes.set(xlim=(0, 100), ylim=(-0.6, len(board) - 0.4), title=title)
+axes.set_xlabel("exact laws (%)")
+handles, labels = axes.get_legend_handles_labels()
+fig.legend(handles[::-1], labels[::-1], loc="outside upper center", ncols=3)
 caption = "Exact laws by benchmark, condition and method, in percent."
 numbers = {f"{c}, {m}": value for table in (rate, rate_flows) for m in table for c, value in table[m].items()}
 save_figure("score_methods", fig, caption=caption, numbers=numbers)
@@ -397,7 +430,7 @@ if full:
 #
 # **1.** (Explore.) How coarse may an integrator be before the law of a flow is lost?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 flow = FLOWS["Roessler"]
 t = flow.times(1500 if full else 400)
 for rtol in (1e-6, 1e-4, 1e-2):
@@ -423,7 +456,7 @@ for rtol in (1e-6, 1e-4, 1e-2):
 #
 # **3.** (Implement.) Add a kind of error of your own, a dead zone: changes smaller than 1 % of the range are not seen.
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 t, clean = flow.trajectory(1500 if full else 400)
 held = clean.copy()
 for k in range(1, len(held)):

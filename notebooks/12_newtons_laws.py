@@ -187,7 +187,7 @@ print(f"apart by at most {100 * apart:.2f} % of the motion")
 assert apart < (0.01 if full else 0.05)
 
 # %%
-fig = plots.plot_forecast(later, true, told)
+fig = plots.plot_path(later, {"true motion": true, "foretold by the law": told})
 caption = "Another motion of the ball: the true path (grey) and what the discovered law foretells."
 save_figure("newton_forecast", fig, caption=caption, numbers={"true": true, "told": told})
 
@@ -499,7 +499,7 @@ save_table("newton_laws", rows, caption="Laws of second order from positions alo
 #
 # **2.** (Explore.) Throw twice. Is that enough?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 two = discover(runs[:2], degree=2, order=2)
 print(two)
 assert (two.system.support == fallen.system.support).all()
@@ -512,7 +512,7 @@ assert (two.system.support == fallen.system.support).all()
 #
 # **3.** (Implement.) Let the order be found, by leaving `order` out: what is said of the throws, and why?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 open_order = discover(runs, degree=2)
 print(open_order.note)
 assert open_order.system.names == fallen.system.names
@@ -526,7 +526,7 @@ assert open_order.system.names == fallen.system.names
 # **4.** (Explore.) Let the pendulum hang in a wind that pushes with $0.5\cos\theta$. Is the push found beside the
 # sine, and what does a start at 0.1 rad say of it?
 
-# %% tags=["hide-cell"]
+# %% tags=["hide-cell"] jupyter={"source_hidden": true, "outputs_hidden": true}
 pushed = {"x": {"vx": 1.0}, "vx": {"sin(x)": -9.81, "vx": -0.1, "cos(x)": 0.5}}
 windy_law = PolynomialSystem.from_terms(pushed, library=sines)
 laws_of = {}

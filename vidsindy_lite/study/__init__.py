@@ -11,27 +11,23 @@
 * `films`, `realistic`, `lab`: what is filmed: benchmarks, a scene with trees, a ball on a table.
 * `trials`, `baselines`, `spline_ado`: who finds the law: `discover`, the methods of the paper's
   tables, the paper's own optimiser.
-* `asking`: where the law is asked for, and what that does to it.
-* `zoo`, `price`: random laws that are in no exam, and the price of a term chosen on them.
 * `metrics`, `cramer_rao`, `tables`: how good a law is, could be, and many of them side by side.
 * `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
 * `ablation`: our solver without each of its mechanisms.
 * `published`, `audit`: the paper's numbers, and whether they agree with each other.
 * `sweeps`: many tasks in parallel, each computed once.
-* `plots`: a figure a function.
+* `plots`: figures that several notebooks or the report have, and the look of all.
 
 The names below are at hand at once. Modules that need large libraries are imported by name, as in
 ``from vidsindy_lite.study import baselines, plots``: `baselines` needs pysindy, `spline_ado` torch,
-`plots` matplotlib and seaborn.
+`plots` matplotlib.
 """
 
 from .ablation import ablation_table, ablations, run_ablation
-from .asking import Asked, law_error
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
 from .metrics import Score, pulls, score, term_errors, trajectory_error
 from .odebench import ODEBENCH
-from .price import price_curve
 from .published import ABLATION, DATASETS_CLAIMED, LAB, LAWS, SCORES, SYSTEMS_S1
 from .realistic import DISTURBANCES, START, SceneTask, run_scene
 from .rivals import LORENZ_GRID, R2_GIVEN, R2_RATES, R2_SOURCE
