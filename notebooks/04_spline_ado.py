@@ -1112,8 +1112,8 @@ assert np.abs(best - offset[:2]).max() <= 1
 
 # %% tags=["hide-input"] jupyter={"source_hidden": true}
 fig, panel = plt.subplots(figsize=(6.2, 4.8), layout="compressed")
-whole = np.arange(np.floor(counts.min()), np.ceil(counts.max()) + 1)
-shown = panel.contourf(x_axis, y_axis, counts, levels=whole)
+bounds = np.arange(np.floor(counts.min()), np.ceil(counts.max()) + 1)
+shown = panel.contourf(x_axis, y_axis, counts, levels=bounds)
 fig.colorbar(shown, ax=panel, label="smoothed number of significant terms")
 panel.plot(*spline(np.linspace(t[0], t[399], 1200))[:, :2].T, color="white", lw=0.5, label="data")
 panel.plot(*offset[:2], "o", ms=15, mfc="none", mec="C1", mew=2, label="true origin")

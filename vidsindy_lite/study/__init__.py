@@ -8,13 +8,13 @@
 
 * `systems`, `corruption`: the seven benchmarks and other flows; noise and gaps as the paper names
   them, and the errors that measurements have.
-* `films`, `realistic`, `lab`: what is filmed: benchmarks, a scene with trees, a ball on a table.
+* `films`, `realistic`: what is filmed: benchmarks, a scene with trees.
 * `trials`, `baselines`, `spline_ado`: who finds the law: `discover`, the methods of the paper's
   tables, the paper's own optimiser.
 * `metrics`, `cramer_rao`, `tables`: how good a law is, could be, and many of them side by side.
 * `scoreboard`, `odebench`, `rivals`: benchmarks that others use, and what they publish of them.
 * `ablation`: our solver without each of its mechanisms.
-* `published`, `audit`: the paper's numbers, and whether they agree with each other.
+* `published`: the paper's numbers, as data.
 * `sweeps`: many tasks in parallel, each computed once.
 * `plots`: figures that several notebooks or the report have, and the look of all.
 
