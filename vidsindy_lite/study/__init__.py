@@ -8,7 +8,7 @@
 
 * `systems`, `corruption`: the seven benchmarks and other flows; noise and gaps as the paper names
   them, and the errors that measurements have.
-* `films`, `realistic`: what is filmed: benchmarks, a scene with trees.
+* `films`: three videos of a benchmark, and what is observed in them.
 * `trials`, `baselines`, `spline_ado`: who finds the law: `discover`, the methods of the paper's
   tables, the paper's own optimiser.
 * `metrics`, `cramer_rao`, `tables`: how good a law is, could be, and many of them side by side.
@@ -29,7 +29,6 @@ from .films import SAMPLES_PER_PERIOD, FilmTask, film, run_film
 from .metrics import Score, pulls, score, term_errors, trajectory_error
 from .odebench import ODEBENCH
 from .published import ABLATION, DATASETS_CLAIMED, LAB, LAWS, SCORES, SYSTEMS_S1
-from .realistic import DISTURBANCES, START, SceneTask, run_scene
 from .rivals import LORENZ_GRID, R2_GIVEN, R2_RATES, R2_SOURCE
 from .scoreboard import CONTESTANTS, ERRORS, MOTIONS, FlowContest, LorenzContest, OdeContest
 from .scoreboard import run_contest, standings
