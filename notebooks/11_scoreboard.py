@@ -50,12 +50,9 @@ from vidsindy_lite.study import (
     CONTESTANTS,
     ERRORS,
     FLOWS,
-    LORENZ_GRID,
     MOTIONS,
     ODEBENCH,
-    R2_GIVEN,
-    R2_RATES,
-    R2_SOURCE,
+    RIVALS,
     FlowContest,
     LorenzContest,
     OdeContest,
@@ -208,14 +205,16 @@ save_table("score_outside", rows, caption=caption)
 # trajectory that they were fitted to. That needs no right term. All 63 equations count.
 
 # %%
-print(f"published: {R2_SOURCE}; given: {R2_GIVEN}")
+rivals = RIVALS["odebench"]
+printed = {method: dict(zip(map(tuple, rivals["conditions"]), rates, strict=True)) for method, rates in rivals["rates"].items()}
+print(f"published: {rivals['source']}; given: {rivals['given']}")
 compared = (*both, *sindy)
 everyone = ode[ode.condition.str.startswith("stored") & ode.method.isin(compared)]
 good = everyone.assign(good=everyone.r2 > 0.9).pivot_table("good", "level", "method", sort=False)
 rows = [
     {"noise (%)": 100 * noise, "dropped (%)": 100 * dropped}
     | {f"{method}, here": 100 * good.loc[[(noise, dropped)], method].iloc[0] for method in compared}
-    | {method: 100 * known[noise, dropped] for method, known in R2_RATES.items()}
+    | {method: known[noise, dropped] for method, known in printed.items()}
     for noise, dropped in levels
 ]
 caption = "ODEBench, percent of 63 laws with R2 above 0.9; columns without 'here' are published."
@@ -241,25 +240,27 @@ if full:
 # neither; a second run is told the origin. With two draws a cell the two may differ by chance either way.
 
 # %%
-shown = np.isin(np.round(1000 * LORENZ_GRID.levels), [50, 100, 200, 250, 300, 400] if full else [100])
-lengths = LORENZ_GRID.lengths if full else LORENZ_GRID.lengths[[0, -1]]
+rival = RIVALS["lorenz_grid"]
+levels, lengths = np.array(rival["levels"]), np.array(rival["lengths"], dtype=float)
+shown = np.isin(np.round(1000 * levels), [50, 100, 200, 250, 300, 400] if full else [100])
+columns = slice(None) if full else [0, -1]
+levels, lengths = levels[shown], lengths[columns]
 draws = range(seed, seed + (2 if full else 1))
-cells = [(noise, length) for noise in LORENZ_GRID.levels[shown] for length in lengths]
+cells = [(noise, length) for noise in levels for length in lengths]
 tasks = [LorenzContest(float(T), float(s), n) for s, T in cells for n in draws]
 contests = sweep(run_contest, tasks, jobs=jobs, desc="Lorenz grid")
 lorenz = standings(contests)
 at_home = [replace(task, origin="data") for task in tasks]
 told = standings(sweep(run_contest, at_home, jobs=jobs, desc="Lorenz grid, origin given"))
-print(f"{LORENZ_GRID.method}: {LORENZ_GRID.source}; given: {LORENZ_GRID.given}")
+print(f"{rival['method']}: {rival['source']}; given: {rival['given']}")
 
 # %%
 shape = shown.sum(), len(lengths), len(draws)
 exact, given = (table.exact.to_numpy(float).reshape(shape).mean(axis=2) for table in (lorenz, told))
-theirs = LORENZ_GRID.rates[shown][:, np.isin(LORENZ_GRID.lengths, lengths)]
-grids = {f"Gauss-Newton, {len(draws)} draws": exact, f"{LORENZ_GRID.method}, published": theirs}
+theirs = np.array(rival["exact"])[shown][:, columns] / rival["draws"]
+grids = {f"Gauss-Newton, {len(draws)} draws": exact, f"{rival['method']}, published": theirs}
 
 # %% tags=["hide-input"] jupyter={"source_hidden": true}
-levels = LORENZ_GRID.levels[shown]
 size = (4.1 * len(grids), 0.42 * len(levels) + 1.2)
 fig, panels = plt.subplots(1, len(grids), figsize=size, sharey=True)
 for axes, (method, rates) in zip(panels, grids.items(), strict=True):
@@ -287,7 +288,7 @@ rows = [
         "noise (%)": 100 * level, "Gauss-Newton (%)": 100 * mine.mean(),
         "the same, origin given (%)": 100 * home.mean(), "ODR-BINDy (%)": 100 * known.mean(),
     }  # fmt: skip
-    for level, mine, home, known in zip(LORENZ_GRID.levels[shown], exact, given, theirs, strict=True)
+    for level, mine, home, known in zip(levels, exact, given, theirs, strict=True)
 ]
 save_table("score_lorenz_rows", rows, caption="Exact Lorenz laws, mean over the lengths.")
 
