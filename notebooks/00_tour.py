@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -252,8 +253,13 @@ good = int(np.argmax(apart)) if apart.any() else len(t)
 print(f"good for {t[good - 1] / period:.1f} periods; the videos last {shot.t[-1] / period:.1f}")
 assert t[good - 1] > (4 if noise_variance == 0 else 1) * period
 
-# %%
-fig = plots.plot_attractors({system: (truth[:2000], forecast[:2000])})
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(6.5, 5), subplot_kw=plots.SPACE)
+axes.plot(*truth[:2000].T, color="0.75", lw=3, label="truth")
+axes.plot(*forecast[:2000].T, color="C0", lw=0.8, label="discovered law")
+axes.set_title(system, loc="center")
+plots.finish_space(axes, azimuth=-60, elevation=20, zoom=0.9)
+fig.legend(loc="outside upper center", ncols=2)
 caption = "Five periods of the discovered law (blue) on the true one (grey), from one start."
 numbers = {"t": t[:2000:5], "truth": truth[:2000:5], "discovered": forecast[:2000:5]}
 save_figure("tour_attractor", fig, caption=caption, numbers=numbers)

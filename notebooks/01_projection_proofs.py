@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -63,8 +64,23 @@ camera = Rig.around(x).cameras[view - 1]
 print("position", camera.position.round(2))
 print("normal  ", camera.normal.round(4))
 
-# %%
-fig = plots.plot_view_plane(camera, x)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7.5, 5.2), subplot_kw=plots.SPACE)
+flat = plots.on_plane(camera, camera.project(x))
+axes.plot(*x.T, lw=1, label="3D trajectory")
+axes.plot(*flat.T, lw=1, label="its projection on the view plane")
+for point, foot in zip(x[:: len(x) // 12], flat[:: len(x) // 12], strict=True):
+    axes.plot(*np.transpose([point, foot]), color="0.6", lw=0.6, ls=":")
+plots.draw_plane(axes, camera, "C1")
+place, reach = camera.position, 180 * camera.scale
+axes.scatter(*place, color="k", s=15)
+halo = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
+for axis, name in zip((*camera.rows, camera.normal), ("X'", "Y'", "Z'"), strict=True):
+    axes.quiver(*place, *(reach * axis), color="k", lw=1.2, arrow_length_ratio=0.15)
+    axes.text(*(place + 1.2 * reach * axis), name, ha="center", va="center", bbox=halo)
+axes.text(*(place - 0.35 * reach * camera.rows[1]), "$C_1$", ha="center", bbox=halo)
+plots.finish_space(axes, azimuth=-40, elevation=8)
+fig.legend(loc="outside upper center", ncols=2)
 caption = "The view plane sees a flat copy of the 3D trajectory; depth along its normal Z' is lost."
 save_figure("figure_S1", fig, caption=caption, numbers={"t": t, "x": x})
 
@@ -165,8 +181,12 @@ errors = {
 assert max(errors["angle by arccos, as written"]) > 1e-9
 assert max(errors["angle by atan2, ours"]) < 1e-14
 
-# %%
-fig = plots.plot_rotation_accuracy(tilt, errors)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots()
+for (name, error), marker in zip(errors.items(), "os", strict=True):
+    axes.loglog(tilt, error, marker, label=name)
+axes.set(xlabel="angle between normal and z axis (rad)", ylabel=r"$\|R\,n - e_z\|$")
+axes.legend()
 caption = "Computed as written, the rotation is off by some 1e-8 for a camera near the z axis."
 save_figure("projection_near_z", fig, caption=caption, numbers={"tilt": tilt, **errors})
 
@@ -204,8 +224,14 @@ caption = (
 )
 save_table("projection_shift", rows, caption=caption)
 
-# %%
-fig = plots.plot_independence(d, turned)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True)
+for axes, (title, values) in zip(panels, turned.items(), strict=True):
+    for letter, value, style in zip("xyz", values.T, ("-", "--", ":"), strict=True):
+        axes.plot(d, value, style, label=f"${letter}_{{rp}}$")
+    axes.set(title=title, xlabel="D (scene units)")
+panels[0].set_ylabel("coordinate (scene units)")
+fig.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
 caption = "Only with the rotation normal-to-e_z are the in-plane coordinates independent of D."
 save_figure("projection_independence_of_d", fig, caption=caption, numbers={"d": d, **turned})
 

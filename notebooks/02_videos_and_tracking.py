@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -91,8 +92,12 @@ worst = max(difference[periods <= 4].max() for difference in differences.values(
 print(f"largest distance in the first four periods: {worst:.1e} of the spread of the motion")
 assert worst < 1e-3
 
-# %%
-fig = plots.plot_divergence(periods, differences)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(8, 4.2))
+for (name, difference), style in zip(differences.items(), plots.STYLES, strict=True):
+    axes.semilogy(periods, np.maximum(difference, 1e-14), ls=style, label=name)
+axes.set(xlabel="time (characteristic periods)", ylabel="distance / spread of the motion")
+fig.legend(loc="outside right center")
 caption = "Runge-Kutta of order 4 against a tight solver: they agree until chaos takes over."
 save_figure("videos_runge_kutta", fig, caption=caption, numbers={"t": periods, **differences})
 
@@ -152,7 +157,14 @@ samples = {
     )
     for name, rate in (("25 per time unit", 25 * fast.period), ("as here", SAMPLES_PER_PERIOD))
 }
-fig = plots.plot_sampling(t, x, samples)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(2, 1, figsize=(8, 4.2), sharex=True, sharey=True)
+for axes, (name, pair) in zip(panels, samples.items(), strict=True):
+    axes.plot(t, x, color="0.7", lw=1.5)
+    axes.plot(*pair, "oC0", ms=3)
+    axes.set(title=name, ylabel="x (scene units)")
+panels[-1].set_xlabel("time (time units)")
 caption = "Four periods of Tsucs2: 8.6 frames a period are too few to see how it moves."
 numbers = {name: np.column_stack(pair) for name, pair in samples.items()}
 save_figure("videos_frame_rate_tsucs2", fig, caption=caption, numbers=numbers)
@@ -286,8 +298,23 @@ print("by hand:", centroid.round(4), " track():", tracks[0][0][middle].round(4))
 print("truth:  ", truth[middle].round(4))
 assert np.linalg.norm(centroid - truth[middle]) < 0.05
 
-# %%
-fig = plots.plot_tracker_steps(frame, behind, coverage, (left, top), centroid)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(1, 4, figsize=(10.5, 3.2), sharex=True, sharey=True)
+style = {"extent": (left - 0.5, left + 47.5, top + 47.5, top - 0.5), "interpolation": "nearest"}
+for axes, image, title in zip(panels, (frame, behind), ("frame", "background"), strict=False):
+    axes.imshow(image[..., ::-1].astype(np.uint8), **style)  # blue-green-red, as read
+    axes.set_title(title)
+    axes.spines[:].set_visible(False)
+units = {"difference": (distance, "grey levels"), "coverage": (coverage, "share of the pixel")}
+for axes, (title, (values, unit)) in zip(panels[2:], units.items(), strict=True):
+    shown = axes.imshow(values, cmap="gray", vmin=0, **style)
+    fig.colorbar(shown, ax=axes, shrink=0.72, pad=0.03, label=unit)
+    axes.set_title(title)
+panels[3].plot(*centroid, "+", color="C1", ms=16, mew=2)
+for axes in panels:
+    axes.grid(False)
+    axes.set_xlabel("u (px)")
+panels[0].set_ylabel("v (px)")
 caption = "From the frame to the centroid (cross): background, difference (grey levels), coverage."
 save_figure("videos_tracker_steps", fig, caption=caption, numbers={"coverage": coverage})
 
@@ -353,8 +380,12 @@ rows = [
 loose = dict.fromkeys(["median error (px)", "rms error (px)", "largest error (px)"], 0.2)
 save_table("videos_tracker", rows, caption="The tracker against the known truth.", tolerance=loose)
 
-# %%
-fig = plots.plot_track_errors(errors)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7.5, 4))
+for (name, error), style in zip(errors.items(), plots.STYLES, strict=False):
+    axes.ecdf(error[np.isfinite(error)], ls=style, label=name)
+axes.set(xscale="log", xlabel="distance from the truth (px)", ylabel="share of frames below")
+axes.legend(loc="upper left")
 caption = (
     "Share of frames in which the tracked position is closer to the truth than a given distance."
 )
@@ -406,7 +437,11 @@ assert np.median([np.sqrt(np.nanmean(error**2)) for error in drawn]) < 0.15
 record = json.loads(vision.WEIGHTS.with_suffix(".json").read_text())
 print(f"{record['parameters']:,} parameters, trained on {record['frames']:,} frames of")
 print(f"{', '.join(record['shapes'])} before {', '.join(record['backgrounds'])}")
-fig = plots.plot_loss(record["loss"], record["steps_per_loss"])
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots()
+axes.plot(record["steps_per_loss"] * (np.arange(len(record["loss"])) + 1), record["loss"])
+axes.set(xlabel="step", ylabel="loss", ylim=(0, None))
 caption = "The loss while the detector was trained."
 save_figure("detector_training", fig, caption=caption, numbers={"loss": record["loss"]})
 
@@ -501,7 +536,8 @@ assert 0.02 < np.isnan(x[:, 0]).mean() < 0.6
 assert error < 1
 
 # %%
-fig = plots.plot_gaps(shot.t, x, shot.x)
+both = {"truth": shot.x, "reconstructed": x}
+fig = plots.plot_path(shot.t, both, "hidden", plots.DASHED, "time units")
 caption = (
     "The reconstructed path of SprottF behind two posts; shaded: fewer than two cameras see it."
 )

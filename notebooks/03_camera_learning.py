@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -245,8 +246,17 @@ errors = {name: errors_of(method, pixel_noise, trials) for method, name in names
 spread = {name: error.std(axis=0).max(axis=0) for name, error in errors.items()}
 assert (spread["joint fit"] < spread["Eq. (4)"]).all()
 
-# %%
-fig = plots.plot_calibration_errors(errors)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(1, 2, figsize=(9, 4.2), sharex=True, sharey=True)
+for i, axes in enumerate(panels):
+    axes.axhline(0, color="k", lw=0.6)
+    axes.axvline(0, color="k", lw=0.6)
+    for (name, error), marker in zip(errors.items(), "so", strict=True):
+        scale, angle = error[:, i].T
+        axes.plot(100 * scale, 1e3 * angle, marker, ms=4, alpha=0.7, mec="none", label=name)
+    axes.set(title=f"camera {i + 2}", xlabel="error of scale (%)")
+panels[0].set_ylabel("error of angle (mrad)")
+fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
 caption = (
     f"Errors of the learned cameras in repeated trials with {pixel_noise:g} px noise: the joint fit is closer."
 )
@@ -274,8 +284,20 @@ scale_errors = {
 bias = {name: error[-1].mean() for name, error in scale_errors.items()}
 assert abs(bias["joint fit"]) < abs(bias["Eq. (4)"])
 
-# %%
-fig = plots.plot_scale_error(noise, scale_errors)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
+for (name, error), style in zip(scale_errors.items(), ("s-", "o-"), strict=True):
+    left.loglog(noise, 100 * np.sqrt(np.mean(error**2, axis=1)), style, label=name)
+    deviation = error.std(axis=1) / np.sqrt(repeats)
+    right.errorbar(noise, 100 * error.mean(axis=1), 200 * deviation, fmt=style, label=name)
+right.axhline(0, color="k", lw=0.6)
+left.set(title="rms error", ylabel="rms error of scale (%)")
+right.set(title="bias", ylabel="mean error of scale (%)", xscale="log")
+for axes in (left, right):
+    axes.set_xlabel("noise per pixel coordinate (px)")
+    axes.set_xticks(noise, [f"{value:g}" for value in noise])
+    axes.minorticks_off()
+right.legend(loc="lower left")
 caption = (
     "Scale of camera 3: rms and mean error over repeated trials; Eq. (4) shrinks it with noise."
 )

@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -43,30 +44,33 @@ seed: int = 0  # of all noise
 
 # %%
 from dataclasses import replace
+from functools import cache
+from itertools import product
 from time import perf_counter
 from timeit import repeat as timed
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from joblib import Parallel, delayed
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
 from scipy.integrate import solve_ivp
 from scipy.optimize import approx_fprime
 from tqdm import tqdm
 
+# %%
 from vidsindy_lite import discover, dynamics
 from vidsindy_lite.companion.artifacts import save_figure, save_slider, save_table, versions
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
     SYSTEMS,
-    Asked,
+    Benchmark,
     add_noise,
     cramer_rao,
-    law_error,
     plots,
-    price_curve,
     score,
     spline_ado,
-    sweep,
 )
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -102,8 +106,18 @@ fine = np.linspace(0, 0.15, 601)
 basis = dynamics.design_matrix(knots, fine)
 assert (np.count_nonzero(basis, axis=1) <= 4).all()
 
-# %%
-fig = plots.plot_basis(fine, basis, 0.065, breakpoints)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(6.4, 2.6))
+here = basis[np.abs(fine - 0.065).argmin()] > 0
+shown = np.where(basis > 0, basis, np.nan)
+axes.plot(fine, shown[:, ~here], color="0.75", lw=1.2)
+axes.plot(fine, shown[:, here], lw=2.2)
+axes.plot(fine, basis.sum(axis=1), "k--", label="sum of all")
+axes.plot([], [], color="0.75", lw=1.2, label="zero at the dotted line")
+axes.axvline(0.065, color="k", ls=":")
+axes.plot(breakpoints, np.zeros_like(breakpoints), "|k", ms=12, label="knots")
+axes.set(xlabel="time (time units)", ylabel="basis function")
+fig.legend(loc="outside upper center", ncols=3)
 caption = "At any time four basis functions differ from zero (colours), and all sum up to one."
 save_figure("solver_basis", fig, caption=caption, numbers={"t": fine, "basis": basis})
 
@@ -210,8 +224,26 @@ A = J.T @ J
 row, column = np.nonzero(A[: P.size, : P.size])
 assert np.abs(row - column).max() == 11
 
-# %%
-fig = plots.plot_normal_matrix(A, P.size, native.support.sum())
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+edges = np.cumsum([0, P.size, native.support.sum(), 3])
+beyond = (np.arange(len(A)) >= P.size).astype(int)  # not of the curve
+kind = 1 + np.add.outer(beyond, beyond)
+fig, axes = plt.subplots(figsize=(6.6, 5.4))
+colours = ("white", "C0", "C4", "C1")
+shown = np.where(A != 0, kind, 0)
+axes.imshow(shown, cmap=ListedColormap(colours), vmin=0, vmax=3, interpolation="nearest")
+for edge in edges[1:-1]:
+    axes.axhline(edge - 0.5, color="k", lw=0.8)
+    axes.axvline(edge - 0.5, color="k", lw=0.8)
+names = ("control\npoints P", r"$\Lambda$", r"$\Delta$")
+axes.set_xticks((edges[1:] + edges[:-1] - 1) / 2, names)
+axes.set_yticks((edges[1:] + edges[:-1] - 1) / 2, names)
+axes.tick_params(length=0)
+axes.grid(False)
+axes.spines[:].set_visible(True)
+labels = ("curve: banded", "border: dense", "law: small")
+handles = [Patch(color=c, label=text) for c, text in zip(colours[1:], labels, strict=True)]
+fig.legend(handles=handles, loc="outside right center")
 caption = "The normal matrix: a band for the curve, a dense border for coefficients and offset."
 save_figure("solver_matrix", fig, caption=caption, numbers={"matrix": A != 0})
 
@@ -285,6 +317,24 @@ window = np.linspace(low, high, 1201)
 inside = (nodes > low) & (nodes < high)
 assert np.abs(unmet(nodes)).max() < 0.01 * np.abs(unmet(window)).max()
 
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+def plot_collocation(first, final, nodes, residual):
+    """Data and curves in the window, and how well the law is met on the curve: pairs of times and values."""
+    fig, (above, below) = plt.subplots(2, 1, figsize=(7, 4.4), sharex=True, height_ratios=(2, 1))
+    above.plot(*samples.values(), "o", color="0.55", ms=4, label="data")
+    above.plot(*first, "C1--", lw=1.6, label="smoothing spline")
+    above.plot(*final, "C0", lw=2, label="curve that obeys the law")
+    above.plot(*nodes, "|k", ms=9, label="collocation nodes")
+    above.set(ylabel="x (scene units)")
+    above.locator_params(axis="y", integer=True)
+    below.plot(*residual, "C0", lw=1.2)
+    below.plot(nodes[0], np.zeros_like(nodes[0]), "|k", ms=9)
+    below.set(ylabel="residual of the law\n/ speed", xlabel="time (time units)")
+    below.ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
+    fig.legend(*above.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    return fig
+
+
 # %%
 seen = (t >= low) & (t <= high)
 first = dynamics.smooth([(t, x)], rng).splines[0]
@@ -292,7 +342,7 @@ at = nodes[inside]
 samples = {"t": t[seen], "data": x[seen, 0]}
 curves = {"first": (window, first(window)[:, 0]), "final": (window, spline(window)[:, 0])}
 checks = {"nodes": (at, spline(at)[:, 0]), "residual": (window, unmet(window))}
-fig = plots.plot_collocation(**samples, **curves, **checks)
+fig = plot_collocation(**curves, **checks)
 caption = "The law pulls the curve off the noise; it holds exactly at the collocation nodes."
 save_figure("solver_curve", fig, caption=caption, numbers=samples | curves | checks)
 
@@ -306,16 +356,40 @@ save_figure("solver_curve", fig, caption=caption, numbers=samples | curves | che
 # the law hold in the middles, or at random times as in the paper, or five times a span at even distances.
 
 # %%
+def times_in(spans, where, number, rng):
+    """So many times in every span between these: even or random."""
+    width, even = np.diff(spans)[:, None], (np.arange(number) + 0.5) / number
+    part = rng.random((len(width), number)) if where == "random" else even
+    return np.sort((spans[:-1, None] + width * part).ravel())
+
+
+# %%
+def law_error(where, per_span, tolerated, trial):
+    """Relative error of the true terms, by where and how often in every span the law has to hold."""
+    rng = np.random.default_rng(trial)
+    x = add_noise(clean, 0.1, rng)
+    segment = dynamics.Segment.even(t, x, spacing=3 * t[1], trajectory=0)
+    speed = np.sqrt((native(clean - offset) ** 2).mean(axis=0))
+    precision, physics = (0.1 * clean.std(axis=0)) ** -2, (tolerated * speed) ** -2
+    fit = dynamics.Collocation.of([segment], native.exponents, precision, physics)
+    if where != "middles":
+        fit = replace(fit, grid=fit.grid.asked_at([times_in(segment.breakpoints, where, per_span, rng)]))
+    control = dynamics.fit_curves(fit, dynamics.smooth([(t, x)], rng).splines)
+    begin = dynamics.State(control, native.coefficients, native.support, offset, offset != 0)
+    found = fit.solve(begin).state.coefficients
+    return np.linalg.norm(found - native.coefficients) / np.linalg.norm(native.coefficients)
+
+
+# %%
 places = {
     "middle of each span": ("middles", 1), "1 random time a span": ("random", 1), "5 even": ("even", 5),
     "5 random": ("random", 5), "20 random": ("random", 20),
 }  # fmt: skip
 tolerated = (1.0, 0.1, 0.01, 0.001)
-asked = [
-    Asked("Lorenz", 0.1, len(t), *place, share, trial)
-    for place in places.values() for share in tolerated for trial in range(3 if full else 1)
-]  # fmt: skip
-l2 = np.median(np.reshape(sweep(law_error, asked, jobs=jobs, desc="fits"), (len(places), len(tolerated), -1)), axis=2)
+asked = [(*place, share, trial) for place in places.values() for share in tolerated for trial in range(3 if full else 1)]
+work = Parallel(n_jobs=jobs, return_as="generator")(delayed(law_error)(*task) for task in asked)
+l2 = np.reshape(list(tqdm(work, total=len(asked), desc="fits")), (len(places), len(tolerated), -1))
+l2 = np.median(l2, axis=2)
 middles, *others = l2
 if full:
     assert middles[-1] < 0.5 * middles[0]
@@ -324,7 +398,15 @@ assert all(row[-1] > 30 * middles[-1] for row in others[1:])
 
 # %%
 errors = {name: dict(zip(tolerated, row.tolist(), strict=True)) for name, row in zip(places, l2, strict=True)}
-fig = plots.plot_asked(errors)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7, 3.8))
+for (label, row), style in zip(errors.items(), ("o-", "s--", "^--", "v:", "D:"), strict=True):
+    axes.plot(list(row), list(row.values()), style, label=label)
+axes.set(xscale="log", yscale="log", ylabel="l2 error of the law")
+axes.set_xlabel("tolerated residual of the law / speed (physics weight grows to the right)")
+axes.invert_xaxis()
+fig.legend(loc="outside upper center", ncols=3)
 caption = "Error of Lorenz' coefficients at 10 % noise against the physics weight, by the times at which the law has to hold."
 save_figure("solver_nodes", fig, caption=caption, numbers=errors)
 
@@ -362,7 +444,8 @@ assert off(by_hand, inside) < 0.02
 
 # %%
 near = slice(100, 300)
-fig = plots.plot_path(t[near], broken[near], bridged.curve(t[near]))
+both = {"reconstructed": broken[near], "curve that obeys the law": bridged.curve(t[near])}
+fig = plots.plot_path(t[near], both, "not seen")
 caption = "Samples with a gap (grey), and the curve (blue) that the law of both sides carries across."
 numbers = {"t": t[near], "data": broken[near], "curve": bridged.curve(t[near])}
 save_figure("solver_gap", fig, caption=caption, numbers=numbers)
@@ -514,7 +597,27 @@ assert last["Gauss-Newton"] < 1e-6 * last["spline-ADO"]
 
 # %%
 terms = {"reference frame": truth.support.sum(), "own frame": native.support.sum()}
-fig = plots.plot_histories(histories, terms)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(3, 1, figsize=(7, 6), sharex=True)
+titles = {
+    "data loss": "data loss\n/ noise variance", "physics loss": "physics loss\n/ mean square speed",
+    "terms": "number of terms",
+}  # fmt: skip
+for axes, (key, title) in zip(panels, titles.items(), strict=True):
+    for (name, history), style in zip(histories.items(), ("s-C1", "o-C0"), strict=True):
+        axes.plot(history["seconds"], history[key], style, ms=4, lw=1.2, label=name)
+    axes.set(xscale="log", yscale="log", ylabel=title)
+panels[0].axhline(1, color="k", lw=0.8, ls=":")
+ticks = [60, 30, *terms.values()]
+for frame, number in terms.items():
+    axes.axhline(number, color="k", lw=0.8, ls=":")
+    beside = {"xy": (1.01, number), "xycoords": ("axes fraction", "data"), "fontsize": 9}
+    axes.annotate(f"truth,\n{frame}", ha="left", va="center", **beside)
+axes.set_yticks(ticks, [str(tick) for tick in ticks])
+axes.minorticks_off()
+axes.set(xlabel="wall time (s)", ylim=(0.7 * min(ticks), None))
+fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
 caption = "Gradient descent settles at a compromise; continuation makes the law hold exactly."
 save_figure("solver_histories", fig, caption=caption, numbers=histories)
 
@@ -576,7 +679,7 @@ def weighted(problem, state):
     rate = dynamics.monomials(curve - state.offset, exponents) @ state.coefficients
     left = (slope - rate)[:, 0] / np.sqrt(np.mean(slope[:, 0] ** 2))
     shown = {"final": (window, curve[:, 0]), "nodes": (middles, held[:, 0]), "residual": (window, left)}
-    fig = plots.plot_collocation(**samples, first=curves["first"], **shown)
+    fig = plot_collocation(first=curves["first"], **shown)
     fig.axes[1].set_ylim(-0.5, 0.5)
     return fig, np.sqrt(np.mean(left**2))
 
@@ -645,7 +748,20 @@ panels = {
     "|c| / error": (z, bar),
     "... after the search": (z_after, bar),
 }
-fig = plots.plot_ranks(panels, is_true)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, grid = plt.subplots(1, 3, figsize=(9.3, 3.5))
+grid[2].sharey(grid[1])
+for axes, (name, (values, threshold)) in zip(grid, panels.items(), strict=True):
+    kept = np.flatnonzero(values > 0)
+    order = kept[np.argsort(-values[kept])]
+    rank, size, hit = np.arange(1, len(order) + 1), values[order], is_true[order]
+    axes.plot(rank[hit], size[hit], "oC0", ms=7, label="true term")
+    axes.plot(rank[~hit], size[~hit], "xC1", ms=7, mew=2, label="false term")
+    if threshold is not None:
+        axes.axhline(threshold, color="k", ls="--", lw=1, label="penalty of a linear term")
+    axes.set(yscale="log", xlabel="rank", title=name, xlim=(0, len(values) + 1))
+fig.legend(*grid[1].get_legend_handles_labels(), loc="outside upper center", ncols=3)
 caption = "All terms by size, by size over error, and after the search, the true ones marked."
 numbers = {name: values for name, (values, _) in panels.items()} | {"true": is_true}
 save_figure("solver_ranks", fig, caption=caption, numbers=numbers)
@@ -754,8 +870,19 @@ print(f"one threshold for all: exact for at most {one_for_all} of {len(tried)}")
 print(f"the subset search: exact for {len(searched)}, {', '.join(searched)}")
 assert one_for_all < len(searched)
 
-# %%
-fig = plots.plot_windows(thresholds, exact)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(8, 0.42 * len(exact) + 1.6))
+words = {"ha": "center", "va": "center", "color": "C1", "xycoords": ("axes fraction", "data")}
+words["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 2}
+for row, good in enumerate(exact.values()):
+    axes.axhline(-row, color="0.85", lw=1)
+    axes.plot(thresholds, np.where(good, -row, np.nan), "s-C0", ms=5)
+    if not good.any():
+        axes.annotate("no threshold", xy=(0.5, -row), **words)
+axes.set_yticks(-np.arange(len(exact)), exact)
+axes.set(xscale="log", xlim=(thresholds[0], thresholds[-1]), ylim=(-len(exact) + 0.4, 0.6))
+axes.set_xlabel("threshold (units of the coefficients)")
+axes.grid(axis="y", visible=False)
 caption = "Thresholds that would leave exactly the true terms: no value serves all systems."
 save_figure("solver_windows", fig, caption=caption, numbers={"threshold": thresholds, **exact})
 
@@ -772,11 +899,108 @@ save_figure("solver_windows", fig, caption=caption, numbers={"threshold": thresh
 # balance lies we ask random sparse laws of one to four states, of which none is a system of this set, at their own truth's fit,
 # so that no search has a part in it.
 
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+cubic = {d: dynamics.monomial_exponents(d, 3) for d in (1, 2, 3, 4)}
+
+
+def random_laws(rng, exponents, number=512):
+    """Few terms, mostly of low degree: a law has one of a degree half as often as one of the degree before."""
+    shape = (number, *exponents.shape)
+    degrees = exponents.sum(axis=1)
+    likely = 0.5**degrees / np.bincount(degrees)[degrees]
+    count = rng.geometric(0.5, size=(number, 1, shape[2]))
+    # The few largest of log(u) / p are a draw without replacement (Efraimidis and Spirakis 2006).
+    order = np.log(rng.random(shape)) / likely[:, None]
+    rank = np.argsort(np.argsort(-order, axis=1), axis=1)
+    sizes = 0.3 * 10 ** rng.random(shape)  # from 0.3 to 3
+    return np.where(rank < count, rng.choice([-1.0, 1.0], size=shape) * sizes, 0.0)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of laws that run away
+def paths_of(laws, x, exponents, step=0.04):
+    """Where all of these laws lead within 20 time units, by Runge-Kutta steps."""
+
+    def slope(x):
+        return np.einsum("hl,hld->hd", dynamics.monomials(np.clip(x, -1e3, 1e3), exponents), laws)
+
+    path = [x]
+    for _ in range(500):
+        k1 = slope(x)
+        k2 = slope(x + step / 2 * k1)
+        k3 = slope(x + step / 2 * k2)
+        x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + slope(x + step * k3))
+        path.append(x)
+    return np.stack(path, axis=1)
+
+
+@cache
+def random_law(number):
+    """The first random law of one to four states that stays within 8 and goes on moving."""
+    d, rng = 1 + number % 4, np.random.default_rng([4, number])
+    while True:
+        laws, starts = random_laws(rng, cubic[d]), rng.normal(size=(512, d))
+        paths = paths_of(laws, starts, cubic[d])
+        spread, late = paths.std(axis=1), paths[:, 250:].std(axis=1)
+        moving = (spread > 0.2) & (late >= (0.5 if d > 1 else 0) * spread)
+        for k in np.flatnonzero((np.abs(paths) < 8).all(axis=(1, 2)) & moving.all(axis=1)):
+            period = 2 * np.pi / (np.gradient(paths[k], 0.04, axis=0) / spread[k]).std()
+            names = dynamics.variable_names(d)
+            law = Benchmark(names, cubic[d], laws[k], f"law {number}", tuple(starts[k].tolist()), float(period))
+            _, x = law.trajectory(1000, 60)
+            if np.isfinite(x).all() and np.abs(x).max() < 8:
+                return law
+
+
+# %% [markdown]
+# All terms of such a law around the fit of the true ones, as a quadratic model; the cheapest law in it, at each price:
+
 # %%
-costs = price_curve(24, (0.02, 0.1, 0.3), (200, 600), jobs) if full else price_curve(4, (0.1,), (200,), jobs)
-curve_of = costs.groupby("false alarm")[["false", "lost"]].mean()
+def model_of_all(law, number, noise, samples):
+    """Information and gradient of all terms, and the fitted coefficients, around the true law's own fit."""
+    rng = np.random.default_rng([number, samples])
+    t, clean = law.trajectory(samples, 60)
+    per_radian, scale, zero = law.period / (2 * np.pi), clean.std(axis=0), np.zeros(law.d)
+    t, x = t / per_radian, add_noise(clean, noise, rng) / scale
+    true = law.coefficients / dynamics.Units(zero, scale, per_radian).factors(law.exponents)
+    control = dynamics.smooth([(t, clean / scale)], rng).splines[0].c
+    state = dynamics.State(control, true, law.support, zero, zero > 0)
+    precision, exact = np.full(law.d, noise**-2), np.full(law.d, 1e8)
+    fit = dynamics.Collocation.of([dynamics.Segment(t, x, t)], law.exponents, precision, exact).solve(state)
+    model = fit.collocation.linearise(fit.state, np.arange(law.exponents.size))
+    return model.information, model.gradient, fit.state.coefficients.T.ravel()
+
+
+# %%
+def wrong_terms(number, conditions):
+    """False and lost terms of the cheapest law, for each condition and each chance of a false term."""
+    law, rows = random_law(number), []
+    true = law.support.T.ravel()
+    for noise, samples in conditions:
+        model = model_of_all(law, number, noise, samples)
+        for chance in 10.0 ** np.arange(-6, 0.1, 0.5):
+            price = np.tile(dynamics.term_penalties(law.exponents, law.d, chance), law.d)
+            kept, *_ = dynamics.subset_search(*model, price, true)
+            rows.append({"chance": chance, "false": (kept & ~true).sum(), "lost": (true & ~kept).sum()})
+    return rows
+
+
+# %%
+number, conditions = (24, list(product((0.02, 0.1, 0.3), (200, 600)))) if full else (4, [(0.1, 200)])
+work = Parallel(n_jobs=jobs, return_as="generator")(delayed(wrong_terms)(k, conditions) for k in range(number))
+costs = pd.DataFrame([row for rows in tqdm(work, total=number, desc="random laws") for row in rows])
+curve_of = costs.groupby("chance")[["false", "lost"]].mean()
 chances, wrong = curve_of.index.to_numpy(), curve_of.sum(axis=1)
-fig = plots.plot_price(chances, curve_of.false.to_numpy(), curve_of.lost.to_numpy(), dynamics.FALSE_ALARM)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7, 3.6))
+axes.plot(chances, wrong, "o-C0", label="wrong")
+axes.plot(chances, curve_of.lost, "s--C2", label="lost")
+axes.plot(chances, curve_of.false, "^:C1", label="false")
+axes.axvline(dynamics.FALSE_ALARM, color="0.5", lw=1)
+beside = {"xy": (dynamics.FALSE_ALARM, 0.02), "xycoords": ("data", "axes fraction")}
+axes.annotate(" the solver's", **beside, ha="left", va="bottom", color="0.4")
+axes.set(xscale="log", ylim=(0, 1.25 * wrong.max()), xlabel="chance of a false term", ylabel="terms per law")
+axes.legend(loc="upper left", ncols=3)
 caption = "False and lost terms per law, of random laws, against the chance of a false term."
 save_figure("solver_price", fig, caption=caption, numbers={"chance": chances, **curve_of.to_dict("list")})
 
@@ -887,12 +1111,22 @@ best = np.array([x_axis[left], y_axis[low]])
 print("fewest terms at", best, "with a smooth count of", counts.min().round(1))
 assert np.abs(best - offset[:2]).max() <= 1
 
-# %%
-axes = {"x_axis": x_axis, "y_axis": y_axis, "count": counts}
-path = spline(np.linspace(t[0], t[399], 1200))[:, :2]
-fig = plots.plot_origin_map(**axes, data=path, best=best, truth=offset[:2])
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panel = plt.subplots(figsize=(6.2, 4.8), layout="compressed")
+bounds = np.arange(np.floor(counts.min()), np.ceil(counts.max()) + 1)
+shown = panel.contourf(x_axis, y_axis, counts, levels=bounds)
+fig.colorbar(shown, ax=panel, label="smoothed number of significant terms")
+panel.plot(*spline(np.linspace(t[0], t[399], 1200))[:, :2].T, color="white", lw=0.5, label="data")
+panel.plot(*offset[:2], "o", ms=15, mfc="none", mec="C1", mew=2, label="true origin")
+panel.plot(*best, "+", color="C1", ms=12, mew=2, label="fewest terms")
+panel.set(xlim=(x_axis[0], x_axis[-1]), ylim=(y_axis[0], y_axis[-1]), aspect="equal")
+panel.set(xlabel="x of the origin (scene units)", ylabel="y of the origin (scene units)")
+panel.grid(False)
+dark = {"frameon": True, "facecolor": "0.25", "edgecolor": "none", "labelcolor": "white"}
+panel.legend(loc="lower right", **dark)
+numbers = {"x_axis": x_axis, "y_axis": y_axis, "count": counts}
 caption = "Smoothed number of significant terms, by origin: fewest at (10, 10), the true one."
-save_figure("solver_origin", fig, caption=caption, numbers=axes)
+save_figure("solver_origin", fig, caption=caption, numbers=numbers)
 
 # %% [markdown]
 # *Coefficients vanish along valleys: z in dy/dt and y in dz/dt where x = 10, x in dz/dt where y = 10. They
@@ -954,7 +1188,22 @@ assert np.sqrt(np.mean(ratio**2)) < 1.5
 labels = [f"{native.terms[k]} in d{'xyz'[j]}/dt" for j, k in np.argwhere(native.support.T)]
 labels += ["origin, x", "origin, y"]
 deviations, bars = (estimates - true) / limit, errors / limit
-fig = plots.plot_errors_and_bound(labels, deviations, bars)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(8.5, 3.7))
+axes.axhspan(-2, 2, color="0.9", label="truth ± 2 Cramér-Rao bounds")
+axes.axhline(0, color="k", lw=0.8)
+beside = np.linspace(-0.36, 0.36, len(deviations) + 2)[1:-1]
+place = beside[:, None] + np.arange(len(labels))
+near = np.abs(deviations) <= 1.96 * bars
+styles = {"95 % interval holds the truth": (near, "oC0"), "does not": (~near, "sC1")}
+for label, (inside, style) in styles.items():
+    whiskers = place[inside], deviations[inside], 1.96 * bars[inside]
+    axes.errorbar(*whiskers, fmt=style, ms=3.5, lw=0.9, capsize=0, label=label)
+axes.set_xticks(range(len(labels)), labels, rotation=25, ha="right")
+axes.set_ylabel("(estimate - truth) / bound")
+axes.grid(axis="x", visible=False)
+fig.legend(loc="outside upper center", ncols=3)
 caption = "Estimates of repeated noise draws with 95 % intervals, in units of the Cramer-Rao bound."
 numbers = {"labels": labels, "deviations": deviations, "errors": bars, "bound": limit}
 save_figure("solver_errors", fig, caption=caption, numbers=numbers)

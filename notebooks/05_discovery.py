@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -250,7 +251,25 @@ if full:
 
 # %%
 pictured = both[both.trial == seed]
-fig = plots.plot_methods(pictured)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+sources, methods = pictured.source.unique(), pictured.method.unique()
+fig, panels = plt.subplots(1, len(sources), figsize=(10.5, 4.4), sharey=True)
+for axes, source in zip(panels, sources, strict=True):
+    for k, method in enumerate(methods):
+        part = pictured[(pictured.source == source) & (pictured.method == method)]
+        place = np.arange(len(part)) + 0.13 * (k - (len(methods) - 1) / 2)
+        style = plots.METHOD_STYLES[method] | {"ms": 8, "mew": 1.5, "ls": ""}
+        at = part.exact.to_numpy()
+        axes.plot(place[at], 100 * part.l2[at], **style)
+        axes.plot(place[~at], 100 * part.l2[~at], mfc="white", **style)
+        axes.plot([], [], label=method, **style)
+    axes.set(title=source, yscale="log")
+    axes.set_xticks(range(len(part)), part.system, rotation=35, ha="right")
+    axes.grid(axis="x", visible=False)
+panels[0].plot([], [], "o", ms=8, color="0.4", mfc="white", mew=1.5, label="open: wrong terms")
+panels[0].set_ylabel(r"relative $\ell_2$ error (%)")
+fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=len(methods) + 1)
 caption = "Relative error of each method on each system, one trial; open symbols: the terms are wrong."
 numbers = {
     f"{method}, {source}": {
@@ -328,8 +347,15 @@ print(f"{len(every)} coefficients, {np.mean(np.abs(every) < 2):.0%} within two s
 if full:
     assert 0.7 < np.mean(np.abs(every) < 2) < 0.95
 
-# %%
-fig = plots.plot_pulls(pulled)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(8, 3.8))
+axes.axhspan(-2, 2, color="0.92")
+axes.axhline(0, color="k", lw=0.8)
+for column, values in enumerate(pulled.values()):
+    axes.plot(column + np.linspace(-0.25, 0.25, len(values)), values, "oC0", ms=4)
+axes.set_xticks(range(len(pulled)), list(pulled), rotation=20)
+axes.set_ylabel("error / standard error")
+axes.grid(axis="x", visible=False)
 caption = "Errors of all coefficients in units of their standard errors; grey: two of them."
 save_figure("discovery_pulls", fig, caption=caption, numbers=pulled, tolerance=0.1)
 
@@ -417,7 +443,25 @@ save_table("discovery_forecast", rows, caption=caption, tolerance=loose)
 
 # %%
 shown = {name: (truth[:6000], found[:6000]) for name, (truth, found) in forecasts.items()}
-fig = plots.plot_attractors(shown)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(-(-len(shown) // 4), min(len(shown), 4), squeeze=False, subplot_kw=plots.SPACE)
+fig.set_size_inches(3.1 * panels.shape[1], 3.3 * panels.shape[0] + 0.5)
+for axes, (name, (truth, law)) in zip(panels.flat, shown.items(), strict=False):
+    axes.plot(*truth.T, color="0.75", lw=3, label="truth")
+    axes.plot(*law.T, color="C0", lw=0.8, label="discovered law")
+    axes.set_title(name, loc="center")
+    axes.set(xlabel="x", ylabel="y", zlabel="z")
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.labelpad = -4
+    axes.set_box_aspect((1, 1, 1), zoom=0.9)  # cubes with few numbers; the legend has the unit
+    axes.locator_params(nbins=4, integer=True)
+    axes.tick_params(labelsize=8, pad=-2)
+    axes.view_init(elev=20, azim=-60)
+for axes in panels.flat[len(shown) :]:
+    axes.remove()
+handles = panels[0, 0].get_legend_handles_labels()
+fig.legend(*handles, loc="outside upper center", ncols=2, title="x, y, z in scene units")
 caption = "The discovered laws (blue) on the true motions (grey), as long as the forecast is good."
 numbers = {name: {"truth": a[::20], "discovered": b[::20]} for name, (a, b) in shown.items()}
 save_figure("fig_2", fig, caption=caption, numbers=numbers)

@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -47,6 +48,8 @@ from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
+import seaborn as sns
+from scipy.stats import halfnorm
 
 from vidsindy_lite import discover, dynamics, observe_tracks
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
@@ -188,8 +191,19 @@ defaults = spline_ado.SplineADOSettings()
 if full:
     assert (defaults.physics_weight, defaults.sparsity_weight) == (alpha, beta)
 
-# %%
-fig = plots.plot_weights(misfits, alphas, betas, ("clean", "10 % noise"))
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(1, 3, figsize=(9.5, 3))
+conditions = {"clean": misfits[..., :1], "10 % noise": misfits[..., 1:], "all": misfits}
+for axes, (title, values) in zip(panels, conditions.items(), strict=True):
+    logarithms = np.log(values).mean(axis=(2, 3))
+    axes.imshow(logarithms, cmap="Blues", aspect="auto", alpha=0.6)
+    for (i, j), value in np.ndenumerate(100 * np.exp(logarithms)):
+        axes.text(j, i, f"{value:.3g} %", ha="center", va="center")
+    axes.set(title=title, xlabel=r"$\beta$")
+    axes.set_xticks(range(len(betas)), [f"{b:g}" for b in betas])
+    axes.set_yticks(range(len(alphas)), [f"{a:g}" for a in alphas])
+    axes.grid(visible=False)
+panels[0].set_ylabel(r"$\alpha$")
 numbers = {f"alpha {a:g}, beta {b:g}": misfits[i, j].T for i, a in enumerate(alphas) for j, b in enumerate(betas)}
 caption = "Misfit of held-out samples by the weights of spline-ADO, in percent of the spread."
 save_figure("study_weights", fig, caption=caption, numbers=numbers, tolerance=0.3)
@@ -235,10 +249,50 @@ if full:
     assert no_path == {"SprottE", "RayleighBenard"}
     assert 0.25 < doubted_here < 0.75
 
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+TITLES = {"noise": "noise", "blocks": "blocks missing", "fibers": "fibers missing"}
+
+
+def plot_robustness(trials, published):
+    """Error and wrong terms against the level; lines join medians, bars hold the middle half."""
+    conditions = trials.condition.unique()
+    levels = [np.sort(trials.level[trials.condition == condition].unique()) for condition in conditions]
+    fig, panels = plt.subplots(
+        2, len(conditions), figsize=(9 if len(conditions) > 1 else 6.5, 5), sharex="col",
+        sharey="row", squeeze=False, width_ratios=[1 + len(level) for level in levels],
+    )  # fmt: skip
+    for column, condition, level in zip(panels.T, conditions, levels, strict=True):
+        chosen = trials[trials.condition == condition]
+        rank = chosen.method.map({name: k for k, name in enumerate(chosen.method.unique())})
+        shift = 0.6 * np.ptp(level) * (rank - rank.max() / 2)  # methods of a level side by side
+        chosen = chosen.assign(**{"l2 (%)": 100 * chosen.l2, "place": 100 * chosen.level + shift})
+        for axes, value in zip(column, ("l2 (%)", "wrong_terms"), strict=True):
+            sns.lineplot(
+                chosen, x="place", y=value, hue="method", style="method", dashes=False, lw=1.4,
+                palette={name: style["color"] for name, style in plots.METHOD_STYLES.items()},
+                markers={name: style["marker"] for name, style in plots.METHOD_STYLES.items()},
+                estimator="median", errorbar=("pi", 50), err_style="bars", markeredgewidth=0,
+                err_kws={"capsize": 2, "elinewidth": 1}, legend="full", ax=axes,
+            )  # fmt: skip
+            axes.get_legend().remove()
+        if published:
+            known = 100 * np.array(list(published[condition].items()))
+            column[0].plot(*known.T, "*k", ms=10, label="paper (Table 2)")
+        column[0].set_title(TITLES[condition])
+        column[1].set_xlabel("level (%)" if condition == "noise" else "rate (%)")
+        column[1].set_xticks(100 * level)
+    panels[0, 0].set(yscale="log", ylabel=r"relative $\ell_2$ error (%)")
+    panels[1, 0].set(ylabel="wrong terms", ylim=(-0.5, max(3.5, panels[1, 0].get_ylim()[1])))
+    panels[1, 0].locator_params(axis="y", integer=True)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    columns = min(len(labels), len(labels) if len(conditions) > 1 else 3)
+    fig.legend(handles, labels, loc="outside upper center", ncols=columns)
+    return fig
+
 
 # %%
 def robustness(figure_id, caption, trials, published=None):
-    fig = plots.plot_robustness(trials, published)
+    fig = plot_robustness(trials, published)
     groups = trials.groupby(["condition", "method", "level"], sort=False)[["l2", "wrong_terms"]]
     numbers = {f"{c}, {m}, {level:g}": group.median() for (c, m, level), group in groups}
     numbers = {key: [significant(l2, 3, LEAST), n] for key, (l2, n) in numbers.items()}
@@ -453,8 +507,22 @@ rows = [
 caption = f"Share of {len(trials)} trials whose terms are all right and none is false."
 save_table("study_exact", rows, caption=caption)
 
-# %%
-fig = plots.plot_shares(shares.drop("all"))
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+percent = 100 * shares.drop("all")
+conditions = percent.columns.unique("condition")
+fig, panels = plt.subplots(
+    1, len(conditions), figsize=(9.5, 3.4), sharey=True, squeeze=False,
+    width_ratios=[percent[condition].shape[1] for condition in conditions],
+)  # fmt: skip
+for axes, condition in zip(panels[0], conditions, strict=True):
+    sns.heatmap(
+        percent[condition], xticklabels=[f"{100 * level:.0f}" for level in percent[condition]],
+        vmin=0, vmax=100, cmap="Blues", annot=True, fmt=".0f", cbar=False, linewidths=1.5,
+        annot_kws={"size": 9}, ax=axes,
+    )  # fmt: skip
+    axes.set(title=TITLES[condition], ylabel="")
+    axes.set_xlabel("level (%)" if condition == "noise" else "rate (%)")
+    axes.tick_params(length=0, rotation=0)
 numbers = {f"{c}, {level:g}": column.to_dict() for (c, level), column in shares.items()}
 save_figure("study_exact_figure", fig, caption=caption, numbers=numbers)
 
@@ -573,8 +641,16 @@ caption = (
 loose = dict.fromkeys(["rms", "l2, median (e-2)", "l2, promised (e-2)"], 0.2)
 save_table("study_pulls", rows, caption=caption, tolerance=loose)
 
-# %%
-fig = plots.plot_pull_distribution(pulled)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7, 4))
+distance = np.linspace(0, 4, 200)
+axes.plot(distance, 100 * halfnorm.cdf(distance), color="0.8", lw=7, label="if they are right")
+colours = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(pulled)))
+for (name, values), colour in zip(pulled.items(), colours, strict=True):
+    sns.ecdfplot(x=abs(values), stat="percent", color=colour, lw=1.4, label=name, ax=axes)
+axes.set(xlim=(0, 4), ylim=(0, 102), xlabel="|error| / standard error")
+axes.set_ylabel("coefficients below (%)")
+axes.legend(loc="lower right")
 caption = "Share of coefficients within so many standard errors; grey: the normal distribution."
 save_figure("study_pulls_figure", fig, caption=caption, numbers=pulled)
 

@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -42,25 +43,36 @@ jobs: int = 2  # trials at a time
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import perf_counter
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
+from joblib import Parallel, delayed
+from tqdm import tqdm
 
-from vidsindy_lite import Rig, Scene, discover, observe, render_video
+# %%
+from vidsindy_lite import (
+    Rig,
+    Scene,
+    discover,
+    observe,
+    observe_tracks,
+    read_frame,
+    render_video,
+    track,
+    vision,
+    write_video,
+)
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
-    DISTURBANCES,
     LEAST,
     REFERENCE_OFFSET,
-    START,
     SYSTEMS,
-    SceneTask,
     plots,
     pulls,
-    run_scene,
     score,
     significant,
-    sweep,
 )
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
@@ -77,6 +89,8 @@ trials = range(seed, seed + (5 if full else 1))
 # random: shape and colour of the target, backgrounds, the trees and where they stand.
 
 # %%
+START = (-1.17, -1.1, 1.0)  # in the native frame
+DISTURBANCES = {"shape": "irregular", "tumbling": 1.0, "size_variation": 0.25, "noise_variance": 0.01}
 print(SYSTEMS["SprottF"].text(), f"from {START}", sep="\n")
 for name, value in DISTURBANCES.items():
     print(f"{name:15} {value}")
@@ -100,12 +114,69 @@ print(f"lost: {np.isnan(seen.x[:, 0]).mean():.0%} of the path", law.equations("n
 assert score(law, truth).exact
 
 # %% [markdown]
-# `run_scene` makes the videos, tracks them, learns cameras 2 and 3, reconstructs the path and discovers the
-# law. Nothing is told to it but the times of the frames, where the cameras stand, and the calibration of
-# the first. Each trial has another scene.
+# Each trial has another scene: one target before three backgrounds, and before each of them a tree.
 
 # %%
-runs = sweep(run_scene, [SceneTask(n, frames) for n in trials], jobs=jobs, desc="trials")
+def scenes(number):
+    """What each camera sees, and what seeds tumbling and noise in it."""
+    target, *streams = np.random.SeedSequence(number).spawn(4)
+    drawn = Scene.random(np.random.default_rng(target), **DISTURBANCES)
+    common = DISTURBANCES | {"colour": drawn.colour, "shape_seed": drawn.shape_seed}
+    for stream in streams:
+        rng = np.random.default_rng(stream)
+        left = round((0.5 + rng.uniform(-0.12, 0.12)) * 512 - 123 / 2)  # somewhere near the middle
+        tree = (left, 512 - 338, 123, 338)
+        scene = Scene.random(rng, **common, trees=(tree,), image_size=(512, 512), size=0.055 * 512)
+        yield scene, int(rng.integers(2**31))
+
+
+# %% [markdown]
+# The renderer says with each frame which share of the target can be seen.
+
+# %%
+def filmed(pixels, scene, seed):
+    """Film pixels before a scene, and track them in the video file."""
+    shares = []
+
+    def images():
+        for drawn in vision.render_labelled(pixels, scene, seed):
+            shares.append(drawn.visible)
+            yield drawn.frame
+
+    with TemporaryDirectory() as folder:
+        video = write_video(Path(folder) / "view.mov", images())
+        found = track(video)
+        seen = np.flatnonzero(np.isfinite(found.pixels).all(axis=1))
+        shown = int(seen[len(seen) // 2])
+        return found, np.array(shares), shown, read_frame(video, shown)
+
+
+# %% [markdown]
+# From the videos to the law. Nothing is told but the times of the frames, where the cameras stand, and the calibration of
+# the first.
+
+# %%
+def watched(pixels, scene, seed):
+    found, visible, shown, image = filmed(pixels, scene, seed)
+    errors = np.linalg.norm(found.pixels - pixels, axis=1)
+    about = {"scene": scene, "track": found, "errors": errors, "shown": shown, "image": image}
+    return SimpleNamespace(**about, visible=visible, hidden=visible < 0.01)  # but for a pixel
+
+
+def run_scene(number):
+    t, x = truth.trajectory(frames)
+    rig = Rig.around(x)
+    views = [watched(c.project(x), *scene) for c, scene in zip(rig.cameras, scenes(number), strict=True)]
+    seen = observe_tracks([one.track.pixels for one in views], rig.uncalibrated(keep=0), t, lags=(0, 0, 0))
+    began = perf_counter()
+    found = discover(t, seen.x, seed=number, systematic=seen.systematic)
+    about = {"t": t, "x": x, "path": seen.x, "truth": truth, "seconds": perf_counter() - began}
+    return SimpleNamespace(**about, views=views, found=found, score=score(found, truth))
+
+
+# %%
+work = Parallel(n_jobs=jobs, return_as="generator")(delayed(run_scene)(n) for n in trials)
+runs = list(tqdm(work, total=len(trials), desc="trials"))
 first = runs[0]
 
 # %%
@@ -136,10 +207,15 @@ print(*told, sep="\n")
 assert all("the target is lost in" in doubt for doubt in told)
 assert len(told) <= len(runs) // 2
 
-# %%
-fig = plots.plot_confidence(
-    [view.visible for view in first.views], [view.track.confidence for view in first.views]
-)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, panels = plt.subplots(3, 1, figsize=(9, 4.6), sharex=True, sharey=True)
+for axes, title, view in zip(panels, titles, first.views, strict=True):
+    share = view.visible
+    axes.fill_between(np.arange(len(share)), share, color="0.85", step="mid", label="visible share")
+    axes.plot(view.track.confidence, color="C0", lw=1, label="confidence of the tracker")
+    axes.set(ylabel=title, ylim=(0, 1.05))
+panels[-1].set(xlabel="frame", xlim=(0, len(share) - 1))
+fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
 caption = "How much of the target can be seen, and how sure the tracker is."
 numbers = {title: view.track.confidence for title, view in zip(titles, first.views, strict=True)}
 save_figure("scene_confidence", fig, caption=caption, numbers=numbers)
@@ -147,6 +223,15 @@ save_figure("scene_confidence", fig, caption=caption, numbers=numbers)
 # %% [markdown]
 # *Where the tree hides the target (white between the grey), the confidence is nil. It is low for partial
 # views, and it varies with the noise even where all of the target is seen.*
+
+# %%
+def delays(view):
+    """Whole views after each time that it was hidden, until it is found again."""
+    whole, found = view.visible > 0.999, np.isfinite(view.errors)
+    ends = np.flatnonzero(view.hidden[:-1] & ~view.hidden[1:]) + 1
+    back = [end + np.argmax(np.append(found[end:], True)) for end in ends]
+    return [int(whole[end:again].sum()) for end, again in zip(ends, back, strict=True)]
+
 
 # %%
 rows = []
@@ -157,7 +242,7 @@ for n, trial in zip(trials, runs, strict=True):
             "trial": n, "camera": i, "background": view.scene.background,
             "hidden (%)": 100 * hidden.mean(),
             "found while hidden": int(np.isfinite(error[hidden]).sum()),
-            "frames until found again": int(view.delays.max(initial=0)),
+            "frames until found again": max(delays(view), default=0),
             "found (%)": 100 * np.isfinite(error).mean(),
             "rms error (px)": np.sqrt(np.nanmean(error**2)),
             "largest error (px)": np.nanmax(error),
@@ -206,7 +291,8 @@ assert 0 < gap.mean() < np.mean(alone)
 assert (error < 0.01 * first.x.std(axis=0)).all()
 
 # %%
-fig = plots.plot_gaps(first.t, first.path, first.x)
+both = {"truth": first.x, "reconstructed": first.path}
+fig = plots.plot_path(first.t, both, "hidden", plots.DASHED, "time units")
 caption = "The reconstructed path of the realistic scene; shaded: fewer than two cameras see it."
 save_figure(
     "fig_4b", fig, caption=caption, numbers={"t": first.t, "path": first.path, "truth": first.x}

@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -48,18 +49,22 @@ from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import LogLocator
 
 from vidsindy_lite import (
     Rig,
+    Scene,
     cameras,
     learn_cameras,
     observe_tracks,
     read_frame,
     reconstruct,
+    render_video,
     residuals,
+    track,
 )
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
-from vidsindy_lite.study import lab, plots
+from vidsindy_lite.study import LAB, plots
 
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
@@ -82,8 +87,10 @@ def rms(error):
 # it is at (180, 300, 26.25) mm.
 
 # %%
-published = length(lab.IDENTIFIED - lab.MARKED)
-print(f"error of the paper: {published:.2f} mm; diameter of its ball: {2 * lab.MARKED[2]} mm")
+MARKED, IDENTIFIED = np.array(LAB.truth), np.array(LAB.found)
+RADIUS = MARKED[2]  # a ball on the table has its centre there
+published = length(IDENTIFIED - MARKED)
+print(f"error of the paper: {published:.2f} mm; diameter of its ball: {2 * RADIUS} mm")
 assert round(published, 2) == 8.87
 
 # %% [markdown]
@@ -96,12 +103,49 @@ assert round(published, 2) == 8.87
 # straight paths and slows down; the first path goes through the marked point.
 
 # %%
-truth = lab.cameras()
-paths = lab.paths(frames)
+FPS = 25
+middles = (MARKED[:2], (430.0, 350.0), (350.0, 450.0))  # where it is in the middle of each clip, mm
+velocities = np.array([(50.0, 170.0), (-220.0, 130.0), (240.0, -80.0)])  # and how fast, mm/s
+
+
+def rolling(frames):
+    """Centre of the ball on three straight paths, on which its weight slows it down by 60 mm/s^2."""
+    t = (np.arange(frames)[:, None] - frames // 2) / FPS
+    x = np.full((3, frames, 3), RADIUS)
+    for path, middle, velocity in zip(x, middles, velocities, strict=True):
+        path[:, :2] = middle + (t - t**2 * 60 / (2 * length(velocity))) * velocity
+    return x
+
+
+# %% [markdown]
+# The paper does not say where its cameras stand. All of ours look at the same point of the table; the focal length
+# grows with the distance, so that the table fills the images.
+
+# %%
+MIDDLE = np.array([350.0, 350.0, 0.0])  # of the part of the table that they look at
+
+
+def camera_at(azimuth, elevation, reach, focal, roll):
+    """A camera that looks at the middle, seen from there in this direction (degrees), rolled."""
+    a, e, roll = np.deg2rad([azimuth, elevation, roll])
+    normal = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+    up = cameras.rotation_to_z(normal)[:2, 2]  # this angle shows it as up in the image
+    place, angle = MIDDLE + reach * normal, np.arctan2(up[0], up[1]) + roll
+    return cameras.PerspectiveCamera(position=place, normal=normal, scale=1 / focal, angle=angle)
+
+
+def table_rig(distance=1.0):
+    places = ((-80, 35, 1900, 1100, 3), (40, 30, 2200, 1250, -5), (160, 40, 2000, 1150, 8))
+    return Rig([camera_at(a, e, distance * r, distance * f, roll) for a, e, r, f, roll in places])
+
+
+# %%
+truth = table_rig()
+paths = rolling(frames)
 x = paths.reshape(-1, 3)
 marked = frames // 2  # index of the frame in which the ball is there
-assert np.allclose(x[marked], lab.MARKED, atol=1e-3)
-assert abs(2 * lab.RADIUS - 52.5) < 0.1  # of a snooker ball, mm
+assert np.allclose(x[marked], MARKED, atol=1e-3)
+assert abs(2 * RADIUS - 52.5) < 0.1  # of a snooker ball, mm
 for one in truth.cameras:
     print(f"at {one.position.round()} mm, focal length {one.focal_length:.0f} px")
 
@@ -115,13 +159,26 @@ for one in truth.cameras:
 # the camera of the paper with a scale $s\,d$ that grows with the distance $d$ from the pinhole
 # $\mathbf p$ along the normal $\mathbf n$. $1/s$ is the focal length in pixels.
 #
-# A ball of radius $r$ is seen as an ellipse, so this is what is drawn.
+# A ball of radius $r$ is seen as an ellipse, so this is what is drawn: in one colour, without highlight, shadow, blur
+# or noise, before a plain cloth.
+
+# %%
+def filmed(file, camera, path, cloth):
+    """Film a path of the ball, and track it."""
+    centroids, shapes = camera.ball_image(path, RADIUS)
+    scene = Scene(background="plain", image_size=camera.image_size)
+    render_video(file, centroids, scene, FPS, cloth, 2 / scene.size * shapes)
+    return track(file).pixels, read_frame(file, marked)
+
 
 # %%
 with TemporaryDirectory() as folder:
-    tracks = lab.film_ball(truth, paths, folder, seed)
-    clips = [Path(folder) / f"path_1_camera_{i}.mov" for i in (1, 2, 3)]
-    images = [read_frame(clip, marked) for clip in clips]
+    clips = [
+        [filmed(Path(folder) / f"{i}_{k}.mov", camera, path, 3 * seed + i) for k, path in enumerate(paths)]
+        for i, camera in enumerate(truth.cameras)
+    ]
+tracks = [np.vstack([pixels for pixels, _ in views]) for views in clips]
+images = [views[0][1] for views in clips]
 lost = sum(np.isnan(track).any(axis=1).sum() for track in tracks)
 print(f"{9 * frames} frames, target lost in {lost}")
 assert lost == 0
@@ -145,14 +202,25 @@ save_figure("lab_frames", fig, caption=caption, numbers=numbers)
 # done for camera 1 is to calibrate it in the middle of the table. The others are learned.
 
 # %%
-t = np.arange(len(x)) / lab.FPS
-seen = observe_tracks(tracks, lab.orthographic(truth).uncalibrated(keep=0), t, lags=(0, 0, 0))
+def flattened(rig):
+    """The same cameras, with one scale for all distances."""
+    return Rig([
+        cameras.OrthographicCamera(
+            position=c.position, normal=c.normal, angle=c.angle, image_size=c.image_size,
+            scale=c.scale * (c.normal @ (c.position - MIDDLE)),
+        ) for c in rig.cameras
+    ])  # fmt: skip
+
+
+# %%
+t = np.arange(len(x)) / FPS
+seen = observe_tracks(tracks, flattened(truth).uncalibrated(keep=0), t, lags=(0, 0, 0))
 assert "the rig does not agree with the tracks" in seen.warnings[0]
 flat, by_flat = seen.rig, seen.x
 error = by_flat - x
 rows = [
-    {"": "truth", **dict(zip("xyz", lab.MARKED, strict=True)), "error (mm)": 0.0},
-    {"": "paper", **dict(zip("xyz", lab.IDENTIFIED, strict=True)), "error (mm)": published},
+    {"": "truth", **dict(zip("xyz", MARKED, strict=True)), "error (mm)": 0.0},
+    {"": "paper", **dict(zip("xyz", IDENTIFIED, strict=True)), "error (mm)": published},
     {"": "here", **dict(zip("xyz", by_flat[marked], strict=True)), "error (mm)": length(error)[marked]},
 ]
 assert 3 < length(error)[marked] < 20
@@ -188,23 +256,53 @@ assert np.sqrt(np.mean(missed**2)) > 1
 # distance, so look at cameras further and further away, with focal lengths to match.
 
 # %%
-predicted = lab.orthographic_error(truth, flat, x)
+def first_order(rig, flat, x):
+    """Error in space of the orthographic cameras that reconstruct, to the first order."""
+    rows, views = [], []
+    for camera, (growth, turn) in zip(rig.cameras, cameras.calibration_errors(flat, flattened(rig)), strict=True):
+        distance = camera.normal @ (camera.position - MIDDLE)
+        growth = growth + (x - MIDDLE) @ camera.normal / distance
+        across = (x - camera.position) @ camera.rows.T
+        pixel = camera.scale * distance
+        rows.append(camera.rows / pixel)
+        views.append((growth[:, None] * across + turn * across[:, ::-1] * (1, -1)) / pixel)
+    return np.hstack(views) @ np.linalg.pinv(np.vstack(rows)).T
+
+
+# %%
+predicted = first_order(truth, flat, x)
 measured_rms, predicted_rms, ratio = [], [], []
 for factor in (1, 2, 4, 8, 16):
-    far = lab.cameras(distance=factor)
+    far = table_rig(distance=factor)
     pixels = [camera.project(x) for camera in far.cameras]
-    found = learn_cameras(pixels, lab.orthographic(far).uncalibrated())
+    found = learn_cameras(pixels, flattened(far).uncalibrated())
     measured_rms.append(rms(reconstruct(pixels, found) - x))
-    predicted_rms.append(rms(lab.orthographic_error(far, found, x)))
-    ratio.append(np.mean([np.ptp(x @ c.normal) / length(c.position - lab.MIDDLE) for c in far.cameras]))
+    predicted_rms.append(rms(first_order(far, found, x)))
+    ratio.append(np.mean([np.ptp(x @ c.normal) / length(c.position - MIDDLE) for c in far.cameras]))
 assert np.isclose(measured_rms[0], rms(error), rtol=0.05)  # from pixels as from videos
 
 # %%
 by_path = length(error).reshape(3, -1), length(predicted).reshape(3, -1)
 by_distance = {"measured": np.array(measured_rms), "first order": np.array(predicted_rms)}
-fig = plots.plot_orthographic_error(
-    np.arange(frames) / lab.FPS, *by_path, np.array(ratio), by_distance
-)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+seconds = np.arange(frames) / FPS
+for k, (measured, expected) in enumerate(zip(*by_path, strict=True)):
+    left.plot(seconds, measured, f"C{k}", label=f"path {k + 1}")
+    left.plot(seconds, expected, "--k", lw=1)
+left.plot([], [], "--k", lw=1, label="first order")
+left.set(title="along the paths", xlabel="time (s)", ylabel="error (mm)", ylim=(0, None))
+left.legend()
+for (name, values), style in zip(by_distance.items(), ("oC1", "--k"), strict=True):
+    right.loglog(ratio, values, style, label=name)
+right.set(title="as the cameras move away", ylabel="rms error (mm)")
+right.set_xticks(ratio, [f"{value:.2g}" for value in ratio])
+right.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+right.yaxis.set_major_formatter("{x:g}")
+right.minorticks_off()
+right.set_xlabel("depth range / distance")
+right.legend()
 caption = "Error of orthographic cameras: along the paths, and against depth range over distance."
 numbers = {"measured": by_path[0], "first order": by_path[1], "ratio": ratio, **by_distance}
 save_figure("lab_orthographic_error", fig, caption=caption, numbers=numbers)
@@ -227,11 +325,20 @@ assert abs(measured_rms[-1] / predicted_rms[-1] - 1) < 0.01
 
 
 # %%
+def random_rig(rng):
+    azimuths = np.zeros(3)
+    while np.diff(azimuths, append=azimuths[0] + 360).min() < 60:
+        azimuths = np.sort(rng.uniform(0, 360, 3))
+    places = zip(rng.permutation(azimuths), rng.uniform(1200, 3000, 3), strict=True)
+    return Rig([camera_at(a, rng.uniform(20, 50), r, 0.575 * r, rng.uniform(-10, 10)) for a, r in places])
+
+
+# %%
 def error_of_rig(stream):
-    rig = lab.random_cameras(np.random.default_rng(stream))
+    rig = random_rig(np.random.default_rng(stream))
     pixels = [camera.project(x) for camera in rig.cameras]
-    found = learn_cameras(pixels, lab.orthographic(rig).uncalibrated())
-    return length(reconstruct(pixels, found)[marked] - lab.MARKED)
+    found = learn_cameras(pixels, flattened(rig).uncalibrated())
+    return length(reconstruct(pixels, found)[marked] - MARKED)
 
 
 streams = np.random.SeedSequence(seed).spawn(200 if full else 12)
@@ -240,8 +347,12 @@ low, middle, high = np.quantile(anywhere, (0.05, 0.5, 0.95))
 print(f"median {middle:.1f} mm, nine of ten between {low:.1f} and {high:.1f} mm")
 assert low < published < high
 
-# %%
-fig = plots.plot_anywhere(anywhere, published)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7, 3.8))
+axes.ecdf(anywhere, color="C1", label="orthographic cameras, somewhere around the table")
+axes.axvline(published, color="k", ls="--", lw=1.2, label=f"the paper's, {published:.2f} mm")
+axes.set(xlabel="error at the marked point (mm)", ylabel="share of rigs below", xlim=(0, None))
+fig.legend(loc="outside upper center", ncols=2)
 caption = "Error at the marked point for rigs put up at random: the paper's is an ordinary one."
 save_figure("lab_anywhere", fig, caption=caption, numbers={"error": anywhere})
 
@@ -281,9 +392,35 @@ assert rms(by_pinhole - x) < 0.1
 
 # %%
 models = {"orthographic": by_flat, "perspective": by_pinhole}
-points = {"marked point": lab.MARKED, "the paper's result for it": lab.IDENTIFIED}
+points = {"marked point": MARKED, "the paper's result for it": IDENTIFIED}
 found = {name: values.reshape(paths.shape) for name, values in models.items()}
-fig = plots.plot_table(truth, paths, found, points)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig = plt.figure(figsize=(10.5, 4.2), layout="compressed")
+panels = fig.subplot_mosaic(
+    [["above", "space"]], width_ratios=(1, 1.15), per_subplot_kw={"space": plots.SPACE}
+)
+above, space = panels["above"], panels["space"]
+for path in paths:
+    space.plot(*path.T, color="k", lw=1.2)
+for i, one in enumerate(truth.cameras, start=1):
+    place = np.array(one.position)
+    looked_at = place - one.normal * length(place - x.mean(axis=0))
+    space.plot(*np.transpose([place, looked_at]), "s:", color="0.4", ms=8, lw=1, markevery=2)
+    space.text(*place + [0, 0, 130], f"$C_{i}$", ha="center")
+space.plot([0, 750, 750, 0, 0], [0, 0, 750, 750, 0], 0, color="0.6", lw=0.8)
+space.set_zlim3d(0, space.get_zlim3d()[1])
+plots.finish_space(space, azimuth=-65, elevation=25, zoom=1.12, unit="mm")
+space.locator_params(nbins=3)
+drawn = {"truth": (paths, {"color": "0.75", "lw": 5})}
+drawn |= {name: (found[name], {"color": f"C{1 - i}", "lw": 1.3}) for i, name in enumerate(found)}
+for name, (lines, style) in drawn.items():
+    for k, path in enumerate(lines):
+        above.plot(*path[:, :2].T, label=name if k == 0 else None, **style)
+for (name, point), style in zip(points.items(), ("*k", "*C4"), strict=True):
+    above.plot(*point[:2], style, ms=12, mec="white", mew=0.6, ls="", label=name)
+above.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+fig.legend(*above.get_legend_handles_labels(), loc="outside upper center", ncols=5)
 caption = "The paths from above: true, by orthographic and by perspective cameras; and the scene."
 save_figure("lab_table", fig, caption=caption, numbers={"truth": paths, **found})
 
@@ -304,12 +441,12 @@ save_figure("lab_table", fig, caption=caption, numbers={"truth": paths, **found}
 
 # %%
 shifts = [
-    length(camera.ball_image(x, lab.RADIUS)[0] - centre)
+    length(camera.ball_image(x, RADIUS)[0] - centre)
     for camera, centre in zip(truth.cameras, pixels, strict=True)
 ]
 tracking = [
-    length(track - camera.ball_image(x, lab.RADIUS)[0])
-    for camera, track in zip(truth.cameras, tracks, strict=True)
+    length(pixels - camera.ball_image(x, RADIUS)[0])
+    for camera, pixels in zip(truth.cameras, tracks, strict=True)
 ]
 print(f"centroid beside centre: up to {np.max(shifts):.3f} px; tracker: up to {np.max(tracking):.3f} px")
 assert np.max(tracking) < 0.005
@@ -317,13 +454,19 @@ assert 5 * np.max(tracking) < np.max(shifts) < 0.1
 
 # %% [markdown]
 # As the ball's radius is known, the difference can be computed once the ball's place is, and taken off:
-# `observe_ball` observes, corrects and observes again. At the other end, a detector that gives **whole
+# observe, correct, and observe again. Each round leaves about a thousandth of the error. At the other end, a detector that gives **whole
 # pixels** (a box, say) costs more than everything else together.
 
 # %%
 rounded = [np.round(track) for track in tracks]
 coarse = observe_tracks(rounded, start, t, lags=(0, 0, 0))
-centred = lab.observe_ball(tracks, start)
+centred = seen
+for _ in range(2):
+    corrected = [
+        pixels - camera.ball_image(centred.x, RADIUS)[0] + camera.project(centred.x)
+        for pixels, camera in zip(tracks, centred.rig.cameras, strict=True)
+    ]
+    centred = observe_tracks(corrected, start, t, lags=(0, 0, 0))
 results = {
     "orthographic": (flat, by_flat),
     "perspective, whole pixels": (coarse.rig, coarse.x),
@@ -334,7 +477,7 @@ results = {
 # %%
 rows = []
 for name, (rig, path) in results.items():
-    scale, angle = np.abs(cameras.calibration_errors(rig, lab.orthographic(truth) if rig is flat else truth)).max(0)
+    scale, angle = np.abs(cameras.calibration_errors(rig, flattened(truth) if rig is flat else truth)).max(0)
     row = {"cameras": name, "rms (mm)": rms(path - x), "largest (mm)": length(path - x).max()}
     row |= {"marked point (mm)": length(path - x)[marked]}
     rows.append(row | {"error of scale (%)": 100 * scale, "error of angle (mrad)": 1000 * angle})
@@ -354,7 +497,14 @@ save_table("lab_models", rows, caption=caption, tolerance=loose)
 
 # %%
 lengths = {name: length(path - x) for name, (_, path) in results.items()}
-fig = plots.plot_model_errors(lengths)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(8, 4))
+for (name, error), colour, style in zip(lengths.items(), (1, 0, 2, 3), ("-", "--", "-.", ":"), strict=True):
+    axes.ecdf(error, color=f"C{colour}", ls=style, label=name)
+axes.axvline(1, color="0.6", lw=0.8)
+axes.set(xscale="log", xlabel="error in space (mm)", ylabel="share of frames below")
+fig.legend(loc="outside upper center", ncols=2)
 caption = "Error in space by the model of the cameras; the vertical line is one millimetre."
 save_figure("lab_model_errors", fig, caption=caption, numbers=lengths)
 
@@ -434,7 +584,7 @@ save_table("lab_misplaced", rows, caption="Perspective cameras, one of them meas
 #   tracked to a few thousandths of a pixel, and the orthographic error stays what it is.
 #   <!-- by: np.max(tracking) < 0.005; 3 < length(error)[marked] < 20 -->
 # * "A standard billiard ball": by its height, a snooker ball.
-#   <!-- by: abs(2 * lab.RADIUS - 52.5) < 0.1; figure lab_marked_point -->
+#   <!-- by: abs(2 * RADIUS - 52.5) < 0.1; figure lab_marked_point -->
 #
 # Not modelled: lens distortion, a principal point off the middle of the image, and cameras that are not
 # synchronised.

@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -233,7 +234,7 @@ save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rat
 # %%
 result = data[shown]
 t, x, curve = (np.array(result[key], dtype=float) for key in ("t", "x", "curve"))
-fig = plots.plot_path(t, x, curve)
+fig = plots.plot_path(t, {"reconstructed": x, "curve that obeys the law": curve}, "not seen")
 caption = "The reconstructed path (grey) and the curve that obeys the law (blue)."
 save_figure("own_path", fig, caption=caption, numbers={"t": t, "x": x, "curve": curve})
 
@@ -315,14 +316,17 @@ learned = Rig.load(report / "rig.toml")
 tried = np.unique(late + np.concatenate((np.arange(-17, 18), 0.1 * np.arange(-4, 5))))
 moved = [align(tracks, (0, lag - lags[1], 0)) for lag in tried]  # they are aligned already
 worst = np.array([max(cameras.disagreement(views, learned)) for views in moved])
-
-# %%
-fig = plots.plot_lags(tried, worst, cameras.DISAGREEMENT)
-caption = "Disagreement of the views for each lag of the second video."
-save_figure("own_lags", fig, caption=caption, numbers={"lag": tried, "pixels": worst})
 assert abs(tried[worst.argmin()] - late) < 0.11
 assert worst.min() < 0.3 * cameras.DISAGREEMENT
 assert worst[tried == late - 1] > 3 * worst.min()
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7.5, 3.8))
+axes.semilogy(tried, worst, "o-", ms=4, lw=1)
+axes.axhline(cameras.DISAGREEMENT, color="0.4", lw=1, ls="--")
+axes.set(xlabel="lag of the second video (frames)", ylabel="disagreement (px)")
+caption = "Disagreement of the views for each lag of the second video."
+save_figure("own_lags", fig, caption=caption, numbers={"lag": tried, "pixels": worst})
 
 # %% [markdown]
 # *Residual that one frame in ten exceeds, for each lag of the second video. The views agree at 7 frames

@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -43,9 +44,12 @@ seed: int = 0  # of control points and of the resampling in E-SINDy
 
 # %%
 from dataclasses import replace
+from itertools import product
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
+from scipy.optimize import least_squares
 
 from vidsindy_lite import Rig, cameras, dynamics, learn_cameras, reconstruct, residuals
 from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
@@ -58,8 +62,8 @@ from vidsindy_lite.study import (
     SCORES,
     SYSTEMS,
     SYSTEMS_S1,
-    audit,
     baselines,
+    metrics,
     plots,
     score,
 )
@@ -329,10 +333,17 @@ note("Eq. (3)", "spans u_i <= u < u_(i+1)", "no basis function at the last knot"
 
 
 # %%
+def rounding_reach(law, truth):
+    """By how much the errors of a printed law, recomputed and printed, may differ by rounding."""
+    coefficients = 0.01 / 2 * np.sqrt(np.count_nonzero(law.coefficients))
+    return coefficients / np.linalg.norm(truth.coefficients) + 1e-4 / 2
+
+
+# %%
 def recompute(method, name, law=None):
     law = LAWS[method, name] if law is None else law
     printed, scored = SCORES["Table 1", method, name], score(law, truths[name])
-    reach = audit.rounding_reach(law, truths[name])
+    reach = rounding_reach(law, truths[name])
     return {
         "system": name, "method": method,
         "l2 printed (e-2)": 100 * printed.l2, "l2 recomputed (e-2)": 100 * scored.l2,
@@ -365,7 +376,20 @@ assert as_z["difference / rounding"] < 1
 # %%
 differences = {f"{row['system']}, {row['method']}": row["difference / rounding"] for row in rows}
 differences["WangSun, PySINDy, 82.27 as z"] = as_z["difference / rounding"]
-fig = plots.plot_recomputed(differences)
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7.5, 0.32 * len(differences) + 1.1))
+heights = np.arange(len(differences))[::-1]
+values = np.maximum(list(differences.values()), 1e-3)
+within = values <= 1
+axes.axvspan(0.8e-3, 1, color="0.92", zorder=0)
+axes.plot(values[within], heights[within], "o", label="within the rounding of the print")
+axes.plot(values[~within], heights[~within], "s", label="not explained by rounding")
+axes.set(xscale="log", xlim=(0.8e-3, 1e2), ylim=(-0.7, len(heights) - 0.3))
+axes.set_yticks(heights, list(differences))
+axes.set_xlabel("|recomputed - printed| / largest effect of rounding")
+axes.grid(axis="y", visible=False)
+fig.legend(loc="outside upper center", ncols=2)
 caption = "Printed against recomputed l2 errors of Table 1, in units of what rounding can explain."
 save_figure("audit_l2_figure", fig, caption=caption, numbers=differences)
 
@@ -409,6 +433,46 @@ note("Sec. 4.1", "results are averaged over five trials",
 # average over five, with the mean number of false positives rounded?
 
 # %%
+HALF = (0.5 + 1e-6) * 1e-4  # of the last digit of P and R, with room for binary fractions
+LIBRARY = 60  # coefficients: 20 monomials up to degree 3 in three equations
+
+
+def counts_behind(row, T):
+    """Numbers of true and of false terms of one law that give the printed P and R."""
+    return [
+        (h, f) for h in range(1, T + 1) for f in range(LIBRARY - T + 1)
+        if abs(h / T - row.recall) <= HALF and abs(h / (h + f) - row.precision) <= HALF
+    ]  # fmt: skip
+
+
+# %% [markdown]
+# An average over five: go through all sums of true and of false terms, with the least and the largest sum of precisions that each
+# can have. What lies between them is not excluded.
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+def could_be(row, T, trials=1):
+    """Whether laws could score a printed row, on average over several trials."""
+    ends = np.array([-1, 1])
+    false_sum = trials * (row.false_positives + 0.5 * ends)
+    hit_sum = trials * (row.recall + HALF * ends) * T
+    precision_sum = trials * (row.precision + HALF * ends)
+    shape = (trials * T + 1, int(false_sum[1]) + 1)
+    low, high = np.full(shape, np.inf), np.full(shape, -np.inf)
+    low[0, 0] = high[0, 0] = 0.0
+    for _ in range(trials):
+        lower, higher = np.full(shape, np.inf), np.full(shape, -np.inf)
+        for h, f in product(range(T + 1), range(min(shape[1] - 1, LIBRARY - T) + 1)):
+            precision = h / (h + f) if h else 0.0
+            now, before = np.s_[h:, f:], np.s_[: shape[0] - h, : shape[1] - f]
+            lower[now] = np.minimum(lower[now], low[before] + precision)
+            higher[now] = np.maximum(higher[now], high[before] + precision)
+        low, high = lower, higher
+    hits, false = np.indices(shape)
+    printed = (hits >= hit_sum[0]) & (hits <= hit_sum[1]) & (false >= false_sum[0])
+    return (printed & (low <= precision_sum[1]) & (high >= precision_sum[0])).any()
+
+
+# %%
 published = {key: (row, true_terms[key[2]]) for key, row in SCORES.items()}
 published |= {
     ("Table 2", f"{method}, {condition} {rate} %", "SprottF"): (row, true_terms["SprottF"])
@@ -416,14 +480,14 @@ published |= {
 }
 
 # %%
-impossible = {key: (row, T) for key, (row, T) in published.items() if not audit.could_be(row, T)}
+impossible = {key: (row, T) for key, (row, T) in published.items() if not could_be(row, T)}
 rows = [
     {
         "table": table, "system": name, "method": method, "true terms": T,
         "false positives": row.false_positives,
         "P (%)": 100 * row.precision, "R (%)": 100 * row.recall,
-        "P and R say": "; ".join(f"{h} true, {f} false" for h, f in audit.counts_behind(row, T)),
-        "mean of five": "possible" if audit.could_be(row, T, trials=5) else "impossible",
+        "P and R say": "; ".join(f"{h} true, {f} false" for h, f in counts_behind(row, T)),
+        "mean of five": "possible" if could_be(row, T, trials=5) else "impossible",
     }
     for (table, method, name), (row, T) in impossible.items()
 ]  # fmt: skip
@@ -436,7 +500,7 @@ assert (len(rows), never, in_s3) == (11, 6, 8)
 assert sum(row["P and R say"] == "" for row in rows) == 3
 by_one = [
     key for key, (row, T) in impossible.items()
-    if any(abs(false - row.false_positives) == 1 for _, false in audit.counts_behind(row, T))
+    if any(abs(false - row.false_positives) == 1 for _, false in counts_behind(row, T))
 ]  # fmt: skip
 assert len(by_one) == 6
 assert not any(method.startswith("Ours") for table, method, _ in impossible if table != "Table 2")
@@ -462,10 +526,23 @@ assert (wang.precision, wang.recall) == (round(14 / 17, 4), round(13 / 14, 4))
 # S2 does show are constants, as the paper says; "small" depends on the measure.
 
 # %%
+def coefficients_of(law, support):
+    """Coefficients of a law at the terms of another one, by term: "dx/dt: yz"."""
+    values = metrics.coefficients_in(law, support.exponents)
+    return {
+        f"d{support.names[j]}/dt: {support.terms[row]}": float(values[row, j])
+        for j, row in np.argwhere(support.support.T)
+    }
+
+
+# %%
 own = {name: score(LAWS["Ours", name], truths[name]) for name in SYSTEMS}
-assert audit.could_be(SCORES["Table 1", "Ours", "WangSun"], 14)
+assert could_be(SCORES["Table 1", "Ours", "WangSun"], 14)
 assert own["WangSun"].exact
-false = {name: audit.false_terms(LAWS["Ours", name], truths[name]) for name in SYSTEMS}
+false = {}
+for name, truth in truths.items():
+    claimed, true = (coefficients_of(law, law) for law in (LAWS["Ours", name], truth))
+    false[name] = {term: value for term, value in claimed.items() if term not in true}
 false = {name: terms for name, terms in false.items() if terms}
 for name, terms in false.items():
     print(name, terms)
@@ -501,10 +578,31 @@ for name, law in (("NoseHoover", LAWS["PySINDy", "NoseHoover"]), ("WangSun", men
         "here, time step / 10": baselines.stlsq(t / 10, x),
         "here, right time step": baselines.stlsq(t, x),
     }
-    ratios[name] = {key: audit.coefficient_ratios(fit, truths[name]) for key, fit in fits.items()}
+    true = coefficients_of(truths[name], truths[name])
+    ratios[name] = {
+        key: {term: value / true[term] for term, value in coefficients_of(fit, truths[name]).items()}
+        for key, fit in fits.items()
+    }
 
-# %%
-fig = plots.plot_ratios(ratios)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+counts = [len(series["Table S2"]) for series in ratios.values()]
+fig, panels = plt.subplots(
+    len(ratios), 1, figsize=(7.5, 0.23 * sum(counts) + 2), sharex=True, height_ratios=counts
+)
+for axes, (name, series), count in zip(panels, ratios.items(), counts, strict=True):
+    heights = np.arange(count)[::-1]
+    for value in (1, 10):
+        axes.axvline(value, color="k", lw=0.8, ls=":")
+    for (label, by_term), marker in zip(series.items(), "so^", strict=True):
+        values = np.array(list(by_term.values()))
+        axes.plot(np.where(values > 0, values, np.nan), heights, marker, mfc="none", label=label)
+    axes.set(xscale="log", xlim=(0.4, 20), title=name, ylim=(-0.7, count - 0.3))
+    axes.set_yticks(heights, list(by_term))
+    axes.set_xticks((0.5, 1, 2, 5, 10, 20), ("0.5", "1", "2", "5", "10", "20"))
+    axes.minorticks_off()
+    axes.grid(axis="y", visible=False)
+axes.set_xlabel("coefficient / true coefficient")
+fig.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
 caption = "PySINDy's coefficients over the true ones (no symbol: not found): printed with a wrong clock."
 save_figure("audit_factor_ten", fig, caption=caption, numbers=ratios)
 
@@ -591,12 +689,47 @@ note("Table S3", "E-SINDy beside PySINDy", "equal in every column for " + ", ".j
 # The largest error of the paper's own method. PySINDy's law, divided by ten, has *the same*
 # $1.10\,y$ in place of $y$, and nearly the same other coefficients. Two methods do not make the same error
 # unless it is in their data. Let us ask in which coordinates $y_i=o_i+k_i x_i$ the true law would be
-# printed so:
+# printed so, perhaps by a clock of other units, too:
+
+
+# %%
+def seen_in(law, scale, offset, clock):
+    """The law of y(t) = offset + scale x(clock t)."""
+    powers = np.prod(scale**law.exponents, axis=1)[:, None]
+    stretched = clock * law.coefficients * scale / powers
+    return dynamics.PolynomialSystem(law.names, law.exponents, stretched).shift(offset)
+
+
+# %% [markdown]
+# Least squares over all coefficients, from the nominal shift:
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+def fit_coordinates(printed, native, free_clock=False):
+    """Stretch, origin and clock that turn a true law into a printed one, and the l2 error that is left."""
+    truth, d = native.shift(REFERENCE_OFFSET), native.d
+    library = np.unique(np.concatenate([printed.exponents, truth.exponents]), axis=0)
+    target, true = (metrics.coefficients_in(law, library) for law in (printed, truth))
+
+    def coordinates(unknowns):
+        scale, offset, clock = np.split(unknowns, [d, 2 * d])
+        return np.exp(scale), offset, float(np.exp(clock.sum()))
+
+    def misfit(unknowns):
+        law = seen_in(native, *coordinates(unknowns))
+        return ((metrics.coefficients_in(law, library) - target) / np.linalg.norm(true)).ravel()
+
+    both = (true != 0) & (target / np.where(true, true, 1) > 0)
+    clock = [np.log(np.median(target[both] / true[both]))] if free_clock else []
+    fit = least_squares(misfit, [*np.zeros(d), *REFERENCE_OFFSET, *clock], xtol=1e-14, ftol=1e-14)
+    found = coordinates(fit.x)
+    parts = dict(zip(("scale", "offset", "clock"), found, strict=True))
+    return SimpleNamespace(**parts, law=seen_in(native, *found), misfit=np.linalg.norm(fit.fun))
+
 
 # %%
 law = LAWS["Ours", "NoseHoover"]
-fit = audit.fit_coordinates(law, SYSTEMS["NoseHoover"], REFERENCE_OFFSET)
-reach = audit.rounding_reach(law, truths["NoseHoover"])
+fit = fit_coordinates(law, SYSTEMS["NoseHoover"])
+reach = rounding_reach(law, truths["NoseHoover"])
 print("stretch", fit.scale.round(3), "  origin", fit.offset.round(2) + 0.0)
 print(f"misfit {fit.misfit:.1e}, rounding explains {reach:.1e}")
 assert fit.misfit < reach
@@ -605,10 +738,10 @@ assert fit.misfit < reach
 columns = {
     "true": truths["NoseHoover"], "Table S2": law, "true law, other coordinates": fit.law,
 }  # fmt: skip
-values = {key: audit.coefficients_of(each, truths["NoseHoover"]) for key, each in columns.items()}
+values = {key: coefficients_of(each, truths["NoseHoover"]) for key, each in columns.items()}
 rows = [{"term": term} | {key: values[key][term] for key in values} for term in values["true"]]
 gaps = [row["Table S2"] - row["true law, other coordinates"] for row in rows]
-assert np.abs(gaps).max() <= audit.COEFFICIENT_STEP / 2
+assert np.abs(gaps).max() <= 0.01 / 2
 save_table("audit_nose_hoover", rows, caption="NoseHoover: the true law in coordinates of its own.")
 
 # %% [markdown]
@@ -618,9 +751,7 @@ save_table("audit_nose_hoover", rows, caption="NoseHoover: the true law in coord
 # of ten:
 
 # %%
-other = audit.fit_coordinates(
-    LAWS["PySINDy", "NoseHoover"], SYSTEMS["NoseHoover"], REFERENCE_OFFSET, free_clock=True
-)
+other = fit_coordinates(LAWS["PySINDy", "NoseHoover"], SYSTEMS["NoseHoover"], free_clock=True)
 print("stretch", other.scale.round(3), "  origin", other.offset.round(2) + 0.0)
 print(f"clock   {other.clock:.3f}")
 assert abs(other.clock - 10) < 0.1
@@ -636,8 +767,8 @@ assert np.allclose(other.offset, fit.offset, atol=0.1)
 rows = []
 for name in SYSTEMS:
     law = LAWS["Ours", name]
-    fitted = audit.fit_coordinates(law, SYSTEMS[name], REFERENCE_OFFSET)
-    reach = audit.rounding_reach(law, truths[name])
+    fitted = fit_coordinates(law, SYSTEMS[name])
+    reach = rounding_reach(law, truths[name])
     rows.append({
         "system": name, "l2 (e-2)": 100 * own[name].l2,
         "l2 in its coordinates (e-2)": 100 * fitted.misfit, "rounding (e-2)": 100 * reach,
@@ -692,8 +823,17 @@ for name, truth in truths.items():
     constant = squares[truth.terms.index("1")] / squares.sum()
     shares[name] = {"constants": constant, "all other terms": 1 - constant}
 
-# %%
-fig = plots.plot_what_l2_sees(shares)
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+fig, axes = plt.subplots(figsize=(7.5, 3.2))
+left = np.zeros(len(shares))
+for kind, colour in (("constants", "C0"), ("all other terms", "C4")):
+    values = np.array([parts[kind] for parts in shares.values()])
+    axes.barh(list(shares), values, left=left, color=colour, label=kind)
+    left += values
+axes.invert_yaxis()
+axes.set(xlim=(0, 1), xlabel="share of the squared norm")
+axes.grid(axis="y", visible=False)
+fig.legend(loc="outside upper center", ncols=3)
 caption = "Share of the constants in the squared norm of each ground truth of Table S2."
 save_figure("audit_norm", fig, caption=caption, numbers=shares)
 

@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -49,12 +50,9 @@ from vidsindy_lite.companion.artifacts import save_figure, save_table, versions
 from vidsindy_lite.study import (
     CONTESTANTS,
     ERRORS,
-    LORENZ_GRID,
     MOTIONS,
     ODEBENCH,
-    R2_GIVEN,
-    R2_RATES,
-    R2_SOURCE,
+    RIVALS,
     FlowContest,
     LorenzContest,
     OdeContest,
@@ -205,14 +203,16 @@ save_table("score_outside", rows, caption=caption)
 # trajectory that they were fitted to. That needs no right term. All 63 equations count.
 
 # %%
-print(f"published: {R2_SOURCE}; given: {R2_GIVEN}")
+rivals = RIVALS["odebench"]
+printed = {method: dict(zip(map(tuple, rivals["conditions"]), rates, strict=True)) for method, rates in rivals["rates"].items()}
+print(f"published: {rivals['source']}; given: {rivals['given']}")
 compared = (*both, *sindy)
 everyone = ode[ode.condition.str.startswith("stored") & ode.method.isin(compared)]
 good = everyone.assign(good=everyone.r2 > 0.9).pivot_table("good", "level", "method", sort=False)
 rows = [
     {"noise (%)": 100 * noise, "dropped (%)": 100 * dropped}
     | {f"{method}, here": 100 * good.loc[[(noise, dropped)], method].iloc[0] for method in compared}
-    | {method: 100 * known[noise, dropped] for method, known in R2_RATES.items()}
+    | {method: known[noise, dropped] for method, known in printed.items()}
     for noise, dropped in levels
 ]
 caption = "ODEBench, percent of 63 laws with R2 above 0.9; columns without 'here' are published."
@@ -238,23 +238,41 @@ if full:
 # neither; a second run is told the origin. With two draws a cell the two may differ by chance either way.
 
 # %%
-shown = np.isin(np.round(1000 * LORENZ_GRID.levels), [50, 100, 200, 250, 300, 400] if full else [100])
-lengths = LORENZ_GRID.lengths if full else LORENZ_GRID.lengths[[0, -1]]
+rival = RIVALS["lorenz_grid"]
+levels, lengths = np.array(rival["levels"]), np.array(rival["lengths"], dtype=float)
+shown = np.isin(np.round(1000 * levels), [50, 100, 200, 250, 300, 400] if full else [100])
+columns = slice(None) if full else [0, -1]
+levels, lengths = levels[shown], lengths[columns]
 draws = range(seed, seed + (2 if full else 1))
-cells = [(noise, length) for noise in LORENZ_GRID.levels[shown] for length in lengths]
+cells = [(noise, length) for noise in levels for length in lengths]
 tasks = [LorenzContest(float(T), float(s), n) for s, T in cells for n in draws]
 contests = sweep(run_contest, tasks, jobs=jobs, desc="Lorenz grid")
 lorenz = standings(contests)
 at_home = [replace(task, origin="data") for task in tasks]
 told = standings(sweep(run_contest, at_home, jobs=jobs, desc="Lorenz grid, origin given"))
-print(f"{LORENZ_GRID.method}: {LORENZ_GRID.source}; given: {LORENZ_GRID.given}")
+print(f"{rival['method']}: {rival['source']}; given: {rival['given']}")
 
 # %%
 shape = shown.sum(), len(lengths), len(draws)
 exact, given = (table.exact.to_numpy(float).reshape(shape).mean(axis=2) for table in (lorenz, told))
-theirs = LORENZ_GRID.rates[shown][:, np.isin(LORENZ_GRID.lengths, lengths)]
-grids = {f"Gauss-Newton, {len(draws)} draws": exact, f"{LORENZ_GRID.method}, published": theirs}
-fig = plots.plot_lorenz_grids(grids, LORENZ_GRID.levels[shown], lengths)
+theirs = np.array(rival["exact"])[shown][:, columns] / rival["draws"]
+grids = {f"Gauss-Newton, {len(draws)} draws": exact, f"{rival['method']}, published": theirs}
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+size = (4.1 * len(grids), 0.42 * len(levels) + 1.2)
+fig, panels = plt.subplots(1, len(grids), figsize=size, sharey=True)
+for axes, (method, rates) in zip(panels, grids.items(), strict=True):
+    axes.imshow(100 * rates, vmin=0, vmax=100, cmap="Blues", aspect="auto")
+    for (row, column), share in np.ndenumerate(rates):
+        style = {"ha": "center", "va": "center", "color": "white" if share > 0.6 else "black"}
+        axes.text(column, row, f"{100 * share:.0f}", size=9, **style)
+    axes.set_xticks(range(len(lengths)), [f"{length:g}" for length in lengths])
+    axes.set_yticks(range(len(levels)), [f"{100 * level:g}" for level in levels])
+    axes.set(title=method, xlabel="length (time units)")
+    axes.tick_params(length=0)
+    axes.grid(False)
+    axes.spines[:].set_visible(False)
+panels[0].set_ylabel("noise (% of the spread)")
 caption = "Share of exact Lorenz laws in percent, over noise and length: Gauss-Newton beside the published."
 save_figure("score_lorenz", fig, caption=caption, numbers=grids)
 
@@ -268,7 +286,7 @@ rows = [
         "noise (%)": 100 * level, "Gauss-Newton (%)": 100 * mine.mean(),
         "the same, origin given (%)": 100 * home.mean(), "ODR-BINDy (%)": 100 * known.mean(),
     }  # fmt: skip
-    for level, mine, home, known in zip(LORENZ_GRID.levels[shown], exact, given, theirs, strict=True)
+    for level, mine, home, known in zip(levels, exact, given, theirs, strict=True)
 ]
 save_table("score_lorenz_rows", rows, caption="Exact Lorenz laws, mean over the lengths.")
 
@@ -307,7 +325,24 @@ save_table("score_errors", count(flow_table), caption=f"Exact laws of {len(flows
 
 # %%
 rate_flows = shares(flow_table)
-fig = plots.plot_standings({"ODEBench": rate, "chaotic flows": rate_flows})
+
+# %% tags=["hide-input"] jupyter={"source_hidden": true}
+boards = {"ODEBench": rate, "chaotic flows": rate_flows}
+heights = [len(board) + 1.5 for board in boards.values()]
+fig, panels = plt.subplots(
+    2, 1, figsize=(7.5, 0.34 * sum(heights) + 1), sharex=True, height_ratios=heights
+)
+for axes, (title, board) in zip(panels, boards.items(), strict=True):
+    places = np.arange(len(board))[::-1]
+    # Later ones lie on top: Gauss-Newton is drawn last, and the others a little apart.
+    for k, method in reversed(list(enumerate(board))):
+        style = plots.METHOD_STYLES[method] | {"ls": "", "ms": 8, "clip_on": False, "label": method}
+        axes.plot(100 * board[method], places + 0.11 * (k - (board.shape[1] - 1) / 2), **style)
+    axes.set_yticks(places, board.index)
+    axes.set(xlim=(0, 100), ylim=(-0.6, len(board) - 0.4), title=title)
+axes.set_xlabel("exact laws (%)")
+handles, labels = axes.get_legend_handles_labels()
+fig.legend(handles[::-1], labels[::-1], loc="outside upper center", ncols=3)
 caption = "Exact laws by benchmark, condition and method, in percent."
 numbers = {f"{c}, {m}": value for table in (rate, rate_flows) for m in table for c, value in table[m].items()}
 save_figure("score_methods", fig, caption=caption, numbers=numbers)

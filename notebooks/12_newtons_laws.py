@@ -6,6 +6,7 @@
 #       extension: .py
 #       format_name: percent
 #       format_version: '1.3'
+#       jupytext_version: 1.19.6
 #   kernelspec:
 #     display_name: Python 3
 #     language: python
@@ -187,7 +188,7 @@ print(f"apart by at most {100 * apart:.2f} % of the motion")
 assert apart < (0.01 if full else 0.05)
 
 # %%
-fig = plots.plot_forecast(later, true, told)
+fig = plots.plot_path(later, {"true motion": true, "foretold by the law": told})
 caption = "Another motion of the ball: the true path (grey) and what the discovered law foretells."
 save_figure("newton_forecast", fig, caption=caption, numbers={"true": true, "told": told})
 

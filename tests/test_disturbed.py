@@ -81,7 +81,7 @@ import json, sys
 import numpy as np
 from vidsindy_lite import Rig, Scene, reconstruct, render_video, track
 from vidsindy_lite.dynamics import runge_kutta_4
-from vidsindy_lite.study import SYSTEMS, lab
+from vidsindy_lite.study import SYSTEMS
 t, x = SYSTEMS["Lorenz"].trajectory(40)
 path = np.linspace([0.0, 0.0, 0.0], [100.0, 40.0, 5.0], 40)
 rig = Rig.around(path)
@@ -91,7 +91,6 @@ print(json.dumps({
     "runge_kutta_4": runge_kutta_4(SYSTEMS["Lorenz"], t, (-8, 7, 27)).tolist(),
     "reconstruct": reconstruct([camera.project(path) for camera in rig.cameras], rig).tolist(),
     "track": track(video).pixels.tolist(),
-    "paths": lab.paths(5).tolist(),
 }))
 """
 

@@ -19,7 +19,6 @@ TARGETS = {
     "vidsindy_lite.vision.tracking": ["track"],
     "vidsindy_lite.cameras.triangulate": ["reconstruct"],
     "vidsindy_lite.dynamics.model": ["PolynomialSystem.simulate", "runge_kutta_4"],
-    "vidsindy_lite.study.lab": ["paths"],
 }
 
 

@@ -3,14 +3,22 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.study import FLOWS, SYSTEMS, rivals, scoreboard
+from vidsindy_lite.dynamics import path
+from vidsindy_lite.study import FLOWS, ODEBENCH, RIVALS, SYSTEMS, scoreboard
 from vidsindy_lite.study.odebench import TIMES
 from vidsindy_lite.study.scoreboard import (
     ERRORS,
     MOTIONS,
+    NOTHING,
+    WITHOUT,
+    Ablation,
     FlowContest,
     LorenzContest,
     OdeContest,
+    Outcome,
+    ablation_table,
+    ablations,
+    run_ablation,
     run_contest,
     standings,
 )
@@ -59,11 +67,6 @@ def test_where_the_origin_is_known_no_other_is_sought():
     assert known.exact
 
 
-def test_another_origin_is_no_choice():
-    with pytest.raises(ValueError, match="origin: must be one of learn, data, got 'nowhere'"):
-        LorenzContest(4, 0.1, origin="nowhere")
-
-
 @pytest.mark.parametrize("error", [*ERRORS, *MOTIONS])
 def test_flows_are_seen_from_one_origin_whatever_the_error(error):
     contest = FlowContest("Lorenz", error, samples=300)
@@ -84,15 +87,6 @@ def test_flows_have_the_period_that_is_written_down():
             rates = flow(x) / x.std(axis=0)
             period = 2 * np.pi / np.sqrt((rates**2).mean(axis=0).mean())
             assert 0.5 < flow.period / period < 2, name
-
-
-def test_bad_contests_are_refused():
-    with pytest.raises(ValueError, match="flow: must be one of .* got 'Lorentz'"):
-        FlowContest("Lorentz", "drift 0.2 %")
-    with pytest.raises(ValueError, match="error: must be one of .* got 'noise'"):
-        FlowContest("Lorenz", "noise")
-    with pytest.raises(ValueError, match="methods: must be one of .* got 'guess'"):
-        run_contest(LorenzContest(4, 0.1, methods=("guess",)))
 
 
 def test_outcomes_are_counted(monkeypatch):
@@ -139,12 +133,103 @@ def test_the_oracle_follows_the_clean_path_at_least_as_closely_as_its_candidates
         assert oracle.r2 >= max(plain.r2, smooth.r2)
 
 
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: FlowContest("Lorentz", "drift 0.2 %"), "flow: must be one of .* got 'Lorentz'"),
+        (lambda: FlowContest("Lorenz", "noise"), "error: must be one of .* got 'noise'"),
+        (lambda: LorenzContest(4, 0.1, origin="nowhere"), "origin: must be one of learn, data"),
+        (lambda: run_contest(LorenzContest(4, 0.1, methods=("guess",))), "methods: must be one of"),
+        (lambda: Ablation(LorenzContest(4, 0.1), "luck"), "without: must be"),
+    ],
+)
+def test_bad_contests_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+# ---------------------------------------------------------------------------------- the ablation
+
+
+@pytest.mark.parametrize("without", WITHOUT)
+def test_what_is_replaced_is_there_and_comes_back(monkeypatch, without):
+    def current():
+        return [getattr(module, name) for module, name, _ in WITHOUT[without]]
+
+    before, seen, contest = current(), [], LorenzContest(2.0, 0.01)
+    monkeypatch.setattr(scoreboard, "run_contest", lambda one: seen.extend(current()) or (one,))
+    assert run_ablation(Ablation(contest, without)) == (without, contest)
+    assert seen == [other for *_, other in WITHOUT[without]]
+    assert current() == before
+
+
+def test_the_table_of_the_ablation_counts_what_is_lost_and_gained():
+    contests = [LorenzContest(2.0, 0.01), LorenzContest(3.0, 0.01)]
+    assert len(set(ablations(contests))) == 2 * len(WITHOUT)
+    said = {NOTHING: ((True, "ok"), (False, "suspect")), "path": ((False, "ok"), (True, "ok"))}
+    table = ablation_table(
+        (without, Outcome(contest, "ours", None, exact, status, 2.0))
+        for without, both in said.items()
+        for contest, (exact, status) in zip(contests, both, strict=True)
+    )
+    assert table.loc[NOTHING].tolist() == [2, 1, 0, 0, 0, 4.0]
+    assert table.loc["path"].tolist() == [2, 1, 1, 1, 1, 4.0]
+
+
+@pytest.mark.slow
+def test_without_the_first_law_at_a_large_error_a_law_is_found_all_the_same():
+    _, outcome = run_ablation(Ablation(LorenzContest(10.0, 0.05), "first tolerance"))
+    assert path.TOLERATED > 0
+    assert outcome.exact
+
+
+# ------------------------------------------------------------------------------ what others print
+
+
 def test_published_rates():
-    grid = rivals.LORENZ_GRID
-    assert grid.rates.shape == (len(grid.levels), len(grid.lengths)) == (16, 7)
-    assert grid.rates.mean() == pytest.approx(0.787, abs=5e-4)
-    levels = np.isin(np.round(grid.levels, 3), (0.1, 0.2, 0.25, 0.3, 0.4))
-    assert grid.rates[levels].mean() == pytest.approx(0.735, abs=5e-4)
-    assert rivals.R2_RATES["SINDy"][0.05, 0.5] == pytest.approx(0.095)
-    assert np.isnan(rivals.R2_RATES["ODEFormer"][0.02, 0.0])
-    assert all(len(row) == 5 for row in rivals.R2_RATES.values())
+    grid, odebench = RIVALS["lorenz_grid"], RIVALS["odebench"]
+    rates = np.array(grid["exact"]) / grid["draws"]
+    assert rates.shape == (len(grid["levels"]), len(grid["lengths"])) == (16, 7)
+    assert rates.mean() == pytest.approx(0.787, abs=5e-4)
+    levels = np.isin(np.round(grid["levels"], 3), (0.1, 0.2, 0.25, 0.3, 0.4))
+    assert rates[levels].mean() == pytest.approx(0.735, abs=5e-4)
+    assert odebench["rates"]["SINDy"][odebench["conditions"].index([0.05, 0.5])] == 9.5
+    assert all(len(row) == 5 for row in odebench["rates"].values())
+
+
+def test_odebench_is_complete():
+    assert list(ODEBENCH) == list(range(1, 64))
+    dimensions = [len(one.starts[0]) for one in ODEBENCH.values()]
+    assert [dimensions.count(d) for d in (1, 2, 3, 4)] == [23, 28, 10, 2]
+    degrees = [e.law.exponents.sum(axis=1).max() for e in ODEBENCH.values() if e.law is not None]
+    assert (len(degrees), sum(degree <= 3 for degree in degrees)) == (37, 35)
+    assert len({equation.name for equation in ODEBENCH.values()}) == 63
+    for equation in ODEBENCH.values():
+        assert len(set(equation.starts)) == 2
+        for start in equation.starts:
+            rate = equation.rate(np.array(start))
+            assert rate.shape == (len(start),)
+            assert np.isfinite(rate).all()
+            assert rate.any()
+
+
+def allee(x):
+    return 0.14 * x * (1 - x / 130) * (x / 4.4 - 1)
+
+
+@pytest.mark.parametrize(
+    ("number", "start", "rate"),
+    [
+        (3, (6.1,), lambda x: (0.79 * x * (1 - x / 74.3),)),
+        (8, (6.123,), lambda x: (allee(x),)),
+        (33, (5.0, 0.7), lambda x, y: (-np.sin(y) - 0.08 * x**2, x - np.cos(y) / x)),
+        (56, (2.3, 8.1, 12.4), lambda x, y, z: (10 * (y - x), x * (28 - z) - y, x * y - 8 / 3 * z)),
+    ],
+)
+def test_equations_are_what_the_textbooks_print(number, start, rate):
+    np.testing.assert_allclose(ODEBENCH[number].rate(np.array(start)), rate(*start))
+
+
+def test_a_solution_that_is_known():
+    path = ODEBENCH[2].law.simulate(TIMES, (4.78,))[:, 0]
+    np.testing.assert_allclose(path, 4.78 * np.exp(0.23 * TIMES), rtol=1e-9)

@@ -103,15 +103,6 @@ def test_gradients_are_those_of_automatic_differentiation(seed, share):
         torch.testing.assert_close(found, unknown.grad, rtol=1e-9, atol=1e-9)
 
 
-def test_collocation_covers_every_knot_span():
-    t, x = spiral()
-    fit = fitted([x], t, degree=1, knots_per_sample=40 / 149, collocation_per_knot=5)
-    assert fit.basis.shape == (1, 4, 10, 40)
-    values, slopes = fit.basis.sum(dim=1).chunk(2, dim=1)
-    np.testing.assert_allclose(values, 1)
-    np.testing.assert_allclose(slopes, 0, atol=1e-9)
-
-
 def test_a_batch_finds_the_laws_of_its_records_alone():
     t, x = spiral(80)
     noisy = x + 0.02 * np.random.default_rng(0).standard_normal(x.shape)
@@ -124,14 +115,6 @@ def test_a_batch_finds_the_laws_of_its_records_alone():
         np.testing.assert_allclose(law.native.coefficients, alone.native.coefficients, rtol=1e-4)
         np.testing.assert_allclose(law.curve, alone.curve, atol=1e-5)
         assert len(law.history) == len(alone.history)
-    with pytest.raises(ValueError, match="seeds: must be one a record, 2, got 1"):
-        spline_ado_batch(t, records[:2], 2, [0])
-    with pytest.raises(ValueError, match="records: must be at least one, .* got none"):
-        spline_ado_batch(t, [])
-    with pytest.raises(ValueError, match=r"records: .* got \(80, 2\), \(79, 2\)"):
-        spline_ado_batch(t, [x, x[1:]])
-    with pytest.raises(ValueError, match=r"physics_weight: .* one a record, got \(1, 2, 3\)"):
-        spline_ado_batch(t, records[:2], physics_weight=(1, 2, 3))
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU here")
@@ -140,18 +123,6 @@ def test_a_gpu_finds_the_same_law():
     here, there = (spline_ado(t, x, 2, device=name, **SHORT).native for name in ("cpu", "cuda"))
     np.testing.assert_array_equal(here.support, there.support)
     np.testing.assert_allclose(here.coefficients, there.coefficients, rtol=1e-3)
-
-
-def test_a_spiral_is_found_away_from_its_origin():
-    t, x = spiral()
-    found = spline_ado(t, x, degree=2, **SHORT)
-    result = score(found, SPIRAL.shift((3, -1)))
-    assert result.exact
-    assert result.max_coefficient_error < 1e-2
-    # A linear law has its constants at zero in one frame only, the data's frame has them all.
-    shifted = found.native.shift(found.offset)
-    kept = np.where(np.abs(shifted.coefficients) < 0.1, 0, shifted.coefficients)
-    np.testing.assert_array_equal(found.system.coefficients, kept)
 
 
 @pytest.mark.slow
@@ -163,12 +134,18 @@ def test_lorenz_is_found_from_clean_data():
     assert result.l2 < 1e-3
 
 
-def test_a_gap_costs_its_samples_and_no_more():
+@pytest.mark.parametrize("gap", [slice(0), slice(60, 100)])
+def test_a_spiral_is_found_away_from_its_origin_and_across_a_gap(gap):
     t, x = spiral()
-    x[60:100] = np.nan
-    result = score(spline_ado(t, x, degree=2, **SHORT), SPIRAL.shift((3, -1)))
+    x[gap] = np.nan
+    found = spline_ado(t, x, degree=2, **SHORT)
+    result = score(found, SPIRAL.shift((3, -1)))
     assert result.exact
     assert result.max_coefficient_error < 1e-2
+    # A linear law has its constants at zero in one frame only, the data's frame has them all.
+    shifted = found.native.shift(found.offset)
+    kept = np.where(np.abs(shifted.coefficients) < 0.1, 0, shifted.coefficients)
+    np.testing.assert_array_equal(found.system.coefficients, kept)
 
 
 def test_history_goes_on_and_the_loss_falls():
@@ -208,27 +185,6 @@ def test_the_law_does_not_depend_on_the_units_of_time_and_space():
     np.testing.assert_allclose(scaled.coefficients, plain.coefficients * factor, rtol=1e-3)
 
 
-def test_bad_input():
-    t, x = spiral(80)
-    with pytest.raises(ValueError, match="t: must increase"):
-        spline_ado(t[::-1], x)
-    with pytest.raises(ValueError, match="x: must hold at least 6 samples, got 5"):
-        spline_ado(t[:5], x[:5], degree=2)
-    with pytest.raises(ValueError, match="x: every coordinate must move"):
-        spline_ado(t, x * [1, 0])
-    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got -1"):
-        spline_ado(t, x, seed=-1)
-    for name in ("knots_per_sample", "collocation_per_knot", "pretraining", "epochs"):
-        with pytest.raises(ValueError, match=f"{name}: must be at least .*, got 0"):
-            spline_ado(t, x, **{name: 0})
-    weights = ("physics_weight", "sparsity_weight", "learning_rate", "prune", "alternations")
-    for name, value in [(name, value) for name in weights for value in (-1, np.nan, np.inf)]:
-        with pytest.raises(ValueError, match=f"{name}: must be at least .*, got {value}"):
-            spline_ado(t, x, **{name: value})
-    with pytest.raises(ValueError, match="device: must be one that PyTorch knows, got 'moon'"):
-        spline_ado(t, x, device="moon")
-
-
 def lorenz_rows():
     truth = SYSTEMS["Lorenz"]
     _, x = truth.trajectory(600)
@@ -263,28 +219,26 @@ def test_the_refit_of_stridge_is_plain_least_squares_on_all_rows():
         np.testing.assert_allclose(column[inside], expected, rtol=1e-6)
 
 
-def test_a_dearer_term_is_a_rarer_term():
-    _, library, derivative = lorenz_rows()
-    noisy = derivative + 2 * np.random.default_rng(0).standard_normal(derivative.shape)
-    weights = (0.0, 1e-3, 1e-2, 10.0)
-    counts = [
-        np.count_nonzero(stridge(library, noisy, np.random.default_rng(0), sparsity_weight=w))
-        for w in weights
-    ]
-    assert counts == sorted(counts, reverse=True)
-    assert counts[0] > counts[-1]
+LEAST = ("knots_per_sample", "collocation_per_knot", "pretraining", "epochs", "learning_rate")
 
 
-def test_stridge_copes_with_a_column_of_zeros_and_a_target_of_zeros():
-    x = np.random.default_rng(0).standard_normal((100, 2))
-    library = np.column_stack([monomials(x, monomial_exponents(2, 2)), np.zeros(100)])
-    found = stridge(library, np.zeros((100, 1)), np.random.default_rng(0))
-    np.testing.assert_array_equal(found, np.zeros((7, 1)))
-
-
-def test_stridge_rejects_bad_shapes():
-    rng = np.random.default_rng(0)
-    with pytest.raises(ValueError, match=r"library and derivative: .* got \(5, 2\) and \(4, 1\)"):
-        stridge(np.ones((5, 2)), np.ones((4, 1)), rng)
-    with pytest.raises(ValueError, match="library: must hold at least 9 training rows, got 10"):
-        stridge(np.ones((10, 9)), np.ones((10, 1)), rng)
+@pytest.mark.parametrize(
+    ("records", "options", "message"),
+    [
+        ([spiral(80)[1][:5]], {}, "x: must hold at least 6 samples, got 5"),
+        ([spiral(80)[1] * [1, 0]], {}, "x: every coordinate must move"),
+        ([], {}, "records: must be at least one, .* got none"),
+        ([np.ones((80, 2)), np.ones((79, 2))], {}, r"records: .* got \(80, 2\), \(79, 2\)"),
+        ([spiral(80)[1]] * 2, {"seeds": [0]}, "seeds: must be one a record, 2, got 1"),
+        ([spiral(80)[1]], {"seeds": [-1]}, "seed: must be an integer of at least 0, got -1"),
+        ([spiral(80)[1]], {"physics_weight": (1, 2)}, "physics_weight: .* one a record"),
+        ([spiral(80)[1]], {"device": "moon"}, "device: must be one that PyTorch knows, got 'moon'"),
+        *[([spiral(80)[1]], {name: 0}, f"{name}: must be at least .*, got 0") for name in LEAST],
+        *[([spiral(80)[1]], {"prune": v}, f"prune: must be at least 0, got {v}")
+          for v in (-1, np.nan, np.inf)],
+    ],
+)  # fmt: skip
+def test_bad_input(records, options, message):
+    t = np.linspace(0, 6, len(records[0]) if records else 80)
+    with pytest.raises(ValueError, match=message):
+        spline_ado_batch(t, records, 2, **options)

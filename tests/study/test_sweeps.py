@@ -5,7 +5,6 @@ import hashlib
 import json
 import math
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -50,12 +49,6 @@ def square(task):
         raise ArithmeticError("below zero")
     # a comment
     return power(task.number), np.random.default_rng(task.number).normal(size=3).tolist()
-
-
-def end(task):
-    """End this very process, as a crash or the system does for want of memory."""
-    if task.number == 0:
-        os._exit(1)
 
 
 def threads(task):
@@ -213,14 +206,6 @@ def test_sweeps_that_run_at_once_share_their_tasks(clone):
     assert clone.called() == list(range(6))
 
 
-def test_progress_starts_at_what_is_stored(clone):
-    clone.sweep([[1, 0.0]])
-    process = clone.start([[1, 0.0], [2, 1.0]])
-    _, errors = process.communicate(timeout=120)
-    percent = re.findall(r"toy: +(\d+)%", errors)
-    assert (percent[0], percent[-1]) == ("50", "100")
-
-
 def test_a_process_has_one_thread(clone):
     pools = clone.sweep([[1], [2]], "threads", OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2")
     assert all(len(pool) > 1 for pool in pools)
@@ -280,19 +265,17 @@ def test_an_entry_of_something_else_is_told_and_computed_again(swept):
     assert errors.count("UserWarning: a result is not stored: ") == 1
 
 
-DEEP = 100_000
-PLANTED = [
-    '{"type": "os:system", "command": "touch planted"}',
-    '{"type": "vidsindy_lite.study.sweeps:sweep", "function": 1}',
-    '{"type": "vidsindy_lite.pipeline:np"}',
-    '{"type": "array", "dtype": "i", "values": [1' + "0" * 40 + "]}",
-    "[" * DEEP + "]" * DEEP,
-    "[" * 900 + "]" * 900,
-    "null",
-]
-
-
-@pytest.mark.parametrize("result", PLANTED, ids=range(len(PLANTED)))
+@pytest.mark.parametrize(
+    "result",
+    [
+        '{"type": "os:system", "command": "touch planted"}',
+        '{"type": "vidsindy_lite.study.sweeps:sweep", "function": 1}',
+        '{"type": "array", "dtype": "i", "values": [1' + "0" * 40 + "]}",
+        "[" * 100_000 + "]" * 100_000,
+        "null",
+    ],
+    ids=range(5),
+)
 def test_a_planted_file_is_read_and_never_executed(cache, monkeypatch, result):
     """Its digest is right, but it is no result: a value of other kinds is a value."""
     monkeypatch.chdir(cache)
@@ -315,12 +298,6 @@ def test_error_names_the_task_and_what_was_finished_stays(clone):
         "TaskError: square(Task(number=-3, pause=1.0)) raised ArithmeticError: below zero"
     )
     assert set(clone.stored()) == {1, 2}
-
-
-def test_named_folder(clone, tmp_path):
-    clone.sweep([[1, 0.0]], VIDSINDY_CACHE=str(tmp_path / "named"))
-    assert len(list((tmp_path / "named").glob("*/toy.square/*.json"))) == 1
-    assert not (clone.root / "build").exists()
 
 
 def test_outside_a_clone_nothing_is_stored(clone):
@@ -374,11 +351,6 @@ def test_cluster_gives_the_results_of_this_machine(clone, cluster, tmp_path):
     assert 5 in clone.stored()
 
 
-def test_cluster_names_the_task_that_ends_its_worker(clone, cluster):
-    error = clone.fail([[1], [0]], "end", VIDSINDY_DASK=cluster)
-    assert "KilledWorker: Attempted to run task 'end(Task(number=0, pause=0.0)) " in error
-
-
 def test_cluster_with_other_code_is_refused(clone, cluster):
     elsewhere = clone.root / "elsewhere"
     elsewhere.mkdir()
@@ -404,12 +376,6 @@ def test_without_distributed_the_error_names_the_extra(cache, monkeypatch):
         sweep(video_info, [Scene()], dask="tcp://127.0.0.1:1")
 
 
-@pytest.mark.parametrize("function", [lambda task: task, Scene.random, wait_for, len])
-def test_function_must_be_of_the_package(cache, function):
-    with pytest.raises(ValueError, match="function: must be a top-level function of vidsindy_lite"):
-        sweep(function, [Scene()])
-
-
 @dataclass
 class Changeable:
     number: int = 1
@@ -420,19 +386,19 @@ class Holder:
     values: object
 
 
-@pytest.mark.parametrize("task", [1, "text", Scene, Changeable(), Holder(np.ones(3)), Holder([1])])
-def test_task_must_be_a_frozen_dataclass_without_arrays(cache, task):
-    with pytest.raises(ValueError, match="tasks: each must be a frozen dataclass .* got "):
-        sweep(video_info, [Scene(), task])
-
-
-def test_jobs_must_be_positive(cache):
-    with pytest.raises(ValueError, match="jobs: must be at least 1, got 0"):
-        sweep(video_info, [Scene()], jobs=0)
-
-
-def test_no_tasks_no_results(cache):
-    assert sweep(video_info, []) == []
+@pytest.mark.parametrize(
+    ("function", "task", "jobs", "message"),
+    [
+        *[(f, Scene(), 1, "function: must be a top-level function of vidsindy_lite")
+          for f in (lambda task: task, Scene.random, wait_for, len)],
+        *[(video_info, task, 1, "tasks: each must be a frozen dataclass .* got ")
+          for task in (1, Scene, Changeable(), Holder(np.ones(3)), Holder([1]))],
+        (video_info, Scene(), 0, "jobs: must be at least 1, got 0"),
+    ],
+)  # fmt: skip
+def test_what_no_sweep_can_do_is_refused(cache, function, task, jobs, message):
+    with pytest.raises(ValueError, match=message):
+        sweep(function, [Scene(), task], jobs=jobs)
 
 
 def test_one_task_is_remembered_by_whoever_asks_next(cache):

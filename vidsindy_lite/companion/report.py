@@ -351,7 +351,9 @@ def _figures(
         t = stacked(np.tile(found.t[:, None], found.targets), 1)[:, 0]
         x = stacked(found.x, 3)
         d = 3 if np.nan_to_num(x)[:, 2].any() else 2  # in the plane of one camera
-        yield "path", _encoded(plot_path(t, x[:, :d], stacked(found.fitted, 3)[:, :d]))
+        curves = {"reconstructed": x[:, :d]}
+        curves["curve that obeys the law"] = stacked(found.fitted, 3)[:, :d]
+        yield "path", _encoded(plot_path(t, curves, "not seen"))
         seen = np.all([np.isfinite(track).all(axis=1) for track in found.tracks], axis=0)
         if seen.any() and paths is not None:
             yield "look", _encoded(_first_look(found, paths, int(seen.argmax())))

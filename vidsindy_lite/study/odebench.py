@@ -12,13 +12,12 @@ dynamical systems with transformers, ICLR 2024.
 S. H. Strogatz, Nonlinear Dynamics and Chaos, CRC Press 2018.
 """
 
-import ast
-import operator
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -29,13 +28,7 @@ from ..dynamics import PolynomialSystem
 TIMES = np.linspace(0, 10, 512)
 """Of the samples of every equation."""
 
-_OPERATORS: dict[type, Callable] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
-    ast.Div: operator.truediv, ast.Pow: operator.pow, ast.USub: operator.neg,
-}  # fmt: skip
-_FUNCTIONS = {
-    name: getattr(np, name) for name in ("sin", "cos", "tan", "exp", "log", "abs")
-}  # fmt: skip
+_NAMES = {name: getattr(np, name) for name in ("sin", "cos", "tan", "exp", "log", "abs")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,57 +61,29 @@ class Equation:
         return self.law is not None and bool(self.law.exponents.sum(axis=1).max() <= 3)
 
 
-def formula(text: str, values: Mapping[str, Any]) -> Any:
-    """Value of a formula such as ``"r*x*(1 - x/K)"``, where its names have these values.
-
-    Parameters
-    ----------
-    text : str
-        Numbers, names, ``+ - * / **``, brackets, and the functions sin, cos, tan, exp, log, abs.
-    values : mapping
-        Numbers or arrays by name.
-
-    Raises
-    ------
-    ValueError
-        If anything else stands in it.
-    """
-
-    def value(node: ast.AST) -> Any:
-        match node:
-            case ast.Constant(value=int() | float() as number):
-                return number
-            case ast.Name(id=name) if name in values:
-                return values[name]
-            case ast.UnaryOp(op=op, operand=inner) if type(op) in _OPERATORS:
-                return _OPERATORS[type(op)](value(inner))
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                return _OPERATORS[type(op)](value(left), value(right))
-            case ast.Call(func=ast.Name(id=name), args=[inner]) if name in _FUNCTIONS:
-                return _FUNCTIONS[name](value(inner))
-        raise ValueError(f"text: must be a formula of {', '.join(values)}, got {text!r}")
-
-    return value(_parsed(text))
+def _value(formula: str, values: Mapping[str, Any]) -> Any:
+    """Value of a formula of this package's file, for which its names have these values."""
+    return eval(_compiled(formula), {"__builtins__": {}, **_NAMES}, dict(values))
 
 
 @cache
-def _parsed(text: str) -> ast.AST:
-    return ast.parse(text, mode="eval").body
+def _compiled(formula: str) -> CodeType:
+    return compile(formula, "odebench.toml", "eval")
 
 
 def _equation(number: str, record: Mapping[str, Any]) -> Equation:
     """An equation from its record; a parameter may be a fraction: "8/3"."""
-    parameters = {name: formula(str(v), {}) for name, v in record["parameters"].items()}
+    parameters = {name: _value(str(v), {}) for name, v in record["parameters"].items()}
     law, rates = None, record.get("rates", {})
     if "terms" in record:
         law = PolynomialSystem.from_terms({
-            variable: {term: formula(text, parameters) for term, text in terms.items()}
+            variable: {term: _value(text, parameters) for term, text in terms.items()}
             for variable, terms in record["terms"].items()
         })  # fmt: skip
 
     def rate(x: Floats) -> Floats:
         values = parameters | dict(zip(rates, x, strict=True))
-        return np.array([formula(text, values) for text in rates.values()])
+        return np.array([_value(text, values) for text in rates.values()])
 
     starts = tuple(tuple(map(float, start)) for start in record["starts"])
     return Equation(int(number), record["name"], record["source"], law or rate, law, starts)

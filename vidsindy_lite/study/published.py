@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -133,3 +134,8 @@ LAWS: dict[tuple[str, str], PolynomialSystem] = {
 MISPRINTS: tuple[dict[str, str], ...] = tuple(_PRINTED["misprints"])
 """Prints of Table S2 that cannot stand as they are, and how they were read into `LAWS`: method,
 system, equation (the name of the variable on the left), printed, read_as."""
+
+RIVALS: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("rivals.toml").read_text("utf-8")
+)
+"""What others publish of ``lorenz_grid`` and ``odebench``, with its source and what was given."""
