@@ -12,8 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vidsindy_lite.vision.rendering import coverage
-from vidsindy_lite.vision.scenery import BACKGROUNDS, bark, leaves
+from vidsindy_lite.vision.rendering import BACKGROUNDS, bark, coverage, leaves
 
 BACKDROPS = ("plain", "sky", "hills", "sea", "wood", "bricks")
 

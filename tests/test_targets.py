@@ -10,7 +10,7 @@ from scipy.linalg import expm
 import vidsindy_lite as vl
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion.report import write_refusal, write_report
-from vidsindy_lite.observation import _check_found
+from vidsindy_lite.observation import check_found
 from vidsindy_lite.pipeline import _driven
 from vidsindy_lite.refusal import Refused
 
@@ -133,12 +133,12 @@ def test_a_film_that_shows_fewer_is_refused_with_all_tracks():
     one = both.copy()
     one[:, 2:] = np.nan
     with pytest.raises(Refused, match="b.mov must show 2 moving targets, got 1 in any") as refused:
-        _check_found([both, one], ["a.mov", "b.mov"], 2)
+        check_found([both, one], ["a.mov", "b.mov"], 2)
     assert refused.value.step == "track"
     assert len(refused.value.tracks) == 2
     with pytest.raises(Refused, match="b.mov must show one moving target, got none in any"):
-        _check_found([both[:, :2], one[:, 2:]], ["a.mov", "b.mov"], 1)
-    _check_found([both, both], ["a.mov", "b.mov"], 2)
+        check_found([both[:, :2], one[:, 2:]], ["a.mov", "b.mov"], 1)
+    check_found([both, both], ["a.mov", "b.mov"], 2)
 
 
 def test_two_views_cannot_tell_targets_apart(films):

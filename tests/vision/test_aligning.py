@@ -8,10 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vidsindy_lite import track
-from vidsindy_lite.vision import aligning
-from vidsindy_lite.vision.aligning import Ground, _error, _middle, _similar, grounds, pyramid
-from vidsindy_lite.vision.aligning import align as align_on
-from vidsindy_lite.vision.steadying import Steadying
+from vidsindy_lite.vision import steadying as aligning
+from vidsindy_lite.vision.steadying import (
+    Ground,
+    Steadying,
+    _error,
+    _middle,
+    _similar,
+    grounds,
+    pyramid,
+)
+from vidsindy_lite.vision.steadying import align as align_on
 
 SIZE = 320, 240
 

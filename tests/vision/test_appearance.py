@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision.appearance import Appearance, followed
-from vidsindy_lite.vision.candidates import Candidates
-from vidsindy_lite.vision.reducing import ReducedFrames
+from vidsindy_lite.vision.background import ReducedFrames
+from vidsindy_lite.vision.candidates import Appearance, Candidates, followed
 
 N = 40
 PLACES = np.column_stack([60 + 30 * np.sin(np.arange(N) / 6), 50 + 0.5 * np.arange(N)])

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from helpers import one_a_frame
 
-from vidsindy_lite.vision.association import TOLD, best_path, plainest_paths
-from vidsindy_lite.vision.candidates import Candidates
+from vidsindy_lite.vision.candidates import TOLD, Candidates, best_path, plainest_paths
 
 RED = np.array([30.0, 30, 200])
 FRAMES = np.arange(30)

@@ -9,6 +9,7 @@ import pytest
 from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
+    ReducedFrames,
     _largest_component,
     _others,
     _shape,
@@ -21,9 +22,7 @@ from vidsindy_lite.vision.background import (
     view_distances,
     whole_views,
 )
-from vidsindy_lite.vision.reducing import ReducedFrames
-from vidsindy_lite.vision.rendering import render
-from vidsindy_lite.vision.scenes import Scene
+from vidsindy_lite.vision.rendering import Scene, render
 from vidsindy_lite.vision.video import write_video
 
 SIZE = (128, 96)

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision import camera
+from vidsindy_lite.vision.background import ReducedFrames
 from vidsindy_lite.vision.camera import camera_motion
-from vidsindy_lite.vision.reducing import ReducedFrames
-from vidsindy_lite.vision.reel import Reel
 from vidsindy_lite.vision.steadying import CameraMotion, corners_tell
-from vidsindy_lite.vision.video import write_video
+from vidsindy_lite.vision.video import Reel, write_video
 
 SHIFTS = np.array([[0, 0], [2, 1], [-1, 2], [1, -2], [2, 2], [-2, 0], [0, -1], [1, 1]])
 

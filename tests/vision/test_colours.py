@@ -6,7 +6,7 @@ import pytest
 
 from vidsindy_lite import track, write_video
 from vidsindy_lite.vision.refining import whole
-from vidsindy_lite.vision.scenery import BACKGROUNDS
+from vidsindy_lite.vision.rendering import BACKGROUNDS
 
 SIZE = 200, 150
 FRAMES = 60

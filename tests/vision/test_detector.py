@@ -10,9 +10,7 @@ from tiny_onnx import BOX, write_red_detector
 from vidsindy_lite.vision import training
 from vidsindy_lite.vision.detector import LEAST, WEIGHTS, LearnedDetector, OnnxDetector, detections
 from vidsindy_lite.vision.network import Network
-from vidsindy_lite.vision.rendering import render
-from vidsindy_lite.vision.scenery import BACKGROUNDS
-from vidsindy_lite.vision.scenes import SHAPES, Scene
+from vidsindy_lite.vision.rendering import BACKGROUNDS, SHAPES, Scene, render
 
 LOG = json.loads(WEIGHTS.with_suffix(".json").read_text())
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import Hint, track, write_video
-from vidsindy_lite.vision.scenery import BACKGROUNDS
+from vidsindy_lite.vision.rendering import BACKGROUNDS
 
 SIZE = 200, 150
 FRAMES = 60

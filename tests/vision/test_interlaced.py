@@ -6,9 +6,8 @@ import pytest
 from phones import write_at
 
 import vidsindy_lite as vl
-from vidsindy_lite.vision.interlaced import with_lines_between
-from vidsindy_lite.vision.rendering import render
-from vidsindy_lite.vision.scenes import Scene
+from vidsindy_lite.vision.rendering import Scene, render
+from vidsindy_lite.vision.video import with_lines_between
 
 SIZE = (160, 120)
 INTERLACED = {"x264-params": "interlaced=1:tff=1", "crf": "6"}

@@ -11,9 +11,9 @@ from helpers import real
 
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import moving
+from vidsindy_lite.vision.background import ReducedFrames
 from vidsindy_lite.vision.candidates import Candidates
 from vidsindy_lite.vision.moving import Film, expected, finished
-from vidsindy_lite.vision.reducing import ReducedFrames
 from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
 from vidsindy_lite.vision.steadying import (
     CameraMotion,

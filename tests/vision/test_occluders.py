@@ -6,7 +6,7 @@ import pytest
 from footage import Phone, write_phone
 
 from vidsindy_lite import track
-from vidsindy_lite.vision.occluders import hidden
+from vidsindy_lite.vision.refining import hidden
 
 
 def view(centre, sides, post):

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.pixels import changes, dot, hull, lengths, relit
+from vidsindy_lite.vision.background import changes, dot, hull, lengths, relit
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision import reducing, reel
-from vidsindy_lite.vision.reducing import ReducedFrames, reduce
-from vidsindy_lite.vision.reel import Reel
+from vidsindy_lite.vision import background as reducing
+from vidsindy_lite.vision import video as reel
+from vidsindy_lite.vision.background import ReducedFrames, reduce
+from vidsindy_lite.vision.video import Reel
 
 
 def rounded(factor):

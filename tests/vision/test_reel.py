@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision import reel as module
-from vidsindy_lite.vision.reel import Reel
+from vidsindy_lite.vision import video as module
+from vidsindy_lite.vision.video import Reel
 
 
 @pytest.mark.parametrize(("room", "reads", "picks"), [(1.0, 1, 0), (0.99, 2, 1)])

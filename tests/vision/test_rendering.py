@@ -10,6 +10,10 @@ from hypothesis import strategies as st
 from vidsindy_lite.vision import rendering
 from vidsindy_lite.vision.rendering import (
     _NORMAL,
+    BACKGROUNDS,
+    COLOURS,
+    SHAPES,
+    Scene,
     _blend,
     _poses,
     coverage,
@@ -19,8 +23,6 @@ from vidsindy_lite.vision.rendering import (
     render_restless,
     render_video,
 )
-from vidsindy_lite.vision.scenery import BACKGROUNDS
-from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
 from vidsindy_lite.vision.video import read_video
 
 SMALL = (96, 80)

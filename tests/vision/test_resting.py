@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision.resting import explains, rests
+from vidsindy_lite.vision.camera import explains, rests
 from vidsindy_lite.vision.steadying import at_rest
 
 SIZE = 160, 120

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidsindy_lite.vision import scenery
+from vidsindy_lite.vision import rendering as scenery
 
 # Blue, green, red of pixels [25::65, 30::60] of an image of 256 x 192, seed 7.
 LOOKS = {

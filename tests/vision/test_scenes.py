@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vidsindy_lite.vision.scenery import BACKGROUNDS
-from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
+from vidsindy_lite.vision.rendering import BACKGROUNDS, COLOURS, SHAPES, Scene
 
 
 @pytest.mark.parametrize(

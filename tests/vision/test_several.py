@@ -5,7 +5,7 @@ import pytest
 
 from vidsindy_lite.vision import Scene, render_video, track_targets
 from vidsindy_lite.vision.moving import Ways
-from vidsindy_lite.vision.several import _touching
+from vidsindy_lite.vision.tracking import _touching
 
 FRAMES, SIZE = 160, 16.0
 

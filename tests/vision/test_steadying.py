@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision import steadying
-from vidsindy_lite.vision.aligning import Aligned
 from vidsindy_lite.vision.steadying import (
     _MANY,
+    Aligned,
     Steadying,
     _by_corners,
     _ByCorners,

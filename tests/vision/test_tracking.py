@@ -16,9 +16,16 @@ from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.vision import tracking
 from vidsindy_lite.vision.background import _shape
 from vidsindy_lite.vision.detector import LEAST, Detection
-from vidsindy_lite.vision.rendering import coverage, render, render_restless, render_video
-from vidsindy_lite.vision.scenery import BACKGROUNDS
-from vidsindy_lite.vision.scenes import COLOURS, SHAPES, Scene
+from vidsindy_lite.vision.rendering import (
+    BACKGROUNDS,
+    COLOURS,
+    SHAPES,
+    Scene,
+    coverage,
+    render,
+    render_restless,
+    render_video,
+)
 from vidsindy_lite.vision.tracking import Track, check_detector, link, track
 from vidsindy_lite.vision.video import write_video
 

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidsindy_lite.__main__ import main
-from vidsindy_lite.vision import scenery, training
+from vidsindy_lite.vision import rendering as scenery
+from vidsindy_lite.vision import training
 from vidsindy_lite.vision.network import anchors
 from vidsindy_lite.vision.rendering import LabelledFrame
 

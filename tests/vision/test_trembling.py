@@ -5,12 +5,11 @@ import pytest
 from footage import Phone, render_phone, write_phone
 
 from vidsindy_lite import track, write_video
-from vidsindy_lite.vision import trembling as trembling_module
-from vidsindy_lite.vision.background import sample_frames
-from vidsindy_lite.vision.reducing import ReducedFrames, reduce
-from vidsindy_lite.vision.reel import Reel
+from vidsindy_lite.vision import camera as trembling_module
+from vidsindy_lite.vision.background import ReducedFrames, reduce, sample_frames
+from vidsindy_lite.vision.camera import trembling
 from vidsindy_lite.vision.steadying import carry
-from vidsindy_lite.vision.trembling import trembling
+from vidsindy_lite.vision.video import Reel
 
 SKY = Phone("sky", 40, noise=3, image_size=(320, 240), frames=60)
 

@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision import video
-from vidsindy_lite.vision.rendering import render, render_video
-from vidsindy_lite.vision.scenes import Scene
+from vidsindy_lite.vision.rendering import Scene, render, render_video
 from vidsindy_lite.vision.video import (
     pick_frames,
     read_frame,

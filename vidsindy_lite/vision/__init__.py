@@ -2,29 +2,25 @@
 
 ::
 
-  video       reading and writing of video files; stills reads films that are folders of images
+  video       reading and writing of video files, and of films that are folders of images
   track_files tracks as text files: DLTdv's, Tracker's, DeepLabCut's and ours
-  tracking    track: a video in, the target's pixels out, by one of
+  tracking    track: a video in, the target's pixels out; track_targets: of several targets; by
   background      what differs from a background at rest (the most exact)
-  moving          what moves most plainly, if camera and background are not: steadying takes out the
-                  camera's motion (aligning: by all pixels, where corners are few), candidates are
-                  what differs from the ground (plate) or from other frames, association finds the
-                  path through them, appearance learns what is on it and follows its looks, or those
-                  of what a hint points at (hints), refining measures
-  several     track_targets: the same for several targets, each where it is apart from the others
+  moving          what moves most plainly, if camera and background are not: steadying and camera
+                  take out the camera's motion, candidates are what differs from the ground (plate)
+                  or from other frames, and the best path through them, which learns the looks of
+                  what is on it, or of what a hint points at (hints); refining measures
   detector        what looks like a target in a single frame: our network, or any YOLO-v8
   network     that network, in PyTorch; training trained it, on frames that are drawn here
-  scenes      what a camera sees; scenery draws its backgrounds, rendering its frames
+  rendering   films of a scene: background, target, and the disturbances between them
 """
 
 from .detector import WEIGHTS, LearnedDetector, detections
 from .hints import Hint, load_hints
-from .rendering import render, render_labelled, render_restless, render_video
-from .scenery import BACKGROUNDS
-from .scenes import SHAPES, Scene
-from .several import track_targets
+from .rendering import BACKGROUNDS, SHAPES, Scene, render, render_labelled, render_restless
+from .rendering import render_video
 from .track_files import TrackFile, read_tracks
-from .tracking import Track, check_detector, track
+from .tracking import Track, check_detector, track, track_targets
 from .video import (
     VideoInfo,
     frame_clock,

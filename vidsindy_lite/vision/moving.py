@@ -17,16 +17,22 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .appearance import Looks, followed
-from .association import TOLD, Path, best_path, plainest_paths
-from .background import sampled
+from .background import ReducedFrames, reduce, reduced, sampled
 from .camera import LOOSE, camera_motion
-from .candidates import Candidates, candidates, uncommon
+from .candidates import (
+    TOLD,
+    Candidates,
+    Looks,
+    Path,
+    best_path,
+    candidates,
+    followed,
+    plainest_paths,
+    uncommon,
+)
 from .hints import Hint
-from .occluders import hidden
 from .plate import Plate, lights_of, noise_of
-from .reducing import ReducedFrames, reduce, reduced
-from .refining import Lens, View, entire, fitting, scatter, swapped
+from .refining import Lens, View, entire, fitting, hidden, scatter, swapped
 from .steadying import CameraMotion, at_rest, carry
 
 _SHORTEST = 5  # frames of a path

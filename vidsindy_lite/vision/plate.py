@@ -13,8 +13,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import light, median_image
-from .pixels import changes
+from .background import changes, light, median_image
 from .steadying import carry
 
 _SHOWN = 3  # samples that must show a place of the plate

@@ -1,28 +1,335 @@
-"""Frames of a target that moves through a scene, one camera at a time.
+"""Scenes and their films: a target that moves before a drawn background, one camera at a time.
 
 A pixel track (the centroid of the target in each frame) and a `Scene` become frames. Pixel
 convention: u to the right, v down, pixel centres at integer coordinates, so that the centre of the
 top left pixel is (0, 0).
+
+FFV1 codes green and the differences blue - green and red - green; the backgrounds put their texture
+into the brightness and keep those differences constant over large areas, which costs little in
+looks and makes the files much smaller. Their colours are muted: the vivid ones are the targets'.
 """
 
+from __future__ import annotations
+
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from ..arrays import Floats, Floats32, Image, Ints
-from ..checks import check_array, check_instance, check_integer, check_rows
-from .scenery import BACKGROUNDS, bark, leaves, tree
-from .scenes import COLOURS, Scene
+from ..arrays import Bools, Floats, Floats32, Image, Ints
+from ..checks import (
+    MALFORMED,
+    check_array,
+    check_choice,
+    check_image_size,
+    check_instance,
+    check_integer,
+    check_number,
+    check_rows,
+    shown,
+)
 from .video import write_video
 
+Size = tuple[int, int]
+"""Width and height in pixels."""
+SHAPES = ("disc", "polygon", "irregular")
+
+COLOURS = {
+    "red": (35, 30, 215),
+    "magenta": (185, 30, 200),
+    "yellow": (15, 225, 250),
+    "orange": (5, 115, 250),
+    "black": (22, 18, 20),
+}
+"""Blue, green and red of each target colour: vivid, far from every colour of every background."""
+
+Box = tuple[int, int, int, int]
+"""Left, top, width and height in whole pixels."""
 _SCANLINES = 16  # per row of pixels, when the target is drawn
 _NORMAL = ndtri((np.arange(2**16) + 0.5) / 2**16).astype(np.float32)  # quantiles, all as likely
+
+
+def _texture(
+    rng: np.random.Generator, size: Size, cells: tuple[int, ...], stretch: Size = (1, 1)
+) -> Floats32:
+    """Smooth random field in [0, 1], (height, width); `cells` of noise per axis, coarse first."""
+    width, height = size
+    field = np.zeros((height, width), np.float32)
+    for cell in cells:
+        grid = rng.random((cell * stretch[1] + 1, cell * stretch[0] + 1), np.float32)
+        field += cv2.resize(grid, (width, height), interpolation=cv2.INTER_CUBIC) / np.float32(cell)
+    return (field - field.min()) / (field.max() - field.min())
+
+
+def _paint(light: ArrayLike, blue: ArrayLike, red: ArrayLike) -> Image:
+    """Colour image from brightness (green) and the differences blue - green and red - green."""
+    green = np.rint(light)
+    image = np.stack([green + np.rint(blue), green, green + np.rint(red)], axis=-1)
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
+def _sky(rng: np.random.Generator, size: Size) -> Image:
+    """Blue above, pale below, with clouds."""
+    width, height = size
+    row = np.linspace(0, 1, height, dtype=np.float32)[:, None]
+    clouds = np.clip(_texture(rng, size, (3, 6, 12, 24), stretch=(1, 2)) * 2.2 - 1.0, 0, 1)
+    light = 150 + 45 * row + 25 * clouds
+    return _paint(light, 48 - 34 * row, -40 + 28 * row)
+
+
+def _hills(rng: np.random.Generator, size: Size) -> Image:
+    """Three ranges of hills, the nearest the darkest, under a sky."""
+    width, height = size
+    image = _sky(rng, size)
+    column = np.linspace(0, 1, width)
+    rows = np.arange(height)[:, None]
+    for depth, (horizon, light, blue, red) in enumerate(
+        [(0.45, 150, 12, -14), (0.58, 128, -12, -16), (0.74, 104, -34, -14)]
+    ):
+        waves = [np.sin(2 * np.pi * (k * column + rng.random())) / k for k in (1, 2, 4, 7)]
+        ridge = height * (horizon + 0.05 * np.sum(waves, axis=0))
+        texture = _texture(rng, size, (8, 16, 32, 64), stretch=(1, 2))
+        layer = _paint(light + (8 + 10 * depth) * (texture - 0.5), blue, red)
+        below = rows >= ridge
+        image[below] = layer[below]
+    return image
+
+
+def _sea(rng: np.random.Generator, size: Size) -> Image:
+    """Waves below a sky, long and thin far away."""
+    width, height = size
+    image = _sky(rng, size)
+    horizon = int(height * rng.uniform(0.35, 0.5))
+    depth = np.linspace(0, 1, height - horizon, dtype=np.float32)[:, None]
+    # Waves are long and thin far away and grow towards the viewer.
+    far = _texture(rng, (width, height - horizon), (6, 12), stretch=(1, 8))
+    near = _texture(rng, (width, height - horizon), (4, 8, 16), stretch=(1, 4))
+    light = 132 - 22 * depth + 30 * ((1 - depth) * far + depth * near - 0.5)
+    image[horizon:] = _paint(light, 26, -44)
+    return image
+
+
+def _wood(rng: np.random.Generator, size: Size) -> Image:
+    """Five planks with grain."""
+    width, height = size
+    image = np.empty((height, width, 3), np.uint8)
+    edges = np.linspace(0, height, 6).astype(int)
+    for top, bottom in zip(edges[:-1], edges[1:], strict=True):
+        plank = (width, bottom - top)
+        # Grain: the level lines of a smooth field, stretched along the plank.
+        field = _texture(rng, plank, (1, 2, 4), stretch=(2, 2))
+        grain = np.sin(2 * np.pi * 6 * field) + 0.8 * (_texture(rng, plank, (8, 16), (1, 3)) - 0.5)
+        light = rng.uniform(118, 140) + 9 * grain
+        light[:2] -= 35
+        image[top:bottom] = _paint(light, -34, 36)
+    return image
+
+
+def _bricks(rng: np.random.Generator, size: Size) -> Image:
+    """A wall of red bricks in pale joints."""
+    width, height = size
+    course, length, joint = 32, 64, 3
+    light = 168 + 14 * (_texture(rng, size, (16, 32, 64)) - 0.5)
+    image = _paint(light, -8, 6)
+    texture = _texture(rng, size, (16, 32, 64))
+    for i, top in enumerate(range(0, height, course)):
+        for left in range(-(i % 2) * length // 2, width, length):
+            rows = slice(top + joint, top + course)
+            columns = slice(max(left + joint, 0), max(left + length, 0))
+            light = rng.uniform(96, 122) + 22 * (texture[rows, columns] - 0.5)
+            image[rows, columns] = _paint(light, -14, rng.uniform(30, 44))
+    return image
+
+
+def _plain(rng: np.random.Generator, size: Size) -> Image:
+    """Grey, a little brighter to the right."""
+    width, height = size
+    column = np.linspace(0, 1, width, dtype=np.float32)
+    light = np.broadcast_to(rng.uniform(120, 170) + 20 * column, (height, width))
+    return _paint(light, 4, -4)
+
+
+BACKGROUNDS: dict[str, Callable[[np.random.Generator, Size], Image]] = {
+    "plain": _plain,
+    "sky": _sky,
+    "hills": _hills,
+    "sea": _sea,
+    "wood": _wood,
+    "bricks": _bricks,
+}
+"""What draws each background: a source of random numbers and (width, height) to an image."""
+
+
+def bark(rng: np.random.Generator, size: Size) -> Image:
+    """Furrows along a trunk, darker towards its sides."""
+    width, height = size
+    light = 66 + 40 * (_texture(rng, size, (4, 8), stretch=(3, 1)) - 0.5)
+    light -= 22 * np.linspace(-1, 1, width, dtype=np.float32) ** 2
+    return _paint(light, -16, 18)
+
+
+def leaves(rng: np.random.Generator, size: Size) -> Image:
+    """Dark green foliage."""
+    return _paint(70 + 60 * (_texture(rng, size, (16, 32), stretch=(2, 1)) - 0.5), -30, -22)
+
+
+def tree(rng: np.random.Generator, size: Size) -> tuple[Image, Bools]:
+    """A tree in a rectangle: its image, (height, width, 3), and where it is, (height, width).
+
+    A trunk in the middle, and a crown of round tufts in the upper two thirds.
+    """
+    width, height = size
+    crown = np.array([width, 2 * height // 3])
+    v, u = np.mgrid[:height, :width]
+    radii = crown.min() * rng.uniform(0.14, 0.26, 20)
+    angle, reach = rng.uniform(0, 2 * np.pi, 20), np.sqrt(rng.random(20))
+    centres = reach * [np.cos(angle), np.sin(angle)] * (crown[:, None] / 2 - radii)
+    centres += crown[:, None] / 2
+    tufts = zip(*centres, radii, strict=True)
+    leafy = np.any([np.hypot(u - x, v - y) < radius for x, y, radius in tufts], axis=0)
+    trunk = (np.abs(u - (width - 1) / 2) < width / 14) & (v > crown[1] / 2)
+    image = np.where(leafy[..., None], leaves(rng, size), bark(rng, size))
+    return image, leafy | trunk
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What one camera sees, apart from the motion: background, target and disturbances.
+
+    Parameters
+    ----------
+    background : {"plain", "sky", "hills", "sea", "wood", "bricks"}
+    shape : {"disc", "polygon", "irregular"}
+        Outline of the target; polygon and irregular outlines are drawn from `shape_seed`.
+    size : float
+        Diameter in pixels, 4 to 100; for other shapes that of the disc of equal area.
+    colour : {"red", "magenta", "yellow", "orange", "black"}
+    turns : float
+        Steady self-rotation, turns over the whole clip.
+    tumbling : float
+        Random self-rotation: standard deviation of its speed, radians per 25 frames.
+    size_variation : float
+        Relative amplitude, in [0, 0.5], of a slow change of the diameter over the clip (as of a
+        target that comes nearer and recedes).
+    noise_variance : float
+        Variance of the Gaussian image noise, for intensities in [0, 1]; the paper uses 0.01.
+    occluders : tuple of (left, top, width, height)
+        Rectangles in whole pixels in front of the target: posts if taller than wide, else hedges.
+    trees : tuple of (left, top, width, height)
+        Rectangles that are each filled by a tree in front of the target.
+    shape_seed : int
+        Chooses the outline, so that several cameras can look at one target.
+    image_size : (width, height)
+
+    Raises
+    ------
+    ValueError
+        If an argument breaks its rule.
+    """
+
+    background: str = "hills"
+    shape: str = "disc"
+    size: float = 20.0
+    colour: str = "red"
+    turns: float = 0.0
+    tumbling: float = 0.0
+    size_variation: float = 0.0
+    noise_variance: float = 0.0
+    occluders: tuple[Box, ...] = ()
+    trees: tuple[Box, ...] = ()
+    shape_seed: int = 0
+    image_size: Size = (512, 512)
+
+    def __post_init__(self) -> None:
+        check_choice("background", self.background, BACKGROUNDS)
+        check_choice("shape", self.shape, SHAPES)
+        check_choice("colour", self.colour, COLOURS)
+        for name, low, high in [
+            ("size", 4, 100),
+            ("turns", -np.inf, np.inf),
+            ("tumbling", 0, np.inf),
+            ("size_variation", 0, 0.5),
+            ("noise_variance", 0, 0.1),
+        ]:
+            if not low <= check_number(name, getattr(self, name)) <= high:
+                raise ValueError(f"{name}: must be in [{low}, {high}], got {getattr(self, name)}")
+        check_integer("shape_seed", self.shape_seed)
+        size = check_image_size(self.image_size, least=64)
+        object.__setattr__(self, "image_size", size)
+        for name in ("occluders", "trees"):
+            object.__setattr__(self, name, _check_rectangles(name, getattr(self, name), size))
+
+    @classmethod
+    def random(cls, rng: np.random.Generator | int, **fixed: Any) -> Self:
+        """A scene drawn at random: background, shape, colour, size of 8 to 40 px and rotation.
+
+        Parameters
+        ----------
+        rng : np.random.Generator or int
+            The source of random numbers, or its seed.
+        **fixed
+            Fields that are given instead of drawn (disturbances are never drawn).
+        """
+        if not isinstance(rng, np.random.Generator):
+            rng = np.random.default_rng(check_integer("rng", rng))
+        drawn: dict[str, Any] = {
+            "background": str(rng.choice(list(BACKGROUNDS))),
+            "shape": str(rng.choice(SHAPES)),
+            "size": float(rng.uniform(8, 40)),
+            "colour": str(rng.choice(list(COLOURS))),
+            "turns": float(rng.uniform(-10, 10)),
+            "tumbling": float(rng.uniform(0, 1)),
+            "shape_seed": int(rng.integers(2**31)),
+        }
+        return cls(**(drawn | fixed))
+
+    def outline(self) -> Floats:
+        """Outline of the target at rest, (m, 2) pixels: centroid at 0, area that of the disc."""
+        rng = np.random.default_rng(self.shape_seed)
+        angle = np.linspace(0, 2 * np.pi, 128, endpoint=False)
+        if self.shape == "polygon":
+            m = int(rng.integers(3, 7))
+            angle = 2 * np.pi * (np.arange(m) + rng.uniform(-0.2, 0.2, m)) / m
+        points = np.column_stack([np.cos(angle), np.sin(angle)])
+        if self.shape == "irregular":
+            order = np.arange(2, 6)
+            amplitude = rng.uniform(0.3, 1, order.size) * 0.35 / order
+            phase = rng.uniform(0, 2 * np.pi, order.size)
+            radius = 1 + np.cos(np.outer(angle, order) + phase) @ amplitude
+            points *= radius[:, None]
+        # Area and centroid by the shoelace formula.
+        x, y = points.T
+        x1, y1 = np.roll(points, -1, axis=0).T
+        cross = x * y1 - x1 * y
+        area = cross.sum() / 2
+        centroid = np.array([((x + x1) * cross).sum(), ((y + y1) * cross).sum()]) / (6 * area)
+        return (points - centroid) * np.sqrt(np.pi * self.size**2 / 4 / area)
+
+
+def _check_rectangles(name: str, rectangles: Iterable[Box], size: Size) -> tuple[Box, ...]:
+    """Boxes of whole pixels that lie in the image."""
+    try:
+        boxes: tuple[Any, ...] = tuple(tuple(rectangle) for rectangle in rectangles)
+        whole = all(len(box) == 4 and all(x == int(x) for x in box) for box in boxes)
+    except MALFORMED:
+        whole = False
+    if not whole:
+        raise ValueError(f"{name}: must be boxes of four whole pixels, got {shown(rectangles)}")
+    for rectangle in boxes:
+        if min(rectangle[:2]) < 0 or min(rectangle[2:]) < 4:
+            raise ValueError(
+                f"{name}: each must be whole pixels (left >= 0, top >= 0, width >= 4, "
+                f"height >= 4), got {rectangle}"
+            )
+        if rectangle[0] + rectangle[2] > size[0] or rectangle[1] + rectangle[3] > size[1]:
+            raise ValueError(f"{name}: must lie in the {size} image, got {rectangle}")
+    return boxes
 
 
 def coverage(polygon: Floats) -> tuple[Floats, Ints]:

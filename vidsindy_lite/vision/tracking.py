@@ -9,7 +9,13 @@ pixel. The paper has one of that kind, YOLO-v8; what such a detector sees in the
 linked here to one motion.
 
 A frame gets NaN where the target is not seen, or not for sure.
+
+Where two meet in an image, nobody can say which is which afterwards: who is who, across meetings
+and views, is for the cameras to tell (`cameras.identify`). So a track is that of one target from
+one meeting to the next.
 """
+
+from __future__ import annotations
 
 import os
 from collections.abc import Sequence
@@ -20,17 +26,35 @@ from typing import Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..arrays import Floats, Image
-from ..checks import check_instance, shown
-from .background import BackgroundModel, sample_frames, track_blobs, view_distances, whole_views
+from ..arrays import Bools, Floats, Image
+from ..checks import check_instance, check_integer, shown
+from .background import (
+    BackgroundModel,
+    ReducedFrames,
+    sample_frames,
+    track_blobs,
+    view_distances,
+    whole_views,
+)
+from .candidates import Candidates, plainest_paths
+from .candidates import Path as Motion
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
-from .moving import Followed, follow
-from .reducing import ReducedFrames
-from .reel import Reel
+from .moving import (
+    Film,
+    Followed,
+    Ways,
+    expected,
+    finished,
+    follow,
+    lens_of,
+    nothing,
+    sighted,
+    viewed,
+)
 from .refining import scatter
 from .steadying import carry
-from .video import read_video, video_info
+from .video import Reel, read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
 
@@ -290,3 +314,115 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
         chain[int(frame[j])] = flat[j]
         j = before[j]
     return chain
+
+
+def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
+    """Track so many moving targets of a video, each where it is apart from the others.
+
+    Parameters
+    ----------
+    path : path
+        A video in which nothing else moves as plainly.
+    count : int
+        How many targets there are.
+
+    Returns
+    -------
+    tuple of Track
+        NaN wherever two targets meet. Behind a meeting a track may be that of another target. If
+        fewer things move, the last tracks are NaN throughout.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If the file is missing or no video.
+    """
+    check_integer("count", count, least=1)
+    frames = ReducedFrames.of(path)
+    samples = sample_frames(frames)
+    # Before a plain background, all that could tell of a camera's motion may be the targets.
+    film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
+    seen, lights = sighted(film, targets=count)
+    n = len(lights)
+    # Paths of a target that may follow each other.
+    paths = plainest_paths(seen, most=count * 8)
+    lanes, strange = _lanes(seen, paths, count)
+    ways = [_joined([expected(seen, p.rows, film, n) for p in lane]) for lane in lanes]
+    touching = _touching(ways)
+    doubts = _doubts(seen, strange, film.factor, n, Path(path).name)
+    tracks = []
+    lens = lens_of(samples, film, *ways)
+    for way, hidden in zip(ways, touching, strict=True):
+        way.centre[hidden] = np.nan
+        followed = finished(viewed(film, lens, way, lights), film.motion, doubts)
+        tracks.append(Track.of_motion(followed))
+        doubts = ()
+    missing = Track.of_motion(nothing(film.motion, n))
+    return (*tracks, *[missing] * (count - len(tracks)))
+
+
+def _lanes(
+    seen: Candidates, paths: list[Motion], count: int
+) -> tuple[list[list[Motion]], list[Motion]]:
+    """The paths of each target, one after the other in time; and paths for which none is left."""
+    lanes: list[list[Motion]] = []
+    left = []
+    plainest = max((path.rating / len(path.rows) for path in paths), default=0.0)
+    for path in sorted(paths, key=lambda path: -len(path.rows)):
+        # Worth of a candidate of a path, relative to those of the plainest.
+        if path.rating / len(path.rows) < 0.4 * plainest:
+            continue
+        free = [lane for lane in lanes if not any(_overlap(seen, path, other) for other in lane)]
+        if free:
+            free[0].append(path)
+        elif len(lanes) < count:
+            lanes.append([path])
+        else:
+            left.append(path)
+    return lanes, left
+
+
+def _overlap(seen: Candidates, one: Motion, other: Motion) -> bool:
+    """Do two paths share any of the time from their first frames to their last?"""
+    (a, b), (c, d) = (seen.frame[path.rows[[0, -1]]] for path in (one, other))
+    return bool(a <= d and c <= b)
+
+
+def _joined(ways: list[Ways]) -> Ways:
+    """The ways of paths that follow each other as one."""
+    centre, box, colour = (field.copy() for field in ways[0])
+    for way in ways[1:]:
+        here = np.isfinite(way.centre[:, 0]) & np.isnan(centre[:, 0])
+        centre[here], box[here], colour[here] = way.centre[here], way.box[here], way.colour[here]
+    return Ways(centre, box, colour)
+
+
+def _touching(ways: list[Ways]) -> list[Bools]:
+    """In which frames each target touches another one, or hides it."""
+    found = [np.zeros(len(ways[0].centre), bool) for _ in ways]
+    for i, one in enumerate(ways):
+        for j, other in enumerate(ways[:i]):
+            apart = np.linalg.norm(one.centre - other.centre, axis=1)
+            sizes = (one.box[:, 2:].max(axis=1) + other.box[:, 2:].max(axis=1)) / 2
+            with np.errstate(invalid="ignore"):
+                # Sizes, and pixels more, between two targets that do not touch.
+                met = apart < 1.3 * sizes + 2.0
+            found[i] |= met
+            found[j] |= met
+    return found
+
+
+def _doubts(
+    seen: Candidates, strange: list[Motion], factor: int, frames: int, name: str
+) -> tuple[str, ...]:
+    """Does one thing more move than there are targets?"""
+    longest = max(strange, key=lambda path: len(path.rows), default=None)
+    # Share of the frames in which one more thing moves, above which there is doubt.
+    if longest is None or len(longest.rows) < 0.2 * frames:
+        return ()
+    row = longest.rows[len(longest.rows) // 2]
+    u, v = factor * seen.place[row]
+    return (
+        f"{name}: one thing more moves than there are targets, e.g. in frame {seen.frame[row]} at "
+        f"({u:.0f}, {v:.0f})",
+    )

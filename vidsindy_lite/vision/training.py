@@ -23,9 +23,7 @@ from ..checks import check_integer, check_path
 from ..repository import write_file
 from .detector import WEIGHTS
 from .network import STRIDE, Network, anchors, as_input
-from .rendering import LabelledFrame, draw_frames
-from .scenery import BACKGROUNDS
-from .scenes import COLOURS, Box, Scene
+from .rendering import BACKGROUNDS, COLOURS, Box, LabelledFrame, Scene, draw_frames
 
 SEEN_BACKGROUNDS = ("plain", "sky", "hills", "wood")
 SEEN_SHAPES = ("disc", "polygon")

@@ -6,7 +6,14 @@ frame only the pixels that differ from the last one: before a background at rest
 its files are small. FFV1 (.mkv) codes whole frames, in several times the time.
 
 What phones write is read as it was filmed: upright, each frame at the time that the file states,
-and of an interlaced frame, which shows two instants, the lines of one.
+and of an interlaced frame, which shows two instants, the lines of one, with those between
+interpolated. Which of the two fields came first does not matter: half a frame, the same for all
+frames, is part of the video's lag.
+
+A film may also be a folder of images, images whose names follow a pattern, or the pages of one
+TIFF. Such films state no frame rate. The numbers in the names are the clock: an image that is
+missing is a frame that was dropped. Images of 16 bits of which the film uses fewer, as those of
+cameras of 10 or 12 bits, are read by those it uses.
 
 PyAV is imported by the functions that need it, since who works with tracks needs none.
 """
@@ -14,6 +21,7 @@ PyAV is imported by the functions that need it, since who works with tracks need
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
@@ -25,10 +33,24 @@ import numpy as np
 
 from ..arrays import Floats, Image
 from ..checks import check_choice, check_instance, check_integer, check_number, check_path
-from .interlaced import upper_field
-from .stills import find_stills, read_stills
-from .timing import Shown, cut_off, timing
 
+if TYPE_CHECKING:
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
+
+Shown = tuple[int | None, bool]
+"""When a packet's frame is shown, in ticks of the stream, and whether decoding can begin there."""
+
+_LESS = (
+    1 - 1e-6
+)  # of a tick by which rounded times may be off: a whole one is a frame in some files
+if TYPE_CHECKING:
+    from av import VideoFrame
+SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
+
+
+_BITS = (8, 10, 12, 14, 16)  # of cameras
+_LOOKED_AT = 9  # images that tell how many bits a film uses
 if TYPE_CHECKING:
     from av import VideoFrame
     from av.container import InputContainer, OutputContainer
@@ -36,6 +58,222 @@ if TYPE_CHECKING:
 
 LOSSLESS = {".mov": "qtrle", ".mkv": "FFV1"}
 """The codec of a file's suffix, unless another is asked for."""
+_ROOM = 300_000_000  # bytes of frames that are kept
+
+
+def timing(packets: Sequence[Shown], stream: VideoStream) -> tuple[Floats, float]:
+    """When each frame is shown, in frames, and the number of frames in a second."""
+    stated = float(stream.guessed_rate or 0)
+    even = np.arange(len(packets), dtype=float)
+    ticks = np.sort([time for time, _ in packets if time is not None]).astype(float)
+    steps = np.diff(ticks)
+    if len(ticks) < len(packets) or len(ticks) < 2 or not stream.time_base or steps.min() <= 0:
+        return even, stated  # some old files do not say
+    tick = float(stream.time_base)
+    seconds = (ticks - ticks[0]) * tick
+    usual = float(np.median(steps)) * tick
+    # Between dropped frames, most follow each other at an even rate, which may not be the stated.
+    counted = np.concatenate(([0.0], np.cumsum(np.rint(steps * tick / usual))))
+    mean = counted[-1] / seconds[-1]
+    for clock, rate in ((even, stated), (counted, stated), (counted, mean)):
+        if rate > 0 and np.abs(seconds * rate - clock).max() < _LESS * rate * tick:
+            return clock, rate
+    return seconds / usual, 1 / usual
+
+
+def cut_off(
+    packets: Sequence[Shown], end: float, container: InputContainer, stream: VideoStream
+) -> int:
+    """Number of frames that were cut off the end of a file, by the duration that it states.
+
+    `end` is when the last packet of all its streams ends, in seconds: a file whose sound goes on
+    to its end is whole.
+    """
+    times = [time for time, _ in packets if time is not None]
+    if not (container.duration and stream.time_base and times):
+        return 0
+    rate, whole = float(stream.guessed_rate or 0), container.duration / 1e6
+    if len(container.streams) > 1 and (whole - end) * rate < 2:
+        return 0
+    return max(round((whole - float(max(times) * stream.time_base)) * rate) - 1, 0)
+
+
+def upper_field(frame: VideoFrame) -> Image:
+    """What an interlaced frame shows in its first, third, ... lines, at full height.
+
+    Parameters
+    ----------
+    frame : VideoFrame
+
+    Returns
+    -------
+    ndarray, shape (height, width, 3), uint8
+        Blue-green-red.
+    """
+    import av
+
+    # By ffmpeg's filter, which takes the right lines of coarser colour planes, too.
+    graph = av.filter.Graph()
+    source = graph.add_buffer(
+        width=frame.width, height=frame.height, format=frame.format, time_base=frame.time_base
+    )
+    field, sink = graph.add("field", "type=top"), graph.add("buffersink")
+    source.link_to(field)
+    field.link_to(sink)
+    graph.configure()
+    graph.push(frame)
+    lines = cast("VideoFrame", graph.pull()).to_ndarray(format="bgr24", threads=1)
+    return with_lines_between(cast("Image", lines))[: frame.height]
+
+
+def with_lines_between(field: Image) -> Image:
+    """A field with the mean of two lines between them, and the last one twice."""
+    lower = np.concatenate((field[1:], field[-1:]))
+    between = ((field.astype(np.uint16) + lower + 1) // 2).astype(np.uint8)
+    return np.stack((field, between), axis=1).reshape(-1, *field.shape[1:])
+
+
+class Stills(NamedTuple):
+    """The files of a film's images in their order, and when each was taken, in frames.
+
+    Of pages, the file stands there once for each.
+    """
+
+    files: list[Path]
+    clock: Floats
+    pages: bool = False
+
+    def read(self, number: int, bits: int) -> Image:
+        """One image, upright, blue-green-red, of so many bits made eight."""
+        file = self.files[number]
+        image = self._decoded(number)
+        if image is None:
+            raise ValueError(f"path: must be an image that OpenCV can read, got '{file}'")
+        if image.dtype == np.uint16:
+            image = np.clip(image >> (bits - 8), 0, 255).astype(np.uint8)
+        return cast("Image", image)
+
+    def bits(self) -> int:
+        """How many bits the film uses, by some of its images."""
+        shown = np.unique(np.linspace(0, len(self.files) - 1, _LOOKED_AT).astype(int))
+        images = [self._decoded(int(k)) for k in shown]
+        if all(image is None or image.dtype == np.uint8 for image in images):
+            return 8
+        largest = max(int(image.max()) for image in images if image is not None)
+        return next((bits for bits in _BITS if largest < 2**bits), _BITS[-1])
+
+    def _decoded(self, number: int) -> np.ndarray | None:
+        """An image as it is stored, but for its colours."""
+        file, how = self.files[number], cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
+        try:
+            if self.pages:
+                _, images = cv2.imreadmulti(str(file), number, 1, flags=how)
+                return images[0] if images else None
+            # Not imread, which knows no Chinese name on some systems.
+            return cv2.imdecode(np.fromfile(file, np.uint8), how) if _holds(file) else None
+        except cv2.error:  # such as a header of more pixels than there are
+            return None
+
+
+def find_stills(path: Path) -> Stills | None:
+    """The images in a folder or of a pattern, such as ``shots/a_%04d.png`` or ``shots/*.png``.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Stills or None
+        None if the path is neither a folder nor a pattern, but the name of a file that is no TIFF.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If there are no such images, or their numbers do not tell their order.
+    """
+    if path.is_file() and path.suffix.lower() in (".tif", ".tiff"):
+        count = cv2.imcount(str(path)) if _holds(path) else 0
+        return Stills([path] * count, np.arange(count, dtype=float), True) if count else None
+    if path.is_file() or not (path.is_dir() or re.search(r"[*?]|%\d*d", path.name)):
+        return None
+    if path.is_dir():
+        files = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES]
+        files = [file for file in files if not file.name.startswith(".")]
+    else:
+        folder = path.parent if path.parent.is_dir() else Path()
+        named = re.compile(_expression(path.name))
+        files = [file for file in folder.iterdir() if named.fullmatch(file.name)]
+    if not files and not path.is_dir():
+        raise FileNotFoundError(
+            f"path: no such video file, nor images of that name, got {str(path)!r}"
+        )
+    if not files:
+        raise ValueError(
+            f"path: must be a video file, or a folder of images, got '{path}' without any"
+        )
+    numbers = [_number(file) for file in files]
+    if None in numbers:
+        return Stills(sorted(files), np.arange(len(files), dtype=float))
+    return _in_order(path, files, np.array(numbers, dtype=float))
+
+
+def _expression(name: str) -> str:
+    """A pattern of names as a regular expression."""
+    parts = re.split(r"(%\d*d|[*?])", name)
+    meaning = {"*": ".*", "?": "."}
+    return "".join(
+        r"\d+" if part.startswith("%") and len(part) > 1 else meaning.get(part, re.escape(part))
+        for part in parts
+    )
+
+
+def _number(file: Path) -> int | None:
+    """The last number in a file's name."""
+    found = re.findall(r"\d+", file.stem)
+    return int(found[-1]) if found else None
+
+
+def _in_order(path: Path, files: list[Path], numbers: Floats) -> Stills:
+    """Images by their numbers, which must be those of frames."""
+    order = np.argsort(numbers)
+    steps = np.diff(numbers[order])
+    step = steps.min() if steps.size else 1.0
+    if step == 0:
+        k = int(steps.argmin())
+        twins = " and ".join(files[i].name for i in order[k : k + 2])
+        raise ValueError(f"path: each image of a film must have its own number, got {twins}")
+    if (steps % step).any() or (steps.size and np.median(steps) > step):
+        raise ValueError(
+            f"path: the numbers of images must count frames, got {files[order[0]].name}, "
+            f"{files[order[1]].name}, ... in '{path}': rename them 0001, 0002, ..."
+        )
+    return Stills([files[i] for i in order], (numbers[order] - numbers.min()) / step)
+
+
+def read_stills(stills: Stills) -> Iterator[Image]:
+    """The images one after the other, blue-green-red, all of one size.
+
+    Raises
+    ------
+    ValueError
+        Where an image cannot be read or has another size.
+    """
+    size, bits = None, stills.bits()
+    for k, file in enumerate(stills.files):
+        image = stills.read(k, bits)
+        size = size or image.shape[1::-1]
+        if image.shape[1::-1] != size:
+            raise ValueError(
+                f"path: all images of a film must have one size, {size}, got "
+                f"{image.shape[1::-1]} in '{file}'"
+            )
+        yield image
+
+
+def _holds(file: Path) -> bool:
+    """Whether there is anything in it: OpenCV fails at nothing with a message of its own."""
+    return file.is_file() and file.stat().st_size > 0
 
 
 class _Codec(NamedTuple):
@@ -451,3 +689,38 @@ def _image(frame: VideoFrame) -> Image:
 def _turned(image: Image) -> Image:
     """Blue-green-red to red-green-blue or back, in half the time that ffmpeg takes."""
     return cast("Image", cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
+
+
+class Reel:
+    """A film whose frames are looked at several times: some of them first, then all in order.
+
+    Parameters
+    ----------
+    path : path
+        See `read_video`.
+    """
+
+    def __init__(self, path: str | os.PathLike) -> None:
+        self.path, self.info = path, video_info(path)
+        if self.info.frames < 2:
+            raise ValueError(f"path: must hold two frames or more, got one in '{path}'")
+        width, height = self.info.size
+        self.few = 3 * width * height * self.info.frames <= _ROOM
+        self._kept: list[Image] | None = None
+
+    def __iter__(self) -> Iterator[Image]:
+        if self._kept is not None:
+            yield from self._kept
+            return
+        kept: list[Image] = []
+        for frame in read_video(self.path):
+            if self.few:
+                kept.append(frame)
+            yield frame
+        self._kept = kept if self.few else None
+
+    def pick(self, numbers: Sequence[int]) -> Iterator[Image]:
+        """The frames of these increasing numbers, as far as the film holds them."""
+        if self.few:
+            return (frame for i, frame in enumerate(self) if i in numbers)
+        return pick_frames(self.path, numbers)
