@@ -302,7 +302,7 @@ assert np.linalg.norm(centroid - truth[middle]) < 0.05
 fig, panels = plt.subplots(1, 4, figsize=(10.5, 3.2), sharex=True, sharey=True)
 style = {"extent": (left - 0.5, left + 47.5, top + 47.5, top - 0.5), "interpolation": "nearest"}
 for axes, image, title in zip(panels, (frame, behind), ("frame", "background"), strict=False):
-    axes.imshow(image[..., ::-1].astype(np.uint8), **style)  # blue-green-red, as read
+    axes.imshow(image.astype(np.uint8), **style)
     axes.set_title(title)
     axes.spines[:].set_visible(False)
 units = {"difference": (distance, "grey levels"), "coverage": (coverage, "share of the pixel")}

@@ -138,7 +138,7 @@ assert abs(flight.g.value - g) < 4 * flight.g.error
 
 # %% tags=["hide-input"] jupyter={"source_hidden": true}
 def draw(axes, film, found):
-    axes.imshow(read_frame(film, 0)[..., ::-1])
+    axes.imshow(read_frame(film, 0))
     axes.plot(*stick[film].T, "o-", color="white", ms=4)
     axes.plot(*found.rig.cameras[0].project(found.fitted).T, color="C0", lw=4, label="the law")
     axes.plot(*found.tracks[0].T, "o", color="C4", ms=2.5, label="the ball, as tracked")

@@ -22,13 +22,13 @@ class Phone:
     """What is filmed and how.
 
     `size` is the diameter in pixels at the middle distance, `nearness` by what factor it changes;
-    `colour` blue-green-red; `exposure` in frames; `bitrate` in bits a second.
+    `colour` in red, green and blue; `exposure` in frames; `bitrate` in bits a second.
     """
 
     background: str = "hills"
     size: float = 24.0
     nearness: float = 1.3
-    colour: tuple[int, int, int] = (35, 30, 215)
+    colour: tuple[int, int, int] = (215, 30, 35)
     exposure: float = 0.5
     flicker: float = 0.0
     noise: float = 2.0
@@ -47,8 +47,8 @@ class Phone:
         """One of the films that people make."""
         width, height = fixed.get("image_size", (640, 480))
         size = float(np.exp(rng.uniform(np.log(6), np.log(90))))
-        vivid = [(35, 30, 215), (185, 30, 200), (15, 225, 250), (5, 115, 250), (22, 18, 20),
-                 (235, 240, 240), (60, 150, 40)]  # fmt: skip
+        vivid = [(215, 30, 35), (200, 30, 185), (250, 225, 15), (250, 115, 5), (20, 18, 22),
+                 (240, 240, 235), (40, 150, 60)]  # fmt: skip
         drawn = {
             "background": str(rng.choice(BACKDROPS)),
             "size": size,
@@ -207,7 +207,8 @@ def write_phone(path: Path, phone: Phone, seed: int = 0):
         stream.codec_context.thread_count = 1
         stream.options = {"preset": "fast"}
         for frame, here, there in render_phone(phone, seed):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "bgr24")))
+            picture = cv2.cvtColor(frame, cv2.COLOR_RGB2BGR)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, "bgr24")))
             steady.append(here)
             raw.append(there)
         container.mux(stream.encode(None))

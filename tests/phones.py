@@ -3,6 +3,7 @@
 from fractions import Fraction
 
 import av
+import cv2
 import numpy as np
 
 TICKS = 90_000  # in a second
@@ -18,7 +19,7 @@ def write_at(path, seconds, frames, codec="qtrle", pixels="rgb24", **options):
                 stream.width, stream.height = frame.shape[1::-1]
                 stream.pix_fmt = pixels
                 stream.time_base = stream.codec_context.time_base = base
-            picture = av.VideoFrame.from_ndarray(frame, "bgr24")
+            picture = av.VideoFrame.from_ndarray(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR), "bgr24")
             picture.pts, picture.time_base = round(time * TICKS), base
             container.mux(stream.encode(picture))
         container.mux(stream.encode(None))

@@ -339,7 +339,7 @@ def test_every_kind_of_film_under_any_name(folder, tmp_path, monkeypatch, capsys
         ending = '"' if "b_" in prefix else ""
         for i, frame in enumerate(vl.read_video(folder / f"{video}.avi")):
             path = tmp_path / f"{prefix}{i:04d}.png{ending}"
-            path.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
+            path.write_bytes(cv2.imencode(".png", frame[..., ::-1])[1].tobytes())
     command = ["discover", *names, "--rig", str(folder / "rig.toml"), "--fps", "30"]
     assert main([*command, "--degree", "2", "--out", "$報告 'r'"]) in (0, 1)
     shown = capsys.readouterr().out

@@ -150,7 +150,7 @@ def test_different_frame_rates(shot, tmp_path):
 
 def test_a_grey_video(shot, tmp_path):
     frames = islice(vl.read_video(shot.paths[0]), 80)
-    grey = (cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) for frame in frames)
+    grey = (cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY) for frame in frames)
     path = vl.write_video(tmp_path / "grey.mkv", (np.dstack([g] * 3) for g in grey))
     error = vl.track(path).pixels - shot.tracks[0][:80]
     assert np.isfinite(error).all(axis=1).mean() > 0.8

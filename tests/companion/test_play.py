@@ -33,7 +33,7 @@ def observed(tmp_path, frames):
 
 def decoded(film):
     with av.open(io.BytesIO(film)) as container:
-        return [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
 def test_the_law_is_drawn_where_the_target_is(tmp_path):

@@ -111,7 +111,7 @@ def test_missing_weights(tmp_path):
 def test_an_onnx_model_sees_frames_of_any_size(tmp_path, size):
     detector = OnnxDetector(write_red_detector(tmp_path / "red.onnx", size))
     frame = np.full((192, 256, 3), 90, np.uint8)
-    frame[64:96, 96:128] = (0, 0, 255)  # whole squares of anchors in all of these sizes
+    frame[64:96, 96:128] = (255, 0, 0)  # whole squares of anchors in all of these sizes
     found = detector.predict(frame)
     sure = found[:, found[4] > 0.5]
     np.testing.assert_allclose(sure[:2].mean(axis=1), [111.5, 79.5], atol=0.01)

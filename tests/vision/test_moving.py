@@ -39,10 +39,10 @@ def errors(path, truth, target=None):
     "phone",
     [
         Phone("bricks", 14, shadow=True, **SMALL),
-        Phone("wood", 20, flicker=0.1, colour=(15, 225, 250), **SMALL),
+        Phone("wood", 20, flicker=0.1, colour=(250, 225, 15), **SMALL),
         Phone("bricks", 18, camera="trembling", **SMALL),
-        Phone("wood", 16, camera="held", flicker=0.03, colour=(235, 240, 240), **SMALL),
-        Phone("plain", 20, colour=(115, 118, 116), noise=1, **SMALL),
+        Phone("wood", 16, camera="held", flicker=0.03, colour=(240, 240, 235), **SMALL),
+        Phone("plain", 20, colour=(116, 118, 115), noise=1, **SMALL),
         Phone("hills", 60, nearness=1.2, bitrate=1_500_000, **SMALL),
     ],
     ids=["shadow", "flicker", "trembling", "held", "grey", "large"],
@@ -56,7 +56,7 @@ def test_phone_footage(tmp_path, phone):
 
 
 def test_a_large_target_is_plainer_than_leaves_that_sway(tmp_path):
-    phone = Phone("sea", 58, colour=(185, 30, 200), noise=3, leaves=True, **SMALL)
+    phone = Phone("sea", 58, colour=(200, 30, 185), noise=3, leaves=True, **SMALL)
     truth, _ = write_phone(tmp_path / "clip.mp4", phone, 1)
     found, error = errors(tmp_path / "clip.mp4", truth)
     assert np.nanpercentile(error, 95) < 1.5
@@ -65,7 +65,7 @@ def test_a_large_target_is_plainer_than_leaves_that_sway(tmp_path):
 
 def test_a_small_dark_ball_is_not_lost_to_somebody_in_dark_clothes(tmp_path):
     # Blurred, it is of their colour, and it passes before them.
-    phone = Phone("sky", 8, colour=(22, 18, 20), noise=4, exposure=0.9, person=True, **SMALL)
+    phone = Phone("sky", 8, colour=(20, 18, 22), noise=4, exposure=0.9, person=True, **SMALL)
     truth, _ = write_phone(tmp_path / "clip.mp4", phone, 4)
     found, error = errors(tmp_path / "clip.mp4", truth)
     assert np.isfinite(error).mean() >= 0.95

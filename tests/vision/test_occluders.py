@@ -58,7 +58,7 @@ def test_what_touches_other_things_does_not_say_where_the_target_is_hidden():
 
 
 def test_a_large_ball_behind_a_post_is_seen_whole_or_not_at_all(tmp_path):
-    phone = Phone("wood", 64, colour=(15, 225, 250), noise=4, occluder=True,
+    phone = Phone("wood", 64, colour=(250, 225, 15), noise=4, occluder=True,
                   image_size=(320, 240), frames=60)  # fmt: skip
     truth, _ = write_phone(tmp_path / "clip.mp4", phone, 2)
     error = np.linalg.norm(track(tmp_path / "clip.mp4").pixels - truth, axis=1)

@@ -109,7 +109,7 @@ def test_a_colour_that_the_film_shows_mixed_with_its_ground_is_not_lost(tmp_path
             yield np.clip(image, 0, 255).astype(np.uint8)
 
     path = write_video(tmp_path / "disc.mov", frames())
-    found = track(path, target=Hint(colour=(110, 230, 40)))
+    found = track(path, target=Hint(colour=(40, 230, 110)))
     error = np.linalg.norm(found.pixels - truth, axis=1)
     assert np.isfinite(error).mean() >= 0.95
     assert np.nanpercentile(error, 95) < 1.5

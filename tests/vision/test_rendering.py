@@ -344,7 +344,7 @@ def test_a_track_of_an_odd_number_of_columns_is_told_of_the_even_one_below():
 def test_posts_are_brown_and_hedges_are_green(box, brown):
     left, top, width, height = box
     frame = next(render([[np.nan, np.nan]], Scene("plain", occluders=(box,), image_size=SMALL)))
-    blue, green, red = frame[top : top + height, left : left + width].reshape(-1, 3).mean(axis=0)
+    red, green, blue = frame[top : top + height, left : left + width].reshape(-1, 3).mean(axis=0)
     assert green > blue + 10
     assert (red > green + 10) == brown
     assert (red < green - 10) != brown

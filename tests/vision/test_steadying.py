@@ -31,7 +31,7 @@ def grains(seed=0):
     rng = np.random.default_rng(seed)
     soft = cv2.GaussianBlur(rng.normal(size=SIZE[::-1]), (0, 0), 2)
     grey = np.clip(128 + 40 * soft / soft.std(), 0, 255).astype(np.uint8)
-    return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
+    return cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB)
 
 
 def followed(*frames):
@@ -156,9 +156,9 @@ def test_each_part_of_an_image_has_at_most_one_corner():
 
 @pytest.mark.parametrize("shift", [(-9, 0), (9, 0), (0, -9), (0, 9), (3, -2)])
 def test_corners_are_followed_as_long_as_they_are_in_the_image(shift):
-    before = cv2.cvtColor(grains(), cv2.COLOR_BGR2GRAY)[200:320, 200:360].copy()
+    before = cv2.cvtColor(grains(), cv2.COLOR_RGB2GRAY)[200:320, 200:360].copy()
     move = np.array([[1, 0, shift[0]], [0, 1, shift[1]]], float)
-    whole = cv2.warpAffine(cv2.cvtColor(grains(), cv2.COLOR_BGR2GRAY), move, SIZE)
+    whole = cv2.warpAffine(cv2.cvtColor(grains(), cv2.COLOR_RGB2GRAY), move, SIZE)
     after = whole[200:320, 200:360].copy()
     points = np.array([[80.0, 60], [4, 60], [155, 60], [80, 4], [80, 115]])
     ends, found = _follow(before, after, points, points + shift)

@@ -92,7 +92,7 @@ def test_a_folder_is_tracked_as_the_video_is(tmp_path):
     video = vl.render_video(tmp_path / "a.mov", track, scene)
     (tmp_path / "a").mkdir()
     for i, frame in enumerate(vl.read_video(video)):
-        cv2.imwrite(str(tmp_path / "a" / f"{i:05d}.png"), frame)
+        cv2.imwrite(str(tmp_path / "a" / f"{i:05d}.png"), frame[..., ::-1])
     np.testing.assert_array_equal(vl.track(tmp_path / "a").pixels, vl.track(video).pixels)
 
 

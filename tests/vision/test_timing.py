@@ -118,7 +118,7 @@ def test_half_a_file_is_told(tmp_path, name, codec, sound):
         for k in range(60):
             image = noise.copy()
             image[20:30, 5 + k : 15 + k] = 230
-            frame = av.VideoFrame.from_ndarray(image.astype(np.uint8), format="bgr24")
+            frame = av.VideoFrame.from_ndarray(image.astype(np.uint8), format="rgb24")
             out.mux(stream.encode(frame))
             if voice:
                 heard = av.AudioFrame.from_ndarray(np.zeros((1, 267), np.int16), "s16", "mono")

@@ -93,7 +93,7 @@ def test_lossy_codecs(tmp_path, name, codec):
 def test_grey_video(tmp_path):
     truth = winding_path()
     grey = (
-        cv2.cvtColor(cv2.cvtColor(f, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+        cv2.cvtColor(cv2.cvtColor(f, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB)
         for f in render(truth, Scene("sky", size=16, colour="black", image_size=SIZE), 2)
     )
     error = errors(write_video(tmp_path / "grey.mkv", grey), truth)

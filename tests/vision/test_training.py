@@ -173,7 +173,7 @@ def test_a_piece_of_a_background_keeps_its_place_and_mixes_its_colours():
     piece = training._background(Given(np.log(2.0), place, 0, mix, 1.0), pool)
     large = pool[0, 200 : 200 + 2 * training.SIDE, 100 : 100 + 2 * training.SIDE].astype(float)
     small = large.reshape(training.SIDE, 2, training.SIDE, 2, 3).mean(axis=(1, 3))
-    small[..., 2] = (0.25 * small[..., 0] + small[..., 2]) / 1.25
+    small[..., 0] = (0.25 * small[..., 2] + small[..., 0]) / 1.25
     np.testing.assert_allclose(piece, small, atol=1.01)
 
 
@@ -192,7 +192,7 @@ def test_white_balance_of_a_camera():
     seen = training._seen_by_a_camera(frame, Given(same, same, 1.1, np.ones(3), -5.0, same, same))
     np.testing.assert_array_equal(seen, np.full((8, 8, 3), (50, 105, 215), np.uint8))
     grey = training._seen_by_a_camera(frame, Given(same, 0.05, 1.0, np.ones(3), 0.0, same, same))
-    assert (grey == cv2.cvtColor(frame[:1, :1], cv2.COLOR_BGR2GRAY)[0, 0]).all()
+    assert (grey == cv2.cvtColor(frame[:1, :1], cv2.COLOR_RGB2GRAY)[0, 0]).all()
     # Of a frame of one colour, neither blur nor a lossy codec leaves much to be seen.
     for rest in ([0.1, 1.0, same], [same, 0.1, 90]):
         seen = training._seen_by_a_camera(frame, Given(same, same, 1.0, np.ones(3), 0.0, *rest))

@@ -177,7 +177,7 @@ def test_frames_of_a_file_with_sound_are_not_those_of_the_sound(tmp_path, second
         stream.pix_fmt = "bgr0"
         sound = container.add_stream("pcm_s16le", rate=8000, layout="mono")
         for frame in drawn(30):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "bgr24")))
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "rgb24")))
         container.mux(stream.encode(None))
         silence = np.zeros((1, int(8000 * seconds)), np.int16)
         heard = av.AudioFrame.from_ndarray(silence, "s16", "mono")
@@ -220,7 +220,7 @@ def read_by_opencv(path):
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     try:
         while (more := capture.read())[0]:
-            yield more[1]
+            yield cv2.cvtColor(more[1], cv2.COLOR_BGR2RGB)
     finally:
         capture.release()
 
@@ -253,7 +253,7 @@ def test_lossy_files_are_as_lossy_as_those_of_opencv(tmp_path, name, codec):
     fourcc = cv2.VideoWriter_fourcc(*codec)
     writer = cv2.VideoWriter(str(tmp_path / name), cv2.CAP_FFMPEG, fourcc, 25, SMALL)
     for frame in frames:
-        writer.write(frame)
+        writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
     writer.release()
     ours = write_video(tmp_path / f"ours_{name}", frames, codec=codec)
     assert ours.stat().st_size == pytest.approx((tmp_path / name).stat().st_size, rel=0.1)
@@ -299,7 +299,7 @@ def write_at(path, times, frames, codec="ffv1", pixels="bgr0", b_frames=0):
         stream.codec_context.max_b_frames = b_frames
         stream.codec_context.gop_size = 8
         for time, frame in zip(times, frames, strict=True):
-            picture = av.VideoFrame.from_ndarray(frame, "bgr24")
+            picture = av.VideoFrame.from_ndarray(frame, "rgb24")
             picture.pts = int(time)
             container.mux(stream.encode(picture))
         container.mux(stream.encode(None))

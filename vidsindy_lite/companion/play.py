@@ -18,7 +18,7 @@ _FRAMES = 200  # of the film at most
 _RATE = 25  # frames a second
 _HEIGHT = 270  # pixels of each view, which stand side by side
 _TRAIL = 40  # frames of the film that the curve reaches back
-_CURVE = (178, 114, 0)  # blue-green-red, as in the figures
+_CURVE = (0, 114, 178)  # as in the figures
 _TUBE = 2.0  # standard deviations of the track around the law
 _FAINT = 0.4  # share of the tube's colour
 
@@ -51,7 +51,7 @@ def law_over_videos(found: VideoDiscovery, paths: Sequence[str | Path]) -> bytes
             if k == 0:
                 stream.width, stream.height = side_by_side.shape[1::-1]
                 stream.pix_fmt = "yuv420p"
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(side_by_side, "bgr24")))
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(side_by_side, "rgb24")))
         container.mux(stream.encode(None))
     return file.getvalue()
 

@@ -63,7 +63,7 @@ class LearnedDetector:
         self.network = fused(network.eval()).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def predict(self, image: Image) -> Predictions:
-        """Predictions, (5, n), for an image (height, width, 3) uint8, blue-green-red."""
+        """Predictions, (5, n), for an image (height, width, 3) uint8, red, green and blue."""
         return self.predict_all(image[None])[0]
 
     def predict_all(self, images: Image) -> Predictions:
@@ -116,7 +116,7 @@ class OnnxDetector:
         self.height, self.width = map(int, shape.pop())
 
     def predict(self, image: Image) -> Predictions:
-        """Predictions, (5, n), for an image (height, width, 3) uint8, blue-green-red."""
+        """Predictions, (5, n), for an image (height, width, 3) uint8, red, green and blue."""
         height, width = image.shape[:2]
         scale = min(self.height / height, self.width / width)
         size = round(scale * width), round(scale * height)
@@ -124,7 +124,7 @@ class OnnxDetector:
         margins = (top, self.height - size[1] - top, left, self.width - size[0] - left)
         resized = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
         padded = cv2.copyMakeBorder(resized, *margins, cv2.BORDER_CONSTANT, value=(_GREY,) * 3)
-        self.network.setInput(cv2.dnn.blobFromImage(padded, 1 / 255, swapRB=True))
+        self.network.setInput(cv2.dnn.blobFromImage(padded, 1 / 255))
         found = np.asarray(self.network.forward(), np.float32)
         if found.ndim != 3 or len(found) != 1 or found.shape[1] < 5:
             raise ValueError(

@@ -81,9 +81,9 @@ class Hint:
     def likeness(self, colours: Floats, grounds: Floats) -> Floats:
         """How like the colour that is told things (m, 3) are before grounds (m, 3), from 0 to 1.
 
-        Also in other light, and where blur mixes them with their ground. All are blue-green-red.
+        Also in other light, and where blur mixes them with their ground.
         """
-        told = np.array(self.colour or (0, 0, 0), float)[::-1]
+        told = np.array(self.colour or (0, 0, 0), float)
         mixed = told - grounds
         share = ((colours - grounds) * mixed).sum(axis=1) / np.maximum((mixed**2).sum(axis=1), 1)
         ways = told, grounds + np.clip(share, 0.25, 1)[:, None] * mixed

@@ -140,7 +140,7 @@ def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> F
     views = viewed(film, lens, ways, lights)
     if hint is not None and hint.colour is not None and any(views):
         colour = np.median([view.colour for view in views if view], axis=0)
-        doubts += hint.unlike(colour[::-1])
+        doubts += hint.unlike(colour)
     found = finished(views, film.motion, doubts)
     return _filled(found, film, views, looks, ways, seed)
 

@@ -4,7 +4,6 @@ Of the family of YOLO-v8, with decoupled heads for *what* (the confidence) and *
 size). Only this module and `training` import torch.
 """
 
-import cv2
 import numpy as np
 import torch
 from torch import nn
@@ -101,8 +100,8 @@ def anchors(rows: int, columns: int) -> torch.Tensor:
 
 
 def as_input(images: Image) -> torch.Tensor:
-    """Blue-green-red images (b, height, width, 3) uint8 as what the network takes."""
-    colours = np.stack([cv2.cvtColor(image, cv2.COLOR_BGR2RGB) for image in images])
+    """Images (b, height, width, 3) uint8 as what the network takes."""
+    colours = np.ascontiguousarray(images)
     planes = torch.from_numpy(colours).permute(0, 3, 1, 2)
     return planes.float().div_(255)  # permuted, the channels stay last in memory: the fast order
 

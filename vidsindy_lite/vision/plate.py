@@ -170,7 +170,7 @@ def lights_of(samples: Image, maps: Floats, known: Bools) -> Floats32:
 
 def tolerance(plate: Plate, noise: float) -> Floats32:
     """Grey levels by which reduced frames may differ from each place of their plate."""
-    grey = cv2.cvtColor(plate.image, cv2.COLOR_BGR2GRAY)
+    grey = cv2.cvtColor(plate.image, cv2.COLOR_RGB2GRAY)
     slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     # Pixels by which an edge may be displaced, and levels below which nothing differs.
     edge = 0.5 if plate.moves else 0.12

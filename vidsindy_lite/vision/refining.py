@@ -186,7 +186,7 @@ class Lens:
         return replace(view if part else replace(all_, area=0.0), whole=all_)
 
     def _tolerance(self, then: Image) -> Floats32:
-        grey = cv2.cvtColor(then, cv2.COLOR_BGR2GRAY)
+        grey = cv2.cvtColor(then, cv2.COLOR_RGB2GRAY)
         slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
         return self.least + _EDGE[self.plate.moves] * slope.astype(np.float32)
 

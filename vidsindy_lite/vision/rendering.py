@@ -41,13 +41,13 @@ Size = tuple[int, int]
 SHAPES = ("disc", "polygon", "irregular")
 
 COLOURS = {
-    "red": (35, 30, 215),
-    "magenta": (185, 30, 200),
-    "yellow": (15, 225, 250),
-    "orange": (5, 115, 250),
-    "black": (22, 18, 20),
+    "red": (215, 30, 35),
+    "magenta": (200, 30, 185),
+    "yellow": (250, 225, 15),
+    "orange": (250, 115, 5),
+    "black": (20, 18, 22),
 }
-"""Blue, green and red of each target colour: vivid, far from every colour of every background."""
+"""Red, green and blue of each target colour: vivid, far from every colour of every background."""
 
 Box = tuple[int, int, int, int]
 """Left, top, width and height in whole pixels."""
@@ -70,7 +70,7 @@ def _texture(
 def _paint(light: ArrayLike, blue: ArrayLike, red: ArrayLike) -> Image:
     """Colour image from brightness (green) and the differences blue - green and red - green."""
     green = np.rint(light)
-    image = np.stack([green + np.rint(blue), green, green + np.rint(red)], axis=-1)
+    image = np.stack([green + np.rint(red), green, green + np.rint(blue)], axis=-1)
     return np.clip(image, 0, 255).astype(np.uint8)
 
 
@@ -414,7 +414,7 @@ def render(
     Yields
     ------
     frame : ndarray, shape (height, width, 3), uint8
-        Blue-green-red.
+        Red, green and blue.
 
     Raises
     ------
@@ -431,7 +431,7 @@ class LabelledFrame(NamedTuple):
     Parameters
     ----------
     frame : ndarray, shape (height, width, 3), uint8
-        Blue-green-red.
+        Red, green and blue.
     extent : ndarray, shape (2,)
         Width and height of the whole target in pixels, of several the last one; NaN in a frame
         without target.
@@ -501,7 +501,7 @@ def render_restless(
     Yields
     ------
     frame : ndarray, shape (height, width, 3), uint8
-        Blue-green-red.
+        Red, green and blue.
 
     Raises
     ------
@@ -559,8 +559,9 @@ def draw_frames(
             extent = np.ptp(polygon, axis=0)
             seen = _blend(frame, visible, polygon, colour)
         if scene.noise_variance > 0:
-            # Takes less than half the time of normal numbers; grey levels are coarser by far.
-            grain = grains[noise.integers(0, len(grains), frame.shape, np.uint16)]
+            # Takes less than half the time of normal numbers; grey levels are coarser by far. Blue
+            # comes first, so that films of a seed are what they were.
+            grain = grains[noise.integers(0, len(grains), frame.shape, np.uint16)][..., ::-1]
             frame = np.asarray(cv2.add(frame, grain, dtype=cv2.CV_8U), np.uint8)
         yield LabelledFrame(frame, extent, seen)
 

@@ -77,7 +77,7 @@ class Aligned(NamedTuple):
 
 def pyramid(small: Image) -> list[Floats32]:
     """Grey levels of an image at a half, a quarter, ... of its size."""
-    levels = [cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)]
+    levels = [cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)]
     # Of the pyramid, the first of half the size.
     while len(levels) <= 4 and min(levels[-1].shape) >= 32:
         levels.append(np.asarray(cv2.pyrDown(levels[-1]), np.float32))
@@ -272,7 +272,7 @@ class _Relief(NamedTuple):
 
     @classmethod
     def of(cls, small: Image) -> _Relief:
-        grey = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)
+        grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 1))
         mean = cv2.blur(cv2.blur(grey, (_WIDTH, _WIDTH)), (_WIDTH, _WIDTH))
         fine = np.clip(128 + _CONTRAST * (grey - mean) / (mean + _DARK), 0, 255).astype(np.uint8)

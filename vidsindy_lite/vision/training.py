@@ -116,7 +116,7 @@ def _background(rng: np.random.Generator, pool: Image) -> Image:
     image = pool[rng.integers(len(pool))][top : top + size, left : left + size]
     resized = cv2.resize(image, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
     # Its colours are mixed, muted: the target's are the vivid ones.
-    mix = np.eye(3) + rng.uniform(-0.25, 0.25, (3, 3))
+    mix = np.eye(3) + rng.uniform(-0.25, 0.25, (3, 3))[::-1, ::-1]  # as the shipped weights saw it
     mix *= rng.uniform(0.6, 1.3) / mix.sum(axis=1, keepdims=True)
     return np.asarray(cv2.transform(resized, mix.astype(np.float32)), np.uint8)
 
@@ -134,6 +134,7 @@ def _tiles(rng: np.random.Generator) -> Floats32:
 
 def _seen_by_a_camera(frame: Image, rng: np.random.Generator) -> Image:
     """Another white balance, colours exchanged, blur, or a lossy codec."""
+    frame = frame[..., ::-1]  # OpenCV's order, whose codec it is
     frame = frame[..., rng.permutation(3)] if rng.random() < 0.5 else frame
     if rng.random() < 0.1:
         frame = np.stack([cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)] * 3, axis=-1)
@@ -145,7 +146,7 @@ def _seen_by_a_camera(frame: Image, rng: np.random.Generator) -> Image:
         quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(40, 95))]
         coded = cv2.imencode(".jpg", frame, quality)[1]
         frame = np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR), np.uint8)
-    return frame
+    return np.ascontiguousarray(frame[..., ::-1])
 
 
 # -------------------------------------------------------------------------------------------- loss

@@ -108,7 +108,7 @@ def upper_field(frame: VideoFrame) -> Image:
     Returns
     -------
     ndarray, shape (height, width, 3), uint8
-        Blue-green-red.
+        Red, green and blue.
     """
     import av
 
@@ -123,7 +123,7 @@ def upper_field(frame: VideoFrame) -> Image:
     graph.configure()
     graph.push(frame)
     lines = cast("VideoFrame", graph.pull()).to_ndarray(format="bgr24", threads=1)
-    return with_lines_between(cast("Image", lines))[: frame.height]
+    return with_lines_between(_turned(cast("Image", lines)))[: frame.height]
 
 
 def with_lines_between(field: Image) -> Image:
@@ -144,14 +144,14 @@ class Stills(NamedTuple):
     pages: bool = False
 
     def read(self, number: int, bits: int) -> Image:
-        """One image, upright, blue-green-red, of so many bits made eight."""
+        """One image, upright, of so many bits made eight."""
         file = self.files[number]
         image = self._decoded(number)
         if image is None:
             raise ValueError(f"path: must be an image that OpenCV can read, got '{file}'")
         if image.dtype == np.uint16:
             image = np.clip(image >> (bits - 8), 0, 255).astype(np.uint8)
-        return cast("Image", image)
+        return _turned(cast("Image", image))
 
     def bits(self) -> int:
         """How many bits the film uses, by some of its images."""
@@ -252,7 +252,7 @@ def _in_order(path: Path, files: list[Path], numbers: Floats) -> Stills:
 
 
 def read_stills(stills: Stills) -> Iterator[Image]:
-    """The images one after the other, blue-green-red, all of one size.
+    """The images one after the other, red, green and blue, all of one size.
 
     Raises
     ------
@@ -333,7 +333,7 @@ def write_video(
     path : path
         .mov (qtrle) or .mkv (FFV1), both lossless; .mp4 only with a lossy codec.
     frames : iterable of ndarray, shape (height, width, 3), uint8
-        Blue-green-red, all of one size.
+        Red, green and blue, all of one size.
     fps : float or Fraction
         Frames per second, in [0.01, 10000]; at most 1000 in .mkv, whose clock counts milliseconds.
     codec : {"qtrle", "FFV1", "mp4v", "MJPG", "H264"}, optional
@@ -411,8 +411,8 @@ def _shown(frame: Image, codec: _Codec) -> VideoFrame:
     from av import VideoFrame
 
     if codec.pixels == "rgb24":
-        return VideoFrame.from_numpy_buffer(_turned(frame), "rgb24")
-    return VideoFrame.from_ndarray(frame, "bgr24")
+        return VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), "rgb24")
+    return VideoFrame.from_ndarray(_turned(frame), "bgr24")
 
 
 def _checked(frames: Iterable[Image]) -> Iterator[Image]:
@@ -464,8 +464,8 @@ def read_video(path: str | os.PathLike) -> Iterator[Image]:
     Yields
     ------
     frame : ndarray, shape (height, width, 3), uint8
-        Blue-green-red, upright if the file says how the camera was held. Of an interlaced frame the
-        upper field, with the lines between interpolated.
+        Red, green and blue, upright if the file says how the camera was held. Of an interlaced
+        frame the upper field, with the lines between interpolated.
 
     Raises
     ------
@@ -493,7 +493,7 @@ def read_frame(path: str | os.PathLike, number: int) -> Image:
     Returns
     -------
     frame : ndarray, shape (height, width, 3), uint8
-        Blue-green-red.
+        Red, green and blue.
 
     Raises
     ------
@@ -676,18 +676,22 @@ def _images(path: str | os.PathLike) -> Iterator[Image]:
 
 
 def _image(frame: VideoFrame) -> Image:
-    """Blue, green and red of a decoded frame, upright."""
+    """Red, green and blue of a decoded frame, upright."""
     if frame.interlaced_frame:
         image = upper_field(frame)
     elif frame.format.name == "rgb24":
-        image = _turned(cast("Image", frame.to_ndarray()))
+        image = cast("Image", frame.to_ndarray())
     else:  # more threads cost more than they save
-        image = cast("Image", frame.to_ndarray(format="bgr24", threads=1))
+        image = _turned(cast("Image", frame.to_ndarray(format="bgr24", threads=1)))
     return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90)))
 
 
 def _turned(image: Image) -> Image:
-    """Blue-green-red to red-green-blue or back, in half the time that ffmpeg takes."""
+    """Red, green and blue to blue, green and red, or back.
+
+    From the colours of a codec ffmpeg makes these to other roundings than those; OpenCV takes
+    these, so that other readers see the same frames.
+    """
     return cast("Image", cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
 
 

@@ -189,7 +189,7 @@ def plot_frames(
     Parameters
     ----------
     images : sequence of ndarray, shape (height, width, 3), uint8
-        Blue-green-red, as a video reader gives them; sizes may differ.
+        As a video reader gives them; sizes may differ.
     titles : sequence of str
     tracks : sequence of ndarray, shape (n, 2)
         Pixels of the target in all frames of each video.
@@ -224,8 +224,8 @@ def plot_frames(
 
 
 def _show(axes: Axes, image: Image, extent: tuple[float, ...] | None = None) -> None:
-    """An image as a video reader gives it (blue-green-red)."""
-    axes.imshow(image[..., ::-1].astype(np.uint8), extent=extent, interpolation="nearest")
+    """An image as a video reader gives it."""
+    axes.imshow(image.astype(np.uint8), extent=extent, interpolation="nearest")
     axes.grid(False)
     axes.spines[:].set_visible(False)
 
@@ -389,7 +389,7 @@ def draw_tour(
     Parameters
     ----------
     films : sequence of sequence of ndarray, shape (height, width, 3)
-        By camera, the frames to show; blue-green-red, as a video reader gives them.
+        By camera, the frames to show; As a video reader gives them.
     moments : ndarray of int, shape (k,)
         Which frames of the videos these are.
     tracks : sequence of ndarray, shape (n, 2)
@@ -409,7 +409,7 @@ def draw_tour(
     for i, (film, track) in enumerate(zip(films, tracks, strict=True)):
         axes = figure.add_axes((0.01 + 0.235 * i, 0.29, 0.225, 0.675))
         axes.set_axis_off()
-        images.append(axes.imshow(film[0][..., ::-1], interpolation="antialiased"))
+        images.append(axes.imshow(film[0], interpolation="antialiased"))
         lines += axes.plot(*track[:1].T, color="white", lw=1.4)
     space = figure.add_axes((0.715, 0.25, 0.28, 0.75), projection="3d")
     path = space.plot(*x[: moments[-1] + 1].T, color="C0", lw=1.4)[0]  # axes that hold all of it
@@ -423,7 +423,7 @@ def draw_tour(
 
     for number, moment in enumerate(moments):
         for image, film in zip(images, films, strict=True):
-            image.set_data(film[number][..., ::-1])
+            image.set_data(film[number])
         for line, track in zip(lines, tracks, strict=True):
             line.set_data(*track[: moment + 1].T)
         path.set_data_3d(*x[: moment + 1].T)
