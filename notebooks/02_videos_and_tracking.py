@@ -277,7 +277,7 @@ frame, behind = clip[middle][window].astype(float), background[window]
 difference = frame - behind
 distance = np.linalg.norm(difference, axis=-1)
 colour = np.median(frame[distance > 0.8 * distance.max()], axis=0)
-print("colour of the target (blue, green, red):", colour)
+print("colour of the target (red, green, blue):", colour)
 
 # %% [markdown]
 # **Then the coverage.** A pixel at the edge is a mixture, $(1-\alpha)$ background and $\alpha$

@@ -60,7 +60,7 @@ def _video(path: Path) -> dict[str, object]:
     frames = []
     for number, image in zip(numbers, pick_frames(path, numbers), strict=False):
         small = cv2.resize(image, None, fx=shrunk, fy=shrunk, interpolation=cv2.INTER_AREA)
-        _, packed = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        _, packed = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
         frames.append({"number": number, "image": base64.b64encode(packed.tobytes()).decode()})
     width, height = info.size
     return {"name": path.name, "width": width, "height": height, "frames": frames}
