@@ -5,7 +5,7 @@ frame, but shared by all frames, so that it does not average out. A law fitted t
 small terms that the true one has not. `discover` takes such errors into account if it is told them.
 
 The covariance of what was learned does not rest on independent errors of the tracks, which
-compression makes similar from frame to frame (`covariance`). A direction that the tracks tell
+compression makes similar from frame to frame (`adjust`). A direction that the tracks tell
 nothing of, such as a turn of the whole rig, is as uncertain as the measurements leave it.
 
 The tracks themselves may share an error, too: see `trailing_errors`.
