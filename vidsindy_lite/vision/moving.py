@@ -247,7 +247,8 @@ def _together(
     at = np.flatnonzero(np.isfinite(looks.box[:, 0]))
     box, area = looks.box[at], 0.7 * looks.box[at, 2:].prod(axis=1)
     centre, worth = box[:, :2], np.clip(1.2 * looks.fit[at], 0.25, 0.8)
-    differing = np.full(len(at), -1)  # what differs there
+    colour, behind = (np.tile(np.median(x, axis=0), (len(at), 1)) if len(x) else
+                      np.zeros((len(at), 3)) for x in (seen.colour, seen.behind))  # fmt: skip
     bounds = np.searchsorted(seen.frame, np.arange(len(maps) + 1))
     for k, i in enumerate(at.tolist()):
         here = np.arange(bounds[i], bounds[i + 1])
@@ -256,17 +257,10 @@ def _together(
                     & (np.abs(np.log(seen.area[here] / area[k])) < 0.8)]  # fmt: skip
         if len(near):
             best = near[quality[near].argmax()]
-            differing[k] = best
+            colour[k], behind[k] = seen.colour[best], seen.behind[best]
             worth[k] += 0.5 * quality[best]
             quality[near] += 0.5 * looks.fit[i]
     place = carry(maps[at], centre)
-    found = differing >= 0
-    colour, behind = np.zeros((2, len(at), 3))
-    if found.any():  # the others are of the colour that it usually has
-        colour, behind = (
-            np.where(found[:, None], x[differing], np.median(x[differing[found]], axis=0))
-            for x in (seen.colour, seen.behind)
-        )
     alike = Candidates(at, place, centre, np.column_stack([centre - box[:, 2:] / 2, box[:, 2:]]),
                        area, colour, behind, worth)  # fmt: skip
     alike.quality[at == first] += TOLD
