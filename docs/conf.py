@@ -41,6 +41,22 @@ notebooks/*
 
 ```{toctree}
 :hidden:
+:glob:
+:caption: Exercises
+
+notebooks/exercises/*
+```
+
+```{toctree}
+:hidden:
+:glob:
+:caption: Solutions
+
+notebooks/solutions/*
+```
+
+```{toctree}
+:hidden:
 :caption: What is found, and how
 
 figures/README
@@ -55,7 +71,8 @@ project = html_title = "vidsindy_lite"
 root_doc = "README"
 extensions = ["myst_nb", "sphinx.ext.apidoc", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 include_patterns = [
-    "*.md", "docs/*.md", "notebooks/*.ipynb", "figures/README.md", "build/api/vidsindy_lite*",
+    "*.md", "docs/*.md", "notebooks/*.ipynb", "notebooks/exercises/*.ipynb",
+    "notebooks/solutions/*.ipynb", "figures/README.md", "build/api/vidsindy_lite*",
 ]  # fmt: skip
 nb_execution_mode = "off"
 myst_enable_extensions = ["dollarmath"]
@@ -99,7 +116,7 @@ def prepare(app, page, source):
     """The first page leads to all others; a notebook says how long it is, its pictures in words."""
     if page == "README":
         source[0] += CONTENTS
-    elif page.startswith("notebooks/"):
+    elif re.fullmatch(r"notebooks/\w+", page):
         source[0] = json.dumps(described(json.loads(source[0])))
 
 

@@ -19,9 +19,6 @@
 # [exercises](../exercises/10_paper_audit.ipynb), and run the check behind each: it says *right*, or fails. The
 # [solutions](../solutions/10_paper_audit.ipynb) lie apart.
 
-# %% tags=["parameters"]
-seed: int = 0  # of all that is random
-
 # %%
 from dataclasses import replace
 from zlib import crc32

@@ -19,9 +19,6 @@
 # [exercises](../exercises/11_scoreboard.ipynb), and run the check behind each: it says *right*, or fails. The
 # [solutions](../solutions/11_scoreboard.ipynb) lie apart.
 
-# %% tags=["parameters"]
-seed: int = 0  # of all that is random
-
 # %%
 from zlib import crc32
 
