@@ -957,9 +957,10 @@ def model_of_all(law, number, noise, samples):
     rng = np.random.default_rng([number, samples])
     t, clean = law.trajectory(samples, 60)
     per_radian, scale, zero = law.period / (2 * np.pi), clean.std(axis=0), np.zeros(law.d)
-    t, x = t / per_radian, add_noise(clean, noise, rng) / scale
     true = law.coefficients / dynamics.Units(zero, scale, per_radian).factors(law.exponents)
+    t = t / per_radian
     control = dynamics.smooth([(t, clean / scale)], rng).splines[0].c
+    x = add_noise(clean, noise, rng) / scale
     state = dynamics.State(control, true, law.support, zero, zero > 0)
     precision, exact = np.full(law.d, noise**-2), np.full(law.d, 1e8)
     fit = dynamics.Collocation.of([dynamics.Segment(t, x, t)], law.exponents, precision, exact).solve(state)
