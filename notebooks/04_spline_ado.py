@@ -44,7 +44,6 @@ seed: int = 0  # of all noise
 
 # %%
 from dataclasses import replace
-from functools import cache
 from itertools import product
 from time import perf_counter
 from timeit import repeat as timed
@@ -916,7 +915,6 @@ def random_laws(rng, exponents, number=512):
     return np.where(rank < count, rng.choice([-1.0, 1.0], size=shape) * sizes, 0.0)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of laws that run away
 def paths_of(laws, x, exponents, step=0.04):
     """Where all of these laws lead within 20 time units, by Runge-Kutta steps."""
 
@@ -933,13 +931,13 @@ def paths_of(laws, x, exponents, step=0.04):
     return np.stack(path, axis=1)
 
 
-@cache
 def random_law(number):
     """The first random law of one to four states that stays within 8 and goes on moving."""
     d, rng = 1 + number % 4, np.random.default_rng([4, number])
     while True:
         laws, starts = random_laws(rng, cubic[d]), rng.normal(size=(512, d))
-        paths = paths_of(laws, starts, cubic[d])
+        with np.errstate(over="ignore", invalid="ignore"):  # some run away
+            paths = paths_of(laws, starts, cubic[d])
         spread, late = paths.std(axis=1), paths[:, 250:].std(axis=1)
         moving = (spread > 0.2) & (late >= (0.5 if d > 1 else 0) * spread)
         for k in np.flatnonzero((np.abs(paths) < 8).all(axis=(1, 2)) & moving.all(axis=1)):
@@ -960,9 +958,10 @@ def model_of_all(law, number, noise, samples):
     rng = np.random.default_rng([number, samples])
     t, clean = law.trajectory(samples, 60)
     per_radian, scale, zero = law.period / (2 * np.pi), clean.std(axis=0), np.zeros(law.d)
-    t, x = t / per_radian, add_noise(clean, noise, rng) / scale
     true = law.coefficients / dynamics.Units(zero, scale, per_radian).factors(law.exponents)
+    t = t / per_radian
     control = dynamics.smooth([(t, clean / scale)], rng).splines[0].c
+    x = add_noise(clean, noise, rng) / scale
     state = dynamics.State(control, true, law.support, zero, zero > 0)
     precision, exact = np.full(law.d, noise**-2), np.full(law.d, 1e8)
     fit = dynamics.Collocation.of([dynamics.Segment(t, x, t)], law.exponents, precision, exact).solve(state)

@@ -1,6 +1,5 @@
 """Two folders of figures, and two runs of a notebook, are compared; what differs is refreshed."""
 
-import base64
 import io
 import json
 
@@ -11,9 +10,7 @@ from PIL import Image
 
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion.compare import (
-    VISIBLE,
     differences,
-    looks_the_same,
     outdated,
     replace,
     same_notebook,
@@ -146,6 +143,7 @@ def shifted(pixels, share):
         (np.roll(LINE, 9, axis=0), False),
         (np.where(LINE == (0, 114, 178), (213, 94, 0), LINE).astype(np.uint8), False),
         (LINE[:-1], False),
+        (np.where(np.indices(LINE.shape)[:2].max(axis=0) < 4, 200, LINE).astype(np.uint8), False),
     ],
 )
 def test_a_picture_is_refreshed_where_one_sees_it(folders, pixels, same):
@@ -153,12 +151,6 @@ def test_a_picture_is_refreshed_where_one_sees_it(folders, pixels, same):
     assert refresh(*folders, "01_first") == ([] if same else ["fig_1"])
     expected = LINE if same else pixels
     assert (folders[0] / "fig_1.png").read_bytes() == png(expected)
-
-
-def test_a_small_thing_that_is_gone_is_seen():
-    with_target = LINE.copy()
-    with_target[8:12, 8:12] = 255 - 2 * VISIBLE
-    assert not looks_the_same(png(LINE), png(with_target))
 
 
 def test_a_picture_of_wall_times_stays_if_the_other_numbers_do(folders):
@@ -170,31 +162,11 @@ def test_a_picture_of_wall_times_stays_if_the_other_numbers_do(folders):
     assert refresh(*folders, "01_first") == ["fig_1"]
 
 
-@pytest.mark.parametrize("change", [{"caption": "B."}, {"tolerance": 0.1}, {"words": ["time"]}])
-def test_other_words_are_refreshed(folders, change):
-    write(folders[1], FIGURE | change)
-    assert refresh(*folders, "01_first") == ["fig_1"]
-    assert files(folders[0]) == files(folders[1])
-
-
 def test_what_a_notebook_makes_no_longer_goes_and_others_things_stay(folders):
     write(folders[0], RECORD | {"id": "other", "notebook": "02_second"})
     (folders[1] / "fig_1.json").unlink()
     assert refresh(*folders, "01_first") == ["fig_1"]
     assert set(files(folders[0])) == {"table_1.json", "other.json"}
-
-
-def test_a_damaged_picture_and_a_copy_are_no_obstacles(folders):
-    (folders[0] / "fig_1.png").write_bytes(b"version https://git-lfs")
-    (folders[0] / "fig_1 copy.json").write_text(json.dumps(FIGURE))
-    assert refresh(*folders, "01_first") == ["fig_1"]
-    assert (folders[0] / "fig_1.png").read_bytes() == png(LINE)
-
-
-def test_a_figure_that_becomes_a_table_leaves_no_picture(folders):
-    write(folders[1], RECORD | {"id": "fig_1"})
-    assert refresh(*folders, "01_first") == ["fig_1"]
-    assert set(files(folders[0])) == {"fig_1.json", "table_1.json"}
 
 
 def test_two_notebooks_cannot_make_one_id(folders):
@@ -266,17 +238,6 @@ def test_what_a_cell_saves_is_compared_where_it_is_saved():
     assert not same_notebook(*others)
     printed = [notebook("print(versions())", said=f"Python 3.11.{n}\n") for n in (7, 9)]
     assert same_notebook(*printed)
-
-
-@pytest.mark.parametrize("kind", ["image/png", "text/latex", "text/html"])
-def test_what_a_cell_shows_and_does_not_save_is_compared(kind):
-    coded = [base64.b64encode(png(p)).decode() for p in (LINE, np.roll(LINE, 9, axis=0))]
-    shown = coded if kind == "image/png" else ["$x = 1.0$", "$y = 1.0$"]
-    books = [notebook(), notebook()]
-    for book, one in zip(books, shown, strict=True):
-        book.cells[0].outputs[1].data[kind] = one
-    assert same_notebook(books[0], books[0])
-    assert not same_notebook(*books)
 
 
 # ------------------------------------------------------------------------------------- side by side

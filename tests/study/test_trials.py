@@ -11,7 +11,6 @@ from vidsindy_lite.observation import Observation
 from vidsindy_lite.refusal import Refused
 from vidsindy_lite.study import score, spline_ado
 from vidsindy_lite.study import trials as experiments
-from vidsindy_lite.study.corruption import add_noise, drop_blocks, drop_fibers
 from vidsindy_lite.study.films import FilmResult, FilmTask, detect_near, film, run_film
 from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.trials import (
@@ -231,19 +230,6 @@ def test_spline_ado_takes_all_draws_at_once_and_each_by_its_own_seed(no_videos, 
     results = run_trials(trials, jobs=1)
     assert given == [(2, [4, 2])] * 2
     assert [result.trial for result in results] == trials
-
-
-def test_corruption_is_that_of_the_protocol():
-    x = SYSTEMS["Lorenz"].trajectory(1500)[1]
-    noisy = Trial("Lorenz", "noise", 0.2).corrupt(x) - x
-    np.testing.assert_allclose(noisy.std(axis=0), 0.2 * x.std(axis=0), rtol=0.1)
-    for condition, gaps in (("blocks", 20), ("fibers", 5)):
-        hidden = np.isnan(Trial("Lorenz", condition, 0.2).corrupt(x)).all(axis=1)
-        assert hidden.sum() == 300
-        assert np.sum(np.diff(np.concatenate([[0], hidden])) == 1) == gaps
-    assert Trial("Lorenz").corrupt(x) is x
-    functions = {"noise": add_noise, "blocks": drop_blocks, "fibers": drop_fibers}
-    assert functions == experiments.CORRUPTIONS
 
 
 # ----------------------------------------------------------------------------------------- results

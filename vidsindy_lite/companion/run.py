@@ -6,24 +6,26 @@ is not repeated there while the code cells, the package and the libraries are th
 what is there already.
 """
 
-import asyncio
 import base64
 import copy
 import hashlib
 import json
 import os
 import shutil
+import subprocess
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
+from multiprocessing.pool import ThreadPool
 from pathlib import Path
 
 import jupytext
 import nbformat
 import papermill
-from filelock import FileLock, Timeout
+from filelock import FileLock
 from nbformat import NotebookNode
 from papermill.exceptions import strip_color
 from tqdm import tqdm
@@ -49,6 +51,7 @@ if sys.platform == "linux":
 from papermill.cli import papermill
 papermill()"""
 OPTIONS = ("--kernel", "python3", "--no-progress-bar", "--log-level", "ERROR")
+_RUNNING: set[subprocess.Popen] = set()  # papermills, which end with the run
 
 
 class NotebookError(RuntimeError):
@@ -145,9 +148,23 @@ def run(
     known = {path.stem for path in find_notebooks(root)}
     gone = [n for n, record in read_records(figures).items() if record["notebook"] not in known]
     replace(figures, figures / "none", gone)
-    outcomes = asyncio.run(_outcomes(chosen, profile, output, force))
+    # The longest begun first, so that none runs on alone for long.
+    by_size = sorted(chosen, key=lambda path: -path.stat().st_size)
+    work = partial(_outcome, profile=profile, output=output, force=force)
+    outcomes = []
+    bar = tqdm(total=len(chosen), desc="notebooks", leave=False, disable=None)
+    try:
+        with ThreadPool(AT_ONCE) as pool, bar:
+            for outcome in pool.imap_unordered(work, by_size):
+                outcomes.append(outcome)
+                with tqdm.external_write_mode():
+                    print(outcome, flush=True)
+                bar.update()
+    finally:
+        for process in _RUNNING:
+            process.terminate()
     write_index(figures)
-    return outcomes
+    return sorted(outcomes, key=lambda outcome: outcome.notebook)
 
 
 def execute(
@@ -195,7 +212,34 @@ def execute(
             f"parameters: notebook {path.stem} has {', '.join(known) or 'none'} (one `name: type = "
             f"value  # help` a line in the cell tagged parameters), got {', '.join(strange)}"
         )
-    return asyncio.run(_execute(source, path, parameters, folder, environment or {}, timeout))
+    folder.mkdir(parents=True, exist_ok=True)
+    nbformat.write(source, folder / EXECUTED)
+    paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH")]
+    variables = {
+        # Sums do not depend on the number of cores, and joblib's workers do not fight over them.
+        "OMP_NUM_THREADS": "1",
+        "OPENCV_FOR_THREADS_NUM": "1",
+        **os.environ,
+        **(environment or {}),
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),  # the kernel imports this very package
+        "PYTHONHASHSEED": "0",  # the order of a set is then the same in every run
+    }
+    command: list[str | Path] = [
+        sys.executable, "-c", PAPERMILL, folder / EXECUTED, folder / EXECUTED, *OPTIONS,
+        "--cwd", path.parent, "--execution-timeout", str(round(timeout)),
+        "-y", json.dumps(dict(parameters)),
+    ]  # fmt: skip
+    with (
+        open(folder / LOG, "w") as log,
+        subprocess.Popen(command, env=variables, stdout=log, stderr=log) as process,
+    ):
+        _RUNNING.add(process)
+        try:
+            status = process.wait()
+        finally:
+            process.terminate()  # if it has not ended
+            _RUNNING.discard(process)
+    return _whole(path, folder, status)
 
 
 def tidy(executed: NotebookNode, source: NotebookNode) -> NotebookNode:
@@ -232,68 +276,31 @@ def tidy(executed: NotebookNode, source: NotebookNode) -> NotebookNode:
 # ------------------------------------------------------------------------------------------ details
 
 
-async def _outcomes(
-    paths: Sequence[Path], profile: str, output: Path, force: bool
-) -> list[Outcome]:
-    """How the notebooks end, the longest begun first, so that none runs on alone for long."""
-    turns, outcomes = asyncio.Semaphore(AT_ONCE), []
-    by_size = sorted(paths, key=lambda path: -path.stat().st_size)
-    works = {asyncio.create_task(_outcome(path, profile, output, force, turns)) for path in by_size}
-    with tqdm(total=len(works), desc="notebooks", leave=False, disable=None) as bar:
-        while works:
-            done, works = await asyncio.wait(works, timeout=1)
-            for outcome in (work.result() for work in done):
-                outcomes.append(outcome)
-                with tqdm.external_write_mode():
-                    print(outcome, flush=True)
-            bar.update(len(done))
-            bar.refresh()
-    return sorted(outcomes, key=lambda outcome: outcome.notebook)
-
-
-async def _outcome(
-    path: Path,
-    profile: str,
-    output: Path,
-    force: bool,
-    turns: asyncio.Semaphore,
-) -> Outcome:
+def _outcome(path: Path, profile: str, output: Path, force: bool) -> Outcome:
     """Execute a notebook, unless this very code has been, and put what it made where it differs."""
     seconds, error = None, None
     changed: list[str] = []
     folder = output / "build" / "runs" / f"{path.stem}-{profile}"
     folder.mkdir(parents=True, exist_ok=True)
-    running, lock = folder / "running", FileLock(folder / "lock")
-    async with turns:
-        try:
-            await _acquired(lock)
+    running = folder / "running"
+    places = {"VIDSINDY_FIGURES": f"{running}/figures", "VIDSINDY_NOTEBOOK": path.stem}
+    try:
+        with FileLock(folder / "lock"):  # until no other run is at this notebook
             source = jupytext.read(path)
             kept = folder / _key(source)
             if force or not kept.exists():
                 began = time.perf_counter()
                 for earlier in folder.glob("*/"):
                     shutil.rmtree(earlier)
-                places = {"VIDSINDY_FIGURES": f"{running}/figures", "VIDSINDY_NOTEBOOK": path.stem}
-                await _execute(source, path, {"profile": profile}, running, places)
+                execute(path, {"profile": profile}, running, environment=places)
                 # What was edited meanwhile is of no code that anybody will have again.
-                kept = running.rename(kept if kept.name == _key(source) else folder / "edited")
+                as_before = kept.name == _key(jupytext.read(path))
+                kept = running.rename(kept if as_before else folder / "edited")
                 seconds = time.perf_counter() - began
             changed = _refresh(source, path, kept, output)
-        except (NotebookError, ValueError, OSError, SyntaxError) as failure:  # the others go on
-            error = str(failure)
-        finally:
-            lock.release()
+    except (NotebookError, ValueError, OSError, SyntaxError) as failure:  # the others go on
+        error = str(failure)
     return Outcome(path.stem, seconds, error, tuple(changed))
-
-
-async def _acquired(lock: FileLock) -> None:
-    """Wait until no other run is at a notebook."""
-    while True:
-        try:
-            lock.acquire(timeout=0)
-            return
-        except Timeout:
-            await asyncio.sleep(1)
 
 
 def _key(source: NotebookNode) -> str:
@@ -314,45 +321,6 @@ def _refresh(source: NotebookNode, path: Path, kept: Path, output: Path) -> list
         write_file(half, (nbformat.writes(notebook) + "\n").encode())
     replace(output / "figures", kept / "figures", changed)
     return changed if same and not changed else [*changed, half.name]
-
-
-async def _execute(
-    source: NotebookNode,
-    path: Path,
-    parameters: Mapping[str, object],
-    folder: Path,
-    environment: Mapping[str, str],
-    timeout: float = CELL_TIMEOUT,
-) -> NotebookNode:
-    """Have papermill execute a notebook into a folder; its kernel imports this very package."""
-    folder.mkdir(parents=True, exist_ok=True)
-    nbformat.write(source, folder / EXECUTED)
-    paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH")]
-    variables = {
-        # Sums do not depend on the number of cores, and joblib's workers do not fight over them.
-        "OMP_NUM_THREADS": "1",
-        "OPENCV_FOR_THREADS_NUM": "1",
-        **os.environ,
-        **environment,
-        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
-        "PYTHONHASHSEED": "0",  # the order of a set is then the same in every run
-    }
-    command: list[str | Path] = [
-        sys.executable, "-c", PAPERMILL, folder / EXECUTED, folder / EXECUTED, *OPTIONS,
-        "--cwd", path.parent, "--execution-timeout", str(round(timeout)),
-        "-y", json.dumps(dict(parameters)),
-    ]  # fmt: skip
-    with open(folder / LOG, "w") as log:
-        process = await asyncio.create_subprocess_exec(
-            *command, env=variables, stdout=log, stderr=log
-        )
-    try:
-        status = await process.wait()
-    finally:
-        with suppress(ProcessLookupError):  # it has ended
-            process.terminate()
-            await process.wait()
-    return _whole(path, folder, status)
 
 
 def _whole(path: Path, folder: Path, status: int) -> NotebookNode:

@@ -25,8 +25,11 @@ from ..checks import (
 )
 from ..dynamics import PolynomialSystem, monomials, runge_kutta_4
 
-BLOCK = 0.01
-"""Length of a random block, as a fraction of the record."""
+BLOCK, FIBERS = 0.01, 5
+"""Length of a random block, as a fraction of the record, and number of fibers, as in the paper."""
+CORRELATION, WIDTH = 0.9, 9
+"""Of neighbours in correlated noise, and draws that averaged noise is made of: such noise lasts for
+about a tenth of a period of a hundred samples."""
 FARTHEST, MOST_CALLS = 1e6, 50_000
 """Where a coarse path is lost: so many times as far as it began, or after so many calls."""
 
@@ -62,41 +65,20 @@ def add_proportional_noise(x: Floats, level: float, rng: np.random.Generator) ->
     return x * (1 + _level(level) * rng.standard_normal(x.shape))
 
 
-def add_correlated_noise(
-    x: Floats, level: float, rng: np.random.Generator, correlation: float = 0.9
-) -> Floats:
-    """Add noise of which every value remembers the last: AR(1).
-
-    Parameters
-    ----------
-    x, level, rng
-        See `add_noise`.
-    correlation : float
-        Of neighbours, at least 0 and below 1.
-    """
+def add_correlated_noise(x: Floats, level: float, rng: np.random.Generator) -> Floats:
+    """Add noise whose neighbours have a correlation of `CORRELATION`, AR(1); see `add_noise`."""
     x = _check(x, rng)
-    if not 0 <= check_number("correlation", correlation) < 1:
-        raise ValueError(f"correlation: must be at least 0 and below 1, got {correlation}")
     fresh = rng.standard_normal(x.shape)
-    fresh[1:] *= np.sqrt(1 - correlation**2)
-    noise = lfilter([1.0], [1.0, -correlation], fresh, axis=0)
+    fresh[1:] *= np.sqrt(1 - CORRELATION**2)
+    noise = lfilter([1.0], [1.0, -CORRELATION], fresh, axis=0)
     return x + _level(level) * np.nanstd(x, axis=0) * noise
 
 
-def add_averaged_noise(x: Floats, level: float, rng: np.random.Generator, width: int = 9) -> Floats:
-    """Add noise that is an average over a few draws, as a filter leaves it.
-
-    Parameters
-    ----------
-    x, level, rng
-        See `add_noise`.
-    width : int
-        Draws that each error is the average of; neighbours share all but one.
-    """
+def add_averaged_noise(x: Floats, level: float, rng: np.random.Generator) -> Floats:
+    """Add noise that is an average over `WIDTH` draws, as a filter leaves it; see `add_noise`."""
     x = _check(x, rng)
-    width = check_integer("width", width, 1)
-    sums = np.cumsum(rng.standard_normal((len(x) + width, x.shape[1])), axis=0)
-    noise = (sums[width:] - sums[:-width]) / np.sqrt(width)
+    sums = np.cumsum(rng.standard_normal((len(x) + WIDTH, x.shape[1])), axis=0)
+    noise = (sums[WIDTH:] - sums[:-WIDTH]) / np.sqrt(WIDTH)
     return x + _level(level) * np.nanstd(x, axis=0) * noise
 
 
@@ -304,21 +286,9 @@ def drop_blocks(x: Floats, rate: float, rng: np.random.Generator) -> Floats:
     return _drop(x, rate, max(1, round(_rate(rate) / BLOCK)), rng)
 
 
-def drop_fibers(x: Floats, rate: float, rng: np.random.Generator, gaps: int = 5) -> Floats:
-    """Hide a few long stretches (paper: "fiber missing"); see `drop_blocks`.
-
-    Parameters
-    ----------
-    x : array_like, shape (n, d)
-        States.
-    rate : float
-        Fraction of the rows to hide, shared evenly by the gaps.
-    rng : numpy.random.Generator
-        Places the gaps.
-    gaps : int
-        Number of separate gaps.
-    """
-    return _drop(x, _rate(rate), check_integer("gaps", gaps, 1), rng)
+def drop_fibers(x: Floats, rate: float, rng: np.random.Generator) -> Floats:
+    """Hide `FIBERS` long stretches (paper: "fiber missing"), all as long; see `drop_blocks`."""
+    return _drop(x, _rate(rate), FIBERS, rng)
 
 
 def _drop(x: Floats, rate: float, count: int, rng: np.random.Generator) -> Floats:
