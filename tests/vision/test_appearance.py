@@ -15,7 +15,7 @@ GROUND = RNG.uniform(60, 180, (120, 160, 3)).astype(np.float32)
 GROUND = cv2.GaussianBlur(GROUND, (0, 0), 2)
 
 
-def drawn(place, colour=(40, 200, 60), shown=True):
+def drawn(place, colour=(60, 200, 40), shown=True):
     image = GROUND.copy()
     if shown:
         at = tuple(np.rint(16 * np.asarray(place)).astype(int).tolist())
@@ -38,7 +38,7 @@ def test_what_is_of_another_colour_or_not_there_fits_less():
     looks = Appearance(drawn((60, 50)), np.array([60.0, 50]), size)
     own, other, none = (
         looks.find(frame, np.array([62.0, 50]), size)
-        for frame in (drawn((60, 50)), drawn((60, 50), (200, 60, 60)), drawn(None, shown=False))
+        for frame in (drawn((60, 50)), drawn((60, 50), (60, 60, 200)), drawn(None, shown=False))
     )
     assert own[1] > 2 * none[1]
     assert own[2] > 2 * max(other[2], none[2])
