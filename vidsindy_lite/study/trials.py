@@ -347,7 +347,10 @@ def find_law(
     which it can be told.
     """
     if method == "Gauss-Newton":
-        return discover(t, x, degree=degree, systematic=systematic, order=1, origin=origin)
+        return discover(
+            t, x, degree=degree, systematic=systematic, order=1, origin=origin,
+            time_limit=None,  # or results would depend on what else the machine does
+        )  # fmt: skip
     from .baselines import BASELINES  # pysindy takes seconds to import
 
     options = {"seed": seed} if method in RANDOM_METHODS else {}
