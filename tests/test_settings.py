@@ -16,7 +16,7 @@ SETTINGS = {
     "02": [{"seed": 1}, {"seed": 2, "noise_variance": 0.02}],
     "03": [{"system": "WangSun", "seed": 1}, {"frames": 300, "pixel_noise": 1.0, "seed": 2}],
     "04": [{"level": 0.05}, {"seed": 1}],
-    "05": [{"seed": 10}, {"seed": 20, "noise": 0.1}],
+    "05": [{"seed": 10}, {"seed": 20}],
     "06": [{"seed": 10}, {"seed": 20, "share": 0.05}],
     "07": [{"seed": 10}, {"seed": 20}],
     "08": [{"seed": 1}, {"camera": 3}],
@@ -24,6 +24,8 @@ SETTINGS = {
     "10": [{"seed": 1}, {"seed": 2}],
     "11": [{"seed": 10}, {"seed": 20}],
     "12": [{"fps": 60}, {"seed": 1}],
+    "13": [{"seed": 1}, {"fps": 60}],
+    "14": [{"seed": 1}, {"seed": 2}],
 }
 QUICK = ("01", "03")
 CASES = [

@@ -170,7 +170,7 @@ class TestRig:
     def test_unknown_model(self, tmp_path, model):
         path = tmp_path / "rig.toml"
         path.write_text(f"[[camera]]\nmodel = {model}\nposition = [0, 0, 1]\nnormal = [0, 0, 1]\n")
-        message = f"camera 0: model: must be one of orthographic, perspective, got {model}"
+        message = f"camera 0: model: must be one of orthographic, perspective, affine, got {model}"
         with pytest.raises(ValueError, match=re.escape(message)):
             Rig.load(path)
 

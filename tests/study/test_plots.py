@@ -97,8 +97,8 @@ def test_videos_and_path_grow_before_the_law_is_shown(pictures):
     assert (law[0][230:] != videos[-1][230:]).any()
 
 
-def test_frames_are_blue_green_red_as_a_video_reader_gives_them():
-    orange = np.full((64, 64, 3), (0, 120, 255), np.uint8)
+def test_frames_have_the_colours_that_a_video_reader_gives_them():
+    orange = np.full((64, 64, 3), (255, 120, 0), np.uint8)
     tracks, path = np.full((3, 2, 2), np.nan), np.array([[0.0, 0, 0], [1, 1, 1]])
     (picture,) = plots.draw_tour([[orange]] * 3, np.array([1]), tracks, path, [])
     assert picture[150, 100].tolist() == [255, 120, 0]

@@ -33,7 +33,15 @@ from ..checks import (
 )
 from ..reading import check_file, read_tree, reading
 from ..repository import write_file
-from .models import MODELS, Camera, OrthographicCamera, all_orthographic, independent, rotation_to_z
+from .models import (
+    MODELS,
+    Camera,
+    OrthographicCamera,
+    PerspectiveCamera,
+    all_orthographic,
+    independent,
+    rotation_to_z,
+)
 
 _FEWEST = 3  # cameras of which nothing is measured
 _MOST = 100  # cameras of a template
@@ -302,7 +310,7 @@ def rig_template(
     """
     if check_integer("cameras", cameras, 2) > _MOST:
         raise ValueError(f"cameras: must be at most {_MOST}, got {cameras}")
-    check_choice("model", model, [*MODELS])
+    check_choice("model", model, [OrthographicCamera.model, PerspectiveCamera.model])
     width, height = check_image_size(image_size)
     flat = model == OrthographicCamera.model
     parts = [_HEAD + (_STILL if flat else _MEASURED)]
