@@ -12,9 +12,9 @@ from vidsindy_lite.vision import steadying as aligning
 from vidsindy_lite.vision.steadying import (
     Ground,
     Steadying,
+    _as_similarity,
     _error,
     _middle,
-    _as_similarity,
     grounds,
     pyramid,
 )
