@@ -54,6 +54,13 @@ def test_views_of_different_things_do_not_agree():
         vl.observe_tracks(tracks, rig, np.arange(240) / FPS)
 
 
+@pytest.mark.parametrize("lags", [None, np.zeros(3)])
+def test_views_with_nothing_in_common_tell_nothing(lags):
+    tracks, rig = filmed()
+    tracks[1][:] = np.nan
+    assert factorised(tracks, rig, np.ones(3), None, lags) is None
+
+
 def test_the_law_of_a_swing_needs_no_rig():
     tracks, rig = filmed(moving=2)
     found = vl.discover_from_tracks(tracks, rig, fps=FPS)

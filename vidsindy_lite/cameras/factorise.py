@@ -77,6 +77,8 @@ def factorised(
     enough = max(_BETTER * found[-1][0], FINE)
     rank = next(rank for rank, (left, _) in zip(ranks, found, strict=True) if left <= enough)
     left, best = found[rank - 1]
+    if not np.isfinite(left):
+        return None
     every = views.matrix(best, views.footage.instants, range(len(tracks)))
     every = every[np.isfinite(every).all(axis=1)]
     count, middle = len(tracks), every.mean(axis=0)
