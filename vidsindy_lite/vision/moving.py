@@ -120,7 +120,10 @@ def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> F
         if not paths and seed is None:
             return nothing(film.motion, n)
         rows = paths[0].rows if paths else np.zeros(0, int)
-        covered = _covering(seen, rows, n, seed, rims=boxes is None)
+        rims = boxes is None or len(rows) < n / 2
+        covered = _covering(seen, rows, n, seed, rims=rims)
+        if covered is not None and boxes is not None and rims:
+            covered = _around(covered, boxes)
         if covered is None or (boxes is not None and _same(covered, boxes)):
             break
         boxes = covered
@@ -224,6 +227,13 @@ def _covering(
     if seed is not None:  # its size is told
         boxes[seen.frame[rows]] = np.column_stack([centre - seed[2] / 2, 0 * centre + seed[2]])
     return boxes
+
+
+def _around(one: Floats, other: Floats) -> Floats:
+    """Boxes (n, 4) around two, or around the one that is known."""
+    low = np.fmin(one[:, :2], other[:, :2])
+    high = np.fmax(one[:, :2] + one[:, 2:], other[:, :2] + other[:, 2:])
+    return np.hstack([low, high - low])
 
 
 def _same(one: Floats, other: Floats) -> bool:
