@@ -27,11 +27,22 @@ from zlib import crc32
 
 import numpy as np
 
-from vidsindy_lite import Rig, learn_cameras, reconstruct
-from vidsindy_lite.study import lab
+from vidsindy_lite import PerspectiveCamera, Rig, cameras, learn_cameras, reconstruct
 
-truth = lab.cameras()
-x = lab.paths(30).reshape(-1, 3)  # mm
+
+def at_the_table(azimuth, elevation, reach):
+    """A camera that looks at the middle of the table from there, upright."""
+    a, e = np.radians([azimuth, elevation])
+    normal = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+    angle = np.arctan2(*cameras.rotation_to_z(normal)[:2, 2])
+    place = np.array([350.0, 350.0, 0.0]) + reach * normal
+    return PerspectiveCamera(position=place, normal=normal, scale=1 / (0.575 * reach), angle=angle)
+
+
+truth = Rig([at_the_table(-80, 35, 1900), at_the_table(40, 30, 2200), at_the_table(160, 40, 2000)])
+t = (np.arange(30)[:, None] - 15) / 25  # s
+rolling = [((300, 300), (50, 170)), ((430, 350), (-220, 130)), ((350, 450), (240, -80))]
+x = np.concatenate([[*middle, 26.25] + t * [*velocity, 0.0] for middle, velocity in rolling])  # mm
 start = truth.uncalibrated(keep=0)
 rng = np.random.default_rng(seed)
 pixels = [camera.project(x) + 0.2 * rng.standard_normal((len(x), 2)) for camera in truth.cameras]
