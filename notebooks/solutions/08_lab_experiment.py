@@ -30,6 +30,7 @@ import numpy as np
 from vidsindy_lite import PerspectiveCamera, Rig, cameras, learn_cameras, reconstruct
 
 
+# %%
 def at_the_table(azimuth, elevation, reach):
     """A camera that looks at the middle of the table from there, upright."""
     a, e = np.radians([azimuth, elevation])
@@ -39,6 +40,7 @@ def at_the_table(azimuth, elevation, reach):
     return PerspectiveCamera(position=place, normal=normal, scale=1 / (0.575 * reach), angle=angle)
 
 
+# %%
 truth = Rig([at_the_table(-80, 35, 1900), at_the_table(40, 30, 2200), at_the_table(160, 40, 2000)])
 t = (np.arange(30)[:, None] - 15) / 25  # s
 rolling = [((300, 300), (50, 170)), ((430, 350), (-220, 130)), ((350, 450), (240, -80))]

@@ -34,6 +34,7 @@ native = SYSTEMS["NoseHoover"]
 whole = native.shift(REFERENCE_OFFSET)
 
 
+# %%
 def misfit(unknowns, law):
     """What is left of a law if it is the true one in axes of other scales and origins."""
     scale, offset = np.exp(unknowns[:3]), unknowns[3:]
