@@ -264,6 +264,24 @@ def test_lossy_files_are_as_lossy_as_those_of_opencv(tmp_path, name, codec):
     assert loss[0] == pytest.approx(loss[1], rel=0.1)
 
 
+@pytest.mark.parametrize("name", ["a.mov", "a.mkv"])
+def test_frames_belong_to_who_draws_on_them(tmp_path, name):
+    """One array that is drawn anew for each frame is written, and what is read may be drawn on."""
+    frames = drawn(6)
+
+    def in_one_array():
+        canvas = np.empty_like(frames[0])
+        for frame in frames:
+            canvas[:] = frame
+            yield canvas
+
+    read = []
+    for frame in read_video(write_video(tmp_path / name, in_one_array())):
+        read.append(frame.copy())
+        frame[:] = 7
+    np.testing.assert_array_equal(read, frames)
+
+
 def hold_upright(path, quarters):
     """Let a .mov file say that the camera was turned by so many quarters, as phones do."""
     data = bytearray(path.read_bytes())

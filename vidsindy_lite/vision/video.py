@@ -411,7 +411,7 @@ def _shown(frame: Image, codec: _Codec) -> VideoFrame:
     from av import VideoFrame
 
     if codec.pixels == "rgb24":
-        return VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), "rgb24")
+        return VideoFrame.from_ndarray(frame, "rgb24")
     return VideoFrame.from_ndarray(_turned(frame), "bgr24")
 
 
@@ -680,7 +680,7 @@ def _image(frame: VideoFrame) -> Image:
     if frame.interlaced_frame:
         image = upper_field(frame)
     elif frame.format.name == "rgb24":
-        image = cast("Image", frame.to_ndarray())
+        image = cast("Image", frame.to_ndarray().copy())  # the decoder needs its own
     else:  # more threads cost more than they save
         image = _turned(cast("Image", frame.to_ndarray(format="bgr24", threads=1)))
     return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90)))
