@@ -179,13 +179,13 @@ def observe(
         check_learnable(rig)
     check_detector(detector)
     check_integer("targets", targets, least=1)
-    if rig is None:
-        videos = check_items("paths", paths)
-        rig = Rig(tuple(PerspectiveCamera(image_size=video_info(one).size) for one in videos))
     if targets > 1:
         _check_several(targets, rig, detector, hints)
     files = _check_paths(paths, rig)
-    shots = _check_shots(files, rig)
+    shots = [video_info(path) for path in files]
+    if rig is None:
+        rig = Rig(tuple(PerspectiveCamera(image_size=shot.size) for shot in shots))
+    _check_shots(files, shots, rig)
     names = [path.name for path in files]
     clocks = [frame_clock(path) for path in files]
     clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
@@ -339,7 +339,7 @@ def _from_afar(
         rig=found.rig,
         lags=found.lags,
         t=clock.times,
-        x=reconstruct(tracks, found.rig) * np.where(moves, 1.0, 0.0),
+        x=reconstruct(tracks, found.rig) * moves,
         systematic=trailing_errors(tracks, found.rig, motion) * moves,
         warnings=(*found.lags.warnings, *doubts),
     )
@@ -398,12 +398,12 @@ def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]
     return given
 
 
-def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
+def _check_paths(paths: Sequence[str | Path], rig: Rig | None) -> list[Path]:
     """One file name per camera."""
     if isinstance(paths, str) or not isinstance(paths, Iterable):
         raise ValueError(f"paths: must be a list of files, one per camera, got {shown(paths)}")
     files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
-    if len(files) != len(rig.cameras):
+    if rig is not None and len(files) != len(rig.cameras):
         raise ValueError(
             f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
             f"got {len(files)}"
@@ -412,9 +412,11 @@ def _check_paths(paths: Sequence[str | Path], rig: Rig) -> list[Path]:
 
 
 def _check_several(
-    targets: int, rig: Rig, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
+    targets: int, rig: Rig | None, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
 ) -> None:
     """That several targets can be told apart."""
+    if rig is None:
+        raise ValueError(f"rig: must be given to tell {targets} targets apart, got None")
     if len(rig.cameras) < 3 or not rig.is_measured:
         known = "known" if rig.is_measured else "unknown"
         raise ValueError(
@@ -428,9 +430,8 @@ def _check_several(
         )
 
 
-def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
-    """What each file is, if it is a video of the size that its camera has."""
-    shots = [video_info(path) for path in files]
+def _check_shots(files: Sequence[Path], shots: Sequence[VideoInfo], rig: Rig) -> None:
+    """That each file is a video of the size that its camera has."""
     for path, shot, camera in zip(files, shots, rig.cameras, strict=True):
         if shot.frames < 2:
             raise ValueError(f"paths: {path.name} must be a video, got a single frame")
@@ -439,7 +440,6 @@ def _check_shots(files: Sequence[Path], rig: Rig) -> list[VideoInfo]:
                 f"paths: {path.name} must have the image size of its camera in the rig, "
                 f"{camera.image_size}, got {shot.size}"
             )
-    return shots
 
 
 def _check_hints(

@@ -61,6 +61,11 @@ def test_views_with_nothing_in_common_tell_nothing(lags):
     assert factorised(tracks, rig, np.ones(3), None, lags) is None
 
 
+def test_what_stands_still_tells_nothing():
+    tracks, rig = filmed()
+    assert factorised([np.ones_like(track) for track in tracks], rig, np.ones(3), None) is None
+
+
 def test_the_law_of_a_swing_needs_no_rig():
     tracks, rig = filmed(moving=2)
     found = vl.discover_from_tracks(tracks, rig, fps=FPS)

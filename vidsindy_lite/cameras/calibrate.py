@@ -424,10 +424,13 @@ def _far_away(
     middle = every.mean(axis=0)
     left, singular, _ = np.linalg.svd((every - middle).T, full_matrices=False)
     motion = (left[:, :3] * singular[:3]).reshape(-1, 2, 3)
+    sizes = np.linalg.norm(motion, axis=(1, 2), keepdims=True)
+    if not sizes.all():  # nothing moves in some view
+        return
     up = np.triu_indices(3)
     twice = 2 - np.eye(3)[up]  # what is off the diagonal stands there twice
     equations = []
-    for one, other in motion / np.linalg.norm(motion, axis=(1, 2), keepdims=True):
+    for one, other in motion / sizes:
         crossed = np.outer(one, other) + np.outer(other, one)
         unlike = np.outer(one, one) - np.outer(other, other)
         equations += [crossed[up] * twice, unlike[up] * twice]

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..arrays import Floats
-from .alignment import Curve, Footage, Lags
+from .alignment import Curve, Lags, check_clocks
 from .models import AffineCamera
 from .rig import Rig
 from .triangulate import ALIKE, FINE, GROSS
@@ -64,11 +65,8 @@ def factorised(
     rates, clocks, lags
         See `align`; lags are found if they are not given.
     """
-    even = [np.arange(len(track), dtype=float) for track in tracks]
-    ticks = even if clocks is None else [np.asarray(clock) for clock in clocks]
-    views = _Views(
-        Footage(tuple(map(Curve, tracks, ticks)), ticks[0], np.zeros(len(tracks)), rates)
-    )
+    ticks = check_clocks(clocks, tracks)
+    views = _Views(tuple(map(Curve, tracks, ticks)), ticks[0], rates)
     ranks = range(1, 4)
     found = [
         views.best(rank) if lags is None else (views.left(lags, range(len(tracks)), rank), lags)
@@ -79,7 +77,7 @@ def factorised(
     left, best = found[rank - 1]
     if not np.isfinite(left):
         return None
-    every = views.matrix(best, views.footage.instants, range(len(tracks)))
+    every = views.matrix(best, views.instants, range(len(tracks)))
     every = every[np.isfinite(every).all(axis=1)]
     count, middle = len(tracks), every.mean(axis=0)
     moved = every - middle
@@ -88,7 +86,7 @@ def factorised(
     of_views = [
         (part**2).reshape(len(every), count, 2).mean(axis=(0, 2)) for part in (moved, missed)
     ]
-    if not (of_views[0] >= _MOVES**2 * of_views[1]).all():
+    if not (of_views[0] > _MOVES**2 * of_views[1]).all():
         return None
     cameras = [
         AffineCamera.of(
@@ -101,32 +99,37 @@ def factorised(
     doubts = () if left <= GROSS else (
         f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
     )  # fmt: skip
-    told = Lags(best, rates, errors, left, doubts, clocks=() if clocks is None else tuple(ticks))
+    told = Lags(best, rates, errors, left, doubts, clocks=() if clocks is None else ticks)
     return Factorised(Rig(tuple(cameras), note=_NOTE), told, rank)
 
 
 @dataclass(frozen=True, eq=False)
 class _Views:
-    """All views at the same instants, as a function of their lags."""
+    """All views at the same instants, (n,), as a function of their lags; rates as of `align`."""
 
-    footage: Footage
+    curves: tuple[Curve, ...]
+    instants: Floats
+    rates: Floats
 
     def matrix(self, lags: Floats, instants: Floats, places: Sequence[int]) -> Floats:
         """Tracks of some views side by side, (n, 2 m)."""
-        curves, rates = self.footage.curves, self.footage.rates
-        return np.hstack([curves[i].at((instants - lags[i]) * rates[i]) for i in places])
+        frames = [(instants - lags[i]) * self.rates[i] for i in places]
+        return np.hstack([self.curves[i].at(at) for i, at in zip(places, frames, strict=True)])
 
-    @property
+    @cached_property
     def some(self) -> Floats:
         """Instants at which lags are compared."""
-        every = self.footage.instants
-        return every[:: -(-len(every) // _INSTANTS)]
+        return self.instants[:: -(-len(self.instants) // _INSTANTS)]
 
-    @property
+    @cached_property
+    def lengths(self) -> Floats:
+        """Of all videos, in frames of the first."""
+        return np.array([np.ptp(curve.clock) + 1 for curve in self.curves]) / self.rates
+
+    @cached_property
     def least(self) -> float:
         """Frames of the first video that all must show."""
-        lengths = [np.ptp(curve.clock) + 1 for curve in self.footage.curves]
-        return _COMMON * float(np.min(lengths / self.footage.rates))
+        return _COMMON * float(self.lengths.min())
 
     def left(self, lags: Floats, places: Sequence[int], rank: int) -> float:
         """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
@@ -145,7 +148,7 @@ class _Views:
         tried together, and further views one by one. Of those that leave about as little, the
         shortest count.
         """
-        count = len(self.footage.curves)
+        count = len(self.curves)
         lags = np.zeros(count)
         promising = [self._promising(i, rank) for i in range(1, count)]
         for last in range(3, count + 1):
@@ -163,10 +166,9 @@ class _Views:
 
     def _promising(self, i: int, rank: int) -> list[float]:
         """Whole lags of a view at which less is left than at their neighbours, the best first."""
-        ends = [(np.ptp(c.clock) + 1) / r for c, r in zip(
-            self.footage.curves, self.footage.rates, strict=True)]  # fmt: skip
-        tried = np.arange(np.ceil(self.least - ends[i]), ends[0] - self.least + 1)
-        lags = np.zeros(len(self.footage.curves))
+        first, last = self.least - self.lengths[i], self.lengths[0] - self.least
+        tried = np.arange(np.ceil(first), last + 1)
+        lags = np.zeros(len(self.curves))
         left = np.full(len(tried) + 2, np.inf)
         for k, lags[i] in enumerate(tried):
             left[k + 1] = self.left(lags, (0, i), rank)
