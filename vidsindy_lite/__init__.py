@@ -13,72 +13,9 @@ is in a plane; each room can be used by itself. The paper's world
 into figures and pages is `vidsindy_lite.companion`.
 """
 
-from .cameras import (
-    Camera,
-    OrthographicCamera,
-    PerspectiveCamera,
-    Rig,
-    align,
-    learn_cameras,
-    learn_lags,
-    reconstruct,
-    residuals,
-    rig_template,
-)
-from .dynamics import (
-    Discovery,
-    Library,
-    PolynomialSystem,
-    SplineSINDy,
-    discover,
-    on_circle,
-    on_sphere,
-)
-from .observation import Observation, observe, observe_tracks
-from .pipeline import VideoDiscovery, discover_from_tracks, discover_from_videos
-from .plane import PlaneDiscovery, discover_from_video
-from .vision import (
-    Hint,
-    Scene,
-    read_frame,
-    read_video,
-    render_video,
-    track,
-    write_video,
-)
+import lazy_loader
 
 __version__ = "0.2.0"
 
-__all__ = [
-    "discover_from_videos",
-    "discover_from_tracks",
-    "VideoDiscovery",
-    "discover_from_video",
-    "observe",
-    "observe_tracks",
-    "Observation",
-    "track",
-    "Hint",
-    "read_video",
-    "read_frame",
-    "write_video",
-    "render_video",
-    "Scene",
-    "align",
-    "learn_lags",
-    "Camera",
-    "OrthographicCamera",
-    "PerspectiveCamera",
-    "Rig",
-    "rig_template",
-    "learn_cameras",
-    "reconstruct",
-    "residuals",
-    "discover",
-    "on_circle",
-    "on_sphere",
-    "Discovery",
-    "Library",
-    "PolynomialSystem",
-    "SplineSINDy",
-]
+# The names of `__init__.pyi`, imported when they are first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 from . import __version__
-from .study import SYSTEMS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -526,10 +525,10 @@ COMMANDS = {
         },
     }, kept="notebooks that have ended are kept, and results in build/cache: start it again"),
     "demo": _Command(_demo, "from three videos to the first equation, in a minute", {
-        "--system": _choice("Lorenz", tuple(SYSTEMS), "default: Lorenz"),
+        "--system": _words("NAME", "of the paper's seven (default: Lorenz)", default="Lorenz"),
         "--frames": _count(500, "per camera (default: 500)"),
         "--seed": _count(0, "of scenes and noise (default: 0)"),
-    }),
+    }, {"name": "system"}),
     "train-detector": _Command(_train, "train the learned detector from scratch", {
         "--seed": _count(0, "of weights and frames (default: 0)"),
         "--steps": _count(None, "batches of 16 frames (default: as shipped)"),
