@@ -65,7 +65,7 @@ build/api/vidsindy_lite
 CHANGELOG
 ```
 """
-WORDS, LINES = 200, 12  # of prose, of code, that one reads in a minute
+WORDS, LINES = 200, 12  # of prose, of code that is not folded, that one reads in a minute
 
 project = html_title = "vidsindy_lite"
 root_doc = "README"
@@ -130,7 +130,8 @@ def described(notebook):
     for cell in notebook["cells"]:
         text = "".join(cell["source"])
         if cell["cell_type"] == "code":
-            lines += text.count("\n") + 1
+            if "hide-input" not in cell["metadata"].get("tags", ()):
+                lines += text.count("\n") + 1
             said = [captions[name] for name in re.findall(r'"(\w+)"', text) if name in captions]
             if said:
                 cell["metadata"]["mystnb"] = {"image": {"alt": " ".join(said)}}

@@ -253,7 +253,7 @@ good = int(np.argmax(apart)) if apart.any() else len(t)
 print(f"good for {t[good - 1] / period:.1f} periods; the videos last {shot.t[-1] / period:.1f}")
 assert t[good - 1] > (4 if noise_variance == 0 else 1) * period
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 fig, axes = plt.subplots(figsize=(6.5, 5), subplot_kw=plots.SPACE)
 axes.plot(*truth[:2000].T, color="0.75", lw=3, label="truth")
 axes.plot(*forecast[:2000].T, color="C0", lw=0.8, label="discovered law")
@@ -302,7 +302,7 @@ save_animation("tour", pictures, caption=caption, numbers={"frame": moments, "eq
 # with all its terms, one false one (a constant of -0.94 in dx/dt) and $\ell_2=1.50\cdot10^{-2}$. Here
 # the false term is gone, and the error is below a thousandth of a percent. All seven systems stand in
 # notebook [05](05_discovery.ipynb).
-# <!-- by: 10: term.endswith(": 1"); scored.exact; scored.l2 < l2_within -->
+# <!-- by: 10b: term.endswith(": 1"); scored.exact; scored.l2 < l2_within -->
 #
 # Next: [the geometry of a camera](01_projection_proofs.ipynb).
 

@@ -193,11 +193,11 @@ results, bound = (
     for source in ("detector", "sub-pixel")
 )
 
+
 # %% [markdown]
 # In the paper's units and beside its numbers. "Exact" counts the trials with all true terms and no others, "wrong terms" are
 # the missing and the false ones trial by trial; errors are the median, the least and the most of the trials. Gauss-Newton alone
 # says whether it doubts its law: how many exact laws it doubts and how many wrong ones it does not.
-
 
 # %%
 def beside_paper(table, methods):
@@ -252,7 +252,7 @@ if full:
 # %%
 pictured = both[both.trial == seed]
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 sources, methods = pictured.source.unique(), pictured.method.unique()
 fig, panels = plt.subplots(1, len(sources), figsize=(10.5, 4.4), sharey=True)
 for axes, source in zip(panels, sources, strict=True):
@@ -347,7 +347,7 @@ print(f"{len(every)} coefficients, {np.mean(np.abs(every) < 2):.0%} within two s
 if full:
     assert 0.7 < np.mean(np.abs(every) < 2) < 0.95
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 fig, axes = plt.subplots(figsize=(8, 3.8))
 axes.axhspan(-2, 2, color="0.92")
 axes.axhline(0, color="k", lw=0.8)
@@ -358,6 +358,7 @@ axes.set_ylabel("error / standard error")
 axes.grid(axis="x", visible=False)
 caption = "Errors of all coefficients in units of their standard errors; grey: two of them."
 save_figure("discovery_pulls", fig, caption=caption, numbers=pulled, tolerance=0.1)
+
 
 # %% [markdown]
 # *Each point is one coefficient in the reference frame: its distance from the truth in standard
@@ -400,7 +401,6 @@ print(len(rows), "terms, stored as table_S2")
 # motion. A law should also hold where nobody filmed: so both start at other points, too, off the first one by a fifth of
 # the spread in each coordinate.
 
-
 # %%
 horizon = 40 if full else 10  # periods
 
@@ -417,6 +417,7 @@ forecasts = {
     name: forecast(first[name].truth, law, first[name].truth.x0, law.curve(paths[name].t[:1])[0], horizon, 400)
     for name, law in found.items()
 }
+
 
 # %%
 def elsewhere(name, draw):
@@ -444,7 +445,7 @@ save_table("discovery_forecast", rows, caption=caption, tolerance=loose)
 # %%
 shown = {name: (truth[:6000], found[:6000]) for name, (truth, found) in forecasts.items()}
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 fig, panels = plt.subplots(-(-len(shown) // 4), min(len(shown), 4), squeeze=False, subplot_kw=plots.SPACE)
 fig.set_size_inches(3.1 * panels.shape[1], 3.3 * panels.shape[0] + 0.5)
 for axes, (name, (truth, law)) in zip(panels.flat, shown.items(), strict=False):
@@ -493,10 +494,10 @@ save_figure("fig_2", fig, caption=caption, numbers=numbers)
 #   <!-- by: (ado["l2 (e-2)"] < ado["paper: l2 (e-2)"]).all(); figure table_1 -->
 # * PySINDy's 824 % (NoseHoover) and 856 % (WangSun) are coefficients ten times too large
 #   throughout: a time step wrong by that factor. With the right step the medians are below 20 % here.
-#   <!-- by: 10: 9 < medians[name] < 11; (plain[["NoseHoover", "WangSun"]] < 20).all(); figure table_1 -->
+#   <!-- by: 10b: 9 < medians[name] < 11; (plain[["NoseHoover", "WangSun"]] < 20).all(); figure table_1 -->
 # * "Nine datasets" are seven, and the paper's frame of reference has to be guessed from its own
 #   ground truths.
-#   <!-- by: 10: len(SYSTEMS_S1) != DATASETS_CLAIMED; 10: all(scored.exact for scored in ground.values()) -->
+#   <!-- by: 10: len(SYSTEMS_S1) != DATASETS_CLAIMED; 10b: all(scored.exact for scored in ground.values()) -->
 #
 # How noise and gaps change this is [notebook 06](06_robustness_and_ablation.ipynb).
 

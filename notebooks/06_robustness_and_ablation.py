@@ -128,21 +128,19 @@ for name in systems:
     })  # fmt: skip
 caption = "Standard deviation of the added noise and rms error of the paths, in scene units."
 loose = dict.fromkeys(["error of the path (rms)", "error / noise of 10 %"], 0.2)
-save_table("study_noise", rows, caption=caption, tolerance=loose)
-
-# %%
 assert all(row["error / noise of 10 %"] < 0.02 for row in rows)
+save_table("study_noise", rows, caption=caption, tolerance=loose)
 
 # %% [markdown]
 # What tracking and cameras leave behind is a small fraction of the noise that follows. From here
 # on, the errors are those of the regression; the last section checks this again by its results.
-
-# %% [markdown]
+#
 # ## One trial
 #
 # The paper adds its noise "to the generated video data", and its blocks hide "the target in the video". So the **tracks** are
 # corrupted, each view by its own draw: those of the learned detector, which are then rounded to whole pixels; **then** cameras
 # and path are learned. Here it is by hand.
+# Then the corruption itself: noise is one line, a fiber two.
 
 # %%
 one = films_of["SprottF"][0]
@@ -155,10 +153,6 @@ by_package = run_trial(trial)
 assert np.allclose(by_package.law.coefficients, law.system.coefficients, rtol=1e-6)
 assert by_package.score.exact or not full
 
-# %% [markdown]
-# And the corruption itself: noise is one line, a fiber two.
-
-# %%
 noisy = one.x + share * one.x.std(axis=0) * np.random.default_rng(seed).normal(size=one.x.shape)
 assert np.allclose(noisy, add_noise(one.x, share, np.random.default_rng(seed)))
 gappy = one.x.copy()
@@ -191,7 +185,7 @@ defaults = spline_ado.SplineADOSettings()
 if full:
     assert (defaults.physics_weight, defaults.sparsity_weight) == (alpha, beta)
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 fig, panels = plt.subplots(1, 3, figsize=(9.5, 3))
 conditions = {"clean": misfits[..., :1], "10 % noise": misfits[..., 1:], "all": misfits}
 for axes, (title, values) in zip(panels, conditions.items(), strict=True):
@@ -249,7 +243,7 @@ if full:
     assert no_path == {"SprottE", "RayleighBenard"}
     assert 0.25 < doubted_here < 0.75
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 TITLES = {"noise": "noise", "blocks": "blocks missing", "fibers": "fibers missing"}
 
 
@@ -337,30 +331,23 @@ robustness("fig_3", caption, sprott[sprott.method.isin(both)], paper)
 # *Fig. 3: relative error (top) and wrong terms (bottom) for SprottF of both optimisers of the paper's model; points are
 # medians of the trials, bars hold the middle half of them. Stars: what the paper prints for its own
 # method. From 30 % noise on, the cameras cannot be learned from these tracks, and there is no law: an error of 100 %.*
-
-# %% [markdown]
+#
 # ## PySINDy under the same (Fig. S4)
 
 # %%
 caption = "PySINDy on SprottF: error and wrong terms, medians and middle half of the trials."
 robustness("figure_S4", caption, sprott[sprott.method == "PySINDy"])
-
-# %% [markdown]
-# *Fig. S4: the same data through PySINDy. Gaps matter less than noise, since the record is cut
-# there and derivatives are local; a difference of neighbours amplifies noise.*
-
-# %%
 caption = "SprottF: all methods on the same data, medians and middle half of the trials."
 robustness("study_methods_sprottf", caption, sprott)
 
-# %% [markdown]
-# *SprottF, all methods.*
 
 # %% [markdown]
+# *Fig. S4, above: the same data through PySINDy. Gaps matter less than noise, since the record is cut
+# there and derivatives are local; a difference of neighbours amplifies noise. Below: all methods.*
+#
 # ## The other systems (Figs. S5-S10)
 #
 # Both optimisers and PySINDy, one figure a system.
-
 
 # %%
 def other(figure_id, name):
@@ -370,42 +357,17 @@ def other(figure_id, name):
         robustness(figure_id, caption, by_level[shown])
 
 
-other("figure_S5", "Lorenz")
+others = {
+    "figure_S5": "Lorenz", "figure_S6": "NoseHoover", "figure_S7": "WangSun", "figure_S8": "SprottE",
+    "figure_S9": "RayleighBenard", "figure_S10": "Tsucs2",
+}  # fmt: skip
+for figure_id, name in others.items():
+    other(figure_id, name)
 
 # %% [markdown]
-# *Fig. S5: Lorenz.*
-
-# %%
-other("figure_S6", "NoseHoover")
-
-# %% [markdown]
-# *Fig. S6: NoseHoover.*
-
-# %%
-other("figure_S7", "WangSun")
-
-# %% [markdown]
-# *Fig. S7: WangSun.*
-
-# %%
-other("figure_S8", "SprottE")
-
-# %% [markdown]
-# *Fig. S8: SprottE.*
-
-# %%
-other("figure_S9", "RayleighBenard")
-
-# %% [markdown]
-# *Fig. S9: RayleighBenard.*
-
-# %%
-other("figure_S10", "Tsucs2")
-
-# %% [markdown]
-# *Fig. S10: Tsucs2, the hardest of the seven; below is why.*
-
-# %% [markdown]
+# *From top to bottom: Fig. S5, Lorenz; S6, NoseHoover; S7, WangSun; S8, SprottE; S9, RayleighBenard; S10, Tsucs2, the
+# hardest of the seven; below is why.*
+#
 # ## The ablation (Table 2)
 #
 # Model-A is the method without its core: a spline, then SINDy, and nothing flows back from the law
@@ -439,7 +401,7 @@ for condition, level in six[["condition", "level"]].drop_duplicates().itertuples
             assert middle_of["Model-A"] > 2 * middle_of[method], level
     assert reached.median() < 1.2 * known_l2 or not full, (condition, level)
 
-# %%
+
 far = sprott[(sprott.method == "spline-ADO") & sprott.condition.isin(["blocks", "fibers"])]
 held = far[far.level <= far.condition.map({"blocks": 0.5, "fibers": 0.2})].exact
 print(f"spline-ADO with up to 50 % in blocks or 20 % in fibers missing: {rate(held)} laws exact")
@@ -458,14 +420,12 @@ flows = ("Roessler", "Arneodo", "Halvorsen", "BurkeShaw", "Chen") if full else (
 contests = [FlowContest(f, e, 800, seed=seed + 40) for f, e in product(flows, errors if full else errors[:1])]
 apart = ablation_table(sweep(run_ablation, ablations(contests), jobs=jobs, desc="taken apart"))
 
-# %%
 caption = f"Exact laws of {len(contests)} contests without each mechanism of the solver: five flows, six kinds of error."
 save_table("table_solver_ablation", apart.reset_index().to_dict("records"), caption=caption, tolerance={"seconds": 1e9})
 
 # %% [markdown]
 # *A mechanism whose row does not differ from the first one does not show in these contests.*
-
-# %% [markdown]
+#
 # ## The second protocol: noise and gaps in the path
 #
 # Here the path is corrupted that sub-pixel tracks gave, so that a level says directly how exact the samples of a law are.
@@ -487,18 +447,15 @@ assert (gaps.l2 < 1e-4).all()
 # %% [markdown]
 # Missing samples cost SprottF next to nothing as long as the others are exact: what is lost is their number, not their
 # quality.
-
-# %% [markdown]
+#
 # ## How often is the law exact?
 #
 # Exact means: every true term and no other, in the reference frame. Here is the share of the trials.
-
 
 # %%
 shares = newton.pivot_table("exact", "system", ["condition", "level"], sort=False)
 shares.loc["all"] = newton.groupby(["condition", "level"], sort=False).exact.mean()
 
-# %%
 rows = [
     {"condition": condition, "level (%)": 100 * level}
     | {name: f"{share:.0%}" for name, share in column.items()}
@@ -507,7 +464,7 @@ rows = [
 caption = f"Share of {len(trials)} trials whose terms are all right and none is false."
 save_table("study_exact", rows, caption=caption)
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 percent = 100 * shares.drop("all")
 conditions = percent.columns.unique("condition")
 fig, panels = plt.subplots(
@@ -538,8 +495,7 @@ assert (within.mean() >= 0.95).all()
 
 # %% [markdown]
 # Up to 20 % noise (Tsucs2: 10 %), 50 % in blocks and 20 % in fibers, hardly a law is wrong.
-
-# %% [markdown]
+#
 # ## Where it fails, and why
 #
 # Every wrong law, by system and condition: from which level on, and what was wrong with it.
@@ -568,14 +524,14 @@ rows = [
 caption = "The wrong laws of Gauss-Newton; in brackets, how many trials had the error."
 save_table("study_failures", rows, caption=caption)
 
+
 # %% [markdown]
 # Could they have been found? A term can be told from zero only if its coefficient is several of its
 # standard errors, and the least possible standard error is the Cramér-Rao bound
-# ([notebook 04](04_spline_ado.ipynb)). It grows in proportion to the noise. So for each system, its
+# ([notebook 04b](04b_the_search.ipynb)). It grows in proportion to the noise. So for each system, its
 # weakest term sets a level beyond which Gauss-Newton cannot be expected to find it, nor any other that
 # is as careful about false terms: where the square of its coefficient, in bounds, is what it
 # asks of the term.
-
 
 # %%
 def weakest(name):
@@ -609,8 +565,7 @@ if full:
 # $20\,y$ and $xz$, and on this attractor the three go together; from about 10 % noise on, the data
 # prefer the law without it. In all others the information lasts beyond the levels shown. Where one
 # of their laws is wrong nevertheless, it is not for lack of information.
-
-# %% [markdown]
+#
 # ## Do the error bars hold?
 #
 # For laws with the right terms, the distance of a coefficient from the truth in standard errors
@@ -621,7 +576,6 @@ noisy = newton[newton.exact & (newton.condition == "noise") & (newton.level > 0)
 groups = {f"{100 * level:.0f} % noise": group for level, group in noisy.groupby("level")}
 pulled = {name: np.concatenate(list(group.pulls)) for name, group in groups.items()}
 
-# %%
 rows = [
     {
         "noise": name, "coefficients": len(values),
@@ -641,7 +595,7 @@ caption = (
 loose = dict.fromkeys(["rms", "l2, median (e-2)", "l2, promised (e-2)"], 0.2)
 save_table("study_pulls", rows, caption=caption, tolerance=loose)
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 fig, axes = plt.subplots(figsize=(7, 4))
 distance = np.linspace(0, 4, 200)
 axes.plot(distance, 100 * halfnorm.cdf(distance), color="0.8", lw=7, label="if they are right")
@@ -690,14 +644,12 @@ rows = [
     for law in ("exact", "wrong")
 ]
 caption = f"Law and status in {len(mine)} trials of Gauss-Newton under the second protocol."
-save_table("study_verdicts", rows, caption=caption)
-
-# %%
 silent = mine[mine.verdict == "wrong, ok"]
 doubted = (mine[mine.exact].status == "suspect").mean()
 print("wrong laws without a warning:", silent.system.value_counts().to_dict())
 print(f"{doubted:.0%} of the exact laws are doubted")
 assert doubted < 0.2
+save_table("study_verdicts", rows, caption=caption)
 
 # %% [markdown]
 # A wrong law without a warning is one that fits the data to within their noise, as the law of
@@ -715,7 +667,6 @@ tasks = grid(systems, {"noise": (0, level)}, trials[:1], both[:1], frames, "path
 tasks += [replace(task, source="truth") for task in tasks]
 two = tabulate(run_trials(tasks, jobs=jobs, desc="videos and truth"))
 l2 = two.set_index(["source", "level", "system"]).l2
-
 
 # %%
 rows = [
@@ -775,18 +726,16 @@ for row in rows:
 #   <!-- by: worst_of["Model-A"] > worst_of[method]; middle_of["Model-A"] > 2 * middle_of[method] -->
 # * Table 2 contradicts itself at 20 % noise: one false positive with a precision of 100 % for one
 #   method, one with 80 % for the other.
-#   <!-- by: 10: (len(rows), never, in_s3) == (11, 6, 8); figure audit_rows -->
+#   <!-- by: 10b: (len(rows), never, in_s3) == (11, 6, 8); figure audit_rows -->
 # * The paper does not say what noise levels are relative to; here it is the spread of each
 #   coordinate. Nor does it say whether the occlusions come with noise; here they do not.
 #   <!-- by: np.allclose(noisy, add_noise(one.x, share; docs/results.md -->
-
-# %% [markdown]
+#
 # ## Exercises
 #
 # [Three exercises](exercises/06_robustness_and_ablation.ipynb), each with a blank cell and a check that says *right* or fails. Their
 # [solutions](solutions/06_robustness_and_ablation.ipynb) lie apart.
-
-# %% [markdown]
+#
 # ## Run time and versions
 #
 # All cells take about 40 minutes on two cores.

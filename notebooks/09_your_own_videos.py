@@ -79,13 +79,13 @@ names = ("Lorenz", "SprottE") if full else ("Lorenz",)
 frames = 1000 if full else 300
 late, fps = 7, 30
 
+
 # %% [markdown]
 # ## Three files
 #
 # We have no cameras at hand, so we make the files: motion JPEG at 30 frames a second. The second camera
 # was started 7 frames late, and the three were stopped at different times. The rig file says where all cameras are
 # and which way they look, but scale and angle of the first one only.
-
 
 # %%
 def shoot(name, folder, suffix=".avi", codec="MJPG", trial=0):
@@ -109,7 +109,6 @@ for folder in folders.values():
     folder.mkdir()
 shots = {name: shoot(name, folder) for name, folder in folders.items()}
 
-# %%
 for name, folder in folders.items():
     for path in sorted(folder.glob("*.avi")):
         shot = vision.video_info(path)
@@ -125,6 +124,7 @@ for name, folder in folders.items():
 # %%
 print(rig_template(cameras=2))
 
+
 # %% [markdown]
 # ## One command
 #
@@ -135,7 +135,6 @@ print(rig_template(cameras=2))
 # ```
 #
 # `--fps` is only there to have the unit of time of the textbooks: without it, times are seconds of video.
-
 
 # %%
 def discover(name, *options):
@@ -163,11 +162,11 @@ assert "http" not in page
 data = {n: json.loads((f / "report/result.json").read_text("utf-8")) for n, f in folders.items()}
 print(", ".join(data[shown]))
 
+
 # %% [markdown]
 # ### The law
 #
 # The file `result.json` holds the law term by term. As we made the videos, we know the true one and can compare.
-
 
 # %%
 def law(terms):
@@ -182,6 +181,7 @@ for name in names:
     print(f"{name}: {scored}")
     assert scored.exact
 
+
 # %% [markdown]
 # ### Stronger compression
 #
@@ -189,7 +189,6 @@ for name in names:
 # smallest changes. A trace of the target then stays where it just was, so that the track trails behind
 # it, by hundredths of a pixel, but all the time. Here are such scenes as mp4v at a low bit rate, this
 # time from Python: several trials, as one proves little.
-
 
 # %%
 def compressed(name, trial):
@@ -224,8 +223,7 @@ save_table("own_codec", rows, caption="Laws from videos in mp4v at a low bit rat
 # (`cameras.trailing_errors`). The errors of the tracks last for several frames, and what lasts looks like
 # terms that were left out: the solver counts that in, but a small false term or the verdict "suspect" remain
 # possible. Film at a high bit rate if you can.
-
-# %% [markdown]
+#
 # ### The path
 #
 # The first figure of the report. The curve obeys the law exactly; where it leaves the path, the law is
@@ -241,8 +239,7 @@ save_figure("own_path", fig, caption=caption, numbers={"t": t, "x": x, "curve": 
 # %% [markdown]
 # *The reconstructed path (grey) and the curve that obeys the law (blue). At the end, only the first
 # camera was still running.*
-
-# %% [markdown]
+#
 # ### The tracks
 #
 # Look at the tracks before you look at the law: do the squares show the same thing? The frames are those of
@@ -261,8 +258,7 @@ save_figure("own_views", fig, caption=caption, numbers=dict(zip("abc", tracks, s
 # %% [markdown]
 # *One instant in the three videos, with the whole track, and the target magnified. Compression has
 # softened the edges.*
-
-# %% [markdown]
+#
 # ### The cameras
 #
 # Scale and angle of cameras 2 and 3 were learned, and so were the lags. We compare with the truth.
@@ -297,8 +293,7 @@ save_figure("own_residuals", fig, caption=caption, numbers=dict(zip("abc", misse
 # %% [markdown]
 # *Residuals of the three cameras. Single high points would be jumps of a track; a level above the dashed
 # line a wrong rig or a wrong lag.*
-
-# %% [markdown]
+#
 # ## When did the cameras start?
 #
 # Let video $i$ start $\ell_i$ frames later than the first. Its frame $k-\ell_i$ then shows what the first
@@ -320,7 +315,7 @@ assert abs(tried[worst.argmin()] - late) < 0.11
 assert worst.min() < 0.3 * cameras.DISAGREEMENT
 assert worst[tried == late - 1] > 3 * worst.min()
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 fig, axes = plt.subplots(figsize=(7.5, 3.8))
 axes.semilogy(tried, worst, "o-", ms=4, lw=1)
 axes.axhline(cameras.DISAGREEMENT, color="0.4", lw=1, ls="--")
@@ -328,11 +323,11 @@ axes.set(xlabel="lag of the second video (frames)", ylabel="disagreement (px)")
 caption = "Disagreement of the views for each lag of the second video."
 save_figure("own_lags", fig, caption=caption, numbers={"lag": tried, "pixels": worst})
 
+
 # %% [markdown]
 # *Residual that one frame in ten exceeds, for each lag of the second video. The views agree at 7 frames
 # and nowhere else.*
-
-# %% [markdown]
+#
 # The search starts with pairs of cameras at all whole lags, goes on with all cameras at the best ones,
 # and ends with Gauss-Newton in the lags. Fractions are kept only if they explain the tracks better than
 # whole frames by more than two more unknowns do by chance.
@@ -343,7 +338,6 @@ save_figure("own_lags", fig, caption=caption, numbers={"lag": tried, "pixels": w
 # scale to three per cent. A rig file may say so, as the template above does, and then the cameras are learned together
 # with the path ([notebook 03](03_camera_learning.ipynb#measured-by-hand)). Let us measure the three cameras like that several
 # times, each time with other errors; the target, we say, moves across two metres.
-
 
 # %%
 def by_hand(camera, tape, rng):
@@ -381,11 +375,11 @@ for name, folder in folders.items():
     print(f"{name}, measured by hand: lags off by {max(off):.3f} frames at most")
     assert max(off) < 0.1
 
+
 # %% [markdown]
 # No film tells how large the room is, nor where its origin and its axes are: these stay as good as the hand. So we compare
 # paths after the best move, turn and stretch (`procrustes`), and laws about their own origins, in the unit in which they
 # agree best. If all lengths come out $u$ times too large, a term of degree $m$ is multiplied by $u^{1-m}$.
-
 
 # %%
 def beside_truth(name, x):
@@ -445,6 +439,7 @@ caption = "The same tracks by how the rig is known: without its error, a measure
 loose = dict.fromkeys(["path, error / spread (%)", "unit of length, off (%)", "law, l2"], 0.2)
 save_table("own_by_hand", rows, caption=caption, tolerance=loose)
 
+
 # %% [markdown]
 # With the errors in the file, a rig measured by hand gives the same path as the exact one, and the same coefficients, but for the
 # unit of length, the origin and the axes. The axes are off by a degree or so, which by itself would look like small false
@@ -458,7 +453,6 @@ save_table("own_by_hand", rows, caption=caption, tolerance=loose)
 #
 # What if the lag had been overlooked? Let us say that all three started together, then let us hand in a
 # file that is no video.
-
 
 # %%
 def complaint(*options):
@@ -508,6 +502,7 @@ except ValueError as reason:
 else:
     raise AssertionError("a rig with one position must be refused")
 
+
 # %% [markdown]
 # ## Two targets at once
 #
@@ -518,7 +513,6 @@ else:
 # a term that holds the other target's coordinates says that it is driven by it.
 #
 # First two weights on springs, joined by a third spring:
-
 
 # %%
 def springs(stiffness, join=0.5, drag=0.1):
@@ -570,7 +564,7 @@ for name, (law, x0, step, asked) in pair.items():
                  "who drives whom": both.driven})  # fmt: skip
     print(both, "\n")
 
-# %%
+
 caption = "Two targets in three films: one law for both, and who drives whom."
 save_table("own_two_targets", rows, caption=caption, tolerance={"l2": 0.2})
 assert all(row["exact"] and row["l2"] < 1e-3 for row in rows)
@@ -592,8 +586,7 @@ assert max(lost) > 0
 
 # %% [markdown]
 # *Two weights on springs in three views. Where they meet, the lines are interrupted.*
-
-# %% [markdown]
+#
 # ## What we learned
 #
 # * Three lossy files of different length that do not start together give the same law, with all true
@@ -615,14 +608,12 @@ assert max(lost) > 0
 # normals that are exact. None has to be: lags are two numbers, an untrusted position two more, and a camera measured by hand seven at most, against three
 # equations left over in every frame.
 # <!-- by: with_errors < 2 * at_best; np.allclose(lags, (0, late, 0), atol=0.01); np.linalg.norm(error) < 0.1 -->
-
-# %% [markdown]
+#
 # ## Exercises
 #
 # [Three exercises](exercises/09_your_own_videos.ipynb), each with a blank cell and a check that says *right* or fails. Their
 # [solutions](solutions/09_your_own_videos.ipynb) lie apart.
-
-# %% [markdown]
+#
 # ## Run time and versions
 #
 # All cells take about 5 minutes on two cores, beside two other notebooks.

@@ -68,6 +68,7 @@ full = profile == "full"
 both = CONTESTANTS[:2]  # Gauss-Newton and PySINDy see everything, the slower ones less
 sindy = CONTESTANTS[-2:]  # SINDy with a smoothing spline, and with the truth to choose by
 
+
 # %% [markdown]
 # ## The rules
 #
@@ -80,7 +81,6 @@ sindy = CONTESTANTS[-2:]  # SINDy with a smoothing spline, and with the truth to
 # * **Exact** means: every true term and no other.
 # * Only Gauss-Newton says whether it trusts its law. *Wrong and ok* is the worst that can happen, *right but doubted* the
 #   price of caution.
-
 
 # %%
 def count(table):
@@ -161,7 +161,7 @@ if full:
 # %% [markdown]
 # Least squares finds about half of these laws even without errors: a threshold on coefficients keeps what is large,
 # not what is needed. The smooth error of the stored integration, of the order of $10^{-4}$, costs neither method a law.
-# It looks like small terms to a solver that takes errors for white noise; Gauss-Newton looks for the law that *persists* while more and more error is tolerated ([notebook 04](04_spline_ado.ipynb)); `found.plot_path()`
+# It looks like small terms to a solver that takes errors for white noise; Gauss-Newton looks for the law that *persists* while more and more error is tolerated ([notebook 04b](04b_the_search.ipynb)); `found.plot_path()`
 # draws that.
 
 # %%
@@ -258,7 +258,7 @@ exact, given = (table.exact.to_numpy(float).reshape(shape).mean(axis=2) for tabl
 theirs = np.array(rival["exact"])[shown][:, columns] / rival["draws"]
 grids = {f"Gauss-Newton, {len(draws)} draws": exact, f"{rival['method']}, published": theirs}
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 size = (4.1 * len(grids), 0.42 * len(levels) + 1.2)
 fig, panels = plt.subplots(1, len(grids), figsize=size, sharey=True)
 for axes, (method, rates) in zip(panels, grids.items(), strict=True):
@@ -326,7 +326,7 @@ save_table("score_errors", count(flow_table), caption=f"Exact laws of {len(flows
 # %%
 rate_flows = shares(flow_table)
 
-# %% tags=["hide-input"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} tags=["hide-input"]
 boards = {"ODEBench": rate, "chaotic flows": rate_flows}
 heights = [len(board) + 1.5 for board in boards.values()]
 fig, panels = plt.subplots(

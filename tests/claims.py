@@ -86,7 +86,7 @@ def claims_of(page: Path) -> list[Claim]:
 def _claim(item: str, page: Path) -> Claim:
     """One claim with its checks looked up."""
     text = " ".join(BY.sub("", item).removeprefix("* ").split())
-    text = re.sub(r"\]\((?:notebooks/)?(?=\d\d_)", "](../notebooks/", text).replace(
+    text = re.sub(r"\]\((?:notebooks/)?(?=\d\d\w?_)", "](../notebooks/", text).replace(
         "](docs/", "]("
     )  # as from docs/
     if not (by := BY.search(item)):
@@ -108,7 +108,7 @@ def _check(name: str, page: Path) -> str:
         return f"false unless `{name}`"
     if path.startswith("docs/") and (root / path).exists():
         return f"stated in [{path}]({Path(path).name})"
-    number = re.match(r"(\d\d): ", name)
+    number = re.match(r"(\d\d\w?): ", name)
     (notebook,) = (root / "notebooks").glob(f"{number[1]}_*.py") if number else [page]
     part = name.removeprefix(number[0]) if number else name
     if notebook.suffix == ".py" and (found := _assertion(part, notebook)):

@@ -31,6 +31,7 @@ REFERENCES = ROOT / "tests" / "quick"  # tables of a quick run
 LARGEST = 600_000  # bytes of an executed notebook; a code host shows no more
 LARGEST_FILE, LARGEST_FOLDER, MOST_FILES = 600_000, 6_000_000, 250  # of figures/; bytes, bytes
 LONGEST = 15  # lines of a code cell that is not folded
+MOST_CELLS = 60
 
 # What a notebook says at its opening and its close, in this order.
 SECTIONS = (
@@ -118,6 +119,8 @@ def anatomy_problems(path):
         problems.append("the header does not name the kernel python3")
     if len(parameters) != 1 or 'profile: str = "full"' not in parameters[0].source:
         problems.append('no parameters cell with profile: str = "full"')
+    if len(notebook.cells) > MOST_CELLS:
+        problems.append(f"{len(notebook.cells)} cells, at most {MOST_CELLS}")
     for cell in parameters:
         for line in cell.source.splitlines():
             if not PARAMETER.fullmatch(line):
@@ -398,6 +401,7 @@ def test_hash_gate_fails_on_a_stamp(pair):
         ("x = 1", "import random", "random state: import random"),
         ("x = 1", "torch.manual_seed(0)", "random state: torch.manual_seed"),
         ("x = 1", "x = 1\n" * 16, "has 16 lines"),
+        ("# %%\nx = 1\n", "# %%\nx = 1\n" * 60, "63 cells, at most 60"),
         ("# %%\nx = 1", '# %% tags=["hide-input"]\nx = 1', "not in both"),
         ("# %%\nx = 1", '# %% jupyter={"source_hidden": true}\nx = 1', "not in both"),
     ],

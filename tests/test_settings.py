@@ -9,19 +9,21 @@ import pytest
 from vidsindy_lite.companion.run import execute, find_notebooks
 from vidsindy_lite.repository import PACKAGE
 
-NOTEBOOKS = {path.stem[:2]: path for path in find_notebooks(PACKAGE.parent)}
+NOTEBOOKS = {path.stem.partition("_")[0]: path for path in find_notebooks(PACKAGE.parent)}
 SETTINGS = {
     "00": [{"system": "SprottF", "camera": 3}, {"system": "WangSun", "noise_variance": 0.003}],
     "01": [{"system": "NoseHoover", "view": 2}, {"view": 3}],
     "02": [{"seed": 1}, {"seed": 2, "noise_variance": 0.02}],
     "03": [{"system": "WangSun", "seed": 1}, {"frames": 300, "pixel_noise": 1.0, "seed": 2}],
     "04": [{"level": 0.05}, {"seed": 1}],
+    "04b": [{"level": 0.05}, {"seed": 1}],
     "05": [{"seed": 10}, {"seed": 20}],
     "06": [{"seed": 10}, {"seed": 20, "share": 0.05}],
     "07": [{"seed": 10}, {"seed": 20}],
     "08": [{"seed": 1}, {"camera": 3}],
     "09": [{"seed": 1}, {"seed": 2}],
     "10": [{"seed": 1}, {"seed": 2}],
+    "10b": [{"seed": 1}, {"seed": 2}],
     "11": [{"seed": 10}, {"seed": 20}],
     "12": [{"fps": 60}, {"seed": 1}],
     "13": [{"seed": 1}, {"fps": 60}],

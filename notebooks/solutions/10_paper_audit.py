@@ -13,98 +13,51 @@
 # ---
 
 # %% [markdown]
-# # Solutions: What does not add up, recomputed
+# # Solutions: What does not add up: the formulas
 #
 # Questions to [the notebook](../10_paper_audit.ipynb). Write into the blank cells of the
 # [exercises](../exercises/10_paper_audit.ipynb), and run the check behind each: it says *right*, or fails. The
 # [solutions](../solutions/10_paper_audit.ipynb) lie apart.
 
 # %%
-from dataclasses import replace
-from zlib import crc32
-
 import numpy as np
-from scipy.optimize import least_squares
 
-from vidsindy_lite.study import REFERENCE_OFFSET, SCORES, SYSTEMS, metrics, score
+from vidsindy_lite import cameras
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS
 
-row = SCORES["Table S3", "WeakSINDy", "RayleighBenard"]
-print(f"recall {row.recall:.2%}, precision {row.precision:.2%}, printed with {row.false_positives} false terms")
-native = SYSTEMS["NoseHoover"]
-whole = native.shift(REFERENCE_OFFSET)
-
-
-# %%
-def misfit(unknowns, law):
-    """What is left of a law if it is the true one in axes of other scales and origins."""
-    scale, offset = np.exp(unknowns[:3]), unknowns[3:]
-    powers = np.prod(scale**native.exponents, axis=1)[:, None]
-    seen = replace(native, coefficients=native.coefficients * scale / powers).shift(offset)
-    library = np.unique(np.concatenate([law.exponents, seen.exponents]), axis=0)
-    apart = metrics.coefficients_in(seen, library) - metrics.coefficients_in(law, library)
-    return apart.ravel() / np.linalg.norm(whole.coefficients)
+normal = np.array([2.0, 3.0, 6.0]) / 7
+rotation = cameras.rotation_to_z(normal)
+truths = {name: system.shift(REFERENCE_OFFSET) for name, system in SYSTEMS.items()}
 
 # %% [markdown]
-# **1.** (Implement.) The law of RayleighBenard has 11 terms. Which pairs (true terms found, false terms) give the
-# recall and precision printed above? Try 1 to 11 true and 0 to 49 false ones, and set `possible` to the list of the
-# pairs that round to both.
+# **1.** (Prove.) `rotation` takes `normal` to the z axis. The text of the paper takes its transpose. Of which camera is that
+# the rotation: which unit vector does the transpose take to the z axis? Set `other` to its three numbers, without solving
+# anything.
 
 # %% tags=["solution"]
-def printed_as(hits, false, true_terms=11):
-    return f"{hits / true_terms:.2%}", f"{hits / (hits + false):.2%}"
-
-
-asked = f"{row.recall:.2%}", f"{row.precision:.2%}"
-possible = [(hits, false) for hits in range(1, 12) for false in range(50) if printed_as(hits, false) == asked]
-print(possible)
+other = normal * (-1, -1, 1)
 
 # %%
-assert crc32(f"10.1 {possible}".encode()) == 4205841709, "not yet"
+assert np.allclose(rotation.T @ other, (0, 0, 1)), "not yet"
 print("right")
 
 # %% [markdown] tags=["solution"]
-# Ten false terms: $11/(11+10)=52.38\,\%$. Printed are nine, for which P would be 55 %. With recall 100 % in every one
-# of five trials, no average helps.
+# By Rodrigues' formula the transpose is the rotation about the same axis by the same angle, backwards. The axis lies in
+# the xy-plane, so what was tilted away from z to one side is now tilted to the other: half a turn about z.
 
 # %% [markdown]
-# **2.** (Explore.) `misfit` above has six free numbers, the logarithms of the axes' scales and their origins. Give it a
-# law with one coefficient that is really wrong, a half of that of z in NoseHoover's dy/dt (of `whole`), and find the
-# six by `least_squares`, from no stretch and `REFERENCE_OFFSET`. What is left, compared with the l2 error of that
-# law? Set `answer`: `"a"` all of it, `"b"` about a half, `"c"` less than a fifth.
+# **2.** (Explore.) How far off may one coefficient of Lorenz' law in the reference frame, `truths["Lorenz"]`, be so that the
+# relative $\ell_2$ error of the whole law stays below 1 %, if it is that of x in dy/dt, which is 28? Set `off` to that
+# number, to three digits.
 
 # %% tags=["solution"]
-values = whole.coefficients.copy()
-values[whole.terms.index("z"), 1] *= 0.5
-halved = replace(whole, coefficients=values)
-fit = least_squares(misfit, [0, 0, 0, *REFERENCE_OFFSET], args=(halved,), xtol=1e-14, ftol=1e-14)
-left = np.linalg.norm(fit.fun)
-rounding = 0.005 * np.sqrt(np.count_nonzero(values)) / np.linalg.norm(whole.coefficients)
-taken, beyond = left / score(halved, whole).l2, left / rounding
-print(f"misfit: {taken:.2f} of l2, {beyond:.0f} times what rounding explains; scales {np.exp(fit.x[:3])}")
-assert taken < 0.2
-assert beyond > 10
-answer = "c"
+off = 0.01 * np.linalg.norm(truths["Lorenz"].coefficients)
+print(off)
 
 # %%
-assert crc32(f"10.2 {answer}".encode()) == 4193792158, "not yet"
+size = np.sqrt(sum(value**2 for value in truths["Lorenz"].coefficients.ravel()))
+assert abs(100 * off / size - 1) < 0.01, "not yet"
 print("right")
 
 # %% [markdown] tags=["solution"]
-# It takes most of $\ell_2$ away, by stretching z to the double. That is why a small misfit alone proves nothing: this
-# one is many times what rounding explains. Only a misfit below rounding is evidence.
-
-# %% [markdown]
-# **3.** (Prove.) A table prints precision 100 % and one false positive for a mean of five trials. Can both be true?
-# Set `answer` to `"yes"` or `"no"`.
-
-# %% tags=["solution"]
-answer = "no"
-
-# %%
-assert crc32(f"10.3 {answer}".encode()) == 357813279, "not yet"
-print("right")
-
-# %% [markdown] tags=["solution"]
-# If the mean of the precisions is 100 %, each of them is, as none can be more; then no trial has a false term, and
-# their mean number is 0. A number rounded up to 1 would need a mean of at least $\tfrac12$, three false terms in five
-# trials, and each of these trials has a precision below one. So no.
+# Nearly 3, a tenth of the coefficient itself: the norm is that of the constants that the shift makes.

@@ -80,7 +80,7 @@ class Outcome:
 
 def find_notebooks(root: str | os.PathLike) -> tuple[Path, ...]:
     """The source halves of a repository's notebooks, in order."""
-    return tuple(sorted(Path(root, "notebooks").glob("[0-9][0-9]_*.py")))
+    return tuple(sorted(Path(root, "notebooks").glob("[0-9][0-9]*_*.py")))
 
 
 def select_notebooks(names: Iterable[str], root: str | os.PathLike) -> tuple[Path, ...]:

@@ -27,7 +27,7 @@ from .smoothing import PENALTIES, smooth
 
 FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where random laws have
-about the fewest wrong terms (notebook 04)."""
+about the fewest wrong terms (notebook 04b)."""
 SURE = 0.004
 """The same where samples share errors, which look like evidence for small terms, and elsewhere for
 a law that is not to be doubted: a term that is only worth the price above is told."""
