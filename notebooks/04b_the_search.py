@@ -56,7 +56,7 @@ from vidsindy_lite.study import (
     SYSTEMS,
     Benchmark,
     add_noise,
-    cramer_rao,
+    cramer_rao_bound,
     plots,
     score,
 )
@@ -554,7 +554,7 @@ assert found.native.support.sum() < found.system.support.sum()
 draws, part, noise = (24, 500, 0.05) if full else (3, 300, 0.05)
 axes_moved = np.array([True, True, False])
 sigma = noise * clean[:part].std(axis=0)
-bound = cramer_rao.bound(native, t[:part], native.x0, sigma, moving=axes_moved)
+bound = cramer_rao_bound(native, t[:part], native.x0, sigma, moving=axes_moved)
 
 
 def repeat(stream):

@@ -67,7 +67,7 @@ from vidsindy_lite.study import (
     ablations,
     add_noise,
     by_condition,
-    cramer_rao,
+    cramer_rao_bound,
     grid,
     plots,
     rate,
@@ -538,7 +538,7 @@ def weakest(name):
     law = SYSTEMS[name]
     t, x = law.trajectory(frames)
     spread, moving = np.std(x, axis=0), [True, True, False]
-    bound = cramer_rao.bound(law, t, law.x0, spread, moving).coefficients
+    bound = cramer_rao_bound(law, t, law.x0, spread, moving).coefficients
     needed = bound * np.sqrt(dynamics.term_penalties(law.exponents))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         level = np.where(law.support, np.abs(law.coefficients) / needed, np.inf)

@@ -372,7 +372,7 @@ note("Lab experiment", "closely aligning with the ground truth", "the distance, 
 # to the one leads to the other, even in the caption of Table 1. Table S1 is once called a figure. Precision and
 # recall have the right formulas, but one sentence for both, which describes recall. Cameras are "calibrated"
 # in the introduction, where only one is. Coefficients are "quoted in two decimal places", but for five with
-# three. Two of PySINDy's equations lack a sign, and in one a term stands twice (`published.MISPRINTS`).
+# three. Two of PySINDy's equations lack a sign, and in one a term stands twice (`paper.MISPRINTS`).
 # All equation numbers that the text refers to exist.
 #
 # ## The audit, first part

@@ -42,7 +42,7 @@ def test_the_contract_is_kept():
         ("dynamics/solver.py", "from ..cameras import Rig"),
         ("cameras/models.py", "def late():\n    from ..study import SYSTEMS"),
         ("vision/video.py", "import vidsindy_lite.pipeline"),
-        ("study/systems.py", "from ..companion import artifacts"),
+        ("study/paper.py", "from ..companion import artifacts"),
         ("checks.py", "from .repository import PACKAGE"),
     ],
 )
@@ -80,7 +80,7 @@ def test_rooms_are_entered_by_their_front_door(room):
     ],
 )
 def test_the_gate_sees_a_side_door(copy, line, door, monkeypatch):
-    path = copy / "vidsindy_lite" / "study" / "systems.py"
+    path = copy / "vidsindy_lite" / "study" / "paper.py"
     path.write_text(f"{path.read_text()}\n{line}\n")
     monkeypatch.setitem(globals(), "ROOT", copy)
     assert side_doors(path) == {door}

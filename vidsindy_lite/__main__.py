@@ -195,7 +195,7 @@ def _pick(options: argparse.Namespace) -> int:
     examples:
       python -m vidsindy_lite pick a.mp4 b.mp4 c.mp4
     """
-    from .companion.pick import write_pick_page
+    from .companion.pages import write_pick_page
 
     print(f"open {write_pick_page(options.videos, options.out)} in a browser")
     return 0

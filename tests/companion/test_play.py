@@ -9,7 +9,7 @@ import pytest
 import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
-from vidsindy_lite.companion.play import law_over_videos
+from vidsindy_lite.companion.pages import law_over_videos
 from vidsindy_lite.observation import Observation
 
 LATER = 4  # frames

@@ -6,7 +6,7 @@ import pytest
 from vidsindy_lite.dynamics import discover
 from vidsindy_lite.dynamics.diagnostics import untold_origins
 from vidsindy_lite.study import corruption, score
-from vidsindy_lite.study.systems import FLOWS
+from vidsindy_lite.study.paper import FLOWS
 
 
 def moved(flow, origin, error, draws):

@@ -9,7 +9,7 @@ from vidsindy_lite.study import baselines
 from vidsindy_lite.study.baselines import BASELINES, RIDGE, THRESHOLDS, WEAK_WIDTH, WEAK_WINDOWS
 from vidsindy_lite.study.corruption import add_noise, drop_blocks, drop_fibers
 from vidsindy_lite.study.metrics import score
-from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.study.paper import REFERENCE_OFFSET, SYSTEMS
 
 pytestmark = pytest.mark.slow  # fits ensembles
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from vidsindy_lite.dynamics import Library, PolynomialSystem
 from vidsindy_lite.study.metrics import pulls, score, term_errors, trajectory_error
-from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.study.paper import REFERENCE_OFFSET, SYSTEMS
 
 TRUTH = PolynomialSystem.from_terms({"x": {"x": 3}, "y": {"xy": -4, "1": 1}})
 

@@ -7,8 +7,17 @@ import pytest
 
 from vidsindy_lite.dynamics import PolynomialSystem, runge_kutta_4
 from vidsindy_lite.study.metrics import score
-from vidsindy_lite.study.published import ABLATION, LAB, LAWS, MISPRINTS, SCORES, SYSTEMS_S1
-from vidsindy_lite.study.systems import FLOWS, REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.study.paper import (
+    ABLATION,
+    FLOWS,
+    LAB,
+    LAWS,
+    MISPRINTS,
+    REFERENCE_OFFSET,
+    SCORES,
+    SYSTEMS,
+    SYSTEMS_S1,
+)
 
 
 def test_every_table_is_complete():

@@ -5,11 +5,11 @@ import pytest
 
 from vidsindy_lite.dynamics import path
 from vidsindy_lite.study import FLOWS, ODEBENCH, RIVALS, SYSTEMS, scoreboard
-from vidsindy_lite.study.odebench import TIMES
 from vidsindy_lite.study.scoreboard import (
     ERRORS,
     MOTIONS,
     NOTHING,
+    TIMES,
     WITHOUT,
     Ablation,
     FlowContest,

@@ -14,6 +14,7 @@ from vidsindy_lite.dynamics import (
     monomials,
 )
 from vidsindy_lite.study.metrics import score
+from vidsindy_lite.study.paper import SYSTEMS
 from vidsindy_lite.study.spline_ado import (
     SplineADOSettings,
     _Fit,
@@ -21,7 +22,6 @@ from vidsindy_lite.study.spline_ado import (
     spline_ado_batch,
     stridge,
 )
-from vidsindy_lite.study.systems import SYSTEMS
 
 SHORT = {"pretraining": 200, "epochs": 100, "alternations": 2, "collocation_per_knot": 3}
 SPIRAL = PolynomialSystem.from_terms(

@@ -12,7 +12,7 @@ from vidsindy_lite.refusal import Refused
 from vidsindy_lite.study import score, spline_ado
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.films import FilmResult, FilmTask, detect_near, film, run_film
-from vidsindy_lite.study.systems import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.study.paper import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.trials import (
     SOURCES,
     Comparison,

@@ -33,8 +33,7 @@ from ..repository import write_files
 from ..study.plots import plot_frames, plot_path, plot_residuals, plot_rig
 from ..values import as_json
 from ..vision import VideoInfo, read_frame, video_info
-from .pages import page
-from .play import law_over_videos
+from .pages import law_over_videos, page
 
 LETTERS = "abcdefgh"  # of several targets, in the heads of tracks
 LONGEST_NAME = 30  # characters above a picture

@@ -21,8 +21,8 @@ from ..checks import check_choice, check_integer
 from ..observation import Observation, observe
 from ..vision import LearnedDetector, Scene, detections, read_video, render_video
 from .metrics import trajectory_error
+from .paper import REFERENCE_OFFSET, SYSTEMS, Benchmark
 from .sweeps import remember
-from .systems import REFERENCE_OFFSET, SYSTEMS, Benchmark
 
 SAMPLES_PER_PERIOD = 100
 """Frames in one characteristic period of a system: playback speed differs per system."""

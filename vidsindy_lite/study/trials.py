@@ -31,8 +31,8 @@ from ..refusal import Refused
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import FilmTask, film_result
 from .metrics import Score, pulls, score
+from .paper import REFERENCE_OFFSET, SYSTEMS
 from .sweeps import sweep
-from .systems import REFERENCE_OFFSET, SYSTEMS
 
 if TYPE_CHECKING:  # pandas is imported where a frame is made
     from pandas import DataFrame, Series
