@@ -1,12 +1,13 @@
 """Exercises, made of their solutions, which lie apart: notebooks/solutions/ is the source.
 
-A cell with the tag `solution` is not in the exercise: text is left out, code becomes a blank cell.
-What stands behind a blank cell is a check, which says whether what was written there is right.
+A cell with the tag `solution` is not in the exercise: text is left out, code becomes a blank cell,
+which says what names the check behind it looks at. The check says whether what they are is right.
 
     python tests/exercises.py             what has changed
     python tests/exercises.py --force     all solutions executed again
 """
 
+import ast
 import copy
 import sys
 from pathlib import Path
@@ -22,18 +23,28 @@ from vidsindy_lite.repository import PACKAGE, write_file
 
 NOTEBOOKS = PACKAGE.parent / "notebooks"
 SOLUTIONS = sorted((NOTEBOOKS / "solutions").glob("*.py"))
-BLANK = "# Your code here."
+BLANK = "# Your code here: set "
+
+
+def names(source: str, context: type[ast.expr_context]) -> set[str]:
+    """Names that a cell sets (`ast.Store`), also by def, or reads (`ast.Load`)."""
+    nodes = list(ast.walk(ast.parse(source)))
+    found = {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, context)}
+    defined = {n.name for n in nodes if isinstance(n, ast.FunctionDef)}
+    return found | (defined if context is ast.Store else set())
 
 
 def exercise(solutions: Path) -> NotebookNode:
     """The notebook with blank cells, from the source half of its solutions."""
     source = jupytext.read(solutions)
     cells = []
-    for cell in copy.deepcopy(source.cells):
+    for index, cell in enumerate(copy.deepcopy(source.cells)):
         if "solution" in cell.metadata.pop("tags", []):
             if cell.cell_type == "markdown":
                 continue
-            cell.source = BLANK
+            check = source.cells[index + 1].source
+            asked = sorted(names(cell.source, ast.Store) & names(check, ast.Load))
+            cell.source = BLANK + ", ".join(asked) + "."
         cell.id = f"cell-{len(cells):02d}"
         cell.source = cell.source.replace("# Solutions: ", "# Exercises: ", 1)
         cells.append(cell)
