@@ -26,6 +26,13 @@ def test_a_hopeless_lag_is_named(case, lag):
         vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0, lag))
 
 
+def test_of_what_stands_still_no_lag_can_be_learned(case):
+    rig, (first, second, third) = case
+    tracks = [first, np.full_like(second, 200.0), third]
+    with pytest.raises(ValueError, match=r"lags: must be given where .* as tracks\[1\] does"):
+        vl.observe_tracks(tracks, rig, np.arange(150))
+
+
 def test_given_lags_that_are_off_by_a_fraction_are_told(case):
     rig, tracks = case
     for off, told in ((0.0, False), (0.01, False), (0.05, True)):
@@ -55,7 +62,7 @@ def noisy():
     t, x = truth.trajectory(1000)
     rig, rng = vl.Rig.around(x), np.random.default_rng(3)
     tracks = [study.add_noise(camera.project(x), 0.15, rng) for camera in rig.cameras]
-    seen = vl.observe_tracks(tracks, rig.uncalibrated(keep=0), t, lags=(0, 0, 0))
+    seen = vl.observe_tracks(tracks, rig.uncalibrated(keep=0), t, lags="synchronous")
     return truth, t, seen
 
 

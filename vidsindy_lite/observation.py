@@ -50,7 +50,7 @@ from .checks import (
 )
 from .dynamics import smooth as smooth_curves
 from .progress import bar
-from .refusal import Refused, refusing
+from .refusal import Refused, refusing, stands_still
 from .vision import (
     Hint,
     Track,
@@ -269,6 +269,10 @@ def _observed(
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     begun = np.zeros(len(raw)) if lags is None else lags
+    with refusing("lags", raw, names):
+        for track, name in zip(raw, names, strict=True):
+            if lags is None and stands_still(track):
+                raise ValueError(f"lags: must be given where a track stands still, as {name} does")
     if not rig.is_measured:
         with refusing("cameras", raw, names):
             far = factorised(raw, rig, clock.rates, clock.uneven, lags)
