@@ -29,7 +29,6 @@ from .dynamics import (
     Discovery,
     Library,
     PolynomialSystem,
-    SplineSINDy,
     discover,
     on_circle,
     on_sphere,
@@ -80,5 +79,4 @@ __all__ = [
     "Discovery",
     "Library",
     "PolynomialSystem",
-    "SplineSINDy",
 ]

@@ -30,8 +30,7 @@ from .model import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
 from .mechanics import Quantity, Round, on_circle, on_sphere
 from .l0 import closest_rival, subset_search
-from .solver import SplineSINDy
-from .smoothing import smooth
+from .bspline import smooth
 from .solver import discover
 from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .collocation import State

@@ -34,8 +34,8 @@ from .library import monomial_exponents, monomials, shift_generators, shift_matr
 from .mechanics import Complexes, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
 from .noise import GROSS, passing, residual_noise
-from .path import RESOLVED, Path
 from .problem import COARSE, Problem
+from .result import Path
 
 # --------------------------------------------------------------------------------------------------
 # Where a motion takes place, looked at before any law: a coordinate at rest, a line, a plane, a
@@ -632,6 +632,8 @@ def _cheapest_two(
 # --------------------------------------------------------------------------------------------------
 # All that is to be said of a law.
 
+RESOLVED = 1e-2
+"""Error, relative to the spread of the data, below which a misfit does not matter."""
 MISFIT = 1.5
 """Residual over estimated noise beyond which the law does not fit."""
 

@@ -19,12 +19,12 @@ from scipy.optimize import least_squares
 from scipy.special import chdtri, exprel
 
 from ..arrays import Bools, Floats, Ints
+from .bspline import smooth
 from .data import inflation
 from .library import monomial_exponents, velocity_names
 from .model import PolynomialSystem
 from .problem import FALSE_ALARM
 from .result import Discovery, Plateau
-from .smoothing import smooth
 
 FEWEST = 6
 """Samples below which nothing is left over of a throw with drag."""

@@ -17,9 +17,8 @@ from .data import Units
 from .l0 import inverse, newcomers
 from .library import divides, shift_generators, shift_matrix
 from .noise import residual_noise
-from .path import History, Path
 from .problem import Problem
-from .result import Discovery
+from .result import Discovery, History, Path
 
 # --------------------------------------------------------------------------------------------------
 # Terms that a law has not: between which values each could be, and which the data could not see.

@@ -6,7 +6,7 @@ autocorrelation time); how precise each measurement is; and whether the motion i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -18,7 +18,7 @@ from .bspline import Segment
 from .collocation import CLEANEST, Collocation, Fit, State
 from .data import CHANCE, autocovariances, inflation
 from .l0 import LEAST
-from .problem import Problem, fit_curves, spread_to_unseen
+from .problem import COARSE, Problem, fit_curves, spread_to_unseen, unpruned
 
 # --------------------------------------------------------------------------------------------------
 # How large the errors of the data are, as a fitted curve leaves them, and how long they last.
@@ -437,3 +437,53 @@ def _bands(signal: Floats) -> Floats:
     octaves = int(np.log2(max(len(power) / OCTAVE, 1.0)))
     edges = [0, *(OCTAVE * 2 ** np.arange(octaves + 1)).tolist()]
     return np.stack([power[low:high].mean(axis=0) for low, high in pairwise(edges)])
+
+
+# --------------------------------------------------------------------------------------------------
+# Noise of data with few samples a turn, told by candidate terms together.
+#
+# A curve without a law has as much freedom as there are samples a turn. Where these are few, it
+# takes motion for noise, or gives the motion up and is flat. So terms are fitted at once, as many
+# as converge, and what they leave is the noise; each of the two noises has its law.
+
+TOLERATED = 0.03
+"""Error that a first law tolerates, relative to the spread of the data: finer terms come after
+those that make the motion."""
+CONSISTENT = 1.5
+"""Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
+
+
+def views(pose: Callable[..., Problem]) -> list[Problem]:
+    """A problem with the noise that its curves leave, and others where that may be wrong.
+
+    Where the curves drop measurements, one with all of them; where terms leave far less than the
+    curves, one with what these leave.
+
+    Parameters
+    ----------
+    pose : callable
+        Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
+        the samples, which serve where smoothed ones leave out a part of the motion.
+    """
+    whole = pose()
+    problem = smoother_weights(whole)
+    # What no smooth curve explains may still be the law's: a transient that a sample or two show.
+    found = [problem] if (problem.counts == whole.counts).all() else [problem, whole]
+    # A curve that has given the motion up, and leaves nearly all of its spread, has no turns.
+    enough = problem.samples_a_turn > COARSE and problem.noise.max() < 0.9
+    if not (enough or problem.measured_errors or (problem.noise <= TOLERATED).all()):
+        told = _by_terms(problem) or _by_terms(pose(True))
+        found += [] if told is None else [told]
+    return found
+
+
+def _by_terms(problem: Problem) -> Problem | None:
+    """The problem with the noise that terms leave, as many as converge, if it is far less."""
+    degrees = problem.exponents.sum(axis=1)
+    for degree in range(problem.form.degree, 0, -1):
+        fit, converged = unpruned(problem, ~problem.form.implicit & (degrees <= degree))
+        left = residual_noise(fit)
+        over = CONSISTENT * left < problem.noise
+        if converged and over.any():
+            return replace(problem, noise=np.where(over, left, problem.noise))
+    return None

@@ -27,8 +27,7 @@ from .data import Trajectory, variable_names
 from .l0 import inverse
 from .library import Library, monomial_gradients, monomials
 from .model import Form
-from .path import FIRST_WEIGHTS, History, leaves_something_over, tightened, unpruned
-from .problem import Problem, fit_curves
+from .problem import Problem, leaves_something_over, tightened, unpruned
 from .result import Discovery
 
 ALIKE = np.deg2rad(2.0)
@@ -141,13 +140,11 @@ class TurnedLaw:
 
 def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Floats]:
     """Orientations in which fits of all terms up to a degree look sparse, for degrees as needed."""
-    collocation = problem.collocation(problem.segments())
-    control, history = fit_curves(collocation, problem.curves), History()
     degrees = problem.exponents.sum(axis=1)
     found: list[Floats] = []
     for degree in range(1, problem.form.degree + 1):
-        fit, weight = unpruned(problem, collocation, control, degrees <= degree, history)
-        if weight < FIRST_WEIGHTS[-1]:  # too many terms for these data
+        fit, converged = unpruned(problem, degrees <= degree)
+        if not converged:  # too many terms for these data
             continue
         for turn in sparse_orientations(TurnedLaw.of(problem, fit), found, rng):
             if all(apart(turn, other) > ALIKE for other in found):

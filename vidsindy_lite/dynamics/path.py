@@ -19,29 +19,39 @@ path around a law leads to that law.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
-from scipy.special import chdtri
-from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
-from .collocation import Collocation, Fit, State, Status, WithCurve
+from .collocation import Fit, State, Status
 from .data import Trajectory
 from .frames import Origin, as_shifted, at_home, cheapest_at, closed, off_home, one_by_one, together
 from .l0 import PLATEAU, inverse, minimiser, subset_path, subset_search
 from .model import PolynomialSystem, runge_kutta_4
-from .noise import effective_noise, errors_left, residual_noise, smoother_weights, time_inflation
-from .problem import COARSE, Problem, fit_curves
-from .result import Plateau, Step
+from .noise import (
+    CONSISTENT,
+    TOLERATED,
+    effective_noise,
+    errors_left,
+    residual_noise,
+    time_inflation,
+)
+from .problem import (
+    FINAL_WEIGHT,
+    FIRST_WEIGHTS,
+    WEIGHTS,
+    Problem,
+    fit_curves,
+    leaves_something_over,
+    tightened,
+    unpruned,
+)
+from .result import History, Path, Plateau
 
-TOLERATED = 0.03
-"""Error that a first law tolerates, relative to the spread of the data: finer terms come after
-those that make the motion."""
 SMOOTH = 0.1
 """Where errors are smooth, a plateau may begin here: terms below are as likely made by the errors.
 Independent errors average out, and whatever they do not explain is a term."""
@@ -49,16 +59,6 @@ LARGEST, STEP = 1.0, 0.1
 """Largest error on a path, that of no law at all; and decades between two laws of a path."""
 ROUNDS = 6
 """Most laws to which paths lead, each followed around the law before."""
-CONSISTENT = 1.5
-"""Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
-RESOLVED = 1e-2
-"""Error, relative to the spread of the data, below which a misfit does not matter."""
-FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
-"""Physics weights of a fit of all terms, relative to the misfit of a plain regression."""
-WEIGHTS = (1e2, 1e4, 1e8)
-"""Physics weights of a search."""
-FINAL_WEIGHT = WEIGHTS[-1]
-"""Weight at which the law holds exactly for all that the data can tell."""
 ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
 """A first law is sought on so many samples and turns of the motion, if they are no more than that
 share of the data."""
@@ -66,70 +66,6 @@ LONGEST_SEARCH = 10
 """Most rounds of a subset search, and most moves of an origin."""
 EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
-
-
-@dataclass(frozen=True, eq=False)
-class Path:
-    """The laws of all equations around a fit, from the errors that it leaves up to no law at all.
-
-    Parameters
-    ----------
-    fit : Fit
-        Around which the laws are found.
-    model : WithCurve
-        Its quadratic model: `Problem.model`.
-    own : float
-        The errors that the fit was weighted with; those of the law, where kicks are larger.
-    level : float
-        Errors that have to be tolerated: a plateau that begins above them is no law of these data.
-    plateaus : tuple of tuple of Plateau
-        Of each equation, from the smallest tolerated error up.
-    """
-
-    fit: Fit
-    model: WithCurve
-    own: float
-    level: float
-    plateaus: tuple[tuple[Plateau, ...], ...]
-
-    @property
-    def lowest(self) -> float:
-        """The smallest tolerated error."""
-        return self.plateaus[0][0].low
-
-    @property
-    def tolerated(self) -> float:
-        """Errors that have to be tolerated, times those that the fit was weighted with."""
-        return max(self.level / self.own, 1.0)
-
-    def width(self, plateau: Plateau) -> float:
-        """How far a plateau reaches beyond the errors there are, in decades."""
-        return max(replace(plateau, low=max(plateau.low, self.own)).decades, 0.0)
-
-    def ranked(self) -> list[list[Plateau]]:
-        """The plateaus of each equation that begin at or below the level, the widest first."""
-        return [
-            sorted((p for p in path if p.low <= self.level), key=lambda p: -p.decades)
-            for path in self.plateaus
-        ]
-
-    def widest(self) -> list[Plateau]:
-        """The widest plateau of each equation, of those that begin at or below the level."""
-        return [ranked[0] for ranked in self.ranked()]
-
-    def of(self, active: Bools) -> list[Plateau]:
-        """The lowest plateau with the terms of each equation of a law, or the lowest of all."""
-        return [
-            next((p for p in path if (p.terms == terms).all()), path[0])
-            for path, terms in zip(self.plateaus, active.T, strict=True)
-        ]
-
-    def restricted(self, active: Bools) -> State:
-        """The state that the quadratic model promises for other terms, (l, d)."""
-        support = np.append(active.T.ravel(), self.fit.state.moving)[self.model.columns]
-        present = self.fit.state.flat()[self.model.columns]
-        solution = minimiser(self.model.information, self.model.gradient, present, support)
-        return self.model.along(self.fit.state, solution - present, 1.0).of_terms(active)
 
 
 def follow(problem: Problem, fit: Fit) -> Path:
@@ -195,16 +131,15 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     least = TOLERATED if tolerated is None else tolerated
     noise = problem.noise if problem.kicked else np.maximum(problem.noise, least)
     tolerant, stretches = replace(problem, noise=noise), enough(problem)
-    part = replace(tolerant, stretches=stretches)
-    collocation, found = part.collocation(part.segments()), []
-    control = fit_curves(collocation, part.curves)
+    part, found = replace(tolerant, stretches=stretches), []
     degrees, implicit = part.exponents.sum(axis=1), part.form.implicit
     # Terms of denominators come last: a factor above and below the line changes nothing.
     stages = [~implicit & (degrees <= 2), ~implicit, np.ones_like(implicit)]
     for k, rows in enumerate(stages):
         if k and (rows == stages[k - 1]).all():
             continue
-        whole, _ = unpruned(part, collocation, control, rows, history)
+        whole, _ = unpruned(part, rows)
+        history.add("all terms", part, whole, FIRST_WEIGHTS[-1])
         fit = at_home(part, whole)
         for weight in WEIGHTS:
             fit = select(part, fit, weight, "subset search", history)
@@ -232,61 +167,6 @@ def enough(problem: Problem) -> list[tuple[int, Trajectory]]:
         end = t[0] + max(share * (t[-1] - t[0]), 2 * np.pi)
         cut.append((i, (t[t <= end], x[t <= end])))
     return cut
-
-
-def unpruned(
-    problem: Problem,
-    collocation: Collocation,
-    control: Floats,
-    rows: Bools,
-    history: History,
-) -> tuple[Fit, float]:
-    """Fit all terms of some rows of the library, (l,), while the physics weight rises.
-
-    The last weight comes back, too. Many terms that the data hardly tell apart cannot be fitted at
-    a large one: such a fit does not converge, and even those before it lean on the terms. Then the
-    first fit is the start.
-    """
-    d = problem.d
-    x, slope = collocation.node_states(control)
-    coefficients = np.zeros(problem.known.shape)
-    terms = problem.terms(x)
-    left = slope - terms @ problem.known
-    coefficients[rows] = np.linalg.lstsq(terms[:, rows], left, rcond=problem.noise.min())[0]
-    active = rows[:, None] & problem.form.candidates
-    coefficients[~active] = 0.0
-    still, shared = np.zeros(d, dtype=bool), problem.form.shared
-    state = State(control, coefficients, active, np.zeros(d), still, shared)
-    fits: list[tuple[Fit, float]] = []
-    for weight in FIRST_WEIGHTS:
-        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
-        state = fit.state
-        history.add("all terms", problem, fit, weight)
-        fits.append((fit, weight))
-        if fit.status is not Status.CONVERGED:
-            return fits[0]
-    return fits[-1]
-
-
-def leaves_something_over(problem: Problem, fit: Fit, chance: float = 0.1) -> bool:
-    """Would the other terms together explain more of the data than chance does?"""
-    searched = problem.form.searched
-    left_out = len(searched) - int(fit.state.free()[searched].sum())
-    if not left_out:
-        return False
-    _, gain = fit.collocation.linearise(fit.state, searched).newton()
-    return bool(gain > chdtri(left_out, chance))
-
-
-def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
-    """The fit of a state's terms while the physics weight rises to its last.
-
-    At that weight alone the law holds so exactly that a state far from the minimum creeps.
-    """
-    for weight in WEIGHTS:
-        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=10)
-        state = fit.state
-    return fit
 
 
 def select(problem: Problem, start: Fit, weight: float, stage: str, history: History) -> Fit:
@@ -489,12 +369,21 @@ def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: Hi
     tolerated = max(max(plateau.low for plateau in goal) / path.own, 1.0)
     tolerant = replace(problem, noise=errors_left(problem, fit) * tolerated)
     collocation = fit.collocation.weighted(tolerant.noise**-2, fit.collocation.physics_weights)
-    trial = tightened(tolerant, collocation, path.restricted(active))
+    trial = tightened(tolerant, collocation, _restricted(path, active))
     trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
     if not np.isfinite(trial.criterion):
         return trial
     history.add("another law of the path", tolerant, trial, FINAL_WEIGHT)
     return framed(tolerant, trial, history)
+
+
+def _restricted(path: Path, active: Bools) -> State:
+    """The state that the quadratic model around a fit promises for other terms, (l, d)."""
+    model, state = path.model, path.fit.state
+    support = np.append(active.T.ravel(), state.moving)[model.columns]
+    present = state.flat()[model.columns]
+    solution = minimiser(model.information, model.gradient, present, support)
+    return model.along(state, solution - present, 1.0).of_terms(active)
 
 
 def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
@@ -560,54 +449,7 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
     return fit
 
 
-# --------------------------------------------------------------------------------------------------
-# Noise of data with few samples a turn, told by candidate terms together.
-#
-# A curve without a law has as much freedom as there are samples a turn. Where these are few, it
-# takes motion for noise, or gives the motion up and is flat. So terms are fitted at once, as many
-# as converge, and what they leave is the noise; each of the two noises has its law.
-
-
-def views(pose: Callable[..., Problem]) -> list[Problem]:
-    """A problem with the noise that its curves leave, and others where that may be wrong.
-
-    Where the curves drop measurements, one with all of them; where terms leave far less than the
-    curves, one with what these leave.
-
-    Parameters
-    ----------
-    pose : callable
-        Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
-        the samples, which serve where smoothed ones leave out a part of the motion.
-    """
-    whole = pose()
-    problem = smoother_weights(whole)
-    # What no smooth curve explains may still be the law's: a transient that a sample or two show.
-    found = [problem] if (problem.counts == whole.counts).all() else [problem, whole]
-    # A curve that has given the motion up, and leaves nearly all of its spread, has no turns.
-    enough = problem.samples_a_turn > COARSE and problem.noise.max() < 0.9
-    if not (enough or problem.measured_errors or (problem.noise <= TOLERATED).all()):
-        told = _by_terms(problem) or _by_terms(pose(True))
-        found += [] if told is None else [told]
-    return found
-
-
-def _by_terms(problem: Problem) -> Problem | None:
-    """The problem with the noise that terms leave, as many as converge, if it is far less."""
-    collocation = problem.collocation(problem.segments())
-    control = fit_curves(collocation, problem.curves)
-    degrees = problem.exponents.sum(axis=1)
-    for degree in range(problem.form.degree, 0, -1):
-        rows = ~problem.form.implicit & (degrees <= degree)
-        fit, weight = unpruned(problem, collocation, control, rows, History())
-        left = residual_noise(fit)
-        over = CONSISTENT * left < problem.noise
-        if weight == FIRST_WEIGHTS[-1] and over.any():
-            return replace(problem, noise=np.where(over, left, problem.noise))
-    return None
-
-
-def evidence(problem: Problem, fit: Fit) -> float:
+def information_criterion(problem: Problem, fit: Fit) -> float:
     """What a law costs whose noise is its own: n log variance, and the price of its terms.
 
     The lower, the better (Bayesian information criterion); of laws of the same data. Measurements
@@ -755,57 +597,3 @@ def join(
 
 # --------------------------------------------------------------------------------------------------
 # How a discovery went: the steps of its fits, in the order of time.
-
-
-@dataclass(frozen=True)
-class History:
-    """The steps of a discovery so far, in the order of time, and how much of it is left.
-
-    Parameters
-    ----------
-    steps : list of Step
-    began : float
-        On the clock of `time.perf_counter`.
-    end : float
-        When no further round begins, on that clock.
-    bar : tqdm, optional
-        Moves with every round.
-    """
-
-    steps: list[Step] = field(default_factory=list)
-    began: float = field(default_factory=time.perf_counter)
-    end: float = np.inf
-    bar: tqdm | None = None
-
-    @property
-    def over(self) -> bool:
-        """Whether there is no time left."""
-        return time.perf_counter() > self.end
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is to be told if the time was not enough."""
-        told = "the time limit ended the search: this is the best law so far; raise time_limit"
-        return (told,) if self.over else ()
-
-    def another(self) -> bool:
-        """Count a round, and say whether there is time for another."""
-        if self.bar is not None:
-            self.bar.update()
-        return not self.over
-
-    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
-        """Add what a fit at a relative physics weight has reached."""
-        state, collocation = fit.state, fit.collocation
-        data = collocation.data_loss(collocation.curve(state.control_points))
-        self.steps.append(
-            Step(
-                stage=stage,
-                seconds=time.perf_counter() - self.began,
-                physics_weight=weight,
-                data_loss=data / collocation.counts.sum(),
-                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
-                terms=int(state.active.sum()),
-                offset=problem.units.point(state.offset),
-            )
-        )

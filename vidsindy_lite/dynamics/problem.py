@@ -17,13 +17,12 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.special import chdtri
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, WIDTH, Segment, basis, normal_band
-from .collocation import CLEANEST, Collocation, Fit, State, WithCurve
+from .bspline import DEGREE, PENALTIES, WIDTH, Segment, basis, normal_band, smooth
+from .collocation import CLEANEST, Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
 from .library import Function, extended, jumps, law_variables, monomials
 from .model import Form, PolynomialSystem
-from .smoothing import PENALTIES, smooth
 
 FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where random laws have
@@ -297,6 +296,64 @@ def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
     filled = np.full(len(seen), np.exp(np.log(np.maximum(noise, CLEANEST)).mean()))
     filled[seen] = noise
     return filled
+
+
+# --------------------------------------------------------------------------------------------------
+# Penalty continuation: fits while the physics weight rises.
+
+FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
+"""Physics weights of a fit of all terms, relative to the misfit of a plain regression."""
+WEIGHTS = (1e2, 1e4, 1e8)
+"""Physics weights of a search."""
+FINAL_WEIGHT = WEIGHTS[-1]
+"""Weight at which the law holds exactly for all that the data can tell."""
+
+
+def unpruned(problem: Problem, rows: Bools) -> tuple[Fit, bool]:
+    """Fit all terms of some rows of the library, (l,), while the physics weight rises.
+
+    And whether all fits converge. Many terms that the data hardly tell apart cannot be fitted at a
+    large weight: such a fit does not converge, and even those before it lean on the terms. Then the
+    first fit is the start.
+    """
+    collocation = problem.collocation(problem.segments())
+    control = fit_curves(collocation, problem.curves)
+    x, slope = collocation.node_states(control)
+    coefficients, terms = np.zeros(problem.known.shape), problem.terms(x)
+    left = slope - terms @ problem.known
+    coefficients[rows] = np.linalg.lstsq(terms[:, rows], left, rcond=problem.noise.min())[0]
+    active = rows[:, None] & problem.form.candidates
+    coefficients[~active] = 0.0
+    still, shared = np.zeros(problem.d, dtype=bool), problem.form.shared
+    state, fits = State(control, coefficients, active, np.zeros(problem.d), still, shared), []
+    for weight in FIRST_WEIGHTS:
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
+        state = fit.state
+        fits.append(fit)
+        if fit.status is not Status.CONVERGED:
+            return fits[0], False
+    return fit, True
+
+
+def leaves_something_over(problem: Problem, fit: Fit, chance: float = 0.1) -> bool:
+    """Would the other terms together explain more of the data than chance does?"""
+    searched = problem.form.searched
+    left_out = len(searched) - int(fit.state.free()[searched].sum())
+    if not left_out:
+        return False
+    _, gain = fit.collocation.linearise(fit.state, searched).newton()
+    return bool(gain > chdtri(left_out, chance))
+
+
+def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
+    """The fit of a state's terms while the physics weight rises to its last.
+
+    At that weight alone the law holds so exactly that a state far from the minimum creeps.
+    """
+    for weight in WEIGHTS:
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=10)
+        state = fit.state
+    return fit
 
 
 # --------------------------------------------------------------------------------------------------
