@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from vidsindy_lite.dynamics.smoothing import smooth
 
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
 from vidsindy_lite.dynamics.collocation import Status
@@ -13,7 +14,6 @@ from vidsindy_lite.dynamics.library import Library, shift_matrix
 from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, framed, select
 from vidsindy_lite.dynamics.problem import fit_curves, pose
-from vidsindy_lite.dynamics.smoothing import smooth
 from vidsindy_lite.dynamics.solver import accelerated, better, discover, unexplained
 from vidsindy_lite.study import SYSTEMS
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.interpolate import BSpline, make_smoothing_spline
+from vidsindy_lite.dynamics.smoothing import PENALTIES, _roughness, smooth
 
 from vidsindy_lite.dynamics.bspline import Grid, Segment, design_matrix
-from vidsindy_lite.dynamics.smoothing import PENALTIES, _roughness, smooth
 
 
 def wave(n):

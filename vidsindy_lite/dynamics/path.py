@@ -19,11 +19,11 @@ path around a law leads to that law.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import BSpline, CubicHermiteSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
@@ -431,10 +431,7 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
     """The fit with these gaps crossed, or those of them that the data allow."""
     law = problem.law(fit.state).shift(fit.state.offset)
     splines = fit.collocation.grid.splines(fit.state.control_points)
-    joined, curves = join(
-        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing,
-        problem.jumps,
-    )  # fmt: skip
+    joined, curves = join(problem, fit.collocation.segments, splines, law, group)
     bridged = problem.collocation(joined)
     start = replace(fit.state, control_points=fit_curves(bridged, curves))
     trial = tightened(problem, bridged, start)
@@ -484,116 +481,59 @@ def gaps(segments: Sequence[Segment]) -> list[Gap]:
     return sorted(lengths, key=lengths.__getitem__)
 
 
-@dataclass(frozen=True)
-class Joined:
-    """A curve made of splines, with the gaps between them crossed by a law.
+def cross(law: PolynomialSystem, left: BSpline, right: BSpline, spacing: float) -> BSpline:
+    """The motion from the end of a curve to where the next one begins.
 
-    Parameters
-    ----------
-    splines : sequence of scipy.interpolate.BSpline
-        Pieces in the order of time, with values of shape (d,).
-    law : PolynomialSystem
-        Integrated forward from the left end and backward from the right end of each gap; the two
-        are blended linearly.
+    The law is integrated from both sides, and the two are blended linearly.
     """
-
-    splines: Sequence[BSpline]
-    law: PolynomialSystem
-
-    def __call__(self, t: Floats) -> Floats:
-        """Evaluate at increasing times, shape (n, d)."""
-        values = np.empty((len(t), self.law.d))
-        ends = [(spline.t[0], spline.t[-1]) for spline in self.splines]
-        for (low, high), spline in zip(ends, self.splines, strict=True):
-            inside = (t >= low) & (t <= high)
-            values[inside] = spline(t[inside])
-        crossed = [(low, high) for (_, low), (high, _) in zip(ends[:-1], ends[1:], strict=True)]
-        inside = [(t > low) & (t < high) for low, high in crossed]
-        steps = 1 + max(rows.sum() for rows in inside)
-        forward, backward = self._crossings(np.array(crossed), steps)
-        for (low, high), rows, left, right in zip(crossed, inside, forward, backward, strict=True):
-            share = (t[rows] - low) / (high - low)
-            values[rows] = (1 - share[:, None]) * left(share) + share[:, None] * right(1 - share)
-        return values
-
-    def _crossings(
-        self, crossed: Floats, steps: int
-    ) -> tuple[list[CubicHermiteSpline], list[CubicHermiteSpline]]:
-        """Each gap from its left and from its right end, as functions of the share covered."""
-        x0 = np.array(
-            [spline(low) for spline, (low, _) in zip(self.splines[:-1], crossed, strict=True)]
-            + [spline(high) for spline, (_, high) in zip(self.splines[1:], crossed, strict=True)]
-        )
-        length = np.diff(crossed)
-        pace = np.concatenate([length, -length])
-        share = np.linspace(0, 1, steps + 1)
-
-        def rate(x: Floats) -> Floats:
-            return pace * self.law(x)
-
-        with np.errstate(over="ignore", invalid="ignore"):
-            paths = runge_kutta_4(rate, share, x0, substeps=1)
-            slopes = np.array([rate(x) for x in paths])
-        # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
-        lost = ~(np.isfinite(paths) & np.isfinite(slopes)).all(axis=(0, 2))
-        paths[:, lost], slopes[:, lost] = x0[lost], 0.0
-        curves = [CubicHermiteSpline(share, paths[:, i], slopes[:, i]) for i in range(len(x0))]
-        return curves[: len(crossed)], curves[len(crossed) :]
+    low, high = left.t[-1], right.t[0]
+    t, ends = np.linspace(low, high, 4 + 4 * int((high - low) / spacing)), [left(low), right(high)]
+    onward = np.array([[1.0], [-1.0]])
+    with np.errstate(over="ignore", invalid="ignore"):
+        paths = runge_kutta_4(lambda x: onward * law(x), t, np.array(ends), substeps=1)
+    # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
+    paths = np.where(np.isfinite(paths).all(axis=(0, 2))[:, None], paths, ends)
+    share = np.linspace(0, 1, len(t))[:, None]
+    return make_interp_spline(t, (1 - share) * paths[:, 0] + share * paths[::-1, 1])
 
 
 def join(
-    segments: Sequence[Segment],
-    splines: Sequence[BSpline],
-    bridged: Sequence[Gap],
-    trajectories: Sequence[Trajectory],
-    law: PolynomialSystem,
-    spacing: float,
-    jumps: Sequence[Floats] | None = None,
-) -> tuple[list[Segment], list[BSpline | Joined]]:
-    """Join segments across the named gaps.
+    problem: Problem, segments: Sequence[Segment], splines: Sequence[BSpline],
+    law: PolynomialSystem, bridged: Sequence[Gap],
+) -> tuple[list[Segment], list[Callable[[Floats], Floats]]]:  # fmt: skip
+    """Join segments across the named gaps, with a first curve for each.
 
     Parameters
     ----------
+    problem : Problem
+        With all data, also samples that were too few to make a segment of their own.
     segments, splines
         The present pieces and their fitted curves.
+    law : PolynomialSystem
+        In the frame of the data.
     bridged : sequence of Gap
         Which gaps to cross.
-    trajectories : sequence of Trajectory
-        All data, including samples that were too few to make a segment of their own.
-    law : PolynomialSystem
-        The law, in the frame of the trajectories.
-    spacing : float
-        Length of a knot span.
-    jumps : sequence of ndarray, optional
-        Times of each trajectory at which a slope may jump.
-
-    Returns
-    -------
-    segments : list of Segment
-    curves : list of callable
-        A first curve for each of them.
     """
-    groups: list[list[int]] = []
-    for i, segment in enumerate(segments):
-        left = segments[i - 1]
-        if i and left.trajectory == segment.trajectory and (left.trajectory, left.t[-1]) in bridged:
-            groups[-1].append(i)
+    joined: list[Segment] = []
+    curves: list[list[BSpline]] = []
+    for segment, spline in zip(segments, splines, strict=True):
+        if joined and (joined[-1].trajectory, joined[-1].t[-1]) in bridged:
+            (t, x), k = problem.trajectories[segment.trajectory], segment.trajectory
+            inside = (t >= joined[-1].t[0]) & (t <= segment.t[-1])
+            joined[-1] = Segment.even(t[inside], x[inside], problem.spacing, k, problem.jumps[k])
+            curves[-1] += [cross(law, curves[-1][-1], spline, problem.spacing), spline]
         else:
-            groups.append([i])
-    joined, curves = [], []
-    for group in groups:
-        first, last = segments[group[0]], segments[group[-1]]
-        if len(group) == 1:
-            joined.append(first)
-            curves.append(splines[group[0]])
-            continue
-        t, x = trajectories[first.trajectory]
-        inside = (t >= first.t[0]) & (t <= last.t[-1])
-        kinks = None if jumps is None else jumps[first.trajectory]
-        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory, kinks))
-        curves.append(Joined([splines[i] for i in group], law))
-    return joined, curves
+            joined.append(segment)
+            curves.append([spline])
+    return joined, [_end_to_end(pieces) for pieces in curves]
 
 
-# --------------------------------------------------------------------------------------------------
-# How a discovery went: the steps of its fits, in the order of time.
+def _end_to_end(pieces: Sequence[BSpline]) -> Callable[[Floats], Floats]:
+    """Curves one after the other as a function of increasing times, (n,)."""
+    ends = [piece.t[-1] for piece in pieces[:-1]]
+
+    def states(t: Floats) -> Floats:
+        parts = np.split(t, np.searchsorted(t, ends, side="right"))
+        return np.concatenate([piece(part) for piece, part in zip(pieces, parts, strict=True)])
+
+    return states
