@@ -39,7 +39,7 @@ def test_what_no_shift_has_changed_stays_however_large_the_errors_that_are_toler
     law = np.array([[0, 0], [0, -1], [1, 0], [0, 0], [0, 0], [0, 0]], float)
     grid = problem.collocation(problem.segments())
     control = fit_curves(grid, problem.curves)
-    state = State(control, law, law != 0, problem.home, np.zeros(2, dtype=bool))
+    state = State(control, law, law != 0, problem.origin, np.zeros(2, dtype=bool))
     fit = problem.weighted(grid, FINAL_WEIGHT).solve(state)
     path = follow(problem, fit)
     tolerant = tuple(

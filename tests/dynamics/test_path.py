@@ -194,7 +194,7 @@ def test_axes_that_moved_for_nothing_come_home_if_the_fit_has_converged():
     collocation = problem.weighted(problem.collocation(problem.segments()), paths.FINAL_WEIGHT)
     control = fit_curves(collocation, problem.curves)
     active = CIRCLE.support
-    state = State(control, 0.0 * active, active, problem.home, np.ones(2, dtype=bool))
+    state = State(control, 0.0 * active, active, problem.origin, np.ones(2, dtype=bool))
     start = collocation.solve(state)
     moved = paths.select(problem, start, paths.FINAL_WEIGHT, "moved", history)
     assert moved.state.moving.all()

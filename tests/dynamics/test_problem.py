@@ -1,4 +1,4 @@
-"""A posed problem: its knots, prices, weights, and what a candidate for its law costs."""
+"""A posed problem: its knots, penalties, weights, and what a candidate for its law costs."""
 
 from dataclasses import replace
 from itertools import product
@@ -9,7 +9,7 @@ import pytest
 from helpers import posed
 
 from vidsindy_lite.dynamics.collocation import Fit, State, Status
-from vidsindy_lite.dynamics.frames import as_shifted, cheapest_at, closed, nearer_home
+from vidsindy_lite.dynamics.frames import as_shifted, cheapest_at, closed, with_fewer_axes
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.noise import residual_noise
@@ -59,9 +59,10 @@ def test_the_noise_of_a_residual_counts_the_freedom_that_was_used():
     np.testing.assert_allclose(residual_noise(fit), expected)
 
 
-def test_an_origin_comes_with_all_ways_of_putting_axes_home():
-    home, origin = np.array([0.0, 1.0, 2.0]), np.array([5.0, 1.0, 7.0])
-    variants = {(tuple(o), tuple(m)) for o, m in nearer_home(SimpleNamespace(home=home), origin)}
+def test_an_origin_comes_with_all_ways_of_giving_its_axes_back():
+    given, origin = np.array([0.0, 1.0, 2.0]), np.array([5.0, 1.0, 7.0])
+    problem = SimpleNamespace(origin=given)
+    variants = {(tuple(o), tuple(m)) for o, m in with_fewer_axes(problem, origin)}
     assert variants == {
         ((5, 1, 7), (True, False, True)),
         ((5, 1, 2), (True, False, False)),
@@ -78,7 +79,7 @@ def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
     state = replace(fit.state, active=linear, coefficients=0.1 * linear, offset=np.zeros(2))
     whole = closed(problem, replace(fit, state=state), 1e2)
     law = as_shifted(problem, whole)
-    origin = np.where(moving, (0.3, -0.2), problem.home)
+    origin = np.where(moving, (0.3, -0.2), problem.origin)
     candidate = cheapest_at(problem, whole, law, (origin, np.array(moving)))
 
     coefficients, information, gradient = law.at(origin)

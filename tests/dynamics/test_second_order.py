@@ -234,12 +234,12 @@ def test_axes_leave_home():
         active[:, 2 + j] = own & (powers[:, 2 + j] <= 1)
     collocation = problem.weighted(problem.collocation(problem.segments()), FINAL_WEIGHT)
     control = fit_curves(collocation, problem.curves)
-    state = State(control, 0.0 * active, active, problem.home, np.zeros(4, dtype=bool))
-    at_home = select(problem, collocation.solve(state), FINAL_WEIGHT, "at home", History())
-    unfinished = replace(at_home, status=Status.MAX_STEPS)
+    state = State(control, 0.0 * active, active, problem.origin, np.zeros(4, dtype=bool))
+    at_origin = select(problem, collocation.solve(state), FINAL_WEIGHT, "at home", History())
+    unfinished = replace(at_origin, status=Status.MAX_STEPS)
     assert framed(problem, unfinished, History()) is unfinished  # its terms tell nothing
-    fit = framed(problem, at_home, History())
-    assert at_home.state.active.sum() == 10
+    fit = framed(problem, at_origin, History())
+    assert at_origin.state.active.sum() == 10
     assert fit.state.active.sum() == 6
     assert problem.units.point(fit.state.offset)[:2] == pytest.approx(rest, abs=1e-4)
 

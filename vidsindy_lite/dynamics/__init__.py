@@ -2,8 +2,8 @@
 
 ::
 
-    prepare   `data` (checked trajectories, units), `smoothing`, `problem` (standard units, prices),
-              `noise` (variance components: errors that last, precision, process noise)
+    prepare   `data` (checked trajectories, units), `bspline` (smoothed curves), `problem` (standard
+              units, penalties), `noise` (variance components: errors that last, process noise)
     path      `collocation` (splines and a law, fitted by banded Gauss-Newton steps), `l0` (which
               terms a quadratic model needs), `frames` (the origin in which a law is sparsest),
               `path` (a first law at a large tolerated error, its support path, the law that
@@ -11,7 +11,7 @@
     infer     `inference` (error bars, the law in the frame of the data), `result` (`Discovery`)
     diagnose  `diagnostics` (each warning in words)
     below     `library` (candidate terms), `model` (systems, their integration, what a law may look
-              like), `bspline`
+              like)
     beside    `orientation` (axes in which a law is sparsest), `mechanics` (what a law says of a
               body), `homogeneous` (of one flight, the law that is the same at every place)
 """

@@ -3,7 +3,7 @@
 B-splines sum to one, so an offset added to the curve is redundant. It matters when the library is
 evaluated at ``x - offset``: then it is the origin of the law's own frame. What a move of the origin
 does to a polynomial law and to its information is exact, so that frames are compared by algebra: an
-axis off the data's origin is one more column of the L0 search, with a price of its own.
+axis off the data's origin is one more column of the L0 search, with a penalty of its own.
 """
 
 from __future__ import annotations
@@ -106,29 +106,29 @@ class ShiftedLaw:
 
 
 def together(problem: Problem, state: State) -> list[Origin]:
-    """Origins at which a term of a law vanishes, where motion is, and those with axes back home.
+    """Origins at which a term of a law vanishes, where motion is, and those with fewer free axes.
 
     Terms that a move brings in are the data's to decide on, while the origin moves.
     """
-    return [*_vanishing(problem, state, problem.form.movable), *nearer_home(problem, state.offset)]
+    return [*free_offsets(problem, state), *with_fewer_axes(problem, state.offset)]
 
 
 def one_by_one(problem: Problem, state: State) -> Iterator[Origin]:
-    """Origins at which a term of a law vanishes, one more axis off home."""
+    """Origins at which a term of a law vanishes, with one more free axis."""
     for axis in np.eye(problem.d, dtype=bool)[problem.form.movable]:
         yield from _vanishing(problem, state, axis)
 
 
-def away(problem: Problem, state: State) -> list[Origin]:
-    """Origins at which a term of a law vanishes, and the axes that are then off home."""
+def free_offsets(problem: Problem, state: State) -> list[Origin]:
+    """Origins at which a term of a law vanishes, and the axes that are then free."""
     return _vanishing(problem, state, problem.form.movable)
 
 
 def _vanishing(problem: Problem, state: State, movable: Bools) -> list[Origin]:
-    """Origins at which a term vanishes, moved along some of the axes that are at home."""
-    exponents, home = problem.exponents, movable & ~state.moving
-    frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), home)
-    below = divides(exponents, home) & ~np.eye(len(exponents), dtype=bool)
+    """Origins at which a term vanishes, moved along some of the axes that are not free."""
+    exponents, fixed = problem.exponents, movable & ~state.moving
+    frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), fixed)
+    below = divides(exponents, fixed) & ~np.eye(len(exponents), dtype=bool)
     low, high = problem.box
     found: list[Origin] = []
     entries = np.argwhere((state.active & (below @ state.active)).T)
@@ -141,11 +141,11 @@ def _vanishing(problem: Problem, state: State, movable: Bools) -> list[Origin]:
     return found
 
 
-def nearer_home(problem: Problem, origin: Floats) -> list[Origin]:
-    """An origin, and the same with some of its axes at home, where they cost nothing."""
-    home = problem.home
-    masks = itertools.product(*((True, False) if away else (False,) for away in origin != home))
-    return [(np.where(mask, origin, home), np.array(mask)) for mask in masks]
+def with_fewer_axes(problem: Problem, origin: Floats) -> list[Origin]:
+    """An origin, and the same with some of its axes at the data's, where they cost nothing."""
+    given = problem.origin
+    masks = itertools.product(*((True, False) if free else (False,) for free in origin != given))
+    return [(np.where(mask, origin, given), np.array(mask)) for mask in masks]
 
 
 def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
@@ -180,7 +180,7 @@ def cheapest_at(problem: Problem, whole: Fit, law: ShiftedLaw, origin: Origin) -
         information[np.ix_(columns, columns)],
         gradient[columns],
         coefficients.T.ravel()[columns],
-        problem.prices[columns],
+        problem.entry_penalties[columns],
         np.ones(len(columns), dtype=bool),
     )
     flat = np.append(np.zeros(whole.state.coefficients.size), place)
@@ -192,22 +192,22 @@ def cheapest_at(problem: Problem, whole: Fit, law: ShiftedLaw, origin: Origin) -
     return replace(whole, state=state, criterion=cost)
 
 
-def at_home(problem: Problem, fit: Fit) -> Fit:
+def at_origin(problem: Problem, fit: Fit) -> Fit:
     """The cheapest support where the data have their origin, from all terms of a fit."""
-    origin = problem.home, np.zeros(problem.d, dtype=bool)
+    origin = problem.origin, np.zeros(problem.d, dtype=bool)
     return cheapest_at(problem, fit, as_shifted(problem, fit), origin)
 
 
-def off_home(problem: Problem, state: State, model: Linearisation, tolerated: float) -> State:
-    """The state with the axis off home by which its law gains most, if that is worth it.
+def with_free_axis(problem: Problem, state: State, model: Linearisation, tolerated: float) -> State:
+    """The state with the free axis by which its law gains most, if that is worth its penalty.
 
-    Its terms were chosen at larger errors, at which it may have been too near home to tell. What it
-    gains has to be worth the price of an axis, and more than its place would be a coincidence.
+    Its terms were chosen at larger errors, which may not have told it from where the data have it.
+    What it gains has to be worth the penalty, and more than its place would be a coincidence.
 
     Parameters
     ----------
     problem : Problem
-        Its prices.
+        Its penalties.
     state : State
         Of the last fit.
     model : Linearisation
@@ -226,7 +226,7 @@ def off_home(problem: Problem, state: State, model: Linearisation, tolerated: fl
 def freed(
     problem: Problem, state: State, model: Linearisation, tolerated: float
 ) -> Iterator[tuple[int, float, float, Floats]]:
-    """Axes at home, what the law would gain if each alone left, and what a place is worth.
+    """Axes that are not free, what the law would gain if one were, and what a place is worth.
 
     That is twice the logarithm of how much wider the box of the data is than the origin is
     uncertain. And what the move does to the law in the frame of the data, (l, d). Without those
@@ -235,7 +235,7 @@ def freed(
     low, high = problem.box
     own = np.flatnonzero(state.free()[model.columns])
     generators = shift_generators(problem.exponents)
-    forth = shift_matrix(problem.exponents, state.offset - problem.home)
+    forth = shift_matrix(problem.exponents, state.offset - problem.origin)
     for axis in np.flatnonzero(problem.form.movable & ~state.moving).tolist():
         rate = -generators[axis] @ state.coefficients
         rows = np.eye(len(model.columns))[own]

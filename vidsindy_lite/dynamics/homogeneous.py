@@ -151,8 +151,8 @@ def homogeneous(
     wanted = numbers >= 2 * m  # force and drag
     if np.diag(departure)[wanted].sum() > np.diag(covariance)[wanted].sum():
         covariance = departure
-    price = chdtri(1, FALSE_ALARM / (2 * m))
-    kept = flight.free & ((flight.theta**2 > price * np.diag(covariance)) | (numbers < 2 * m))
+    penalty = chdtri(1, FALSE_ALARM / (2 * m))
+    kept = flight.free & ((flight.theta**2 > penalty * np.diag(covariance)) | (numbers < 2 * m))
     law = Flight.fitted(since, x, kept)
     for mode in () if systematic is None else systematic:
         moved = Flight.fitted(since, x + mode, kept).theta - law.theta
@@ -168,19 +168,19 @@ def homogeneous(
         )
         for j in range(found.system.d)
     )
-    return replace(found, warnings=_doubt(flight, richer, price), path=path)
+    return replace(found, warnings=_doubt(flight, richer, penalty), path=path)
 
 
 def _departure(flight: Flight, richer: Flight) -> Floats:
     """Mean products of what the numbers of a richer law are off those of a flight."""
-    away = richer.theta - flight.theta
-    return (richer.covariance + np.outer(away, away)) * np.outer(flight.free, flight.free)
+    apart = richer.theta - flight.theta
+    return (richer.covariance + np.outer(apart, apart)) * np.outer(flight.free, flight.free)
 
 
-def _doubt(flight: Flight, richer: Flight, price: float) -> tuple[str, ...]:
+def _doubt(flight: Flight, richer: Flight, penalty: float) -> tuple[str, ...]:
     """Whether the next richer law fits better, and what it would be."""
     gained = (flight.left**2).sum() - (richer.left**2).sum()
-    if richer is flight or gained < price * richer.error**2 * inflation([richer.left]).max():
+    if richer is flight or gained < penalty * richer.error**2 * inflation([richer.left]).max():
         return ()
     pull, left, k = np.linalg.norm(richer.force), richer.error / flight.error, richer.theta[-1]
     if not k:

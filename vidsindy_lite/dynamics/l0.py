@@ -20,7 +20,7 @@ NONE = np.array([], dtype=int)
 """No entries."""
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
-PLATEAU = 1e-6
+NEGLIGIBLE = 1e-6
 """Changes of the function below this are taken for rounding."""
 MOST_CHANGES = 4
 """Most changes of a support on its way down, for each entry that there is."""
@@ -54,7 +54,7 @@ def subset_search(
     present : ndarray, shape (m,)
         ``p``; zeros for a plain regression.
     penalty : ndarray, shape (m,)
-        Price of each non-zero entry, in the units of the objective; minus infinity keeps it in.
+        Penalty of each non-zero entry, in the units of the objective; minus infinity keeps it in.
     start : ndarray of bool, shape (m,)
         First support.
 
@@ -227,11 +227,11 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
     best = model.fit(start)
     for _ in range(MOST_CHANGES * len(start)):
         change, dropped, added = _best_change(model, model.tableau(best))
-        if not change < -PLATEAU:
+        if not change < -NEGLIGIBLE:
             return best
         # Rounding may promise a fall that does not come: what counts is the value itself.
         fit = model.fit(_changed(best.support, dropped, added))
-        if not fit.value < best.value - PLATEAU:
+        if not fit.value < best.value - NEGLIGIBLE:
             return best
         best = fit
     return best
@@ -240,8 +240,8 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """A lower value reached by forcing one entry in, which may let others go.
 
-    Of those with which one of the others is not worth its price any more, as an update of rank one
-    tells.
+    Of those with which one of the others is not worth its penalty any more, as an update of rank
+    one tells.
     """
     tableau = model.tableau(best)
     room, response = np.maximum(tableau.room, COLLINEAR)[:, None], tableau.response
@@ -250,7 +250,7 @@ def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     lets_go = (lost < model.penalty[tableau.inside]).any(axis=1)
     for entry in tableau.outside[lets_go & ~np.isposinf(model.penalty[tableau.outside])].tolist():
         trial = _forced(model, best.support, entry)
-        if trial.value < best.value - PLATEAU:
+        if trial.value < best.value - NEGLIGIBLE:
             return _descend(model, trial.support)
     return None
 
@@ -319,16 +319,16 @@ class _Tableau:
 def _best_change(model: _Quadratic, tableau: _Tableau) -> Change:
     """The best of all drops, adds and swaps."""
     inside, outside, share = tableau.inside, tableau.outside, model.share
-    lost, price = tableau.fitted**2 / tableau.spread, model.penalty[outside]
+    lost, penalty = tableau.fitted**2 / tableau.spread, model.penalty[outside]
     loss = share * lost - model.penalty[inside]
-    cost = price - share * tableau.gained
+    cost = penalty - share * tableau.gained
     changes = [(np.inf, NONE, NONE)]
     if len(inside):
         changes.append((loss.min(), inside[[loss.argmin()]], NONE))
     if len(outside):
         changes.append((cost.min(), NONE, outside[[cost.argmin()]]))
     if len(inside) and len(outside):
-        swap = loss + price[:, None]
+        swap = loss + penalty[:, None]
         swap -= share * tableau.gained_after
         add, drop = divmod(int(swap.argmin()), len(inside))
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
@@ -390,14 +390,14 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
 # How likely a law is next to which a law's coefficients are elsewhere than their errors say.
 #
 # The standard errors of a law hold if its terms are the right ones. A law with one term more, one
-# less or one in place of another may fit a little worse, or better by less than the price of a
-# term, and have other coefficients: where a motion tells the sum of two dampings alone, the law
+# less or one in place of another may fit a little worse, or better by less than the penalty of
+# a term, and have other coefficients: where a motion tells the sum of two dampings alone, the law
 # that gives all of it to one of them has an error that is ten times too small. So the laws next to
 # a law are weighed by their evidence (Laplace's approximation; Madigan and Raftery 1994), and those
 # count that are far away in units of the errors that are told.
 
 
-def prior_prices(exponents: Ints) -> Floats:
+def prior_penalties(exponents: Ints) -> Floats:
     """Twice the log odds that an equation lacks a term of each kind, shape (l,).
 
     An equation has one linear term by expectation, half a quadratic one and so on, and a constant
@@ -410,7 +410,7 @@ def prior_prices(exponents: Ints) -> Floats:
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of columns that are combinations
 def far_neighbours(
-    information: Floats, gradient: Floats, present: Floats, price: Floats, support: Bools
+    information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
 ) -> tuple[float, Ints, Ints, int, float]:
     """The odds of the neighbours of a support that have other entries, and the likeliest of them.
 
@@ -418,7 +418,7 @@ def far_neighbours(
     ----------
     information, gradient, present : ndarray
         See `subset_search`; in units in which an entry is as large as 1.
-    price : ndarray, shape (m,)
+    penalty : ndarray, shape (m,)
         Twice the log odds that an entry is zero.
     support : ndarray of bool, shape (m,)
         Of which a neighbour has one entry more, one less or one in place of another.
@@ -444,22 +444,23 @@ def far_neighbours(
     # First axis: the entry that leaves, last of all none; second: the one that joins, likewise.
     leaves, none = np.eye(len(own) + 1, len(own), dtype=bool)[:, None], np.zeros((1, len(own)))
     out, gone = np.vstack([inverse / spread[:, None], none]), np.append(fitted, 0.0)[:, None]
-    lost = fitted**2 / spread + np.log(spread * scale[own] ** 2) - price[own]
+    lost = fitted**2 / spread + np.log(spread * scale[own] ** 2) - penalty[own]
     along = np.vstack([(response / spread).T, np.zeros((1, len(others)))])
     freed = along * np.append(spread, 0.0)[:, None]
     left = pull[others] - response @ pull[own] + along * gone
     room = 1 - (response * shared).sum(axis=1) + along * freed
     new = room > COLLINEAR
     step = np.where(new, left / room, 0.0)
-    joined = np.where(new, np.log(room / scale[others] ** 2) + price[others] - left * step, np.inf)
+    entered = np.log(room / scale[others] ** 2) + penalty[others] - left * step
+    joined = np.where(new, entered, np.inf)
     cost = np.append(lost, 0.0)[:, None] + np.hstack([joined, np.zeros((len(own) + 1, 1))])
     gives = np.concatenate([response - freed[:, :, None] * out[:, None], 0.0 * leaves], axis=1)
     values = (fitted - out * gone)[:, None] - gives * np.hstack([step, 0.0 * gone])[:, :, None]
     values = np.where(leaves, 0.0, values)
-    away = np.abs(values - fitted) / np.sqrt(spread)
+    apart = np.abs(values - fitted) / np.sqrt(spread)
     weight = np.exp((cost.min() - cost) / 2)
-    weight = np.where((away > FAR).any(axis=2), weight / weight.sum(), 0.0)
+    weight = np.where((apart > FAR).any(axis=2), weight / weight.sum(), 0.0)
     drop, add = np.unravel_index(weight.argmax(), weight.shape)
-    entry = int(away[drop, add].argmax())
+    entry = int(apart[drop, add].argmax())
     value = float(values[drop, add, entry] * scale[own[entry]])
     return float(weight.sum()), own[drop : drop + 1], others[add : add + 1], int(own[entry]), value

@@ -18,7 +18,7 @@ from .bspline import Segment
 from .collocation import CLEANEST, Collocation, Fit, State
 from .data import CHANCE, autocovariances, inflation
 from .l0 import LEAST
-from .problem import COARSE, Problem, fit_curves, spread_to_unseen, unpruned
+from .problem import COARSE, FINAL_WEIGHT, Problem, fit_curves, spread_to_unseen, unpruned
 
 # --------------------------------------------------------------------------------------------------
 # How large the errors of the data are, as a fitted curve leaves them, and how long they last.
@@ -190,7 +190,7 @@ def smoother_weights(problem: Problem) -> Problem:
     residual = np.nan_to_num(np.concatenate(left_over))
     observed = np.isfinite(np.concatenate([x for _, (_, x) in problem.stretches]))
     signal, speed = np.concatenate(path, axis=1)
-    causes = [(signal - problem.home) ** 2, speed**2]  # what the variance of the noise may follow
+    causes = [(signal - problem.origin) ** 2, speed**2]  # what the variance of the noise may follow
     spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(observed.sum(axis=0), 1))
     factors, noise = np.ones_like(residual), problem.noise.copy()
     for j in np.flatnonzero(spread > 1e-4):  # below are the errors of splines
@@ -268,8 +268,6 @@ def _variance(residual: Floats, causes: Floats, updates: int = 60) -> tuple[floa
 
 PROBES = 8
 """Random vectors of a trace (Hutchinson): they leave an error of a hundredth at 1,500 samples."""
-HARDEST = 1e8
-"""Physics weight, relative to the misfit of a plain regression, that leaves no room for kicks."""
 OCTAVE = 8
 """Frequencies of the lowest band of a spectrum; each next one has twice as many."""
 
@@ -324,7 +322,7 @@ def _free(problem: Problem) -> Bools:
 
 def _hard_where_known(collocation: Collocation, free: Bools) -> Collocation:
     """What is known of a law (the slope of a position is the velocity) holds exactly."""
-    hard = HARDEST * collocation.physics_weights
+    hard = FINAL_WEIGHT * collocation.physics_weights
     return collocation.weighted(
         collocation.data_weights, np.where(free, collocation.physics_weights, hard)
     )
@@ -342,7 +340,7 @@ def evidence(fit: Fit) -> float:
 def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
     """The exact law on other knots, at the errors that it leaves."""
     grid = problem.collocation(segments, residual_noise(fit))
-    exact = problem.weighted(grid, HARDEST).solve(_on_knots(grid, fit))
+    exact = problem.weighted(grid, FINAL_WEIGHT).solve(_on_knots(grid, fit))
     own = exact.collocation.weighted(residual_noise(exact) ** -2, exact.collocation.physics_weights)
     return own.solve(exact.state)
 
@@ -369,7 +367,7 @@ def _balanced(
     free, told = _free(problem), problem.measured_errors
     grid, d = collocation.grid, collocation.d
     probes = rng.choice([-1.0, 1.0], (grid.r * d, PROBES))
-    hardest = HARDEST * collocation.physics_weights
+    hardest = FINAL_WEIGHT * collocation.physics_weights
     unfitted = len(grid.node_weights) - state.active.sum(axis=0)
     for _ in range(updates):
         fit = collocation.solve(state, tolerance=1.0, max_steps=10)

@@ -211,7 +211,7 @@ def _turns(problem: Problem, state: State) -> Floats:
         generator = np.zeros((m, m))
         generator[[i, j], [j, i]] = 1.0, -1.0
         turn = np.kron(np.eye(problem.d // m), generator) * scale / scale[:, None]
-        moved = np.einsum("njk,nk->nj", slopes, (y + state.offset - problem.home) @ turn.T)
+        moved = np.einsum("njk,nk->nj", slopes, (y + state.offset - problem.origin) @ turn.T)
         change = np.linalg.pinv(values) @ (values @ law @ turn.T - moved)
         changes.append(np.append(change.T, np.zeros(problem.d)))
     return np.column_stack(changes)

@@ -3,10 +3,10 @@
 One objective, in standard units, with ``s`` the error that is tolerated over that of the data::
 
     J_s = s^-2 (sum w r^2 / sigma^2 + sum |x' - Theta(x - Delta) Lambda|^2 / q)
-          + price (|Lambda|_0 + |Delta|_0)
+          + penalty (|Lambda|_0 + |Delta|_0)
 
 A smooth error of a thousandth (of an integrator, of a lens) is a small change of the law: terms
-that no noise model refuses, each worth its price. Raise the error that is tolerated, and the law
+that no noise model refuses, each worth its penalty. Raise the error that is tolerated, and the law
 changes at every step until only the terms remain that the motion needs; then it stays the same over
 a wide range. So each equation has a *path* of laws over ``s``, and the widest plateau, in decades,
 is the law (stability selection). To tolerate an error is to divide the quadratic model of a fit by
@@ -29,8 +29,17 @@ from ..arrays import Bools, Floats
 from .bspline import Segment
 from .collocation import Fit, State, Status
 from .data import Trajectory
-from .frames import Origin, as_shifted, at_home, cheapest_at, closed, off_home, one_by_one, together
-from .l0 import PLATEAU, inverse, minimiser, subset_path, subset_search
+from .frames import (
+    Origin,
+    as_shifted,
+    at_origin,
+    cheapest_at,
+    closed,
+    one_by_one,
+    together,
+    with_free_axis,
+)
+from .l0 import NEGLIGIBLE, inverse, minimiser, subset_path, subset_search
 from .model import PolynomialSystem, runge_kutta_4
 from .noise import (
     CONSISTENT,
@@ -74,13 +83,13 @@ def follow(problem: Problem, fit: Fit) -> Path:
     Parameters
     ----------
     problem : Problem
-        Its prices.
+        Its penalties.
     fit : Fit
         Around which.
     """
     model, terms_end = problem.model(fit), len(problem.form.searched)
     columns = model.columns
-    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
+    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
     own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))
     single = np.full(problem.d, own) if problem.kicked else residual_noise(fit)
@@ -99,7 +108,7 @@ def follow(problem: Problem, fit: Fit) -> Path:
     functions = [
         (m.information, m.gradient, share) for m, share in zip(tolerating, shares, strict=True)
     ]
-    searched = subset_path(functions, present, prices, support)
+    searched = subset_path(functions, present, penalties, support)
     for low, high, support in zip(lows, highs, searched, strict=True):
         active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
         active.flat[problem.form.searched] = support[:terms_end]
@@ -140,7 +149,7 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
             continue
         whole, _ = unpruned(part, rows)
         history.add("all terms", part, whole, FIRST_WEIGHTS[-1])
-        fit = at_home(part, whole)
+        fit = at_origin(part, whole)
         for weight in WEIGHTS:
             fit = select(part, fit, weight, "subset search", history)
         found.append(framed(part, fit, history))
@@ -183,20 +192,20 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
 
     best = refit(start.state)
     history.add(stage, problem, best, weight)
-    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
+    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))
     for _ in range(LONGEST_SEARCH):
         state = best.state
         columns = problem.columns(state)
         model = weighted.linearise(state, columns)
         support, solution, _ = subset_search(
-            model.information, model.gradient, state.flat()[columns], prices[columns],
+            model.information, model.gradient, state.flat()[columns], penalties[columns],
             state.free()[columns],
         )  # fmt: skip
         if (support == state.free()[columns]).all():
             break
         promised = model.along(state, solution - state.flat()[columns], 1.0)
         trial = refit(replace(promised, active=promised.coefficients != 0))
-        if not trial.criterion < best.criterion - PLATEAU or history.over:
+        if not trial.criterion < best.criterion - NEGLIGIBLE or history.over:
             break
         best = trial
         history.add(stage, problem, best, weight)
@@ -233,7 +242,7 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
         return fit
     start = start.collocation.solve(start.state)  # its curve is still that of the frame before
     trial = select(problem, start, FINAL_WEIGHT, "another frame", history)
-    cheaper = trial.criterion < fit.criterion - PLATEAU
+    cheaper = trial.criterion < fit.criterion - NEGLIGIBLE
     return trial if cheaper and problem.holds_origin(trial.state.offset) else fit
 
 
@@ -252,7 +261,7 @@ def persistent(
         A first law.
     history : History
     free : bool
-        Whether an axis that is at home by chance may leave it.
+        Whether an axis that is where the data have it by chance may be freed.
 
     Returns
     -------
@@ -280,7 +289,7 @@ def persistent(
         elif not crossed:
             fit, crossed = bridged(problem, fit), True
         else:
-            state = off_home(problem.cautious, fit.state, path.model, path.tolerated)
+            state = with_free_axis(problem.cautious, fit.state, path.model, path.tolerated)
             if not free or state is fit.state:
                 return fit, path, fit.status is Status.CONVERGED
             fit = replace(fit, state=state)
@@ -447,7 +456,7 @@ def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
 
 
 def information_criterion(problem: Problem, fit: Fit) -> float:
-    """What a law costs whose noise is its own: n log variance, and the price of its terms.
+    """What a law costs whose noise is its own: n log variance, and the penalty of its terms.
 
     The lower, the better (Bayesian information criterion); of laws of the same data. Measurements
     that are dropped are as likely anywhere in the spread of the data.
@@ -458,7 +467,7 @@ def information_criterion(problem: Problem, fit: Fit) -> float:
     single = (
         np.hypot(problem.noise, problem.process_noise) if problem.kicked else residual_noise(fit)
     )
-    return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.price(fit.state)
+    return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.penalty(fit.state)
 
 
 # --------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """The problem that a discovery solves: the data in standard units, and what is known before a law.
 
 In standard units every coordinate has mean 0 and variance 1, and time runs so that the
-root-mean-square speed is 1. `pose` makes it from data: units, gaps, the noise, prices, and first
+root-mean-square speed is 1. `pose` makes it from data: units, gaps, the noise, penalties, and first
 guesses of the states that nobody has measured.
 """
 
@@ -29,16 +29,16 @@ FALSE_ALARM = 0.02
 about the fewest wrong terms (notebook 04)."""
 SURE = 0.004
 """The same where samples share errors, which look like evidence for small terms, and elsewhere for
-a law that is not to be doubted: a term that is only worth the price above is told."""
+a law that is not to be doubted: a term that is only worth the penalty above is told."""
 OFFSET_PENALTY = 0.95
-"""Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
+"""Penalty of a free axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 COARSE = 20
 """Samples a turn from which on a curve tells the noise to a tenth, and kicks from a drive."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One discovery's data and prices; all but ``measured`` in standard units.
+    """One discovery's data and penalties; all but ``measured`` in standard units.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Problem:
     form : Form
         Which terms the law may have, and which it has.
     penalties : ndarray, shape (l,)
-        Price of a term; see `term_penalties`.
+        Penalty of a term; see `term_penalties`.
     slack : ndarray, shape (d,)
         Misfit of a plain regression on the smoothed curves: the scale of physics weights.
     process_noise : ndarray, shape (d,)
@@ -121,7 +121,7 @@ class Problem:
         return self.form.known / self.units.factors(self.exponents)
 
     @property
-    def prices(self) -> Floats:
+    def entry_penalties(self) -> Floats:
         """The penalties of all terms, equation by equation, shape (l d,)."""
         return np.tile(self.penalties, self.d)
 
@@ -132,7 +132,7 @@ class Problem:
 
     @property
     def cautious(self) -> Problem:
-        """The same at the prices of `SURE`, at which a law is compared with its rivals."""
+        """The same at the penalties of `SURE`, at which a law is compared with its rivals."""
         equations = self.measured[0][1].shape[1]
         return replace(self, penalties=term_penalties(self.exponents, equations, SURE))
 
@@ -146,7 +146,7 @@ class Problem:
         return fit.collocation.linearise(fit.state, self.columns(fit.state))
 
     @property
-    def home(self) -> Floats:
+    def origin(self) -> Floats:
         """The origin of the data's frame, shape (d,)."""
         return self.units.standard(np.zeros(self.d))
 
@@ -154,24 +154,24 @@ class Problem:
     def box(self) -> tuple[Floats, Floats]:
         """Corners of the box in which a law has its origin, each (d,).
 
-        It holds the data and home, and a spread more: a motion need not pass its centre.
+        It holds the data and their origin, and a spread more: a motion need not pass its centre.
         """
         x = np.concatenate([values for _, (_, values) in self.stretches])
-        movable, home = self.form.movable, self.home
+        movable, given = self.form.movable, self.origin
         low, high = (
-            np.where(movable, extreme(extreme.reduce(x), home) + more, home)
+            np.where(movable, extreme(extreme.reduce(x), given) + more, given)
             for extreme, more in ((np.fmin, -1.0), (np.fmax, 1.0))
         )
         return low, high
 
     def holds_origin(self, origin: Floats) -> bool:
-        """Whether an origin is in the box of data and home."""
+        """Whether an origin is in the box of the data and their origin."""
         low, high = self.box
         return bool(((low <= origin) & (origin <= high)).all())
 
     @property
     def axis_penalty(self) -> float:
-        """Price of an axis along which the law's origin is not at home."""
+        """Penalty of an axis along which the law's origin is not that of the data."""
         return float(OFFSET_PENALTY * self.penalties[0])
 
     @property
@@ -249,11 +249,11 @@ class Problem:
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
-        return collocation.objective(state) + self.price(state)
+        return collocation.objective(state) + self.penalty(state)
 
-    def price(self, state: State) -> float:
+    def penalty(self, state: State) -> float:
         """The penalties of the terms and axes of a law."""
-        terms = self.prices @ state.free()[: len(self.prices)]
+        terms = self.entry_penalties @ state.free()[: len(self.entry_penalties)]
         return float(terms + self.axis_penalty * state.moving.sum())
 
     def law(self, state: State) -> PolynomialSystem:
@@ -278,7 +278,7 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
 def term_penalties(
     exponents: Ints, equations: int | None = None, false_alarm: float = FALSE_ALARM
 ) -> Floats:
-    """Price of a term of each kind: how much of the chi-square it has to explain, shape (l,).
+    """Penalty of a term of each kind: how much of the chi-square it has to explain, shape (l,).
 
     Half of the chance of a false alarm goes to the constants, half of the rest to the linear
     terms, and so on; the terms of one degree in all equations share evenly (Bonferroni). So a term
@@ -506,7 +506,7 @@ def pose(
     sigma: list[Floats] | None = None,
     through: bool = False,
 ) -> Problem:
-    """Pose the problem of a discovery: standard units, gaps, noise, prices.
+    """Pose the problem of a discovery: standard units, gaps, noise, penalties.
 
     The noise is as given by ``sigma``, (n, d) for each trajectory, or as the smoothing estimates;
     the curves are smoothed, or go ``through`` the samples.

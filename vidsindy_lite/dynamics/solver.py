@@ -1,7 +1,7 @@
 """Spline-enhanced sparse regression: a noisy trajectory goes in, the governing equations come out.
 
 The objective is the paper's (Eqs. 8-9): data loss of a cubic B-spline, physics loss at collocation
-points, a price per term. What differs is how it is minimised: banded Gauss-Newton steps with the
+points, a penalty per term. What differs is how it is minimised: banded Gauss-Newton steps with the
 curve eliminated (`collocation`), a search over supports in the small algebra that remains
 (`l0`), the offset as the origin in which the law is sparsest (`frames`), a physics weight
 that is raised until the law holds exactly, and an error that is tolerated (`path`). Nothing is set
