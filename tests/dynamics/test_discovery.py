@@ -157,18 +157,6 @@ def test_steps_are_timed_from_the_beginning():
     assert 0 <= seconds[0] <= seconds[-1] <= ended
 
 
-def test_turns_are_counted_from_the_first_sample_to_the_last():
-    law = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
-    t = np.linspace(0, 5, 100)
-    x = law.simulate(t, (1.0, 0.0))
-    told = [
-        [text for text in discover(times, x, degree=1).warnings if "turns of the motion" in text]
-        for times in (t, t + 50)
-    ]
-    assert len(told[0]) == 1
-    assert told[1] == told[0]
-
-
 def test_a_curve_forgives_the_rounding_of_its_ends_in_proportion_to_its_length(found):
     low, high = found.curves[0].t[[0, -1]]
     near, far = (share * (high - low) for share in (1e-10, 1e-6))

@@ -1,18 +1,17 @@
 """The path of laws: a first law, smooth errors, plateaus that compete, and which law persists."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import path as paths
-from vidsindy_lite.dynamics.collocation import Collocation, Fit, State, Status
+from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.data import check_trajectory
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form, PolynomialSystem
-from vidsindy_lite.dynamics.path import LARGEST, History, Path, Plateau
+from vidsindy_lite.dynamics.path import LARGEST, History
 from vidsindy_lite.dynamics.problem import fit_curves, pose
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
@@ -44,10 +43,6 @@ def drifting(t, x, share):
     """A slow wander, less than one period over all the record."""
     wander = np.stack([np.sin(2 * np.pi * (0.7 * t / t[-1] + phase)) for phase in (0.1, 0.6)], 1)
     return x + share * x.std(axis=0) * wander
-
-
-def test_a_plateau_is_measured_in_decades():
-    assert Plateau(0, 0.01, 1.0, np.ones(3, dtype=bool)).decades == pytest.approx(2)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.2])
@@ -158,11 +153,6 @@ def posed(times, degree=2):
     shared = [np.empty((*x.shape, 0)) for _, x in runs]
     form = Form.of(("x", "y"), Library.polynomial(degree))
     return pose(runs, shared, form, np.random.default_rng(0))
-
-
-def test_short_data_are_searched_as_they_are():
-    problem = posed([np.linspace(0, 20, 400)])
-    assert paths.enough(problem) is problem.stretches
 
 
 def test_of_long_data_each_stretch_gives_its_share(monkeypatch):
@@ -317,15 +307,6 @@ def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over(seed):
     found = discover(t[seen], x[seen], order=1)
     assert found.terms[np.flatnonzero(found.system.support[:, 0])[-1]] == "x^2"
     assert found.noise < 1e-3 * x.std()
-
-
-@pytest.mark.parametrize("high", [0.5, 0.05])
-def test_a_law_persists_if_no_other_plateau_is_wider(high):
-    terms = np.eye(2, dtype=bool)
-    rivals = Plateau(0, 0.01, high, terms[0]), Plateau(0, high, 1.0, terms[1])
-    path = Path(None, None, 0.01, 0.1, (rivals,))
-    fit = Fit(SimpleNamespace(active=terms[:1].T), None, Status.CONVERGED)
-    assert paths.has_terms(fit, path.widest()) is (high == 0.5)
 
 
 @pytest.mark.parametrize("rounds", [1, 2])

@@ -12,7 +12,6 @@ from vidsindy_lite.dynamics.collocation import Fit, State, Status
 from vidsindy_lite.dynamics.frames import as_shifted, cheapest_at, closed, with_fewer_axes
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form
-from vidsindy_lite.dynamics.noise import residual_noise
 from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, pose, term_penalties
 from vidsindy_lite.study import SYSTEMS
 
@@ -28,11 +27,6 @@ def fit_of(problem, moving=(True, False)):
     return Fit(state, collocation, Status.CONVERGED)
 
 
-@pytest.mark.parametrize(("noise", "spacing"), [(0.0, 1 / 16), (0.005, 1 / 16), (0.1, 1 / 5)])
-def test_knots_are_wider_where_there_is_noise(noise, spacing):
-    assert posed(noise).spacing == spacing
-
-
 @pytest.mark.parametrize("moving", [(False, False), (True, False), (True, True)])
 def test_the_criterion_adds_the_prices(moving):
     problem = posed(0.1)
@@ -41,22 +35,6 @@ def test_the_criterion_adds_the_prices(moving):
     price += sum(moving) * OFFSET_PENALTY * problem.penalties[0]
     expected = fit.collocation.objective(fit.state) + price
     assert problem.criterion(fit.collocation, fit.state) == pytest.approx(expected)
-
-
-def test_physics_weights_are_relative_to_the_slack():
-    problem = posed(0.1)
-    collocation = problem.weighted(fit_of(problem).collocation, 7.0)
-    np.testing.assert_allclose(collocation.physics_weights, 7 / problem.slack**2)
-    np.testing.assert_allclose(collocation.data_weights, 1 / problem.noise**2)
-
-
-def test_the_noise_of_a_residual_counts_the_freedom_that_was_used():
-    problem = posed(0.1)
-    fit = fit_of(problem)
-    residual, _ = fit.collocation.data_residual(fit.state.control_points)
-    free = 401 - ((fit.state.active.sum() + 1) / 2 + 1)
-    expected = np.sqrt((residual**2).sum(axis=0) / free)
-    np.testing.assert_allclose(residual_noise(fit), expected)
 
 
 def test_an_origin_comes_with_all_ways_of_giving_its_axes_back():

@@ -14,7 +14,7 @@ from vidsindy_lite.dynamics.library import Library, shift_matrix
 from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, framed, select
 from vidsindy_lite.dynamics.problem import fit_curves, pose
-from vidsindy_lite.dynamics.solver import accelerated, better, discover, unexplained
+from vidsindy_lite.dynamics.solver import accelerated, better, discover
 from vidsindy_lite.study import SYSTEMS
 
 
@@ -259,17 +259,6 @@ def test_an_order_that_is_none():
             discover(t, t[:, None] ** 2, order=order)
 
 
-def test_what_is_known_is_no_candidate():
-    form = Form.of(("x", "y"), Library.polynomial(2), 2)
-    assert form.names == ("x", "y", "vx", "vy")
-    assert not form.candidates[form.known != 0].any()
-    assert form.candidates.sum() == len(form.searched) == 2 * len(form.exponents)
-    first = Form.of(("x", "y", "z"), Library.polynomial(2))
-    assert first.candidates.all()
-    assert not first.known.any()
-    assert first.movable.all()
-
-
 def test_only_velocities_by_name_make_a_second_order():
     tied = {"x": {"vx": 1.0}, "vx": {"x": -1.0}}
     assert PolynomialSystem.from_terms(tied).order == 2
@@ -344,13 +333,6 @@ def test_which_of_two_laws_is_better():
     dense = PolynomialSystem(("x",), [[0], [1], [2], [3]], np.ones((4, 1)))
     assert better(replace(first, system=dense, native=dense), second).system.order == 2
     assert better(replace(first, system=dense, native=dense), doubtful).system.order == 1
-
-
-def test_too_few_points_explain_nothing():
-    assert np.isnan(unexplained(np.ones((4, 2)), np.ones((4, 1))))
-    line = np.arange(10.0)[:, None]
-    assert unexplained(line, 2 * line) < 1e-20
-    assert unexplained(line, np.ones((10, 1))) > 0.1
 
 
 @pytest.mark.parametrize("seed", [1, 5, 7])

@@ -439,7 +439,7 @@ class Wider:
         )
 
 
-def widened(problem: Problem, fit: Fit, budget: float = 2e7) -> Wider:
+def widened(problem: Problem, fit: Fit, budget: float = 5e6) -> Wider:
     """The last fit among terms beyond its library; of a fraction, in its numerators.
 
     The budget is of entries of the derivatives of the data, or the curve, in the further terms.
