@@ -11,8 +11,9 @@ from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.data import check_trajectory
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form, PolynomialSystem
-from vidsindy_lite.dynamics.path import LARGEST, History
-from vidsindy_lite.dynamics.problem import fit_curves, pose
+from vidsindy_lite.dynamics.path import LARGEST
+from vidsindy_lite.dynamics.problem import FINAL_WEIGHT, fit_curves, pose, unpruned
+from vidsindy_lite.dynamics.result import History
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
@@ -181,12 +182,12 @@ def test_all_data_decide_on_the_terms_of_a_part(monkeypatch):
 
 def test_axes_that_moved_for_nothing_come_home_if_the_fit_has_converged():
     problem, history = posed([np.linspace(0, 20, 400)]), History()
-    collocation = problem.weighted(problem.collocation(problem.segments()), paths.FINAL_WEIGHT)
+    collocation = problem.weighted(problem.collocation(problem.segments()), FINAL_WEIGHT)
     control = fit_curves(collocation, problem.curves)
     active = CIRCLE.support
     state = State(control, 0.0 * active, active, problem.origin, np.ones(2, dtype=bool))
     start = collocation.solve(state)
-    moved = paths.select(problem, start, paths.FINAL_WEIGHT, "moved", history)
+    moved = paths.select(problem, start, FINAL_WEIGHT, "moved", history)
     assert moved.state.moving.all()
     assert not paths.framed(problem, moved, history).state.moving.any()
     unfinished = replace(moved, status=Status.MAX_STEPS)
@@ -196,8 +197,6 @@ def test_axes_that_moved_for_nothing_come_home_if_the_fit_has_converged():
 @pytest.mark.parametrize("fails_at", [None, 1, 3])
 def test_terms_that_cannot_be_told_apart_are_searched_from_the_first_fit(monkeypatch, fails_at):
     problem = posed([np.linspace(0, 20, 400)])
-    collocation = problem.collocation(problem.segments())
-    control = fit_curves(collocation, problem.curves)
     solve, calls = Collocation.solve, []
 
     def solved(self, state, **options):
@@ -208,9 +207,9 @@ def test_terms_that_cannot_be_told_apart_are_searched_from_the_first_fit(monkeyp
 
     monkeypatch.setattr(Collocation, "solve", solved)
     every = np.ones(len(problem.exponents), dtype=bool)
-    _, weight = paths.unpruned(problem, collocation, control, every, History())
-    expected = paths.FIRST_WEIGHTS[-1 if fails_at is None else 0]
-    assert weight == expected
+    fit, converged = unpruned(problem, every)
+    assert converged is (fails_at is None)
+    assert fit.state.control_points is calls[-1 if converged else 0].state.control_points
     assert len(calls) == (4 if fails_at is None else fails_at + 1)
 
 

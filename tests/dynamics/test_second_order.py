@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from vidsindy_lite.dynamics.smoothing import smooth
 
 from vidsindy_lite.dynamics import Discovery, PolynomialSystem, State
+from vidsindy_lite.dynamics.bspline import smooth
 from vidsindy_lite.dynamics.collocation import Status
-from vidsindy_lite.dynamics.frames import away
+from vidsindy_lite.dynamics.frames import free_offsets
 from vidsindy_lite.dynamics.library import Library, shift_matrix
 from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, framed, select
@@ -209,16 +209,16 @@ def test_a_law_is_shortest_around_its_own_origin():
     for rest in (0.0, 0.7):
         law = shift_matrix(exponents, np.array([rest, 0])) @ coefficients
         state = State(np.zeros((4, 2)), law, law != 0, zeros, zeros.astype(bool))
-        found = away(problem, state)
+        found = free_offsets(problem, state)
         assert (len(found) > 0) == (rest > 0)
         if found:
             origin, off = found[0]
             assert origin == pytest.approx([rest, 0])
             assert off.tolist() == [True, False]
-        assert away(problem, replace(state, moving=np.array([True, False]))) == []
+        assert free_offsets(problem, replace(state, moving=np.array([True, False]))) == []
     outside = problem.box[1] * [1, 0] + [0.1, 0]  # no motion is there
     far = shift_matrix(exponents, outside) @ coefficients
-    assert away(problem, replace(state, coefficients=far, active=far != 0)) == []
+    assert free_offsets(problem, replace(state, coefficients=far, active=far != 0)) == []
 
 
 def test_axes_leave_home():

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
-from vidsindy_lite.dynamics.smoothing import PENALTIES, _roughness, smooth
 
-from vidsindy_lite.dynamics.bspline import Grid, Segment, design_matrix
+from vidsindy_lite.dynamics.bspline import (
+    PENALTIES,
+    Grid,
+    Segment,
+    _roughness,
+    design_matrix,
+    smooth,
+)
 
 
 def wave(n):
