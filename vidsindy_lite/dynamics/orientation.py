@@ -16,9 +16,10 @@ from operator import itemgetter
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import block_diag, eigh, expm
+from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from scipy.stats import special_ortho_group
 
 from ..arrays import Floats, Ints
 from ..checks import check_choice
@@ -137,8 +138,7 @@ def refined(problem: Problem, fit: Fit) -> Floats:
     own = np.eye(len(model.columns))[fit.state.free()[model.columns]]
     ways = np.vstack([own, _turns(problem, fit.state)[model.columns].T])
     step = inverse(ways @ model.information @ ways.T) @ (ways @ model.gradient)
-    angles = step[len(own) :, None, None]
-    return expm(-(angles * _generators(_places(problem))).sum(axis=0))
+    return turned(step[len(own) :], _places(problem))
 
 
 def with_turns(problem: Problem, fit: Fit, chosen: float = 1e-8) -> Linearisation:
@@ -186,11 +186,9 @@ def _turns(problem: Problem, state: State) -> Floats:
 
 
 def _generators(m: int) -> Floats:
-    """Of the turns of each two of m axes, (k, m, m)."""
-    first, second = np.triu_indices(m, 1)
-    generators, k = np.zeros((len(first), m, m)), np.arange(len(first))
-    generators[k, first, second], generators[k, second, first] = 1.0, -1.0
-    return generators
+    """How axes change as they are `turned` back by a small angle about each, (k, m, m)."""
+    back = np.cross(np.eye(3), np.eye(3)[:, None]).swapaxes(1, 2)
+    return back if m == 3 else back[2:, :2, :2]
 
 
 def _places(problem: Problem) -> int:
@@ -223,7 +221,7 @@ def sparse_orientations(
     largest directions of uncertainty.
     """
     law, m = replace(law, estimates=law.estimates[:41]), law.estimates.shape[2]
-    starts = [*known, np.eye(m), *(random_turn(m, rng) for _ in range(20))]
+    starts = [*known, np.eye(m), *special_ortho_group.rvs(m, 20, rng)]
     # A coefficient counts from a tenth of its standard size on, at the end from a hundredth.
     coarse = sorted((law.descended(turn, np.zeros(m), 0.1) for turn in starts), key=itemgetter(0))
     fine = [law.descended(turn, origin, 0.01) for _, turn, origin in coarse[: 2 * most]]
@@ -233,13 +231,6 @@ def sparse_orientations(
         if all(apart(near, other) > ALIKE for other in found):
             found.append(near)
     return found[:most]
-
-
-def random_turn(m: int, rng: np.random.Generator) -> Floats:
-    """A rotation of two or three axes, (m, m), any as likely."""
-    if m == 3:
-        return Rotation.random(random_state=rng).as_matrix()
-    return turned(rng.uniform(0, 2 * np.pi), m)
 
 
 def apart(turn: Floats, other: Floats) -> float:
