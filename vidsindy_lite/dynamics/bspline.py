@@ -381,8 +381,6 @@ PROBES = 24
 """Random vectors with which the trace of the influence matrix is estimated."""
 PENALTIES = 10.0 ** np.arange(-4, 11.6, 0.5)
 """Of the squared second derivative, in units of the median time step."""
-COARSE = 4
-"""One penalty in so many is tried first, then those beside the best."""
 
 
 @dataclass(frozen=True)
@@ -447,9 +445,10 @@ def _cross_validated(
     best, noise = np.full(d, np.inf), np.zeros(d)
     control, chosen = np.zeros((samples.shape[1], d)), np.zeros(d, dtype=int)
     every = np.arange(len(penalties))
-    coarse = every % COARSE == 0
+    pitch = 4  # one penalty in so many is tried first, then those beside the best
+    coarse = every % pitch == 0
     for refined in (False, True):
-        near = np.abs(every[:, None] - chosen).min(axis=1) < COARSE
+        near = np.abs(every[:, None] - chosen).min(axis=1) < pitch
         for index in every[near & ~coarse if refined else coarse]:
             band = sample_band + penalties[index] * roughness
             band[0] += 1e-12 * band[0].max()

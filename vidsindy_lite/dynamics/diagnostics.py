@@ -633,9 +633,6 @@ def _cheapest_two(
 # --------------------------------------------------------------------------------------------------
 # All that is to be said of a law.
 
-RESOLVED = 1e-2
-"""Error, relative to the spread of the data, below which a misfit does not matter."""
-
 
 def diagnose(
     problem: Problem,
@@ -754,7 +751,8 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
 def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     """Does the curve miss the data, or by less than the errors that were given?"""
     residual, names = residual_noise(fit), problem.form.names
-    seen = (fit.collocation.counts > 0) & (residual > RESOLVED)
+    # Less than a hundredth of the spread does not matter.
+    seen = (fit.collocation.counts > 0) & (residual > 1e-2)
     ratio = np.where(seen, residual / problem.noise, 0.0)
     misses = ~(ratio < CONSISTENT)
     # A curve without a law follows errors that last, too: they are no misfit.

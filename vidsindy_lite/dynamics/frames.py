@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from .collocation import Fit, Linearisation, State
 from .l0 import newcomers, subset_search
-from .library import closure_mask, divides, shift_generators, shift_matrix
+from .library import divides, shift_generators, shift_matrix
 from .problem import Problem
 
 Origin = tuple[Floats, Bools]
@@ -154,7 +154,7 @@ def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
     state = replace(
         fit.state,
         coefficients=shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
-        active=closure_mask(exponents, fit.state.active, problem.form.movable),
+        active=divides(exponents, problem.form.movable) @ fit.state.active,
         offset=np.zeros(d),
         moving=np.zeros(d, dtype=bool),
     )

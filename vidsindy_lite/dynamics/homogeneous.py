@@ -26,13 +26,6 @@ from .model import PolynomialSystem
 from .problem import FALSE_ALARM
 from .result import Discovery, Plateau
 
-FEWEST = 6
-"""Samples below which nothing is left over of a throw with drag."""
-STEEP = 5.0
-"""Largest drag, over one through the duration: with more, the velocity is lost at once."""
-POINTS = 201
-"""Points through which the curve of a law is drawn."""
-
 
 @dataclass(frozen=True, eq=False)
 class Flight:
@@ -58,7 +51,7 @@ class Flight:
     @classmethod
     def fitted(cls, t: Floats, x: Floats, free: Bools) -> Flight:
         """By least squares to samples (n, m), as many as ``free`` tells."""
-        most = STEEP / np.ptp(t)
+        most = 5 / np.ptp(t)  # with more drag the velocity is lost at once
 
         def whole(values: Floats) -> Floats:
             theta = np.zeros(len(free))
@@ -134,8 +127,8 @@ def homogeneous(
     ValueError
         If there are fewer than six samples.
     """
-    if len(x) < FEWEST:
-        raise ValueError(f"x: must hold at least {FEWEST} places, got {len(x)}")
+    if len(x) < 6:  # nothing is left over of a throw with drag
+        raise ValueError(f"x: must hold at least 6 places, got {len(x)}")
     m, middle = x.shape[1], (t[0] + t[-1]) / 2
     since, numbers = t - middle, np.arange(3 * m + 1)
     classes = [Flight.fitted(since, x, numbers < count) for count in (m, 2 * m, 3 * m, 3 * m + 1)]
@@ -202,7 +195,7 @@ def _told(law: Flight, covariance: Floats, t: Floats, names: tuple[str, ...]) ->
     still = coefficients_of(0 * law.theta, exponents)
     rates = [(coefficients_of(one, exponents) - still).T.ravel() for one in np.eye(len(law.theta))]
     spread = np.transpose(rates) @ covariance @ rates
-    shown = np.linspace(t[0], t[-1], POINTS)
+    shown = np.linspace(t[0], t[-1], 201)  # enough for a smooth curve
     since = shown - (t[0] + t[-1]) / 2
     states = np.hstack([places(since, law.theta, slope) for slope in (False, True)])
     noise = np.append(np.sqrt((law.left**2).mean(axis=0)), np.full(len(names), np.nan))
