@@ -202,23 +202,25 @@ def test_a_law_is_shortest_around_its_own_origin():
     x = moving(duffing, [1.5], [0.0], t)
     library, rng = Library.polynomial(3), np.random.default_rng(0)
     problem = pose([(t, x)], [np.empty((100, 1, 0))], Form.of(("x",), library, 2), rng)
-    exponents, zeros = problem.exponents, np.zeros(2)
+    exponents, zeros, movable = problem.exponents, np.zeros(2), problem.form.movable
+    assert movable.tolist() == [True, False]
     coefficients = np.zeros(exponents.shape)
     for term, value in {(1, 0): -1.0, (0, 1): -0.1, (3, 0): -0.5}.items():
         coefficients[(exponents == term).all(axis=1), 1] = value
     for rest in (0.0, 0.7):
         law = shift_matrix(exponents, np.array([rest, 0])) @ coefficients
         state = State(np.zeros((4, 2)), law, law != 0, zeros, zeros.astype(bool))
-        found = free_offsets(problem, state)
+        found = free_offsets(problem, state, movable)
         assert (len(found) > 0) == (rest > 0)
         if found:
             origin, off = found[0]
             assert origin == pytest.approx([rest, 0])
             assert off.tolist() == [True, False]
-        assert free_offsets(problem, replace(state, moving=np.array([True, False]))) == []
+        assert free_offsets(problem, replace(state, moving=movable), movable) == []
     outside = problem.box[1] * [1, 0] + [0.1, 0]  # no motion is there
     far = shift_matrix(exponents, outside) @ coefficients
-    assert free_offsets(problem, replace(state, coefficients=far, active=far != 0)) == []
+    there = replace(state, coefficients=far, active=far != 0)
+    assert free_offsets(problem, there, movable) == []
 
 
 def test_axes_leave_home():

@@ -596,7 +596,7 @@ def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
     """The same law with a free axis where the data have it, or one free that is not, and which."""
     axes = np.eye(problem.d, dtype=bool)[state.moving]
     fewer = [(np.where(axis, problem.origin, state.offset), state.moving & ~axis) for axis in axes]
-    for origin, moving in [*fewer, *free_offsets(problem, state)]:
+    for origin, moving in [*fewer, *free_offsets(problem, state, problem.form.movable)]:
         moved = shift_matrix(problem.exponents, state.offset - origin) @ state.coefficients
         axis = int(np.argmax(moving != state.moving))
         yield axis, replace(state, coefficients=moved, offset=origin, moving=moving)

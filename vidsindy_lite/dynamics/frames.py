@@ -105,27 +105,11 @@ class ShiftedLaw:
         return origins
 
 
-def together(problem: Problem, state: State) -> list[Origin]:
-    """Origins at which a term of a law vanishes, where motion is, and those with fewer free axes.
+def free_offsets(problem: Problem, state: State, movable: Bools) -> list[Origin]:
+    """Origins at which a term of a law vanishes, moved along some of the axes that are not free.
 
     Terms that a move brings in are the data's to decide on, while the origin moves.
     """
-    return [*free_offsets(problem, state), *with_fewer_axes(problem, state.offset)]
-
-
-def one_by_one(problem: Problem, state: State) -> Iterator[Origin]:
-    """Origins at which a term of a law vanishes, with one more free axis."""
-    for axis in np.eye(problem.d, dtype=bool)[problem.form.movable]:
-        yield from _vanishing(problem, state, axis)
-
-
-def free_offsets(problem: Problem, state: State) -> list[Origin]:
-    """Origins at which a term of a law vanishes, and the axes that are then free."""
-    return _vanishing(problem, state, problem.form.movable)
-
-
-def _vanishing(problem: Problem, state: State, movable: Bools) -> list[Origin]:
-    """Origins at which a term vanishes, moved along some of the axes that are not free."""
     exponents, fixed = problem.exponents, movable & ~state.moving
     frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), fixed)
     below = divides(exponents, fixed) & ~np.eye(len(exponents), dtype=bool)

@@ -35,8 +35,8 @@ from .frames import (
     at_origin,
     cheapest_at,
     closed,
-    one_by_one,
-    together,
+    free_offsets,
+    with_fewer_axes,
     with_free_axis,
 )
 from .l0 import NEGLIGIBLE, inverse, minimiser, subset_path, subset_search
@@ -217,12 +217,16 @@ def framed(problem: Problem, fit: Fit, history: History) -> Fit:
 
     Axes move together, to where a term vanishes; only if that does not pay, one by one.
     """
+    movable = problem.form.movable
     for _ in range(LONGEST_SEARCH):
         if fit.status is not Status.CONVERGED or history.over:
             break  # what has not converged is no law whose terms could tell
-        trial = _moved(problem, fit, together(problem, fit.state), history)
+        together = free_offsets(problem, fit.state, movable)
+        fewer = with_fewer_axes(problem, fit.state.offset)
+        trial = _moved(problem, fit, [*together, *fewer], history)
         if not trial.criterion < fit.criterion:
-            trial = _moved(problem, fit, list(one_by_one(problem, fit.state)), history)
+            alone = [free_offsets(problem, fit.state, a) for a in np.diag(movable)[movable]]
+            trial = _moved(problem, fit, [origin for one in alone for origin in one], history)
         if not trial.criterion < fit.criterion:
             break
         fit = trial

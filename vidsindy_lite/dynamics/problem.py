@@ -363,36 +363,12 @@ def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
 # given a curve to begin with.
 
 
-def with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
-    """The same with velocities as further states: a velocity of zero stays what it is."""
-    units = problem.units
-    slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in positions]
-    rms = np.sqrt((np.concatenate(slopes) ** 2).mean(axis=0))
+def with_unseen(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Problem:
+    """The same with the states that nobody has measured, in standard units with mean 0.
 
-    def with_velocity(position: BSpline) -> Callable[[Floats], Floats]:
-        velocity = position.derivative()
-        return lambda t: np.hstack([position(t), velocity(t) / rms])
-
-    curves = [with_velocity(spline) for spline in positions]
-    seen = np.repeat([True, False], len(rms))
-    return _with_states(problem, curves, rms * units.scale / units.time, seen)
-
-
-def with_time(problem: Problem) -> Problem:
-    """The same with the time as a last state, in time units."""
-
-    def with_clock(curve: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-        return lambda t: np.column_stack([curve(t), t])
-
-    curves = [with_clock(curve) for curve in problem.curves]
-    seen = np.append(np.ones(len(problem.noise), dtype=bool), False)
-    return _with_states(problem, curves, np.array([problem.units.time]), seen)
-
-
-def with_hidden(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Problem:
-    """The same with coordinates that were never seen, each told by an equation that is known.
-
-    Of a seen coordinate y with ``y' = g + b u``, with b and g known, it is ``u = (y' - g) / b``.
+    Coordinates that were never seen, each told by an equation that is known: of a seen coordinate
+    y with ``y' = g + b u``, with b and g known, it is ``u = (y' - g) / b``. Then velocities, and
+    last the time.
 
     Parameters
     ----------
@@ -408,38 +384,60 @@ def with_hidden(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Pro
     ValueError
         If no equation tells a coordinate, or the law is of second order.
     """
-    form, units, m = problem.form, problem.units, len(seen)
-    if form.states > m:
-        name = form.names[int(np.argmin(seen))]
+    form, units, m, d = problem.form, problem.units, len(seen), problem.d
+    hidden, moves, timed = np.flatnonzero(~seen), form.states > m, form.states < d
+    if hidden.size and moves:
+        name = form.names[hidden[0]]
         raise ValueError(f"x: of a law of order 2 every position must be seen, got none of {name}")
-    telling = [_telling(form, seen, u) for u in np.flatnonzero(~seen).tolist()]
+    telling = [_telling(form, seen, u) for u in hidden.tolist()]
+    measured = np.append(seen, np.zeros(d - m, dtype=bool))
 
-    def with_told(curve: BSpline) -> Callable[[Floats], Floats]:
-        slope = curve.derivative()
+    def whole(curve: BSpline, t: Floats) -> Floats:
+        """All states in units of the data."""
+        x, slopes = np.zeros((len(t), d)), np.zeros((len(t), m))
+        x[:, measured] = units.point(curve(t))
+        slopes[:, seen] = curve(t, 1) * units.scale / units.time
+        for u, (j, term) in zip(hidden, telling, strict=True):
+            rest = form.known[:, j].copy()
+            rest[term] = 0.0
+            known = monomials(x[:, :m], form.exponents[:, :m]) @ rest
+            x[:, u] = (slopes[:, j] - known) / form.known[term, j]
+        if moves:
+            x[:, m : 2 * m] = slopes
+        if timed:
+            x[:, -1] = t * units.time
+        return x
 
+    values = np.concatenate([whole(curve, curve.t[DEGREE:-DEGREE]) for curve in curves])
+    centre, scale = np.zeros(d), np.sqrt((values**2).mean(axis=0))
+    centre[measured], scale[measured] = units.centre, units.scale
+    scale[-1] = units.time if timed else scale[-1]
+
+    def standard(curve: BSpline) -> Callable[[Floats], Floats]:
         def states(t: Floats) -> Floats:
-            x, slopes = np.zeros((len(t), m)), np.zeros((len(t), m))
-            x[:, seen] = units.point(curve(t))
-            slopes[:, seen] = slope(t) * units.scale / units.time
-            for u, (j, term) in zip(np.flatnonzero(~seen), telling, strict=True):
-                rest = form.known[:, j].copy()
-                rest[term] = 0.0
-                known = monomials(x, form.exponents[:, :m]) @ rest
-                x[:, u] = (slopes[:, j] - known) / form.known[term, j]
+            x = (whole(curve, t) - centre) / scale
+            x[:, measured] = curve(t)
             return x
 
         return states
 
-    told = [with_told(curve) for curve in curves]
-    values = [states(c.t[DEGREE:-DEGREE])[:, ~seen] for states, c in zip(told, curves, strict=True)]
-    scale = np.sqrt((np.concatenate(values) ** 2).mean(axis=0))
-    whole = np.ones(m)
-    whole[seen], whole[~seen] = units.scale, scale
+    def among(values: Floats, filling: float) -> Floats:
+        every = np.full((len(values), d, *values.shape[2:]), filling)
+        every[:, measured] = values
+        return every
 
-    def standard(states: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-        return lambda t: states(t) / whole
-
-    return _with_states(problem, [standard(states) for states in told], scale, seen)
+    return replace(
+        problem,
+        trajectories=[(t, among(x, np.nan)) for t, x in problem.trajectories],
+        systematic=[among(modes, 0.0) for modes in problem.systematic],
+        smoothed=[among(x, np.nan) for x in problem.smoothed],
+        pulls=np.moveaxis(among(np.moveaxis(among(problem.pulls, 0.0), 1, 0), 0.0), 0, 1),
+        precision=[among(precision, 0.0) for precision in problem.precision],
+        stretches=[(i, (t, among(x, np.nan))) for i, (t, x) in problem.stretches],
+        curves=[standard(curve) for curve in curves],
+        units=Units(centre, scale, units.time),
+        noise=spread_to_unseen(problem.noise, measured),
+    )
 
 
 def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
@@ -457,37 +455,6 @@ def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
         f"x: a coordinate that was never seen must be told by an equation that is known, as in "
         f"library.where({{{form.names[int(np.argmax(seen))]!r}: {{{name!r}: 1, '...': 0}}}}), "
         f"got none for {name}"
-    )
-
-
-def _with_states(
-    problem: Problem, curves: Sequence[Callable[[Floats], Floats]], scale: Floats, seen: Bools
-) -> Problem:
-    """The same with further states, of curves and scales (k,), which nobody has measured.
-
-    ``seen``, (m + k,), says where the others stand among all; the standard units of the new ones
-    have mean 0.
-    """
-    units = problem.units
-
-    def among(values: Floats, filling: float) -> Floats:
-        whole = np.full((len(values), len(seen), *values.shape[2:]), filling)
-        whole[:, seen] = values
-        return whole
-
-    centres, scales = np.zeros(len(seen)), np.empty(len(seen))
-    centres[seen], scales[seen], scales[~seen] = units.centre, units.scale, scale
-    return replace(
-        problem,
-        trajectories=[(t, among(x, np.nan)) for t, x in problem.trajectories],
-        systematic=[among(modes, 0.0) for modes in problem.systematic],
-        smoothed=[among(x, np.nan) for x in problem.smoothed],
-        pulls=np.moveaxis(among(np.moveaxis(among(problem.pulls, 0.0), 1, 0), 0.0), 0, 1),
-        precision=[among(precision, 0.0) for precision in problem.precision],
-        stretches=[(i, (t, among(x, np.nan))) for i, (t, x) in problem.stretches],
-        curves=curves,
-        units=Units(centres, scales, units.time),
-        noise=spread_to_unseen(problem.noise, seen),
     )
 
 
@@ -570,12 +537,8 @@ def pose(
     )
     if problem.shared:
         problem = problem.cautious
-    if not seen.all():
-        problem = with_hidden(problem, curves, seen)
-    elif form.states > len(seen):
-        problem = with_velocities(problem, curves)
-    if form.states < len(form.names):
-        problem = with_time(problem)
+    if seen.sum() < problem.d:
+        problem = with_unseen(problem, curves, seen)
     if form.exponents.shape[1] > len(form.names):
         problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))
