@@ -214,7 +214,7 @@ def _checked(
 ) -> dict[str, Any]:
     """What `discover` takes beside the path, checked before anything is tracked."""
     terms = check_library(degree, library)
-    check_order(order, origin, terms)
+    check_order(order, origin)
     check_orientation(orientation, terms, 3 * targets, origin)
     Form.of(variable_names(3 * targets), terms, 2 if order == 2 else 1)
     check_integer("seed", seed)

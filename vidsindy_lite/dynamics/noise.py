@@ -11,13 +11,13 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cho_solve_banded
+from scipy.linalg import cho_solve_banded, toeplitz
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
 from .collocation import CLEANEST, Collocation, Fit, State
 from .data import CHANCE, autocovariances, inflation
-from .l0 import LEAST
+from .l0 import LEAST, RIDGE
 from .problem import COARSE, FINAL_WEIGHT, Problem, fit_curves, spread_to_unseen, unpruned
 
 # --------------------------------------------------------------------------------------------------
@@ -101,15 +101,19 @@ def prediction_gain(fit: Fit, most: int = 40) -> Floats:
     """By how much the errors before it foretell an error: n times its log variance ratio, (d,).
 
     Minus twice the log likelihood of an autoregressive model of the residual over that of white
-    noise (Levinson's recursion; its order, no more than ``most``, by the Bayesian information
-    criterion).
+    noise (its order, no more than ``most``, by the Bayesian information criterion). What is left
+    of an error by so many before it is on the diagonal of a Cholesky factor.
     """
     errors = [np.concatenate(pieces)[:, 0] for pieces in _errors_seen(fit)]
     fewest = min((len(e) for e in errors if len(e)), default=0)
-    lags = range(min(most, fewest // 10) + 1)
-    covariances = [np.array([e[k:] @ e[: len(e) - k] for k in lags]) for e in errors]
-    sizes = map(len, errors)
-    return np.array([_levinson(c, n).min() for c, n in zip(covariances, sizes, strict=True)])
+    gains, orders = np.zeros(len(errors)), np.arange(min(most, fewest // 10) + 1)
+    for j, e in enumerate(errors):
+        if e.any():  # it was observed
+            covariance = np.array([e[k:] @ e[: len(e) - k] for k in orders]) / (e @ e)
+            covariance[0] += RIDGE
+            left = np.diag(np.linalg.cholesky(toeplitz(covariance))) ** 2
+            gains[j] = (len(e) * np.log(left) + orders * np.log(len(e))).min()
+    return gains
 
 
 def passing(fit: Fit, tried: int) -> Bools:
@@ -143,20 +147,6 @@ def rebound(pieces: Sequence[Floats]) -> Floats:
     """The lowest autocorrelation of errors at any lag, (d,), as those of `inflation`."""
     covariances = autocovariances(pieces)
     return covariances.min(axis=0) / np.maximum(covariances[0], LEAST)
-
-
-def _levinson(covariance: Floats, n: int) -> Floats:
-    """The gain for every number of errors that foretell the next."""
-    gains = np.zeros(len(covariance))
-    if not covariance[0] > 0:
-        return gains  # of what was never observed
-    variance, weights = covariance[0], np.zeros(0)
-    for order in range(1, len(covariance)):
-        reflection = (covariance[order] - weights @ covariance[order - 1 : 0 : -1]) / variance
-        weights = np.append(weights - reflection * weights[::-1], reflection)
-        variance *= 1 - reflection**2
-        gains[order] = n * np.log(variance / covariance[0]) + order * np.log(n)
-    return gains
 
 
 # --------------------------------------------------------------------------------------------------

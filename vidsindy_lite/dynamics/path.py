@@ -505,7 +505,7 @@ def cross(law: PolynomialSystem, left: BSpline, right: BSpline, spacing: float) 
     with np.errstate(over="ignore", invalid="ignore"):
         paths = runge_kutta_4(lambda x: onward * law(x), t, np.array(ends), substeps=1)
     # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
-    paths = np.where(np.isfinite(paths).all(axis=(0, 2))[:, None], paths, ends)
+    paths = np.where(np.isfinite(paths).all(axis=(0, 2), keepdims=True), paths, ends)
     share = np.linspace(0, 1, len(t))[:, None]
     return make_interp_spline(t, (1 - share) * paths[:, 0] + share * paths[::-1, 1])
 

@@ -169,7 +169,7 @@ def discover(
     >>> print(vl.discover(t, x).equations())
     """
     library, seed = check_library(degree, library), check_integer("seed", seed)
-    check_order(order, origin, library)
+    check_order(order, origin)
     trajectories = check_trajectories(t, x)
     check_orientation(orientation, library, trajectories[0][1].shape[1], origin)
     names = coordinate_names(t, x)
@@ -338,8 +338,8 @@ def _kicked(
 # how it moves. In the flows that people write down as x' = f(x) it is not.
 
 
-def check_order(order: object, origin: str, library: Library) -> None:
-    """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
+def check_order(order: object, origin: str) -> None:
+    """Refuse what is no order of a law, or no origin."""
     if isinstance(order, bool | float) or order not in (1, 2, "auto"):
         raise ValueError(f"order: must be 1, 2 or 'auto', got {shown(order)}")
     check_choice("origin", origin, ("learn", "data"))
