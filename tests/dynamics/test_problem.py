@@ -9,7 +9,7 @@ import pytest
 from helpers import posed
 
 from vidsindy_lite.dynamics.collocation import Fit, State, Status
-from vidsindy_lite.dynamics.frames import as_shifted, cheapest_at, closed, with_fewer_axes
+from vidsindy_lite.dynamics.frames import ShiftedLaw, cheapest, closed, with_fewer_axes
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form
 from vidsindy_lite.dynamics.problem import OFFSET_PENALTY, SURE, fit_curves, pose, term_penalties
@@ -56,9 +56,13 @@ def test_a_candidate_costs_its_misfit_its_terms_and_its_moved_axes(moving):
     linear = np.repeat(problem.exponents.sum(axis=1) <= 1, 2).reshape(-1, 2)
     state = replace(fit.state, active=linear, coefficients=0.1 * linear, offset=np.zeros(2))
     whole = closed(problem, replace(fit, state=state), 1e2)
-    law = as_shifted(problem, whole)
+    columns = np.flatnonzero(whole.state.free())
+    model = whole.collocation.linearise(whole.state, columns)
+    known, pull = np.diag(np.where(linear.T.ravel(), 0.0, 1e30)), np.zeros(12)
+    known[np.ix_(columns, columns)], pull[columns] = model.information, model.gradient
+    law = ShiftedLaw(problem.exponents, whole.state.coefficients, known, gradient=pull)
     origin = np.where(moving, (0.3, -0.2), problem.origin)
-    candidate = cheapest_at(problem, whole, law, (origin, np.array(moving)))
+    candidate = cheapest(problem, whole, [(origin, np.array(moving))])
 
     coefficients, information, gradient = law.at(origin)
     step, penalties = np.linalg.solve(information, gradient), np.tile(problem.penalties, 2)

@@ -9,7 +9,7 @@ axis off the data's origin is one more column of the L0 search, with a penalty o
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -145,41 +145,32 @@ def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
     return replace(fit, state=state, collocation=problem.weighted(fit.collocation, weight))
 
 
-def as_shifted(problem: Problem, fit: Fit) -> ShiftedLaw:
-    """The law of a fit, whose terms are closed under shifts, with its information."""
-    state, columns = fit.state, np.flatnonzero(fit.state.free())
+def cheapest(problem: Problem, whole: Fit, origins: Sequence[Origin]) -> Fit:
+    """The cheapest support at one of some origins, by the quadratic model around a law.
+
+    That has all terms of the library, or of a shift closure; what it lacks stays zero.
+    """
+    state, columns = whole.state, np.flatnonzero(whole.state.free())
     information = np.diag(np.where(state.free()[: -problem.d], 0.0, 1e30))
-    model, gradient = fit.collocation.linearise(state, columns), np.zeros(len(information))
+    model, gradient = whole.collocation.linearise(state, columns), np.zeros(len(information))
     information[np.ix_(columns, columns)], gradient[columns] = model.information, model.gradient
-    movable = problem.form.movable
-    return ShiftedLaw(problem.exponents, state.coefficients, information, movable, gradient)
+    law = ShiftedLaw(problem.exponents, state.coefficients, information, gradient=gradient)
+    objective, every = whole.collocation.objective(state), np.ones(len(columns), dtype=bool)
 
+    def at(origin: Floats, moving: Bools) -> Fit:
+        coefficients, information, gradient = law.at(origin)
+        _, solution, value = subset_search(
+            information[np.ix_(columns, columns)], gradient[columns],
+            coefficients.T.ravel()[columns], problem.entry_penalties[columns], every,
+        )  # fmt: skip
+        flat = np.append(np.zeros(state.coefficients.size), origin)
+        flat[columns] = solution
+        there = state.moved(state.control_points, flat)
+        there = replace(there, active=there.coefficients != 0, moving=moving)
+        cost = objective + value + problem.axis_penalty * moving.sum()
+        return replace(whole, state=there, criterion=cost)
 
-def cheapest_at(problem: Problem, whole: Fit, law: ShiftedLaw, origin: Origin) -> Fit:
-    """The cheapest support at an origin, by the quadratic model around a law with all its terms."""
-    place, moving = origin
-    coefficients, information, gradient = law.at(place)
-    columns = np.flatnonzero(whole.state.free())
-    _, solution, value = subset_search(
-        information[np.ix_(columns, columns)],
-        gradient[columns],
-        coefficients.T.ravel()[columns],
-        problem.entry_penalties[columns],
-        np.ones(len(columns), dtype=bool),
-    )
-    flat = np.append(np.zeros(whole.state.coefficients.size), place)
-    flat[columns] = solution
-    state = whole.state.moved(whole.state.control_points, flat)
-    state = replace(state, active=state.coefficients != 0, moving=moving)
-    objective = whole.collocation.objective(whole.state)
-    cost = objective + value + problem.axis_penalty * moving.sum()
-    return replace(whole, state=state, criterion=cost)
-
-
-def at_origin(problem: Problem, fit: Fit) -> Fit:
-    """The cheapest support where the data have their origin, from all terms of a fit."""
-    origin = problem.origin, np.zeros(problem.d, dtype=bool)
-    return cheapest_at(problem, fit, as_shifted(problem, fit), origin)
+    return min((at(*origin) for origin in origins), key=lambda fit: fit.criterion)
 
 
 def with_free_axis(problem: Problem, state: State, model: Linearisation, tolerated: float) -> State:

@@ -280,7 +280,9 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     ]
     start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
-    kicked = _balanced(problem, _hard_where_known(start, free), every, rng)
+    # What is known of a law (the slope of a position is the velocity) holds exactly.
+    physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
+    kicked = _balanced(problem, start.weighted(start.data_weights, physics), every, rng)
     if unlike_kicks(kicked, free, rng) > 4:  # standard errors
         return problem
     exact = _measured_badly(problem, fit, segments)
@@ -308,14 +310,6 @@ def _with_variances(problem: Problem, weights: Collocation) -> Problem:
 def _free(problem: Problem) -> Bools:
     """Which equations may be kicked: those that are not known, (d,)."""
     return np.asarray(problem.form.candidates.any(axis=0), dtype=bool)
-
-
-def _hard_where_known(collocation: Collocation, free: Bools) -> Collocation:
-    """What is known of a law (the slope of a position is the velocity) holds exactly."""
-    hard = FINAL_WEIGHT * collocation.physics_weights
-    return collocation.weighted(
-        collocation.data_weights, np.where(free, collocation.physics_weights, hard)
-    )
 
 
 def evidence(fit: Fit) -> float:

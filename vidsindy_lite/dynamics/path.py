@@ -31,9 +31,7 @@ from .collocation import Fit, State, Status
 from .data import Trajectory
 from .frames import (
     Origin,
-    as_shifted,
-    at_origin,
-    cheapest_at,
+    cheapest,
     closed,
     free_offsets,
     with_fewer_axes,
@@ -149,7 +147,7 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
             continue
         whole, _ = unpruned(part, rows)
         history.add("all terms", part, whole, FIRST_WEIGHTS[-1])
-        fit = at_origin(part, whole)
+        fit = cheapest(part, whole, [(part.origin, np.zeros(part.d, dtype=bool))])
         for weight in WEIGHTS:
             fit = select(part, fit, weight, "subset search", history)
         found.append(framed(part, fit, history))
@@ -238,10 +236,7 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
     others = [there for there in origins if (there[1] != fit.state.moving).any()]
     if not others:
         return fit
-    whole = closed(problem, fit, FINAL_WEIGHT)
-    law = as_shifted(problem, whole)
-    starts = [cheapest_at(problem, whole, law, there) for there in others]
-    start = min(starts, key=lambda candidate: candidate.criterion)
+    start = cheapest(problem, closed(problem, fit, FINAL_WEIGHT), others)
     if not start.criterion < fit.criterion + problem.penalties.max():
         return fit
     start = start.collocation.solve(start.state)  # its curve is still that of the frame before
