@@ -21,11 +21,11 @@ from .collocation import Collocation, Status
 from .result import Discovery
 from .model import Form
 from .model import runge_kutta_4
-from .library import Function, monomial_exponents, monomial_gradients, monomials
+from .library import Function, monomial_exponents, monomials
 from .solver import check_order
 from .frames import ShiftedLaw
 from .homogeneous import homogeneous
-from .result import Plateau, Swing
+from .result import Swing
 from .model import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
 from .mechanics import Quantity, Round, on_circle, on_sphere

@@ -270,7 +270,8 @@ def persistent(
     persists : bool
         Whether the path leads to the law; else it is the last to which one led.
     """
-    crossed = not gaps(fit.collocation.segments)
+    open_gaps = gaps(fit.collocation.segments)
+    crossed = not open_gaps
     for k in range(ROUNDS):
         coarse = k > 0 or not crossed or not near(problem, fit, TOLERATED)
         fit = at_own_errors(problem, fit) if coarse else polish(problem, fit, history)
@@ -286,7 +287,7 @@ def persistent(
                 break  # what cannot be fitted is no law
             fit = other
         elif not crossed:
-            fit, crossed = bridged(problem, fit), True
+            fit, crossed = bridged(problem, fit, open_gaps), True
         else:
             state = with_free_axis(problem.cautious, fit.state, path.model, path.tolerated)
             if not free or state is fit.state:
@@ -294,7 +295,7 @@ def persistent(
             fit = replace(fit, state=state)
         if not history.another():
             break
-    fit = polish(problem, fit if crossed else bridged(problem, fit), history)
+    fit = polish(problem, fit if crossed else bridged(problem, fit, open_gaps), history)
     path = follow(problem, fit)
     return fit, path, fit.status is Status.CONVERGED and has_terms(fit, path.widest())
 
@@ -425,32 +426,27 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
     return fit
 
 
-def bridged(problem: Problem, fit: Fit) -> Fit:
-    """Integrate the law across gaps and fit again with the physics enforced there.
+def bridged(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
+    """The fit with the law across these gaps, or those of them that the data allow.
 
-    A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut
-    at gaps. Groups of gaps are tried, shortest first; a group whose bridges spoil the fit is
-    halved, down to single gaps.
+    A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut at gaps.
+    The law is integrated across all, and fitted again with the physics enforced there; a group
+    whose bridges spoil the fit is halved, down to single gaps.
     """
-    return _bridge_group(problem, fit, gaps(fit.collocation.segments))
-
-
-def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
-    """The fit with these gaps crossed, or those of them that the data allow."""
     law = problem.law(fit.state).shift(fit.state.offset)
     splines = fit.collocation.grid.splines(fit.state.control_points)
     joined, curves = join(problem, fit.collocation.segments, splines, law, group)
-    bridged = problem.collocation(joined)
-    start = replace(fit.state, control_points=fit_curves(bridged, curves))
-    trial = tightened(problem, bridged, start)
+    whole = problem.collocation(joined)
+    start = replace(fit.state, control_points=fit_curves(whole, curves))
+    trial = tightened(problem, whole, start)
     # A bridge takes away the freedom of one initial condition: so much may the fit lose.
-    freedom = problem.d * len(group) + (bridged.counts - fit.collocation.counts).sum()
+    freedom = problem.d * len(group) + (whole.counts - fit.collocation.counts).sum()
     loss = trial.collocation.objective(trial.state) - fit.collocation.objective(fit.state)
     if loss < freedom + 4 * np.sqrt(2 * freedom):
         return replace(fit, state=trial.state, collocation=trial.collocation)
     if len(group) > 1:
         for half in (group[: len(group) // 2], group[len(group) // 2 :]):
-            fit = _bridge_group(problem, fit, half)
+            fit = bridged(problem, fit, half)
     return fit
 
 
