@@ -47,7 +47,7 @@ def test_equations_show_errors_in_both_frames(found):
     assert "±" in found.equations()
     assert found.equations("data") != found.equations("native")
     assert found.equations("native").count("±") == found.native.support.sum()
-    with pytest.raises(ValueError, match="frame: must be 'data' or 'native', got 'reference'"):
+    with pytest.raises(ValueError, match="frame: must be one of data, native, got 'reference'"):
         found.equations("reference")
 
 

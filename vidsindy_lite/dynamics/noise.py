@@ -6,7 +6,7 @@ autocorrelation time); how precise each measurement is; and whether the motion i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -126,7 +126,8 @@ def passing(fit: Fit, tried: int) -> Bools:
     """
     seen, errors = fit.collocation.counts > 0, _errors_seen(fit)
     counts = np.array([sum(independent(piece[:, 0]) for piece in pieces) for pieces in errors])
-    lowest = np.concatenate([rebound(pieces) for pieces in errors])
+    products = [autocovariances(pieces)[:, 0] for pieces in errors]
+    lowest = np.array([some.min() / max(some[0], LEAST) for some in products])
     # An autocorrelation of -.3 is three standard errors of a hundred independent ones: errors come
     # back with the other sign, as a motion does. A tenth of the spread may well be meant by a law.
     forgotten = (counts > tried) & (lowest > -0.3) & (residual_noise(fit) < 0.1)
@@ -141,12 +142,6 @@ def independent(errors: Floats) -> float:
     """
     powers = np.abs(np.fft.rfft(errors, max(len(errors), 1))[1:]) ** 2
     return float(4 * powers.sum() ** 2 / (powers**2).sum()) if powers.any() else 0.0
-
-
-def rebound(pieces: Sequence[Floats]) -> Floats:
-    """The lowest autocorrelation of errors at any lag, (d,), as those of `inflation`."""
-    covariances = autocovariances(pieces)
-    return covariances.min(axis=0) / np.maximum(covariances[0], LEAST)
 
 
 # --------------------------------------------------------------------------------------------------

@@ -241,8 +241,9 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
         return fit
     start = start.collocation.solve(start.state)  # its curve is still that of the frame before
     trial = select(problem, start, FINAL_WEIGHT, "another frame", history)
-    cheaper = trial.criterion < fit.criterion - NEGLIGIBLE
-    return trial if cheaper and problem.holds_origin(trial.state.offset) else fit
+    low, high = problem.box
+    inside = ((low <= trial.state.offset) & (trial.state.offset <= high)).all()
+    return trial if inside and trial.criterion < fit.criterion - NEGLIGIBLE else fit
 
 
 # ---------------------------------------------------------------------------- the law that persists

@@ -164,11 +164,6 @@ class Problem:
         )
         return low, high
 
-    def holds_origin(self, origin: Floats) -> bool:
-        """Whether an origin is in the box of the data and their origin."""
-        low, high = self.box
-        return bool(((low <= origin) & (origin <= high)).all())
-
     @property
     def axis_penalty(self) -> float:
         """Penalty of an axis along which the law's origin is not that of the data."""

@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline
 from tqdm import tqdm
 
 from ..arrays import Bools, Floats
-from ..checks import MALFORMED, check_array, check_output, shown
+from ..checks import MALFORMED, check_array, check_choice, check_output, shown
 from ..reading import check_file, read_tree
 from ..repository import write_file
 from ..values import built, decoded, encoded
@@ -327,8 +327,7 @@ class Discovery:
         frame : {"data", "native"}
             Which frame.
         """
-        if frame not in ("data", "native"):
-            raise ValueError(f"frame: must be 'data' or 'native', got {frame!r}")
+        check_choice("frame", frame, ("data", "native"))
         native = frame == "native"
         law = self.native if native else self.system
         errors = self.native_standard_errors if native else self.standard_errors
