@@ -848,7 +848,7 @@ def _rivals(
     law: PolynomialSystem, remedy: str, clean: bool,
 ) -> Iterator[str]:  # fmt: skip
     """Do other terms or another origin explain the data as well?"""
-    if clean and not problem.kicked:
+    if clean and not problem.has_process_noise:
         return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(state.active)) > path.lowest
     found = wider.beyond
@@ -910,7 +910,7 @@ def _sampling(problem: Problem, law: PolynomialSystem, remedy: str) -> Iterator[
     if samples < 2 * np.pi:  # a step is longer than a time scale of the motion
         yield f"only {samples:.1f} samples per turn of the motion: sample faster"
     coarse = problem.samples_a_turn < COARSE
-    if problem.kicked and (coarse or turns < 10):
+    if problem.has_process_noise and (coarse or turns < 10):
         few = f"{turns:.1f} turns of {problem.samples_a_turn:.0f} samples each"
         yield (
             f"the motion is taken for kicked at random, which {few} cannot tell from a drive or a "

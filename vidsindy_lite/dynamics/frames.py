@@ -173,8 +173,10 @@ def cheapest(problem: Problem, whole: Fit, origins: Sequence[Origin]) -> Fit:
     return min((at(*origin) for origin in origins), key=lambda fit: fit.criterion)
 
 
-def with_free_axis(problem: Problem, state: State, model: Linearisation, tolerated: float) -> State:
-    """The state with the free axis by which its law gains most, if that is worth its penalty.
+def with_free_axis(
+    problem: Problem, state: State, model: Linearisation, tolerated: float
+) -> State | None:
+    """The state with the free axis by which its law gains most, if one is worth its penalty.
 
     Its terms were chosen at larger errors, which may not have told it from where the data have it.
     What it gains has to be worth the penalty, and more than its place would be a coincidence.
@@ -194,7 +196,7 @@ def with_free_axis(problem: Problem, state: State, model: Linearisation, tolerat
     gains = [(gain - max(room, problem.axis_penalty), axis) for axis, gain, room, _ in axes]
     gain, axis = max(gains, default=(0.0, 0))
     if not gain > 0:
-        return state
+        return None
     return replace(state, moving=state.moving | (np.arange(problem.d) == axis))
 
 

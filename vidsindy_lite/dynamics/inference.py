@@ -111,7 +111,9 @@ def infer(
         native_covariance=covariance[: l * d, : l * d],
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
         noise=np.where(
-            seen, (problem.noise if problem.kicked else residual_noise(fit)) * units.scale, np.nan
+            seen,
+            (problem.noise if problem.has_process_noise else residual_noise(fit)) * units.scale,
+            np.nan,
         ),
         model_error=_kicks(problem, fit),
         warnings=(),

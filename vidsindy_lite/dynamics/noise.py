@@ -58,7 +58,7 @@ def errors_left(problem: Problem, fit: Fit) -> Floats:
     A curve that may leave its law follows the errors, too: then they are as estimated. Of errors
     that are given only how long they last is estimated.
     """
-    if problem.kicked:
+    if problem.has_process_noise:
         return problem.noise
     errors = effective_noise(fit)
     return problem.noise * errors / residual_noise(fit) if problem.measured_errors else errors
@@ -257,8 +257,8 @@ OCTAVE = 8
 """Frequencies of the lowest band of a spectrum; each next one has twice as many."""
 
 
-def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
-    """The problem with the kicks that its data show; the same problem if they show none.
+def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem | None:
+    """The problem with the process noise that its data show; none if they show none.
 
     Parameters
     ----------
@@ -279,12 +279,12 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
     kicked = _balanced(problem, start.weighted(start.data_weights, physics), every, rng)
     if unlike_kicks(kicked, free, rng) > 4:  # standard errors
-        return problem
+        return None
     exact = _measured_badly(problem, fit, segments)
     newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
     measured = evidence(exact) + prediction_gain(exact).sum()
     if not evidence(kicked) + 2 * newcomers < measured:
-        return problem
+        return None
     return _with_variances(problem, kicked.collocation)
 
 

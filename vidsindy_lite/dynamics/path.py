@@ -90,8 +90,8 @@ def follow(problem: Problem, fit: Fit) -> Path:
     penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
     own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))
-    single = np.full(problem.d, own) if problem.kicked else residual_noise(fit)
-    lasting = single if problem.kicked else effective_noise(fit)
+    single = np.full(problem.d, own) if problem.has_process_noise else residual_noise(fit)
+    lasting = single if problem.has_process_noise else effective_noise(fit)
     lowest = min(typical(single), LARGEST / 10**STEP)
     # No measurement is as good as a ten-thousandth, but a simulation may be: its errors are smooth.
     smooth = bool((lasting > 2 * single).any() or typical(single) <= 1e-4)
@@ -136,7 +136,7 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     the terms once more.
     """
     least = TOLERATED if tolerated is None else tolerated
-    noise = problem.noise if problem.kicked else np.maximum(problem.noise, least)
+    noise = problem.noise if problem.has_process_noise else np.maximum(problem.noise, least)
     tolerant, stretches = replace(problem, noise=noise), enough(problem)
     part, found = replace(tolerant, stretches=stretches), []
     degrees, implicit = part.exponents.sum(axis=1), part.form.implicit
@@ -291,7 +291,7 @@ def persistent(
             fit, crossed = bridged(problem, fit, open_gaps), True
         else:
             state = with_free_axis(problem.cautious, fit.state, path.model, path.tolerated)
-            if not free or state is fit.state:
+            if not free or state is None:
                 return fit, path, fit.status is Status.CONVERGED
             fit = replace(fit, state=state)
         if not history.another():
@@ -459,10 +459,9 @@ def information_criterion(problem: Problem, fit: Fit) -> float:
     """
     counts = fit.collocation.counts
     seen = counts > 0
-    # Of a law that is kicked, what is not foretold: the curve follows its data.
-    single = (
-        np.hypot(problem.noise, problem.process_noise) if problem.kicked else residual_noise(fit)
-    )
+    # Under process noise, what is not foretold: the curve follows its data.
+    foretold = np.hypot(problem.noise, problem.process_noise)
+    single = foretold if problem.has_process_noise else residual_noise(fit)
     return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.penalty(fit.state)
 
 

@@ -238,7 +238,7 @@ class Problem:
         return collocation.weighted(collocation.data_weights, physics)
 
     @property
-    def kicked(self) -> bool:
+    def has_process_noise(self) -> bool:
         """Whether the law holds but for random kicks."""
         return bool(self.process_noise.any())
 

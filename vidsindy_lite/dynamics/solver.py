@@ -61,7 +61,7 @@ from .problem import Problem, pose
 from .result import LIBRARY, NAME, Discovery, History, Path, Swing, swinging
 
 MOST_LAWS = 3
-"""Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
+"""Most laws to which paths are followed: a first, one under process noise, one at larger errors."""
 
 
 _lock = Lock()
@@ -295,39 +295,39 @@ def _law(
 ) -> tuple[Problem, Fit, Path]:
     """The law that persists: the problem as that tells it, the last fit, and the path of laws.
 
-    Where a first law does not fit, the motion may be kicked; where no path leads to a law, errors
+    Where a first law does not fit, there may be process noise; where no path leads to a law, errors
     that last may have made terms of the first, and one that tolerates them is the start.
     """
     fit = first_law(problem, history)
     asked = not near(problem, fit, TOLERATED)
     if asked and not history.over:
-        problem, fit = _kicked(problem, fit, probes, history)
+        problem, fit = _under_process_noise(problem, fit, probes, history) or (problem, fit)
     fit, path, persists = persistent(problem, fit, history, free)
     if not (asked or history.over or near(problem, fit, 0.0)):
-        kicked, law = _kicked(problem, fit, probes, history)
-        if kicked.kicked:
-            return kicked, *persistent(kicked, law, history, free)[:2]
-    if not (persists or problem.kicked or history.over):
+        found = _under_process_noise(problem, fit, probes, history)
+        if found is not None:
+            return found[0], *persistent(*found, history, free)[:2]
+    if not (persists or problem.has_process_noise or history.over):
         law = first_law(problem, history, path.level)
-        other, around, found = persistent(problem, law, history, free)
-        fit, path = (other, around) if found else (fit, path)
+        other, around, leads = persistent(problem, law, history, free)
+        fit, path = (other, around) if leads else (fit, path)
     return problem, fit, path
 
 
-def _kicked(
+def _under_process_noise(
     problem: Problem, fit: Fit, probes: np.random.Generator, history: History
-) -> tuple[Problem, Fit]:
-    """The problem with the kicks that its data show, and the law under them; else both as given.
+) -> tuple[Problem, Fit] | None:
+    """The problem with the process noise that its data show, and the law under it; else none.
 
-    A poor law shows kicks that are none: the law that is found under them must not hold exactly.
+    A poor law shows some where there is none: a law that is found under it must not hold exactly.
     """
-    kicked = with_process_noise(problem, fit, probes)
-    if kicked is problem:
-        return problem, fit
-    law = first_law(kicked, history)
-    if with_process_noise(problem, law, probes) is problem:
-        return problem, fit
-    return rebalanced(kicked, law, probes), law
+    noisy = with_process_noise(problem, fit, probes)
+    if noisy is None:
+        return None
+    law = first_law(noisy, history)
+    if with_process_noise(problem, law, probes) is None:
+        return None
+    return rebalanced(noisy, law, probes), law
 
 
 # --------------------------------------------------------------------------------------------------
