@@ -89,7 +89,7 @@ def test_the_law_foretells_another_motion_and_survives_a_file(tmp_path):
     assert again.equations() == found.equations()
 
 
-def test_an_origin_away_from_home_is_found():
+def test_an_origin_off_that_of_the_data_is_found():
     t = np.linspace(0, 20, 800)
     x = noisy(moving(duffing, [1.5], [0.0], t), 0.01) + 7.0
     found = discover(t, x, order=2)
@@ -223,7 +223,7 @@ def test_a_law_is_shortest_around_its_own_origin():
     assert free_offsets(problem, there, movable) == []
 
 
-def test_axes_leave_home():
+def test_axes_are_freed_where_a_law_is_shorter():
     t, rest = np.linspace(0, 12, 300), np.array([0.7, -0.5])
     x = moving(lambda x, v: -9 * x - 0.1 * v - 4 * x**3, [1, 0.5], [0, 1], t) + rest
     library, rng = Library.polynomial(3), np.random.default_rng(0)
@@ -237,7 +237,7 @@ def test_axes_leave_home():
     collocation = problem.weighted(problem.collocation(problem.segments()), FINAL_WEIGHT)
     control = fit_curves(collocation, problem.curves)
     state = State(control, 0.0 * active, active, problem.origin, np.zeros(4, dtype=bool))
-    at_origin = select(problem, collocation.solve(state), FINAL_WEIGHT, "at home", History())
+    at_origin = select(problem, collocation.solve(state), FINAL_WEIGHT, "at the origin", History())
     unfinished = replace(at_origin, status=Status.MAX_STEPS)
     assert framed(problem, unfinished, History()) is unfinished  # its terms tell nothing
     fit = framed(problem, at_origin, History())
