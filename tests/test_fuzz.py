@@ -85,7 +85,6 @@ RIGHT = {
     "learn_lags": lambda: {"tracks": TRACKS, "rig": RIG},
     "on_circle": lambda: {"x": X},
     "on_sphere": lambda: {"x": np.c_[X, T]},
-    "SplineSINDy": dict,
     "track": lambda: {"path": "none.mkv"},
     "read_video": lambda: {"path": "none.mkv"},
     "read_frame": lambda: {"path": "none.mkv", "number": 0},

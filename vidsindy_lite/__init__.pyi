@@ -13,7 +13,6 @@ from .cameras import rig_template as rig_template
 from .dynamics import Discovery as Discovery
 from .dynamics import Library as Library
 from .dynamics import PolynomialSystem as PolynomialSystem
-from .dynamics import SplineSINDy as SplineSINDy
 from .dynamics import discover as discover
 from .dynamics import on_circle as on_circle
 from .dynamics import on_sphere as on_sphere

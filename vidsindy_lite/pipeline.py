@@ -135,14 +135,14 @@ def discover_from_videos(
         See `observe` and `discover`. What can be told before a video is tracked is.
     """
     check_integer("targets", targets, least=1)
-    how = _checked(degree, library, order, origin, orientation, seed, targets)
+    how, unasked = _checked(degree, library, order, origin, orientation, seed, targets)
     how |= {"progress": progress}
     seen = observe(
         paths, rig, t, lags=lags, detector=detector, hints=hints, targets=targets,
         progress=progress,
     )  # fmt: skip
     names = [Path(path).name for path in paths]
-    return _with_law(seen, names, how, degree is None and library is None and order == "auto")
+    return _with_law(seen, names, how, unasked)
 
 
 def discover_from_tracks(
@@ -192,7 +192,8 @@ def discover_from_tracks(
         If a file is missing or holds no track, if times are given twice or not at all, or as
         `observe_tracks` and `discover` do.
     """
-    how = _checked(degree, library, order, origin, orientation, seed) | {"progress": progress}
+    how, unasked = _checked(degree, library, order, origin, orientation, seed)
+    how |= {"progress": progress}
     check_instance("rig", rig, Rig)
     read = _read(tracks, rig, individual)
     names, pixels = [track.name for track in read], [track.pixels for track in read]
@@ -200,7 +201,7 @@ def discover_from_tracks(
     seen = observe_tracks(pixels, rig, times, lags=lags, names=names, progress=progress)
     doubts = [*(warning for track in read for warning in track.warnings), *doubts]
     seen = replace(seen, warnings=(*seen.warnings, *doubts))
-    return _with_law(seen, names, how, degree is None and library is None and order == "auto")
+    return _with_law(seen, names, how, unasked)
 
 
 def _checked(
@@ -211,15 +212,19 @@ def _checked(
     orientation: str,
     seed: int,
     targets: int = 1,
-) -> dict[str, Any]:
-    """What `discover` takes beside the path, checked before anything is tracked."""
+) -> tuple[dict[str, Any], bool]:
+    """What `discover` takes beside the path, checked before anything is tracked.
+
+    And whether nothing is asked of the law.
+    """
     terms = check_library(degree, library)
-    check_order(order, origin, terms)
+    check_order(order, origin)
     check_orientation(orientation, terms, 3 * targets, origin)
     Form.of(variable_names(3 * targets), terms, 2 if order == 2 else 1)
     check_integer("seed", seed)
     chosen = {"order": order, "origin": origin, "orientation": orientation}
-    return {"library": terms, "seed": seed} | chosen
+    unasked = degree is None and library is None and order == "auto"
+    return {"library": terms, "seed": seed} | chosen, unasked
 
 
 def _driven(law: PolynomialSystem) -> str:

@@ -169,7 +169,8 @@ def discover_from_video(
     >>> print(found, found.g)
     """
     check_detector(detector)
-    check_order(order, "learn", check_library(degree, None))
+    check_order(order, "learn")
+    check_library(degree, None)
     check_integer("seed", seed)
     share = check_number("length_error", length_error)
     if not 0 <= share < 1:

@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import posed
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import Library, discover, monomial_exponents
-from vidsindy_lite.dynamics.collocation import Fit, State, Status
-from vidsindy_lite.dynamics.diagnostics import Beyond, _higher, newcomers, widened
+from vidsindy_lite.dynamics.diagnostics import Beyond, _higher, newcomers
 from vidsindy_lite.study.scoreboard import OdeContest
 
 TIMES = np.linspace(0, 20, 600)
@@ -135,22 +133,6 @@ def test_the_wider_library_keeps_the_old_one_and_within_the_budget():
     assert ((pairs[len(cubic) :] > 0).sum(axis=1) <= 2).all()
     assert len(single) == len(cubic) + 6
     assert _higher(cubic, 3, 5) is cubic
-
-
-def test_a_curve_of_many_knots_takes_from_the_budget():
-    problem = posed()
-    coarse = problem.collocation(problem.segments())
-    fine = problem.collocation([s.refined().refined().refined() for s in coarse.segments])
-    assert coarse.grid.r < len(coarse.grid.x) < fine.grid.r
-    budget = 20.0 * coarse.grid.x.size * problem.d
-    nothing = np.zeros((len(problem.exponents), problem.d))
-    wide = []
-    for collocation in (coarse, fine):
-        control, still = np.zeros((collocation.grid.r, problem.d)), np.zeros(problem.d, dtype=bool)
-        state = State(control, nothing, nothing != 0, np.zeros(problem.d), still)
-        fit = Fit(state, collocation, Status.CONVERGED)
-        wide.append(len(widened(problem, fit, budget).further))
-    assert wide[1] < wide[0]
 
 
 def test_what_a_single_term_explains_is_what_a_refit_gains():

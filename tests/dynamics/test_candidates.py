@@ -4,13 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import vidsindy_lite as vl
 from vidsindy_lite import Library, PolynomialSystem
-from vidsindy_lite.dynamics.library import closure, monomial_exponents
 from vidsindy_lite.dynamics.model import Form
 
 PENDULUM = Library.polynomial(1) + Library.fourier(1)
@@ -239,15 +236,6 @@ def test_a_path_ends_at_a_pole():
     assert np.nanmax(x) < 1.01
 
 
-@given(st.integers(1, 4), st.integers(0, 4))
-def test_the_polynomial_library_is_the_special_case(d, degree):
-    names = tuple(f"x{i}" for i in range(d))
-    exponents, functions = Library.polynomial(degree).resolve(names, d)
-    assert functions == ()
-    np.testing.assert_array_equal(exponents, monomial_exponents(d, degree))
-    np.testing.assert_array_equal(closure(exponents), exponents)
-
-
 def test_a_degree_is_short_for_a_polynomial_library():
     t = np.linspace(0, 10, 300)
     x = np.column_stack([np.cos(t), -np.sin(t)])
@@ -263,21 +251,6 @@ def test_what_an_argument_is_by_default_is_no_variable():
     x = np.random.default_rng(0).normal(size=(5, 2))
     np.testing.assert_array_equal(plain.value(x), np.sin(x[:, 0]))
     np.testing.assert_array_equal(twice.value(x), np.sin(2 * x[:, 0]))
-
-
-@pytest.mark.parametrize("size", [0.5, 4.0])
-def test_functions_in_standard_units_are_those_of_the_data_and_know_their_slopes(size):
-    library = Library.fourier(2) + Library.terms({"|v|v": drag})
-    _, functions = library.resolve(("v", "u"), 2)
-    centre, scale = np.array([0.3, -1.2]), np.array([2.5, 0.4])
-    x = np.random.default_rng(0).normal(size=(30, 2))
-    assert len(functions) == 9
-    for function in functions:
-        ours = function.standardised(centre, scale, size)
-        np.testing.assert_allclose(size * ours.value(x), function.value(centre + scale * x))
-        for i, axis in enumerate(1e-6 * np.eye(2)):
-            slope = (ours.value(x + axis) - ours.value(x - axis)) / 2e-6
-            np.testing.assert_allclose(ours.gradient(x)[:, i], slope, atol=1e-7)
 
 
 def test_a_law_evaluates_differentiates_and_prints():
@@ -411,11 +384,6 @@ def test_a_library_that_does_not_suit_is_refused_in_one_line(library, words):
 def test_what_is_no_library_is_refused(make, words):
     with pytest.raises(ValueError, match=words):
         make()
-
-
-def test_a_library_is_a_sum_of_libraries_only():
-    with pytest.raises(TypeError):
-        Library.polynomial(1) + 3
 
 
 def test_a_product_of_coordinates_is_named_alike_in_every_library():

@@ -7,7 +7,7 @@ import pytest
 
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics.model import Form
-from vidsindy_lite.dynamics.path import views
+from vidsindy_lite.dynamics.noise import views
 from vidsindy_lite.dynamics.problem import pose
 from vidsindy_lite.study import FLOWS
 

@@ -59,10 +59,6 @@ def dense_jacobian(problem, state, columns):
     return approx_fprime(np.zeros(size + len(columns)), at, 1e-7)
 
 
-def test_one_equation_per_control_point_but_for_the_initial_condition(problem):
-    assert problem.grid.nodes.shape[0] == problem.grid.r - len(problem.segments)
-
-
 def test_objective_is_the_sum_of_squares(problem, state):
     assert problem.objective(state) == pytest.approx((residuals(problem, state) ** 2).sum())
 
@@ -80,24 +76,6 @@ def test_schur_complement_and_gradient_agree_with_dense_algebra(problem, state):
     np.testing.assert_allclose(model.response[:, 0], step, rtol=1e-4, atol=1e-5)
     left = ((residual + curve @ step) ** 2).sum()
     assert model.fall == pytest.approx((residual**2).sum() - left, rel=1e-6)
-
-
-def test_a_curve_that_nothing_tells_of_has_a_factor(state):
-    # Three samples, more control points, and a law that counts for nothing.
-    t = np.array([0.0, 0.1, 4.0])
-    segments = [Segment.even(t, np.stack([t, t**2], axis=1), 0.5, 0)]
-    none = Collocation.of(segments, monomial_exponents(2, 2), np.ones(2), np.zeros(2))
-    free = replace(state, control_points=np.zeros((none.grid.r, 2)))
-    factor, _ = none.factor(free)
-    assert none.grid.r > len(t)
-    assert np.isfinite(factor).all()
-    assert (factor[0] > 0).all()
-
-
-def test_the_factor_follows_the_unit_of_the_weights(problem, state):
-    factor, _ = problem.factor(state)
-    scaled = problem.weighted(1e-12 * problem.data_weights, 1e-12 * problem.physics_weights)
-    np.testing.assert_allclose(scaled.factor(state)[0], 1e-6 * factor, rtol=1e-6, atol=1e-20)
 
 
 def test_solve_reaches_a_stationary_point(problem, state):
@@ -121,14 +99,6 @@ def test_refined_segment_halves_every_span():
     assert len(segment.breakpoints) == 5
     assert len(segment.refined().breakpoints) == 9
     assert set(segment.breakpoints) <= set(segment.refined().breakpoints)
-
-
-def test_other_weights_leave_a_problem_as_it_is(problem, state):
-    before = problem.objective(state)
-    other = problem.weighted(np.array([1.0, 9.0]), np.array([5.0, 2.0]))
-    fresh = Collocation.of(problem.segments, problem.exponents, [1.0, 9.0], [5.0, 2.0])
-    assert other.objective(state) == fresh.objective(state) != before
-    assert problem.objective(state) == before
 
 
 def test_a_fit_stops_when_nothing_more_is_promised(problem, state):

@@ -28,18 +28,12 @@ def test_pruning_conditions_on_zero():
     assert not left[0].any()
 
 
-def test_pruning_keeps_what_is_significant():
-    kept, left = pruned([4.0, 20.0], np.eye(2), np.array([9.0, 9.0]))
-    assert kept.ravel().tolist() == [4.0, 20.0]
-    assert (left == np.eye(2)).all()
-
-
 def test_what_no_shift_has_changed_stays_however_large_the_errors_that_are_tolerated():
     problem = posed(0.1)
     law = np.array([[0, 0], [0, -1], [1, 0], [0, 0], [0, 0], [0, 0]], float)
     grid = problem.collocation(problem.segments())
     control = fit_curves(grid, problem.curves)
-    state = State(control, law, law != 0, problem.home, np.zeros(2, dtype=bool))
+    state = State(control, law, law != 0, problem.origin, np.zeros(2, dtype=bool))
     fit = problem.weighted(grid, FINAL_WEIGHT).solve(state)
     path = follow(problem, fit)
     tolerant = tuple(

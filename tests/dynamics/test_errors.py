@@ -8,11 +8,9 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from vidsindy_lite.dynamics.noise import (
-    independent,
     inflation,
     passing,
     prediction_gain,
-    rebound,
     time_inflation,
 )
 
@@ -32,12 +30,6 @@ def test_autoregressive_errors_are_inflated_as_theory_says(correlation):
     error = lasting(200_000, correlation, np.random.default_rng(1))
     expected = (1 + correlation) / (1 - correlation)
     assert inflation([error[:, None]])[0] == pytest.approx(expected, rel=0.1)
-
-
-def test_a_mean_of_lasting_errors_is_as_uncertain_as_they_say():
-    error = lasting(400_000, 0.9, np.random.default_rng(2)).reshape(400, 1000)
-    expected = error.mean(axis=1).var() * 1000
-    assert inflation([error.reshape(-1, 1)])[0] == pytest.approx(expected, rel=0.25)
 
 
 def test_errors_that_alternate_are_not_inflated():
@@ -88,13 +80,6 @@ def test_what_errors_foretell_is_as_theory_says(correlation):
     assert gain == pytest.approx(20_000 * np.log(1 - correlation**2), rel=0.05, abs=20)
 
 
-def test_few_errors_foretell_little():
-    for n in (1, 5, 11, 25):
-        gain = prediction_gain(fit_with(np.random.default_rng(n).standard_normal((n, 2))))
-        assert gain.shape == (2,)
-        assert (np.abs(gain) < 20).all()
-
-
 def test_errors_of_what_was_not_seen_foretell_nothing():
     assert prediction_gain(fit_with(np.zeros((100, 1))))[0] == 0
 
@@ -120,40 +105,6 @@ def test_errors_pass_that_are_forgotten_and_do_not_rebound():
     assert passing(fit_with(errors[:, [1, 6]]), 56).tolist() == [True, True]  # the 2nd was not seen
     assert not passing(fit_with(errors[:, :4]), 2000).any()  # so many terms these cannot judge
     assert not passing(fit_with(1.2 * errors), 56).any()  # a large part of the motion
-
-
-def test_errors_swing_as_theory_says():
-    t = 2 * np.pi * np.arange(6000) / 6000
-    assert rebound([np.sin(60 * t)[:, None]])[0] == pytest.approx(-1, abs=0.02)
-    # One for the last and minus a half for the one before: at lag 1, -.5 / 1.25.
-    white = np.random.default_rng(10).standard_normal(20_001)
-    assert rebound([(white[1:] - 0.5 * white[:-1])[:, None]])[0] == pytest.approx(-0.4, abs=0.03)
-    assert -0.1 < rebound([white[:, None]])[0] < 0
-    # Two stretches know nothing of each other, and one that is empty of none.
-    assert rebound([np.ones((50, 1)), -np.ones((50, 1))])[0] >= 0
-    assert rebound([white[:, None], np.zeros((0, 1))])[0] == rebound([white[:, None]])[0]
-
-
-@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
-def test_as_many_errors_are_independent_as_theory_says(correlation):
-    # Bartlett: n over the sum of the squared autocorrelations, here c^(2 |k|).
-    error = lasting(20_000, correlation, np.random.default_rng(10))
-    expected = 20_000 * (1 - correlation**2) / (1 + correlation**2)
-    assert independent(error) == pytest.approx(expected, rel=0.1)
-
-
-def test_few_errors_are_independent_of_which_few_periods_are_left():
-    t = 2 * np.pi * np.arange(600) / 600
-    assert independent(np.sin(5 * t)) == pytest.approx(4)
-    together = sum(np.sin(k * t + k) for k in (5, 6, 7))
-    assert independent(together) == pytest.approx(12)
-    noise = np.random.default_rng(11).standard_normal(600)
-    assert independent(together + 0.3 * noise) < 21 < independent(noise)
-
-
-@pytest.mark.parametrize("n", [0, 1, 2, 50])
-def test_no_error_is_independent_where_there_is_none(n):
-    assert independent(np.zeros(n)) == 0
 
 
 def test_errors_of_time_are_along_the_path():

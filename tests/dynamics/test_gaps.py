@@ -1,5 +1,7 @@
 """Curves across gaps."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
@@ -8,6 +10,12 @@ from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.path import gaps, join
 
 CIRCLE = PolynomialSystem.from_terms({"x": {"y": 1}, "y": {"x": -1}})
+
+
+def data(*trajectories, spacing=0.2):
+    """A problem as far as its gaps matter."""
+    jumps = [np.zeros(0)] * len(trajectories)
+    return SimpleNamespace(trajectories=trajectories, spacing=spacing, jumps=jumps)
 
 
 def pieces():
@@ -28,7 +36,7 @@ def test_gaps_are_within_one_trajectory():
 
 def test_a_law_carries_the_curve_across_the_gap():
     trajectories, segments, splines = pieces()
-    joined, curves = join(segments, splines, [(0, 2.0)], trajectories, CIRCLE, 0.2)
+    joined, curves = join(data(*trajectories), segments, splines, CIRCLE, [(0, 2.0)])
     assert [segment.trajectory for segment in joined] == [0, 1]
     assert len(joined[0].t) == 121  # samples inside the gap, if any, come back
     t = np.linspace(2, 3, 40)
@@ -38,15 +46,16 @@ def test_a_law_carries_the_curve_across_the_gap():
 
 def test_gaps_that_are_not_named_stay_open():
     trajectories, segments, splines = pieces()
-    joined, curves = join(segments, splines, [], trajectories, CIRCLE, 0.2)
+    joined, curves = join(data(*trajectories), segments, splines, CIRCLE, [])
     assert joined == segments
-    assert curves == splines
+    for segment, curve, spline in zip(segments, curves, splines, strict=True):
+        np.testing.assert_array_equal(curve(segment.t), spline(segment.t))
 
 
 def test_a_law_that_blows_up_in_a_gap_leaves_the_curve_finite():
     trajectories, segments, splines = pieces()
     wild = PolynomialSystem.from_terms({"x": {"x^3": 1e3}, "y": {"x": -1}})
-    _, curves = join(segments, splines, [(0, 2.0)], trajectories, wild, 0.2)
+    _, curves = join(data(*trajectories), segments, splines, wild, [(0, 2.0)])
     t = np.linspace(2.1, 2.9, 40)
     assert np.isfinite(curves[0](t)).all()
 
@@ -67,7 +76,7 @@ def test_both_sides_are_blended_linearly_across_the_gap():
     parts = [t <= 2, t >= 3]
     segments = [Segment.even(t[s], x[s], 0.2, 0) for s in parts]
     splines = [make_interp_spline(s.t, s.x, 3) for s in segments]
-    joined, (curve,) = join(segments, splines, [(0, 2.0)], [(t, x)], CIRCLE, 0.2)
+    joined, (curve,) = join(data((t, x)), segments, splines, CIRCLE, [(0, 2.0)])
     assert len(joined) == 1
     inside = np.linspace(2, 3, 30)
     size = 1 + (inside - 2)
@@ -79,7 +88,8 @@ def test_both_sides_are_blended_linearly_across_the_gap():
 
 def test_a_joined_segment_holds_what_was_measured_in_the_gap():
     trajectories, segments, splines = pieces()
-    joined, _ = join(segments, splines, [(0, 2.0)], trajectories, CIRCLE, 0.25)
+    problem = data(*trajectories, spacing=0.25)
+    joined, _ = join(problem, segments, splines, CIRCLE, [(0, 2.0)])
     assert joined[0].t[[0, -1]].tolist() == [0.0, 6.0]
     np.testing.assert_array_equal(joined[0].t, trajectories[0][0])
     assert np.diff(joined[0].breakpoints).max() <= 0.25 + 1e-12

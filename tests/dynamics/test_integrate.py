@@ -8,18 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import vidsindy_lite
-from vidsindy_lite.dynamics.model import PolynomialSystem, integrate, runge_kutta_4
+from vidsindy_lite.dynamics.model import integrate, runge_kutta_4
 
-LORENZ = PolynomialSystem.from_terms(
-    {
-        "x": {"x": -10, "y": 10},
-        "y": {"x": 28, "xz": -1, "y": -1},
-        "z": {"xy": 1, "z": -8 / 3},
-    }
-)
 DIGEST = """
 import hashlib
 from vidsindy_lite.study import SYSTEMS
@@ -50,20 +42,6 @@ def test_the_tolerance_is_met():
     assert errors[0] > errors[1] > errors[2] > 0
 
 
-def test_no_more_steps_than_scipy_needs():
-    calls = []
-    t = np.array([0.0, 10.0])
-
-    def rate(x):
-        calls.append(1)
-        return LORENZ(x)
-
-    ours, _ = integrate(rate, t, np.array([-8.0, 7, 27]))
-    theirs = solve_ivp(lambda _, x: LORENZ(x), t, ours[0], method="DOP853", rtol=1e-11, atol=1e-11)
-    np.testing.assert_allclose(ours[-1], theirs.y[:, -1], rtol=1e-5)
-    assert len(calls) < 1.6 * theirs.nfev
-
-
 def test_after_a_blow_up_there_is_nothing():
     t = np.linspace(0, 2, 21)  # 1 / (1 - t)
     path = integrate(lambda x: x**2, t, np.array([1.0]), farthest=1e6)[0][:, 0]
@@ -71,10 +49,6 @@ def test_after_a_blow_up_there_is_nothing():
     assert np.isnan(path[10:]).all()
     endless = integrate(lambda x: x**2, t, np.array([1.0]))[0][:, 0]
     assert np.isnan(endless[11:]).all()
-
-
-def test_one_time_is_the_initial_condition():
-    np.testing.assert_array_equal(integrate(circle, np.array([3.0]), np.ones(2))[0], [[1, 1]])
 
 
 def test_the_classical_method_is_of_fourth_order():
@@ -101,13 +75,6 @@ def test_a_chaotic_path_is_the_same_with_every_kernel_of_linear_algebra():
     assert len(here.strip()) == len(hashlib.sha256().hexdigest())
     for kernel in ("Haswell", "Prescott"):
         assert digest(OPENBLAS_CORETYPE=kernel, OMP_NUM_THREADS="2") == here
-
-
-def test_rows_that_lie_close_are_no_stiffness():
-    path, _ = integrate(
-        lambda x: 0 * x + 2, np.linspace(0.0, 1.0, 50), np.array([0.0]), most_steps=60
-    )
-    np.testing.assert_allclose(path[:, 0], np.linspace(0.0, 2.0, 50), atol=1e-12)
 
 
 def test_a_motion_too_stiff_to_follow_ends():

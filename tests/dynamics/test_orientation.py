@@ -7,13 +7,11 @@ from scipy.spatial.transform import Rotation
 import vidsindy_lite as vl
 from vidsindy_lite.dynamics import orientation, solver
 from vidsindy_lite.dynamics.l0 import inverse
-from vidsindy_lite.dynamics.library import Library, monomial_exponents
+from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.orientation import (
-    TurnedLaw,
     _turns,
     apart,
     in_axes,
-    nearest,
     turned,
     with_turns,
 )
@@ -205,14 +203,6 @@ def test_what_has_no_orientation_is_refused(options, message):
         vl.discover(np.arange(200.0), x, **({"orientation": "learn"} | options))
 
 
-def test_the_nearest_order_and_signs_of_axes_are_taken():
-    turn = Rotation.from_rotvec([0.1, -0.2, 0.05]).as_matrix()
-    swapped = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]]) @ turn
-    np.testing.assert_array_equal(nearest(swapped), turn)
-    assert apart(swapped, turn) < 1e-6
-    assert apart(turn, np.eye(3)) > 0.1
-
-
 def test_what_was_measured_is_turned_as_a_whole():
     turn = Rotation.from_euler("z", 90, degrees=True).as_matrix()[:2, :2].T
     x = np.array([[1.0, 2.0], [3.0, np.nan], [5.0, 6.0]])
@@ -222,20 +212,3 @@ def test_what_was_measured_is_turned_as_a_whole():
     np.testing.assert_allclose(y, [[2, -1], [6, -5]])
     np.testing.assert_allclose(shared[:, :, 0], [[1, -1], [1, -1]])
     np.testing.assert_allclose(sigma[0], [[0.2, 0.1], [0.2, 0.1]])
-
-
-def test_descending_ends_in_the_axes_and_at_the_origin_that_it_counted():
-    """A law of two terms around (.2, -.1), turned by .3: of the twelve terms two are left."""
-    exponents = monomial_exponents(2, 2)
-    law, rng = np.zeros((6, 2)), np.random.default_rng(0)
-    law[(exponents == (1, 1)).all(axis=1), 0] = 1.0
-    law[(exponents == (1, 0)).all(axis=1), 1] = -1.5
-    directions = 1e-3 * rng.normal(size=(12, 6, 2))
-    about = TurnedLaw(exponents, np.stack([law, *directions]), np.zeros(2))
-    turn, away = Rotation.from_rotvec([0, 0, 0.3]).as_matrix()[:2, :2], np.array([-0.2, 0.1])
-    askew = about._mapped(turn, turn @ away, turn.T)
-    cost, axes, origin = askew.descended(np.eye(2), np.zeros(2), 0.01)
-    estimate, variance = askew.seen(axes, origin)
-    z2 = estimate**2 / (variance + 0.01**2)
-    assert cost == pytest.approx(0.5 * np.log1p(z2).sum(), rel=1e-6)
-    assert (z2 > 1).sum() == 2

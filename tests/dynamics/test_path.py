@@ -1,19 +1,19 @@
 """The path of laws: a first law, smooth errors, plateaus that compete, and which law persists."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from vidsindy_lite.dynamics import path as paths
-from vidsindy_lite.dynamics.collocation import Collocation, Fit, State, Status
+from vidsindy_lite.dynamics.collocation import Collocation, State, Status
 from vidsindy_lite.dynamics.data import check_trajectory
 from vidsindy_lite.dynamics.library import Library
 from vidsindy_lite.dynamics.model import Form, PolynomialSystem
-from vidsindy_lite.dynamics.path import LARGEST, History, Path, Plateau
-from vidsindy_lite.dynamics.problem import fit_curves, pose
+from vidsindy_lite.dynamics.path import LARGEST
+from vidsindy_lite.dynamics.problem import FINAL_WEIGHT, fit_curves, pose, unpruned
+from vidsindy_lite.dynamics.result import History
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
@@ -44,10 +44,6 @@ def drifting(t, x, share):
     """A slow wander, less than one period over all the record."""
     wander = np.stack([np.sin(2 * np.pi * (0.7 * t / t[-1] + phase)) for phase in (0.1, 0.6)], 1)
     return x + share * x.std(axis=0) * wander
-
-
-def test_a_plateau_is_measured_in_decades():
-    assert Plateau(0, 0.01, 1.0, np.ones(3, dtype=bool)).decades == pytest.approx(2)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.2])
@@ -160,11 +156,6 @@ def posed(times, degree=2):
     return pose(runs, shared, form, np.random.default_rng(0))
 
 
-def test_short_data_are_searched_as_they_are():
-    problem = posed([np.linspace(0, 20, 400)])
-    assert paths.enough(problem) is problem.stretches
-
-
 def test_of_long_data_each_stretch_gives_its_share(monkeypatch):
     monkeypatch.setattr(paths, "ENOUGH_SAMPLES", 300)
     monkeypatch.setattr(paths, "ENOUGH_TURNS", 3)
@@ -191,12 +182,12 @@ def test_all_data_decide_on_the_terms_of_a_part(monkeypatch):
 
 def test_axes_that_moved_for_nothing_come_home_if_the_fit_has_converged():
     problem, history = posed([np.linspace(0, 20, 400)]), History()
-    collocation = problem.weighted(problem.collocation(problem.segments()), paths.FINAL_WEIGHT)
+    collocation = problem.weighted(problem.collocation(problem.segments()), FINAL_WEIGHT)
     control = fit_curves(collocation, problem.curves)
     active = CIRCLE.support
-    state = State(control, 0.0 * active, active, problem.home, np.ones(2, dtype=bool))
+    state = State(control, 0.0 * active, active, problem.origin, np.ones(2, dtype=bool))
     start = collocation.solve(state)
-    moved = paths.select(problem, start, paths.FINAL_WEIGHT, "moved", history)
+    moved = paths.select(problem, start, FINAL_WEIGHT, "moved", history)
     assert moved.state.moving.all()
     assert not paths.framed(problem, moved, history).state.moving.any()
     unfinished = replace(moved, status=Status.MAX_STEPS)
@@ -206,8 +197,6 @@ def test_axes_that_moved_for_nothing_come_home_if_the_fit_has_converged():
 @pytest.mark.parametrize("fails_at", [None, 1, 3])
 def test_terms_that_cannot_be_told_apart_are_searched_from_the_first_fit(monkeypatch, fails_at):
     problem = posed([np.linspace(0, 20, 400)])
-    collocation = problem.collocation(problem.segments())
-    control = fit_curves(collocation, problem.curves)
     solve, calls = Collocation.solve, []
 
     def solved(self, state, **options):
@@ -218,9 +207,9 @@ def test_terms_that_cannot_be_told_apart_are_searched_from_the_first_fit(monkeyp
 
     monkeypatch.setattr(Collocation, "solve", solved)
     every = np.ones(len(problem.exponents), dtype=bool)
-    _, weight = paths.unpruned(problem, collocation, control, every, History())
-    expected = paths.FIRST_WEIGHTS[-1 if fails_at is None else 0]
-    assert weight == expected
+    fit, converged = unpruned(problem, every)
+    assert converged is (fails_at is None)
+    assert fit.state.control_points is calls[-1 if converged else 0].state.control_points
     assert len(calls) == (4 if fails_at is None else fails_at + 1)
 
 
@@ -317,15 +306,6 @@ def test_a_plateau_that_leaves_more_than_it_was_said_to_is_passed_over(seed):
     found = discover(t[seen], x[seen], order=1)
     assert found.terms[np.flatnonzero(found.system.support[:, 0])[-1]] == "x^2"
     assert found.noise < 1e-3 * x.std()
-
-
-@pytest.mark.parametrize("high", [0.5, 0.05])
-def test_a_law_persists_if_no_other_plateau_is_wider(high):
-    terms = np.eye(2, dtype=bool)
-    rivals = Plateau(0, 0.01, high, terms[0]), Plateau(0, high, 1.0, terms[1])
-    path = Path(None, None, 0.01, 0.1, (rivals,))
-    fit = Fit(SimpleNamespace(active=terms[:1].T), None, Status.CONVERGED)
-    assert paths.has_terms(fit, path.widest()) is (high == 0.5)
 
 
 @pytest.mark.parametrize("rounds", [1, 2])

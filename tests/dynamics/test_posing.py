@@ -19,7 +19,7 @@ def test_data_are_in_standard_units():
     speed = np.sqrt((np.gradient(x, t, axis=0) ** 2).mean())
     assert speed == pytest.approx(1, rel=0.02)
     np.testing.assert_allclose(problem.systematic[0][0, :, 0], 1 / measured[1].std(axis=0))
-    np.testing.assert_allclose(problem.home, -measured[1].mean(axis=0) / measured[1].std(axis=0))
+    np.testing.assert_allclose(problem.origin, -measured[1].mean(axis=0) / measured[1].std(axis=0))
 
 
 def test_a_pause_is_a_gap_if_the_target_moves_far_in_it():

@@ -12,7 +12,7 @@ from vidsindy_lite.dynamics.bspline import Segment
 from vidsindy_lite.dynamics.collocation import Collocation, Fit, State, Status
 from vidsindy_lite.dynamics.inference import _kicks
 from vidsindy_lite.dynamics.library import monomial_exponents
-from vidsindy_lite.dynamics.noise import OCTAVE, _bands, evidence
+from vidsindy_lite.dynamics.noise import evidence
 from vidsindy_lite.dynamics.path import first_law
 
 LAW = PolynomialSystem.from_terms(
@@ -186,21 +186,6 @@ def test_evidence_is_that_of_the_gaussian_model():
     for noise, kick in ((0.1, 0.3), (0.5, 0.01)):
         ours, dense = both(noise, kick)
         assert ours == pytest.approx(dense, rel=1e-6)
-
-
-@pytest.mark.parametrize(("n", "bands"), [(10, 1), (40, 2), (1024, 7), (1500, 7)])
-def test_white_noise_is_as_strong_in_every_octave(n, bands):
-    noise = np.random.default_rng(0).normal(size=(n, 2, 400)) * [[1.0], [3.0]]
-    found = _bands(noise)
-    assert found.shape == (bands, 2)
-    np.testing.assert_allclose(found, np.tile([1.0, 9.0], (bands, 1)), rtol=0.15)
-
-
-def test_a_tone_is_in_the_octave_of_its_frequency():
-    for k in (OCTAVE, OCTAVE + 1, 5 * OCTAVE):  # waves in the whole signal
-        tone = np.cos(2 * np.pi * k * np.arange(512) / 512)[:, None, None]
-        (band,) = np.flatnonzero(_bands(tone)[:, 0] > 1e-9)
-        assert band == (0 if k == OCTAVE else 1 + int(np.log2((k - 1) / OCTAVE)))
 
 
 def test_kicks_of_few_samples_a_turn_may_be_a_drive():

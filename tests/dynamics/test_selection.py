@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 
 from vidsindy_lite.dynamics import l0 as selection
 from vidsindy_lite.dynamics.l0 import (
-    _Quadratic,
     closest_rival,
-    equilibrated,
     inverse,
     subset_path,
     subset_search,
@@ -54,21 +52,6 @@ def test_without_correlation_the_search_finds_the_global_minimum(seed, m, price,
     assert (support == expected).all()
     assert value == pytest.approx(lowest, abs=1e-8)
     np.testing.assert_allclose(solution, np.where(expected, pull / np.diag(information), 0.0))
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(2, 3), st.floats(0.01, 10))
-def test_with_three_columns_the_search_from_everything_is_rarely_off(seed, m, price):
-    information, pull, _ = random_problem(seed, m)
-    penalty = np.full(m, price)
-    _, _, value = subset_search(information, pull, 0 * pull, penalty, np.ones(m, dtype=bool))
-    _, lowest = brute_force(information, pull, penalty)
-    others = [
-        subset_search(information, pull, 0 * pull, penalty, np.array(s, dtype=bool))[2]
-        for s in product([False, True], repeat=m)
-    ]
-    # One of the starts is the minimum itself, where the search has to stay.
-    assert min(others) == pytest.approx(lowest, rel=1e-8, abs=1e-8)
-    assert value >= lowest - 1e-8 * (1 + abs(lowest))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.floats(0.01, 10))
@@ -181,20 +164,6 @@ def test_a_path_is_a_search_of_each_share_that_begins_where_the_last_ended(seed,
         assert (found == support).all()
 
 
-def test_a_path_solves_no_support_twice(monkeypatch):
-    information, pull, _ = random_problem(3, 8)
-    solved, fitted = [], _Quadratic._fitted
-
-    def counted(model, support):
-        solved.append(support.tobytes())
-        return fitted(model, support)
-
-    monkeypatch.setattr(_Quadratic, "_fitted", counted)
-    functions = [(information, pull, share) for share in np.geomspace(1, 1e-2, 20)]
-    subset_path(functions, 0 * pull, np.full(8, 1.0), np.ones(8, dtype=bool))
-    assert len(solved) == len(set(solved))
-
-
 def test_a_penalty_of_minus_infinity_keeps_a_worthless_column():
     information, pull = np.eye(3), np.array([5.0, 0.0, 0.1])
     penalty = np.array([1.0, -np.inf, 1.0])
@@ -204,12 +173,6 @@ def test_a_penalty_of_minus_infinity_keeps_a_worthless_column():
     assert list(support) == [True, True, False]
     np.testing.assert_allclose(solution, [5, 0, 0])
     assert value == pytest.approx(1 - 25)
-
-
-def test_the_start_is_left_as_it_is():
-    start = np.ones(3, dtype=bool)
-    subset_search(np.eye(3), np.zeros(3), np.zeros(3), np.ones(3), start)
-    assert start.all()
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -234,13 +197,6 @@ def test_inverse_of_badly_scaled_information():
     core = np.array([[2, 1, 0], [1, 2, 1], [0, 1, 2.0]])
     back = scale @ inverse(scale @ core @ scale) @ scale
     np.testing.assert_allclose(back, np.linalg.inv(core), atol=1e-11)
-
-
-def test_equilibrated_has_a_unit_diagonal_and_scales_back():
-    information = np.array([[4.0, 1.0], [1.0, 9e8]])
-    matrix, scale = equilibrated(information, ridge=0.0)
-    np.testing.assert_allclose(np.diag(matrix), 1)
-    np.testing.assert_allclose(matrix / scale[:, None] / scale, information)
 
 
 def test_what_cannot_be_told_is_uncertain_not_certain():

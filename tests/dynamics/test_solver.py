@@ -11,10 +11,9 @@ from vidsindy_lite.dynamics import collocation, solver
 from vidsindy_lite.dynamics import path as paths
 from vidsindy_lite.dynamics.bspline import Segment
 from vidsindy_lite.dynamics.collocation import State
-from vidsindy_lite.dynamics.library import Library, monomial_exponents
-from vidsindy_lite.dynamics.model import Form, PolynomialSystem
+from vidsindy_lite.dynamics.model import PolynomialSystem
 from vidsindy_lite.dynamics.path import FINAL_WEIGHT, History, polish
-from vidsindy_lite.dynamics.problem import fit_curves, pose, term_penalties
+from vidsindy_lite.dynamics.problem import fit_curves
 from vidsindy_lite.dynamics.solver import discover
 from vidsindy_lite.study import (
     REFERENCE_OFFSET,
@@ -281,22 +280,6 @@ def test_bad_time_limits_are_refused(limit):
         discover(t, np.sin(t)[:, None], time_limit=limit)
 
 
-def test_history_tells_the_fit(lorenz):
-    history = lorenz[-1].history
-    assert history[0].terms == 30
-    assert history[-1].terms == 7
-    assert history[-1].physics_loss < 1e-4 * history[0].physics_loss
-    assert all(a.seconds <= b.seconds for a, b in zip(history, history[1:], strict=False))
-
-
-def test_knots_are_halved_once_where_that_does_not_matter(lorenz):
-    _, t, x, found = lorenz
-    form, rng = Form.of(("x", "y", "z"), Library.polynomial(3)), np.random.default_rng(0)
-    problem = pose([(t, x)], [np.empty((*x.shape, 0))], form, rng)
-    spans = [len(segment.breakpoints) - 1 for segment in problem.segments()]
-    assert [len(np.unique(curve.t)) - 1 for curve in found.curves] == [2 * n for n in spans]
-
-
 # -- warnings --------------------------------------------------------------------------------------
 
 
@@ -387,13 +370,6 @@ def test_bad_degrees_are_refused(degree):
     _, t, x = measured("Lorenz", 0.0)
     with pytest.raises(ValueError, match="degree: must be"):
         discover(t, x, degree=degree)
-
-
-def test_penalties_rise_with_the_number_of_rivals():
-    penalties = term_penalties(monomial_exponents(3, 3))
-    by_degree = [np.unique(penalties[monomial_exponents(3, 3).sum(axis=1) == k]) for k in range(4)]
-    assert all(len(values) == 1 for values in by_degree)
-    assert np.diff(np.concatenate(by_degree)).min() > 0
 
 
 @pytest.mark.parametrize(("spacing", "halvings"), [(1.0, 1), (2.0, 2)])

@@ -58,11 +58,6 @@ def test_masked_rows_are_missing():
     assert x.max() == 1
 
 
-def test_one_or_several_trajectories():
-    assert [len(t) for t, _ in check_trajectories(T, X)] == [5]
-    assert [len(t) for t, _ in check_trajectories([(T, X), [T[:3], X[:3]]])] == [5, 3]
-
-
 @pytest.mark.parametrize("t", [[1, 2], T, (T, X), [(T, X, X)], {"t": X}, None, [T, X]])
 def test_what_is_no_list_of_trajectories(t):
     with pytest.raises(ValueError, match=r"x: must be given, unless t is a list of pairs \(t, x\)"):

@@ -2,8 +2,8 @@
 
 ::
 
-    prepare   `data` (checked trajectories, units), `smoothing`, `problem` (standard units, prices),
-              `noise` (variance components: errors that last, precision, process noise)
+    prepare   `data` (checked trajectories, units), `bspline` (smoothed curves), `problem` (standard
+              units, penalties), `noise` (variance components: errors that last, process noise)
     path      `collocation` (splines and a law, fitted by banded Gauss-Newton steps), `l0` (which
               terms a quadratic model needs), `frames` (the origin in which a law is sparsest),
               `path` (a first law at a large tolerated error, its support path, the law that
@@ -11,7 +11,7 @@
     infer     `inference` (error bars, the law in the frame of the data), `result` (`Discovery`)
     diagnose  `diagnostics` (each warning in words)
     below     `library` (candidate terms), `model` (systems, their integration, what a law may look
-              like), `bspline`
+              like)
     beside    `orientation` (axes in which a law is sparsest), `mechanics` (what a law says of a
               body), `homogeneous` (of one flight, the law that is the same at every place)
 """
@@ -21,17 +21,16 @@ from .collocation import Collocation, Status
 from .result import Discovery
 from .model import Form
 from .model import runge_kutta_4
-from .library import Function, monomial_exponents, monomial_gradients, monomials
+from .library import Function, monomial_exponents, monomials
 from .solver import check_order
 from .frames import ShiftedLaw
 from .homogeneous import homogeneous
-from .result import Plateau, Swing
+from .result import Swing
 from .model import PolynomialSystem
 from .problem import FALSE_ALARM, fit_curves, term_penalties
 from .mechanics import Quantity, Round, on_circle, on_sphere
 from .l0 import closest_rival, subset_search
-from .solver import SplineSINDy
-from .smoothing import smooth
+from .bspline import smooth
 from .solver import discover
 from .bspline import DEGREE, Segment, clamped_knots, design_matrix, local_basis
 from .collocation import State

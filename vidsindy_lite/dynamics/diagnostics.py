@@ -20,22 +20,22 @@ from scipy.special import betaincc, chdtrc, chdtri
 from ..arrays import Bools, Floats, Ints
 from .collocation import CLEANEST, Fit, Linearisation, State, Status
 from .data import Trajectory, autocovariances, typical_step
-from .frames import away, freed
+from .frames import free_offsets, freed
 from .l0 import (
     LEAST,
     closest_rival,
     far_neighbours,
     minimiser,
     newcomers,
-    prior_prices,
+    prior_penalties,
     subset_search,
 )
 from .library import monomial_exponents, monomials, shift_generators, shift_matrix, velocity_names
 from .mechanics import Complexes, Round, on_circle, on_sphere
 from .model import PolynomialSystem, place, spoken, sum_text
-from .noise import GROSS, passing, residual_noise
-from .path import RESOLVED, Path
+from .noise import CONSISTENT, GROSS, passing, residual_noise
 from .problem import COARSE, Problem
+from .result import Path
 
 # --------------------------------------------------------------------------------------------------
 # Where a motion takes place, looked at before any law: a coordinate at rest, a line, a plane, a
@@ -403,7 +403,7 @@ class Wider:
     Parameters
     ----------
     problem : Problem
-        With all of these as candidates; it has no prices.
+        With all of these as candidates; it has no penalties.
     fit : Fit
         With the old terms alone.
     further : ndarray of int
@@ -439,7 +439,7 @@ class Wider:
         )
 
 
-def widened(problem: Problem, fit: Fit, budget: float = 2e7) -> Wider:
+def widened(problem: Problem, fit: Fit, budget: float = 5e6) -> Wider:
     """The last fit among terms beyond its library; of a fraction, in its numerators.
 
     The budget is of entries of the derivatives of the data, or the curve, in the further terms.
@@ -506,7 +506,7 @@ def _higher(exponents: Ints, d: int, most: float) -> Ints:
 # An axis whose origin is that of the data is a claim: of all places in the box of the data it
 # would be just there. It is believed if the data hold it to be so likelier than chance makes it.
 
-AWAY = "another origin"
+ELSEWHERE = "another origin"
 """That of a law is said to be elsewhere than where it was found."""
 VANISHED = 1e-6
 """What is left of a term in another frame, over the parts that cancel in it, if it vanishes."""
@@ -518,12 +518,12 @@ Rival = tuple[str, str, float]
 def elsewhere(
     problem: Problem, state: State, whole: Linearisation, law: PolynomialSystem
 ) -> Iterator[Rival]:
-    """Other laws that fit almost as well, one axis nearer home or one away from it.
+    """Other laws that fit almost as well, with one free axis less or one more.
 
     Parameters
     ----------
     problem : Problem
-        Its prices.
+        Its penalties.
     state : State
         Of the last fit.
     whole : Linearisation
@@ -533,17 +533,17 @@ def elsewhere(
     """
     # The offset stays where it is: with it free, the same law in another frame would count.
     model = whole.of(problem.form.searched)
-    own = problem.price(state)
+    own = problem.penalty(state)
     for axis, there in _neighbours(problem, state):
         for value, rival in _cheapest_two(problem, state, model, there):
             cost = value + problem.axis_penalty * there.moving.sum() - own
             if not cost < 4.0:  # a likelihood ratio of 7 tells two laws apart
                 break  # the next costs more
-            matrix = shift_matrix(problem.exponents, rival.offset - problem.home)
+            matrix = shift_matrix(problem.exponents, rival.offset - problem.origin)
             parts = np.abs(matrix) @ np.abs(rival.coefficients)
             terms = (np.abs(matrix @ rival.coefficients) > VANISHED * parts) | (problem.known != 0)
             if (terms != law.support).any():
-                where = AWAY if there.moving[axis] else "the origin of the data"
+                where = ELSEWHERE if there.moving[axis] else "the origin of the data"
                 yield where, problem.form.names[axis], cost
                 break
 
@@ -555,10 +555,10 @@ def pinned(
     law: PolynomialSystem,
     tolerated: float,
 ) -> Iterator[Rival]:
-    """Axes that may as well be a little off home, by which the law would have other terms.
+    """Axes that may as well be free, a little off the data's, by which the law had other terms.
 
-    Where other axes have left, none is at home for the asking: then to be there is a coincidence,
-    as much as the box is wider than the origin is uncertain. A move costs twice its logarithm.
+    Where other axes are free, none is fixed for the asking: to be there is a coincidence, as much
+    as the box is wider than the origin is uncertain. A move costs twice its logarithm.
 
     Parameters
     ----------
@@ -571,7 +571,7 @@ def pinned(
         new = (np.abs(moved) > VANISHED * np.abs(moved).max(initial=0.0)) & ~law.support
         # Odds of 20 to 1: strong evidence by Kass and Raftery 1995.
         if state.moving.any() and new.any() and room - gain < 6.0:
-            yield AWAY, problem.form.names[axis], room - gain
+            yield ELSEWHERE, problem.form.names[axis], room - gain
 
 
 def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:
@@ -593,10 +593,10 @@ def untold_origins(found: Sequence[Rival], remedy: str) -> Iterator[str]:
 
 
 def _neighbours(problem: Problem, state: State) -> Iterator[tuple[int, State]]:
-    """The same law with an axis at home that is not, or away from where it is, and which."""
+    """The same law with a free axis where the data have it, or one free that is not, and which."""
     axes = np.eye(problem.d, dtype=bool)[state.moving]
-    nearer = [(np.where(home, problem.home, state.offset), state.moving & ~home) for home in axes]
-    for origin, moving in [*nearer, *away(problem, state)]:
+    fewer = [(np.where(axis, problem.origin, state.offset), state.moving & ~axis) for axis in axes]
+    for origin, moving in [*fewer, *free_offsets(problem, state, problem.form.movable)]:
         moved = shift_matrix(problem.exponents, state.offset - origin) @ state.coefficients
         axis = int(np.argmax(moving != state.moving))
         yield axis, replace(state, coefficients=moved, offset=origin, moving=moving)
@@ -618,12 +618,13 @@ def _cheapest_two(
     pull, present = model.gradient - model.information @ step, there.flat()[columns]
     quadratic = changes @ model.information @ changes.T, changes @ pull, present
     risen = float(-step @ (model.gradient + pull))
-    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
-    support, solution, value = subset_search(*quadratic, prices, (present != 0) | (columns >= size))
+    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))[columns]
+    start = (present != 0) | (columns >= size)
+    support, solution, value = subset_search(*quadratic, penalties, start)
     flat = there.flat()
     flat[columns] = solution
     yield risen + value, there.moved(there.control_points, flat)
-    cost, dropped, added = closest_rival(*quadratic, prices, support)
+    cost, dropped, added = closest_rival(*quadratic, penalties, support)
     support[dropped], support[added] = False, True
     flat[columns] = minimiser(*quadratic, support)
     yield risen + value + cost, there.moved(there.control_points, flat)
@@ -631,9 +632,6 @@ def _cheapest_two(
 
 # --------------------------------------------------------------------------------------------------
 # All that is to be said of a law.
-
-MISFIT = 1.5
-"""Residual over estimated noise beyond which the law does not fit."""
 
 
 def diagnose(
@@ -753,9 +751,10 @@ def _shape(problem: Problem, fit: Fit) -> Iterator[str]:
 def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
     """Does the curve miss the data, or by less than the errors that were given?"""
     residual, names = residual_noise(fit), problem.form.names
-    seen = (fit.collocation.counts > 0) & (residual > RESOLVED)
+    # Less than a hundredth of the spread does not matter.
+    seen = (fit.collocation.counts > 0) & (residual > 1e-2)
     ratio = np.where(seen, residual / problem.noise, 0.0)
-    misses = ~(ratio < MISFIT)
+    misses = ~(ratio < CONSISTENT)
     # A curve without a law follows errors that last, too: they are no misfit.
     if misses.any() and wider.beyond.count and not wider.beyond.significant:
         misses &= ~passing(fit, len(wider.problem.exponents))
@@ -771,7 +770,7 @@ def _misfit(problem: Problem, fit: Fit, wider: Wider) -> Iterator[str]:
         )
     too_large = problem.noise / residual
     j = int(too_large.argmax())
-    if problem.measured_errors and too_large[j] > MISFIT:
+    if problem.measured_errors and too_large[j] > CONSISTENT:
         yield (
             f"sigma of {names[j]} is {too_large[j]:.3g} times the errors that the law leaves: the "
             "error bars are too wide, and terms may be lost; leave it out, and the errors are "
@@ -849,7 +848,7 @@ def _rivals(
     law: PolynomialSystem, remedy: str, clean: bool,
 ) -> Iterator[str]:  # fmt: skip
     """Do other terms or another origin explain the data as well?"""
-    if clean and not problem.kicked:
+    if clean and not problem.has_process_noise:
         return  # what is left is the error of the splines, not noise: it settles nothing
     tolerant = clean or max(plateau.low for plateau in path.of(state.active)) > path.lowest
     found = wider.beyond
@@ -878,9 +877,10 @@ def _far_neighbours(wider: Wider, remedy: str, odds_allowed: float = 0.02) -> It
     support, present = wider.fit.state.free()[columns], wider.fit.state.flat()[columns]
     if not support.any():
         return
-    model, prices = wider.model.of(columns), np.tile(prior_prices(law.exponents), law.d)[columns]
+    model = wider.model.of(columns)
+    penalties = np.tile(prior_penalties(law.exponents), law.d)[columns]
     odds, dropped, added, entry, value = far_neighbours(
-        model.information, model.gradient, present, prices, support
+        model.information, model.gradient, present, penalties, support
     )
     if odds > odds_allowed:
         out, into = (" and ".join(place(law, columns[k]) for k in at) for at in (dropped, added))
@@ -910,7 +910,7 @@ def _sampling(problem: Problem, law: PolynomialSystem, remedy: str) -> Iterator[
     if samples < 2 * np.pi:  # a step is longer than a time scale of the motion
         yield f"only {samples:.1f} samples per turn of the motion: sample faster"
     coarse = problem.samples_a_turn < COARSE
-    if problem.kicked and (coarse or turns < 10):
+    if problem.has_process_noise and (coarse or turns < 10):
         few = f"{turns:.1f} turns of {problem.samples_a_turn:.0f} samples each"
         yield (
             f"the motion is taken for kicked at random, which {few} cannot tell from a drive or a "

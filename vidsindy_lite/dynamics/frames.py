@@ -3,13 +3,13 @@
 B-splines sum to one, so an offset added to the curve is redundant. It matters when the library is
 evaluated at ``x - offset``: then it is the origin of the law's own frame. What a move of the origin
 does to a polynomial law and to its information is exact, so that frames are compared by algebra: an
-axis off the data's origin is one more column of the L0 search, with a price of its own.
+axis off the data's origin is one more column of the L0 search, with a penalty of its own.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from .collocation import Fit, Linearisation, State
 from .l0 import newcomers, subset_search
-from .library import closure_mask, divides, shift_generators, shift_matrix
+from .library import divides, shift_generators, shift_matrix
 from .problem import Problem
 
 Origin = tuple[Floats, Bools]
@@ -105,30 +105,14 @@ class ShiftedLaw:
         return origins
 
 
-def together(problem: Problem, state: State) -> list[Origin]:
-    """Origins at which a term of a law vanishes, where motion is, and those with axes back home.
+def free_offsets(problem: Problem, state: State, movable: Bools) -> list[Origin]:
+    """Origins at which a term of a law vanishes, moved along some of the axes that are not free.
 
     Terms that a move brings in are the data's to decide on, while the origin moves.
     """
-    return [*_vanishing(problem, state, problem.form.movable), *nearer_home(problem, state.offset)]
-
-
-def one_by_one(problem: Problem, state: State) -> Iterator[Origin]:
-    """Origins at which a term of a law vanishes, one more axis off home."""
-    for axis in np.eye(problem.d, dtype=bool)[problem.form.movable]:
-        yield from _vanishing(problem, state, axis)
-
-
-def away(problem: Problem, state: State) -> list[Origin]:
-    """Origins at which a term of a law vanishes, and the axes that are then off home."""
-    return _vanishing(problem, state, problem.form.movable)
-
-
-def _vanishing(problem: Problem, state: State, movable: Bools) -> list[Origin]:
-    """Origins at which a term vanishes, moved along some of the axes that are at home."""
-    exponents, home = problem.exponents, movable & ~state.moving
-    frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), home)
-    below = divides(exponents, home) & ~np.eye(len(exponents), dtype=bool)
+    exponents, fixed = problem.exponents, movable & ~state.moving
+    frames = ShiftedLaw(exponents, state.coefficients, np.empty(0), fixed)
+    below = divides(exponents, fixed) & ~np.eye(len(exponents), dtype=bool)
     low, high = problem.box
     found: list[Origin] = []
     entries = np.argwhere((state.active & (below @ state.active)).T)
@@ -141,11 +125,11 @@ def _vanishing(problem: Problem, state: State, movable: Bools) -> list[Origin]:
     return found
 
 
-def nearer_home(problem: Problem, origin: Floats) -> list[Origin]:
-    """An origin, and the same with some of its axes at home, where they cost nothing."""
-    home = problem.home
-    masks = itertools.product(*((True, False) if away else (False,) for away in origin != home))
-    return [(np.where(mask, origin, home), np.array(mask)) for mask in masks]
+def with_fewer_axes(problem: Problem, origin: Floats) -> list[Origin]:
+    """An origin, and the same with some of its axes at the data's, where they cost nothing."""
+    given = problem.origin
+    masks = itertools.product(*((True, False) if free else (False,) for free in origin != given))
+    return [(np.where(mask, origin, given), np.array(mask)) for mask in masks]
 
 
 def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
@@ -154,60 +138,53 @@ def closed(problem: Problem, fit: Fit, weight: float) -> Fit:
     state = replace(
         fit.state,
         coefficients=shift_matrix(exponents, fit.state.offset) @ fit.state.coefficients,
-        active=closure_mask(exponents, fit.state.active, problem.form.movable),
+        active=divides(exponents, problem.form.movable) @ fit.state.active,
         offset=np.zeros(d),
         moving=np.zeros(d, dtype=bool),
     )
     return replace(fit, state=state, collocation=problem.weighted(fit.collocation, weight))
 
 
-def as_shifted(problem: Problem, fit: Fit) -> ShiftedLaw:
-    """The law of a fit, whose terms are closed under shifts, with its information."""
-    state, columns = fit.state, np.flatnonzero(fit.state.free())
+def cheapest(problem: Problem, whole: Fit, origins: Sequence[Origin]) -> Fit:
+    """The cheapest support at one of some origins, by the quadratic model around a law.
+
+    That has all terms of the library, or of a shift closure; what it lacks stays zero.
+    """
+    state, columns = whole.state, np.flatnonzero(whole.state.free())
     information = np.diag(np.where(state.free()[: -problem.d], 0.0, 1e30))
-    model, gradient = fit.collocation.linearise(state, columns), np.zeros(len(information))
+    model, gradient = whole.collocation.linearise(state, columns), np.zeros(len(information))
     information[np.ix_(columns, columns)], gradient[columns] = model.information, model.gradient
-    movable = problem.form.movable
-    return ShiftedLaw(problem.exponents, state.coefficients, information, movable, gradient)
+    law = ShiftedLaw(problem.exponents, state.coefficients, information, gradient=gradient)
+    objective, every = whole.collocation.objective(state), np.ones(len(columns), dtype=bool)
+
+    def at(origin: Floats, moving: Bools) -> Fit:
+        coefficients, information, gradient = law.at(origin)
+        _, solution, value = subset_search(
+            information[np.ix_(columns, columns)], gradient[columns],
+            coefficients.T.ravel()[columns], problem.entry_penalties[columns], every,
+        )  # fmt: skip
+        flat = np.append(np.zeros(state.coefficients.size), origin)
+        flat[columns] = solution
+        there = state.moved(state.control_points, flat)
+        there = replace(there, active=there.coefficients != 0, moving=moving)
+        cost = objective + value + problem.axis_penalty * moving.sum()
+        return replace(whole, state=there, criterion=cost)
+
+    return min((at(*origin) for origin in origins), key=lambda fit: fit.criterion)
 
 
-def cheapest_at(problem: Problem, whole: Fit, law: ShiftedLaw, origin: Origin) -> Fit:
-    """The cheapest support at an origin, by the quadratic model around a law with all its terms."""
-    place, moving = origin
-    coefficients, information, gradient = law.at(place)
-    columns = np.flatnonzero(whole.state.free())
-    _, solution, value = subset_search(
-        information[np.ix_(columns, columns)],
-        gradient[columns],
-        coefficients.T.ravel()[columns],
-        problem.prices[columns],
-        np.ones(len(columns), dtype=bool),
-    )
-    flat = np.append(np.zeros(whole.state.coefficients.size), place)
-    flat[columns] = solution
-    state = whole.state.moved(whole.state.control_points, flat)
-    state = replace(state, active=state.coefficients != 0, moving=moving)
-    objective = whole.collocation.objective(whole.state)
-    cost = objective + value + problem.axis_penalty * moving.sum()
-    return replace(whole, state=state, criterion=cost)
+def with_free_axis(
+    problem: Problem, state: State, model: Linearisation, tolerated: float
+) -> State | None:
+    """The state with the free axis by which its law gains most, if one is worth its penalty.
 
-
-def at_home(problem: Problem, fit: Fit) -> Fit:
-    """The cheapest support where the data have their origin, from all terms of a fit."""
-    origin = problem.home, np.zeros(problem.d, dtype=bool)
-    return cheapest_at(problem, fit, as_shifted(problem, fit), origin)
-
-
-def off_home(problem: Problem, state: State, model: Linearisation, tolerated: float) -> State:
-    """The state with the axis off home by which its law gains most, if that is worth it.
-
-    Its terms were chosen at larger errors, at which it may have been too near home to tell. What it
-    gains has to be worth the price of an axis, and more than its place would be a coincidence.
+    Its terms were chosen at larger errors, which may not have told it from where the data have it.
+    What it gains has to be worth the penalty, and more than its place would be a coincidence.
 
     Parameters
     ----------
     problem : Problem
-        Its prices.
+        Its penalties.
     state : State
         Of the last fit.
     model : Linearisation
@@ -219,14 +196,14 @@ def off_home(problem: Problem, state: State, model: Linearisation, tolerated: fl
     gains = [(gain - max(room, problem.axis_penalty), axis) for axis, gain, room, _ in axes]
     gain, axis = max(gains, default=(0.0, 0))
     if not gain > 0:
-        return state
+        return None
     return replace(state, moving=state.moving | (np.arange(problem.d) == axis))
 
 
 def freed(
     problem: Problem, state: State, model: Linearisation, tolerated: float
 ) -> Iterator[tuple[int, float, float, Floats]]:
-    """Axes at home, what the law would gain if each alone left, and what a place is worth.
+    """Axes that are not free, what the law would gain if one were, and what a place is worth.
 
     That is twice the logarithm of how much wider the box of the data is than the origin is
     uncertain. And what the move does to the law in the frame of the data, (l, d). Without those
@@ -235,7 +212,7 @@ def freed(
     low, high = problem.box
     own = np.flatnonzero(state.free()[model.columns])
     generators = shift_generators(problem.exponents)
-    forth = shift_matrix(problem.exponents, state.offset - problem.home)
+    forth = shift_matrix(problem.exponents, state.offset - problem.origin)
     for axis in np.flatnonzero(problem.form.movable & ~state.moving).tolist():
         rate = -generators[axis] @ state.coefficients
         rows = np.eye(len(model.columns))[own]

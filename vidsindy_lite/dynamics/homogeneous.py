@@ -19,19 +19,12 @@ from scipy.optimize import least_squares
 from scipy.special import chdtri, exprel
 
 from ..arrays import Bools, Floats, Ints
+from .bspline import smooth
 from .data import inflation
 from .library import monomial_exponents, velocity_names
 from .model import PolynomialSystem
 from .problem import FALSE_ALARM
 from .result import Discovery, Plateau
-from .smoothing import smooth
-
-FEWEST = 6
-"""Samples below which nothing is left over of a throw with drag."""
-STEEP = 5.0
-"""Largest drag, over one through the duration: with more, the velocity is lost at once."""
-POINTS = 201
-"""Points through which the curve of a law is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +51,7 @@ class Flight:
     @classmethod
     def fitted(cls, t: Floats, x: Floats, free: Bools) -> Flight:
         """By least squares to samples (n, m), as many as ``free`` tells."""
-        most = STEEP / np.ptp(t)
+        most = 5 / np.ptp(t)  # with more drag the velocity is lost at once
 
         def whole(values: Floats) -> Floats:
             theta = np.zeros(len(free))
@@ -134,8 +127,8 @@ def homogeneous(
     ValueError
         If there are fewer than six samples.
     """
-    if len(x) < FEWEST:
-        raise ValueError(f"x: must hold at least {FEWEST} places, got {len(x)}")
+    if len(x) < 6:  # nothing is left over of a throw with drag
+        raise ValueError(f"x: must hold at least 6 places, got {len(x)}")
     m, middle = x.shape[1], (t[0] + t[-1]) / 2
     since, numbers = t - middle, np.arange(3 * m + 1)
     classes = [Flight.fitted(since, x, numbers < count) for count in (m, 2 * m, 3 * m, 3 * m + 1)]
@@ -151,8 +144,8 @@ def homogeneous(
     wanted = numbers >= 2 * m  # force and drag
     if np.diag(departure)[wanted].sum() > np.diag(covariance)[wanted].sum():
         covariance = departure
-    price = chdtri(1, FALSE_ALARM / (2 * m))
-    kept = flight.free & ((flight.theta**2 > price * np.diag(covariance)) | (numbers < 2 * m))
+    penalty = chdtri(1, FALSE_ALARM / (2 * m))
+    kept = flight.free & ((flight.theta**2 > penalty * np.diag(covariance)) | (numbers < 2 * m))
     law = Flight.fitted(since, x, kept)
     for mode in () if systematic is None else systematic:
         moved = Flight.fitted(since, x + mode, kept).theta - law.theta
@@ -168,19 +161,19 @@ def homogeneous(
         )
         for j in range(found.system.d)
     )
-    return replace(found, warnings=_doubt(flight, richer, price), path=path)
+    return replace(found, warnings=_doubt(flight, richer, penalty), path=path)
 
 
 def _departure(flight: Flight, richer: Flight) -> Floats:
     """Mean products of what the numbers of a richer law are off those of a flight."""
-    away = richer.theta - flight.theta
-    return (richer.covariance + np.outer(away, away)) * np.outer(flight.free, flight.free)
+    apart = richer.theta - flight.theta
+    return (richer.covariance + np.outer(apart, apart)) * np.outer(flight.free, flight.free)
 
 
-def _doubt(flight: Flight, richer: Flight, price: float) -> tuple[str, ...]:
+def _doubt(flight: Flight, richer: Flight, penalty: float) -> tuple[str, ...]:
     """Whether the next richer law fits better, and what it would be."""
     gained = (flight.left**2).sum() - (richer.left**2).sum()
-    if richer is flight or gained < price * richer.error**2 * inflation([richer.left]).max():
+    if richer is flight or gained < penalty * richer.error**2 * inflation([richer.left]).max():
         return ()
     pull, left, k = np.linalg.norm(richer.force), richer.error / flight.error, richer.theta[-1]
     if not k:
@@ -202,7 +195,7 @@ def _told(law: Flight, covariance: Floats, t: Floats, names: tuple[str, ...]) ->
     still = coefficients_of(0 * law.theta, exponents)
     rates = [(coefficients_of(one, exponents) - still).T.ravel() for one in np.eye(len(law.theta))]
     spread = np.transpose(rates) @ covariance @ rates
-    shown = np.linspace(t[0], t[-1], POINTS)
+    shown = np.linspace(t[0], t[-1], 201)  # enough for a smooth curve
     since = shown - (t[0] + t[-1]) / 2
     states = np.hstack([places(since, law.theta, slope) for slope in (False, True)])
     noise = np.append(np.sqrt((law.left**2).mean(axis=0)), np.full(len(names), np.nan))

@@ -17,9 +17,8 @@ from .data import Units
 from .l0 import inverse, newcomers
 from .library import divides, shift_generators, shift_matrix
 from .noise import residual_noise
-from .path import History, Path
 from .problem import Problem
-from .result import Discovery
+from .result import Discovery, History, Path
 
 # --------------------------------------------------------------------------------------------------
 # Terms that a law has not: between which values each could be, and which the data could not see.
@@ -68,7 +67,7 @@ def intervals(problem: Problem, state: State, model: Linearisation, tolerated: F
 # From the last fit to what is told of it: the law in the units and the frame of the data.
 
 KEPT = 1e-12
-"""Price of a term that stays whatever its error."""
+"""Penalty of a term that stays whatever its error."""
 
 
 def infer(
@@ -79,7 +78,7 @@ def infer(
     Parameters
     ----------
     problem : Problem
-        The data and the prices: a coefficient whose squared score is lower than its price cannot
+        The data and the penalties: a coefficient whose squared score is lower than its own cannot
         be told from zero.
     fit : Fit
         At a physics weight at which the law holds exactly.
@@ -99,9 +98,9 @@ def infer(
     tolerated = np.maximum([plateau.low / path.own for plateau in path.of(state.active)], 1.0)
     # To what the shift adds nothing, that the fit has weighed.
     weighed = _shifted(exponents, coefficients, offset) == coefficients.T.ravel()
-    prices = np.where(weighed, KEPT, problem.prices * np.repeat(tolerated, l) ** 2)
+    penalties = np.where(weighed, KEPT, problem.entry_penalties * np.repeat(tolerated, l) ** 2)
     native = exponents, coefficients, offset, covariance
-    moved, moved_covariance = _pruned(*native, prices)
+    moved, moved_covariance = _pruned(*native, penalties)
     law = form.law(moved + form.known)
     seen = collocation.counts > 0
     found = Discovery(
@@ -112,7 +111,9 @@ def infer(
         native_covariance=covariance[: l * d, : l * d],
         offset_errors=np.sqrt(np.diag(covariance)[l * d :]),
         noise=np.where(
-            seen, (problem.noise if problem.kicked else residual_noise(fit)) * units.scale, np.nan
+            seen,
+            (problem.noise if problem.has_process_noise else residual_noise(fit)) * units.scale,
+            np.nan,
         ),
         model_error=_kicks(problem, fit),
         warnings=(),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 
@@ -20,7 +21,7 @@ NONE = np.array([], dtype=int)
 """No entries."""
 COLLINEAR = 1e-9
 """Share of a column that is not a combination of others, below which it is taken to be one."""
-PLATEAU = 1e-6
+NEGLIGIBLE = 1e-6
 """Changes of the function below this are taken for rounding."""
 MOST_CHANGES = 4
 """Most changes of a support on its way down, for each entry that there is."""
@@ -54,7 +55,7 @@ def subset_search(
     present : ndarray, shape (m,)
         ``p``; zeros for a plain regression.
     penalty : ndarray, shape (m,)
-        Price of each non-zero entry, in the units of the objective; minus infinity keeps it in.
+        Penalty of each non-zero entry, in the units of the objective; minus infinity keeps it in.
     start : ndarray of bool, shape (m,)
         First support.
 
@@ -70,7 +71,7 @@ def subset_search(
     best = _search(model, start)
     solution = np.zeros(len(penalty))
     solution[best.inside] = best.fitted * model.scale[best.inside]
-    return best.support, solution, best.value
+    return best.support, solution, model.value(best)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of columns that are all but combinations
@@ -124,9 +125,9 @@ def closest_rival(
     rivals = [_forced(model, support, k) for k in np.flatnonzero(np.isfinite(penalty)).tolist()]
     if not rivals:
         return np.inf, NONE, NONE
-    rival = min(rivals, key=lambda rival: rival.value)
-    dropped, added = support & ~rival.support, rival.support & ~support
-    return rival.value - model.fit(support).value, np.flatnonzero(dropped), np.flatnonzero(added)
+    value, rival = min(rivals, key=itemgetter(0))
+    cost = value - model.value(model.fit(support))
+    return cost, np.flatnonzero(support & ~rival), np.flatnonzero(rival & ~support)
 
 
 def minimiser(information: Floats, gradient: Floats, present: Floats, support: Bools) -> Floats:
@@ -137,17 +138,56 @@ def minimiser(information: Floats, gradient: Floats, present: Floats, support: B
     return solution
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Fit:
-    """A quadratic function at its minimum on a support, all in scaled entries."""
+    """A quadratic function at its minimum on a support, and what single changes of it hang on.
 
+    All in scaled entries: ``left`` is the gradient that is left, ``response`` (outside, inside) how
+    far those inside give way to a newcomer, ``room`` the share of it that is no combination of
+    those inside.
+    """
+
+    matrix: Floats
     support: Bools
     inside: Ints
     inverse: Floats
     fitted: Floats
     left: Floats
     fall: float
-    value: float
+
+    @cached_property
+    def outside(self) -> Ints:
+        return np.flatnonzero(~self.support)
+
+    @cached_property
+    def spread(self) -> Floats:
+        return self.inverse.diagonal()
+
+    @cached_property
+    def response(self) -> Floats:
+        return self.matrix[self.outside[:, None], self.inside] @ self.inverse
+
+    @cached_property
+    def room(self) -> Floats:
+        shared = self.matrix[self.outside[:, None], self.inside]
+        return 1 - (self.response * shared).sum(axis=1)
+
+    @cached_property
+    def gained(self) -> Floats:
+        """What each newcomer explains."""
+        return _gain(self.left[self.outside], self.room)
+
+    @cached_property
+    def gained_after(self) -> Floats:
+        """What it explains after each drop, (outside, inside).
+
+        A drop changes what the others leave over, and the room a newcomer has, by rank one.
+        """
+        left = self.response * (self.fitted / self.spread)
+        left += self.left[self.outside, None]
+        room = self.response**2 / self.spread
+        room += self.room[:, None]
+        return _gain(left, room)
 
 
 @dataclass(frozen=True)
@@ -168,7 +208,6 @@ class _Quadratic:
     penalty: Floats
     share: float = 1.0
     fits: dict[bytes, _Fit] = field(default_factory=dict)
-    tableaus: dict[bytes, _Tableau] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -178,22 +217,16 @@ class _Quadratic:
         matrix, scale = equilibrated(information)
         return cls(matrix, scale, gradient * scale, present / scale, penalty)
 
-    def paid(self, inside: Ints) -> float:
-        """What entries cost, but for those that must be there."""
-        return float(self.penalty[inside][np.isfinite(self.penalty[inside])].sum())
-
-    def tableau(self, fit: _Fit) -> _Tableau:
-        """What can be read off around a fit."""
-        if (key := fit.support.tobytes()) not in self.tableaus:
-            self.tableaus[key] = _Tableau.of(self, fit)
-        return self.tableaus[key]
+    def value(self, fit: _Fit) -> float:
+        """The share of the function, and what entries cost but for those that must be there."""
+        penalty = self.penalty[fit.inside]
+        return float(penalty[np.isfinite(penalty)].sum()) + self.share * fit.fall
 
     def fit(self, support: Bools) -> _Fit:
-        """The minimum on a support, and its value for the share and the penalties."""
+        """The minimum on a support."""
         if (key := support.tobytes()) not in self.fits:
             self.fits[key] = self._fitted(support)
-        fit = self.fits[key]
-        return replace(fit, value=self.paid(fit.inside) + self.share * fit.fall)
+        return self.fits[key]
 
     def _fitted(self, support: Bools) -> _Fit:
         inside = np.flatnonzero(support)
@@ -207,13 +240,13 @@ class _Quadratic:
         step[inside] = moved
         left = self.gradient - self.matrix @ step
         fall, fitted = -float(step @ (left + self.gradient)), self.present[inside] + moved
-        return _Fit(support, inside, inverse, fitted, left, fall, np.nan)
+        return _Fit(self.matrix, support, inside, inverse, fitted, left, fall)
 
 
 def _search(model: _Quadratic, start: Bools) -> _Fit:
     """The lowest value from a support and from nothing, and through newcomers from there."""
     starts = (start, np.isneginf(model.penalty))
-    best = min((_descend(model, first) for first in starts), key=lambda fit: fit.value)
+    best = min((_descend(model, first) for first in starts), key=model.value)
     for _ in range(MOST_CHANGES * len(start)):
         deeper = _through_newcomer(model, best)
         if deeper is None:
@@ -226,12 +259,12 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
     """Take the best of all drops, adds and swaps until none helps."""
     best = model.fit(start)
     for _ in range(MOST_CHANGES * len(start)):
-        change, dropped, added = _best_change(model, model.tableau(best))
-        if not change < -PLATEAU:
+        change, dropped, added = _best_change(model, best)
+        if not change < -NEGLIGIBLE:
             return best
         # Rounding may promise a fall that does not come: what counts is the value itself.
         fit = model.fit(_changed(best.support, dropped, added))
-        if not fit.value < best.value - PLATEAU:
+        if not model.value(fit) < model.value(best) - NEGLIGIBLE:
             return best
         best = fit
     return best
@@ -240,28 +273,28 @@ def _descend(model: _Quadratic, start: Bools) -> _Fit:
 def _through_newcomer(model: _Quadratic, best: _Fit) -> _Fit | None:
     """A lower value reached by forcing one entry in, which may let others go.
 
-    Of those with which one of the others is not worth its price any more, as an update of rank one
-    tells.
+    Of those with which one of the others is not worth its penalty any more, as an update of rank
+    one tells.
     """
-    tableau = model.tableau(best)
-    room, response = np.maximum(tableau.room, COLLINEAR)[:, None], tableau.response
-    fitted = tableau.fitted - response * (tableau.left[:, None] / room)
-    lost = model.share * fitted**2 / (tableau.spread + response**2 / room)
-    lets_go = (lost < model.penalty[tableau.inside]).any(axis=1)
-    for entry in tableau.outside[lets_go & ~np.isposinf(model.penalty[tableau.outside])].tolist():
-        trial = _forced(model, best.support, entry)
-        if trial.value < best.value - PLATEAU:
-            return _descend(model, trial.support)
+    room, left = np.maximum(best.room, COLLINEAR)[:, None], best.left[best.outside, None]
+    fitted = best.fitted - best.response * (left / room)
+    lost = model.share * fitted**2 / (best.spread + best.response**2 / room)
+    lets_go = (lost < model.penalty[best.inside]).any(axis=1)
+    for entry in best.outside[lets_go & ~np.isposinf(model.penalty[best.outside])].tolist():
+        value, support = _forced(model, best.support, entry)
+        if value < model.value(best) - NEGLIGIBLE:
+            return _descend(model, support)
     return None
 
 
-def _forced(model: _Quadratic, support: Bools, entry: int) -> _Fit:
-    """The fit that a descent reaches with an entry of a support forced out, or another one in."""
+def _forced(model: _Quadratic, support: Bools, entry: int) -> tuple[float, Bools]:
+    """The value and support of a descent with an entry forced out of a support, or into it."""
     inside, penalty = support[entry], model.penalty.copy()
     penalty[entry] = np.inf if inside else -np.inf
     changed = _changed(support, entry, NONE) if inside else _changed(support, NONE, entry)
-    trial = _descend(replace(model, penalty=penalty), changed)
-    return trial if inside else replace(trial, value=trial.value + model.penalty[entry])
+    forced = replace(model, penalty=penalty)
+    trial = _descend(forced, changed)
+    return forced.value(trial) + (0.0 if inside else model.penalty[entry]), trial.support
 
 
 def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
@@ -271,65 +304,20 @@ def _changed(support: Bools, dropped: Ints | int, added: Ints | int) -> Bools:
     return changed
 
 
-@dataclass(frozen=True)
-class _Tableau:
-    """What single changes of a support hang on: entries that may leave, and that may join.
-
-    ``spread`` is the inverse's diagonal, ``response`` (outside, inside) how far those inside give
-    way to a newcomer, ``left`` the gradient that is left to it, ``room`` the share of it that is no
-    combination of those inside.
-    """
-
-    inside: Ints
-    outside: Ints
-    fitted: Floats
-    spread: Floats
-    response: Floats
-    left: Floats
-    room: Floats
-
-    @classmethod
-    def of(cls, model: _Quadratic, fit: _Fit) -> _Tableau:
-        inside, outside = fit.inside, np.flatnonzero(~fit.support)
-        shared = model.matrix[outside[:, None], inside]
-        response = shared @ fit.inverse
-        room = 1 - (response * shared).sum(axis=1)
-        return cls(
-            inside, outside, fit.fitted, fit.inverse.diagonal(), response, fit.left[outside], room
-        )
-
-    @cached_property
-    def gained(self) -> Floats:
-        """What each newcomer explains."""
-        return _gain(self.left, self.room)
-
-    @cached_property
-    def gained_after(self) -> Floats:
-        """What it explains after each drop, (outside, inside).
-
-        A drop changes what the others leave over, and the room a newcomer has, by rank one.
-        """
-        left = self.response * (self.fitted / self.spread)
-        left += self.left[:, None]
-        room = self.response**2 / self.spread
-        room += self.room[:, None]
-        return _gain(left, room)
-
-
-def _best_change(model: _Quadratic, tableau: _Tableau) -> Change:
+def _best_change(model: _Quadratic, fit: _Fit) -> Change:
     """The best of all drops, adds and swaps."""
-    inside, outside, share = tableau.inside, tableau.outside, model.share
-    lost, price = tableau.fitted**2 / tableau.spread, model.penalty[outside]
+    inside, outside, share = fit.inside, fit.outside, model.share
+    lost, penalty = fit.fitted**2 / fit.spread, model.penalty[outside]
     loss = share * lost - model.penalty[inside]
-    cost = price - share * tableau.gained
+    cost = penalty - share * fit.gained
     changes = [(np.inf, NONE, NONE)]
     if len(inside):
         changes.append((loss.min(), inside[[loss.argmin()]], NONE))
     if len(outside):
         changes.append((cost.min(), NONE, outside[[cost.argmin()]]))
     if len(inside) and len(outside):
-        swap = loss + price[:, None]
-        swap -= share * tableau.gained_after
+        swap = loss + penalty[:, None]
+        swap -= share * fit.gained_after
         add, drop = divmod(int(swap.argmin()), len(inside))
         changes.append((swap[add, drop], inside[[drop]], outside[[add]]))
     return min(changes, key=lambda change: change[0])
@@ -390,14 +378,14 @@ def newcomers(information: Floats, gradient: Floats, own: int) -> tuple[Floats, 
 # How likely a law is next to which a law's coefficients are elsewhere than their errors say.
 #
 # The standard errors of a law hold if its terms are the right ones. A law with one term more, one
-# less or one in place of another may fit a little worse, or better by less than the price of a
-# term, and have other coefficients: where a motion tells the sum of two dampings alone, the law
+# less or one in place of another may fit a little worse, or better by less than the penalty of
+# a term, and have other coefficients: where a motion tells the sum of two dampings alone, the law
 # that gives all of it to one of them has an error that is ten times too small. So the laws next to
 # a law are weighed by their evidence (Laplace's approximation; Madigan and Raftery 1994), and those
 # count that are far away in units of the errors that are told.
 
 
-def prior_prices(exponents: Ints) -> Floats:
+def prior_penalties(exponents: Ints) -> Floats:
     """Twice the log odds that an equation lacks a term of each kind, shape (l,).
 
     An equation has one linear term by expectation, half a quadratic one and so on, and a constant
@@ -410,7 +398,7 @@ def prior_prices(exponents: Ints) -> Floats:
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of columns that are combinations
 def far_neighbours(
-    information: Floats, gradient: Floats, present: Floats, price: Floats, support: Bools
+    information: Floats, gradient: Floats, present: Floats, penalty: Floats, support: Bools
 ) -> tuple[float, Ints, Ints, int, float]:
     """The odds of the neighbours of a support that have other entries, and the likeliest of them.
 
@@ -418,7 +406,7 @@ def far_neighbours(
     ----------
     information, gradient, present : ndarray
         See `subset_search`; in units in which an entry is as large as 1.
-    price : ndarray, shape (m,)
+    penalty : ndarray, shape (m,)
         Twice the log odds that an entry is zero.
     support : ndarray of bool, shape (m,)
         Of which a neighbour has one entry more, one less or one in place of another.
@@ -444,22 +432,23 @@ def far_neighbours(
     # First axis: the entry that leaves, last of all none; second: the one that joins, likewise.
     leaves, none = np.eye(len(own) + 1, len(own), dtype=bool)[:, None], np.zeros((1, len(own)))
     out, gone = np.vstack([inverse / spread[:, None], none]), np.append(fitted, 0.0)[:, None]
-    lost = fitted**2 / spread + np.log(spread * scale[own] ** 2) - price[own]
+    lost = fitted**2 / spread + np.log(spread * scale[own] ** 2) - penalty[own]
     along = np.vstack([(response / spread).T, np.zeros((1, len(others)))])
     freed = along * np.append(spread, 0.0)[:, None]
     left = pull[others] - response @ pull[own] + along * gone
     room = 1 - (response * shared).sum(axis=1) + along * freed
     new = room > COLLINEAR
     step = np.where(new, left / room, 0.0)
-    joined = np.where(new, np.log(room / scale[others] ** 2) + price[others] - left * step, np.inf)
+    entered = np.log(room / scale[others] ** 2) + penalty[others] - left * step
+    joined = np.where(new, entered, np.inf)
     cost = np.append(lost, 0.0)[:, None] + np.hstack([joined, np.zeros((len(own) + 1, 1))])
     gives = np.concatenate([response - freed[:, :, None] * out[:, None], 0.0 * leaves], axis=1)
     values = (fitted - out * gone)[:, None] - gives * np.hstack([step, 0.0 * gone])[:, :, None]
     values = np.where(leaves, 0.0, values)
-    away = np.abs(values - fitted) / np.sqrt(spread)
+    apart = np.abs(values - fitted) / np.sqrt(spread)
     weight = np.exp((cost.min() - cost) / 2)
-    weight = np.where((away > FAR).any(axis=2), weight / weight.sum(), 0.0)
+    weight = np.where((apart > FAR).any(axis=2), weight / weight.sum(), 0.0)
     drop, add = np.unravel_index(weight.argmax(), weight.shape)
-    entry = int(away[drop, add].argmax())
+    entry = int(apart[drop, add].argmax())
     value = float(values[drop, add, entry] * scale[own[entry]])
     return float(weight.sum()), own[drop : drop + 1], others[add : add + 1], int(own[entry]), value

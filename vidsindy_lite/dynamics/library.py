@@ -233,14 +233,6 @@ def divides(exponents: Ints, axes: Bools | None = None) -> Bools:
     return np.all((row == column) | lower, axis=-1)
 
 
-def closure_mask(exponents: Ints, support: Bools, axes: Bools | None = None) -> Bools:
-    """Widen a support (l, d) to all divisors of its terms: what a shift of it may contain.
-
-    If axes are given, bool (d,), of a shift along these.
-    """
-    return divides(exponents, axes) @ support
-
-
 def shift_generators(exponents: Ints) -> Floats:
     """Matrices ``N_i`` with ``d phi / d x_i = phi N_i``, shape (d, l, l).
 
@@ -258,10 +250,6 @@ def shift_generators(exponents: Ints) -> Floats:
 
 # --------------------------------------------------------------------------------------------------
 # Measured inputs: known functions of the time, such as a force that somebody applies.
-
-WAYWARD = 0.1
-"""Distance of a cubic through samples from a line, midway between two, over their standard
-deviation, beyond which it is a guess: a sine makes so much at six samples a period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +318,8 @@ def _curve(name: str, t: Floats, values: Floats, hold: str | None) -> CubicSplin
     if hold is None:
         middles = (t[1:] + t[:-1]) / 2
         apart = np.abs(curve(middles) - line(middles))
-        hold = "zero" if apart.max() > WAYWARD * values.std() else "cubic"
+        # Midway a cubic is so far from a line at six samples of a sine a period: more is a guess.
+        hold = "zero" if apart.max() > 0.1 * values.std() else "cubic"
         if hold == "zero":
             warnings.warn(
                 f"inputs: {name} jumps, as at t = {t[1 + np.abs(np.diff(values)).argmax()]:g}, "

@@ -814,8 +814,7 @@ class Form:
     @property
     def implicit(self) -> Bools:
         """Which terms hold a slope, (l,)."""
-        slopes = self.exponents[:, len(self.names) + len(self.functions) :]
-        return np.asarray(slopes.any(axis=1))
+        return self.law(self.known).implicit
 
     @property
     def degree(self) -> int:

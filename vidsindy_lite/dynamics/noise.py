@@ -6,19 +6,19 @@ autocorrelation time); how precise each measurement is; and whether the motion i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cho_solve_banded
+from scipy.linalg import cho_solve_banded, toeplitz
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
 from .collocation import CLEANEST, Collocation, Fit, State
 from .data import CHANCE, autocovariances, inflation
-from .l0 import LEAST
-from .problem import Problem, fit_curves, spread_to_unseen
+from .l0 import LEAST, RIDGE
+from .problem import COARSE, FINAL_WEIGHT, Problem, fit_curves, spread_to_unseen, unpruned
 
 # --------------------------------------------------------------------------------------------------
 # How large the errors of the data are, as a fitted curve leaves them, and how long they last.
@@ -58,7 +58,7 @@ def errors_left(problem: Problem, fit: Fit) -> Floats:
     A curve that may leave its law follows the errors, too: then they are as estimated. Of errors
     that are given only how long they last is estimated.
     """
-    if problem.kicked:
+    if problem.has_process_noise:
         return problem.noise
     errors = effective_noise(fit)
     return problem.noise * errors / residual_noise(fit) if problem.measured_errors else errors
@@ -101,15 +101,19 @@ def prediction_gain(fit: Fit, most: int = 40) -> Floats:
     """By how much the errors before it foretell an error: n times its log variance ratio, (d,).
 
     Minus twice the log likelihood of an autoregressive model of the residual over that of white
-    noise (Levinson's recursion; its order, no more than ``most``, by the Bayesian information
-    criterion).
+    noise (its order, no more than ``most``, by the Bayesian information criterion). What is left
+    of an error by so many before it is on the diagonal of a Cholesky factor.
     """
     errors = [np.concatenate(pieces)[:, 0] for pieces in _errors_seen(fit)]
     fewest = min((len(e) for e in errors if len(e)), default=0)
-    lags = range(min(most, fewest // 10) + 1)
-    covariances = [np.array([e[k:] @ e[: len(e) - k] for k in lags]) for e in errors]
-    sizes = map(len, errors)
-    return np.array([_levinson(c, n).min() for c, n in zip(covariances, sizes, strict=True)])
+    gains, orders = np.zeros(len(errors)), np.arange(min(most, fewest // 10) + 1)
+    for j, e in enumerate(errors):
+        if e.any():  # it was observed
+            covariance = np.array([e[k:] @ e[: len(e) - k] for k in orders]) / (e @ e)
+            covariance[0] += RIDGE
+            left = np.diag(np.linalg.cholesky(toeplitz(covariance))) ** 2
+            gains[j] = (len(e) * np.log(left) + orders * np.log(len(e))).min()
+    return gains
 
 
 def passing(fit: Fit, tried: int) -> Bools:
@@ -122,7 +126,8 @@ def passing(fit: Fit, tried: int) -> Bools:
     """
     seen, errors = fit.collocation.counts > 0, _errors_seen(fit)
     counts = np.array([sum(independent(piece[:, 0]) for piece in pieces) for pieces in errors])
-    lowest = np.concatenate([rebound(pieces) for pieces in errors])
+    products = [autocovariances(pieces)[:, 0] for pieces in errors]
+    lowest = np.array([some.min() / max(some[0], LEAST) for some in products])
     # An autocorrelation of -.3 is three standard errors of a hundred independent ones: errors come
     # back with the other sign, as a motion does. A tenth of the spread may well be meant by a law.
     forgotten = (counts > tried) & (lowest > -0.3) & (residual_noise(fit) < 0.1)
@@ -137,26 +142,6 @@ def independent(errors: Floats) -> float:
     """
     powers = np.abs(np.fft.rfft(errors, max(len(errors), 1))[1:]) ** 2
     return float(4 * powers.sum() ** 2 / (powers**2).sum()) if powers.any() else 0.0
-
-
-def rebound(pieces: Sequence[Floats]) -> Floats:
-    """The lowest autocorrelation of errors at any lag, (d,), as those of `inflation`."""
-    covariances = autocovariances(pieces)
-    return covariances.min(axis=0) / np.maximum(covariances[0], LEAST)
-
-
-def _levinson(covariance: Floats, n: int) -> Floats:
-    """The gain for every number of errors that foretell the next."""
-    gains = np.zeros(len(covariance))
-    if not covariance[0] > 0:
-        return gains  # of what was never observed
-    variance, weights = covariance[0], np.zeros(0)
-    for order in range(1, len(covariance)):
-        reflection = (covariance[order] - weights @ covariance[order - 1 : 0 : -1]) / variance
-        weights = np.append(weights - reflection * weights[::-1], reflection)
-        variance *= 1 - reflection**2
-        gains[order] = n * np.log(variance / covariance[0]) + order * np.log(n)
-    return gains
 
 
 # --------------------------------------------------------------------------------------------------
@@ -190,7 +175,7 @@ def smoother_weights(problem: Problem) -> Problem:
     residual = np.nan_to_num(np.concatenate(left_over))
     observed = np.isfinite(np.concatenate([x for _, (_, x) in problem.stretches]))
     signal, speed = np.concatenate(path, axis=1)
-    causes = [(signal - problem.home) ** 2, speed**2]  # what the variance of the noise may follow
+    causes = [(signal - problem.origin) ** 2, speed**2]  # what the variance of the noise may follow
     spread = np.sqrt((residual**2).sum(axis=0) / np.maximum(observed.sum(axis=0), 1))
     factors, noise = np.ones_like(residual), problem.noise.copy()
     for j in np.flatnonzero(spread > 1e-4):  # below are the errors of splines
@@ -268,14 +253,12 @@ def _variance(residual: Floats, causes: Floats, updates: int = 60) -> tuple[floa
 
 PROBES = 8
 """Random vectors of a trace (Hutchinson): they leave an error of a hundredth at 1,500 samples."""
-HARDEST = 1e8
-"""Physics weight, relative to the misfit of a plain regression, that leaves no room for kicks."""
 OCTAVE = 8
 """Frequencies of the lowest band of a spectrum; each next one has twice as many."""
 
 
-def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
-    """The problem with the kicks that its data show; the same problem if they show none.
+def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem | None:
+    """The problem with the process noise that its data show; none if they show none.
 
     Parameters
     ----------
@@ -292,14 +275,16 @@ def with_process_noise(problem: Problem, fit: Fit, rng: np.random.Generator) -> 
     ]
     start, free = problem.weighted(problem.collocation(segments), 1.0), _free(problem)
     every = replace(_on_knots(start, fit), active=problem.form.candidates)
-    kicked = _balanced(problem, _hard_where_known(start, free), every, rng)
+    # What is known of a law (the slope of a position is the velocity) holds exactly.
+    physics = np.where(free, 1.0, FINAL_WEIGHT) * start.physics_weights
+    kicked = _balanced(problem, start.weighted(start.data_weights, physics), every, rng)
     if unlike_kicks(kicked, free, rng) > 4:  # standard errors
-        return problem
+        return None
     exact = _measured_badly(problem, fit, segments)
     newcomers = int((every.active & ~fit.state.active).sum())  # each of them gains 1 by chance
     measured = evidence(exact) + prediction_gain(exact).sum()
     if not evidence(kicked) + 2 * newcomers < measured:
-        return problem
+        return None
     return _with_variances(problem, kicked.collocation)
 
 
@@ -322,14 +307,6 @@ def _free(problem: Problem) -> Bools:
     return np.asarray(problem.form.candidates.any(axis=0), dtype=bool)
 
 
-def _hard_where_known(collocation: Collocation, free: Bools) -> Collocation:
-    """What is known of a law (the slope of a position is the velocity) holds exactly."""
-    hard = HARDEST * collocation.physics_weights
-    return collocation.weighted(
-        collocation.data_weights, np.where(free, collocation.physics_weights, hard)
-    )
-
-
 def evidence(fit: Fit) -> float:
     """Minus twice the log marginal likelihood of a fit; comparable on the same knots."""
     collocation, grid = fit.collocation, fit.collocation.grid
@@ -342,7 +319,7 @@ def evidence(fit: Fit) -> float:
 def _measured_badly(problem: Problem, fit: Fit, segments: list[Segment]) -> Fit:
     """The exact law on other knots, at the errors that it leaves."""
     grid = problem.collocation(segments, residual_noise(fit))
-    exact = problem.weighted(grid, HARDEST).solve(_on_knots(grid, fit))
+    exact = problem.weighted(grid, FINAL_WEIGHT).solve(_on_knots(grid, fit))
     own = exact.collocation.weighted(residual_noise(exact) ** -2, exact.collocation.physics_weights)
     return own.solve(exact.state)
 
@@ -369,7 +346,7 @@ def _balanced(
     free, told = _free(problem), problem.measured_errors
     grid, d = collocation.grid, collocation.d
     probes = rng.choice([-1.0, 1.0], (grid.r * d, PROBES))
-    hardest = HARDEST * collocation.physics_weights
+    hardest = FINAL_WEIGHT * collocation.physics_weights
     unfitted = len(grid.node_weights) - state.active.sum(axis=0)
     for _ in range(updates):
         fit = collocation.solve(state, tolerance=1.0, max_steps=10)
@@ -437,3 +414,53 @@ def _bands(signal: Floats) -> Floats:
     octaves = int(np.log2(max(len(power) / OCTAVE, 1.0)))
     edges = [0, *(OCTAVE * 2 ** np.arange(octaves + 1)).tolist()]
     return np.stack([power[low:high].mean(axis=0) for low, high in pairwise(edges)])
+
+
+# --------------------------------------------------------------------------------------------------
+# Noise of data with few samples a turn, told by candidate terms together.
+#
+# A curve without a law has as much freedom as there are samples a turn. Where these are few, it
+# takes motion for noise, or gives the motion up and is flat. So terms are fitted at once, as many
+# as converge, and what they leave is the noise; each of the two noises has its law.
+
+TOLERATED = 0.03
+"""Error that a first law tolerates, relative to the spread of the data: finer terms come after
+those that make the motion."""
+CONSISTENT = 1.5
+"""Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
+
+
+def views(pose: Callable[..., Problem]) -> list[Problem]:
+    """A problem with the noise that its curves leave, and others where that may be wrong.
+
+    Where the curves drop measurements, one with all of them; where terms leave far less than the
+    curves, one with what these leave.
+
+    Parameters
+    ----------
+    pose : callable
+        Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
+        the samples, which serve where smoothed ones leave out a part of the motion.
+    """
+    whole = pose()
+    problem = smoother_weights(whole)
+    # What no smooth curve explains may still be the law's: a transient that a sample or two show.
+    found = [problem] if (problem.counts == whole.counts).all() else [problem, whole]
+    # A curve that has given the motion up, and leaves nearly all of its spread, has no turns.
+    enough = problem.samples_a_turn > COARSE and problem.noise.max() < 0.9
+    if not (enough or problem.measured_errors or (problem.noise <= TOLERATED).all()):
+        told = _by_terms(problem) or _by_terms(pose(True))
+        found += [] if told is None else [told]
+    return found
+
+
+def _by_terms(problem: Problem) -> Problem | None:
+    """The problem with the noise that terms leave, as many as converge, if it is far less."""
+    degrees = problem.exponents.sum(axis=1)
+    for degree in range(problem.form.degree, 0, -1):
+        fit, converged = unpruned(problem, ~problem.form.implicit & (degrees <= degree))
+        left = residual_noise(fit)
+        over = CONSISTENT * left < problem.noise
+        if converged and over.any():
+            return replace(problem, noise=np.where(over, left, problem.noise))
+    return None

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations, product
+from itertools import permutations, product
 from math import comb
 from operator import itemgetter
 
@@ -19,16 +19,16 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from scipy.stats import special_ortho_group
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Floats, Ints
 from ..checks import check_choice
 from .collocation import Fit, Linearisation, State
 from .data import Trajectory, variable_names
 from .l0 import inverse
 from .library import Library, monomial_gradients, monomials
 from .model import Form
-from .path import FIRST_WEIGHTS, History, leaves_something_over, tightened, unpruned
-from .problem import Problem, fit_curves
+from .problem import Problem, leaves_something_over, tightened, unpruned
 from .result import Discovery
 
 ALIKE = np.deg2rad(2.0)
@@ -52,33 +52,22 @@ class TurnedLaw:
     estimates : ndarray, shape (1 + k, l, m)
         Coefficients in axes of one unit, and the directions in which they are uncertain, each one
         standard error long.
-    origin : ndarray, shape (m,)
-        Where the fit had its origin, in these axes, around the middle of the data.
     """
 
     exponents: Ints
     estimates: Floats
-    origin: Floats
 
     @classmethod
     def of(cls, problem: Problem, fit: Fit) -> TurnedLaw:
-        """The quadratic model around a fit, in all terms; the unit is the spread of the data."""
-        state, m = fit.state, problem.measured[0][1].shape[1]
-        rows = _rows(fit)
-        columns = np.flatnonzero((problem.form.candidates & rows[:, None]).T)
-        model = fit.collocation.linearise(state, columns)
-        flat = state.flat()[columns] + model.newton()[0]
-        values, axes = np.linalg.eigh(inverse(model.information))
-        directions = (axes * np.sqrt(np.maximum(values, 0.0))).T
+        """The quadratic model around a fit of all terms of some rows of the library."""
+        rows, columns = fit.state.active.any(axis=1), np.flatnonzero(fit.state.free())
+        model, m = fit.collocation.linearise(fit.state, columns), _places(problem)
+        factors = _in_one_unit(problem)[rows, -m:].T.ravel()
+        flat = factors * (fit.state.flat()[columns] + model.newton()[0])
+        values, axes = np.linalg.eigh(factors[:, None] * inverse(model.information) * factors)
+        directions = (axes * np.sqrt(np.maximum(values, 0.0))).T[::-1]
         stacked = np.vstack([flat, directions]).reshape(-1, m, rows.sum())
-        scale, unit = problem.units.scale, _unit(problem)
-        origin = (state.offset * scale / unit)[:m]
-        law = cls(problem.exponents[rows], np.moveaxis(stacked, 1, 2), origin)
-        law = law._mapped(np.diag(unit / scale), -state.offset, np.diag((scale / unit)[-m:]))
-        flat = law.estimates[1:].reshape(len(directions), -1)
-        _, sizes, largest = np.linalg.svd(flat, full_matrices=False)
-        modes = (sizes[:, None] * largest).reshape(-1, *law.estimates.shape[1:])
-        return replace(law, estimates=np.concatenate([law.estimates[:1], modes]))
+        return cls(problem.exponents[rows], np.moveaxis(stacked, 1, 2))
 
     def _mapped(self, inward: Floats, origin: Floats, outward: Floats) -> TurnedLaw:
         """The law of ``outward f(inward y + origin)``, compared at points enough."""
@@ -99,55 +88,32 @@ class TurnedLaw:
         law = self._mapped(block_diag(*[turn.T] * copies), origin, turn)
         return law.estimates[0], (law.estimates[1:] ** 2).sum(axis=0)
 
-    def _fitted(
-        self, scores: Callable[[Floats, Floats], Floats], turn: Floats, origin: Floats, **how: str
-    ) -> tuple[float, Floats, Floats]:
-        """Where near an orientation and origin scores of what is `seen` are least; how large."""
-        m = len(turn)
-
-        def moved(step: Floats) -> tuple[Floats, Floats]:
-            return turned(step[:-m], m) @ turn, origin + step[-m:]
-
-        start = np.zeros(m * (m - 1) // 2 + m)
-        best = least_squares(lambda s: scores(*self.seen(*moved(s))), start, max_nfev=60, **how)
-        return float(best.cost), *moved(best.x)
-
     def descended(self, turn: Floats, origin: Floats, size: float) -> tuple[float, Floats, Floats]:
         """The nearest orientation and origin with fewest terms, and their smoothed number.
 
         A coefficient counts ``log(1 + z^2)``, with ``z`` over its standard error and a size.
         """
-        return self._fitted(
-            lambda estimate, variance: (estimate / np.sqrt(variance + size**2)).ravel(),
-            turn, origin, loss="cauchy",
-        )  # fmt: skip
+        m = len(turn)
 
-    def freed(self, support: Bools) -> Floats:
-        """The small turn, (m, m), after which only these terms, (l, m), are left, if they are all.
+        def moved(step: Floats) -> tuple[Floats, Floats]:
+            return turned(step[:-m], m) @ turn, origin + step[-m:]
 
-        The others are made as small as their covariance asks for, while the origin gives way.
-        """
-        same = np.eye(len(self.origin))
-        law = self._mapped(np.eye(self.exponents.shape[1]), self.origin, same)
-        directions = law.estimates[1:][:, ~support]
-        sizes = np.maximum(np.linalg.norm(directions, axis=0), np.finfo(float).tiny)
-        values, axes = np.linalg.eigh((directions / sizes).T @ (directions / sizes))
-        whiten = axes / np.sqrt(np.maximum(values, 1e-10 * values[-1]))  # less is rounding
-        return self._fitted(
-            lambda estimate, _: (estimate[~support] / sizes) @ whiten,
-            same, self.origin, x_scale="jac",
-        )[1]  # fmt: skip
+        def scores(step: Floats) -> Floats:
+            estimate, variance = self.seen(*moved(step))
+            return (estimate / np.sqrt(variance + size**2)).ravel()
+
+        start = np.zeros(m * (m - 1) // 2 + m)
+        best = least_squares(scores, start, max_nfev=60, loss="cauchy")
+        return float(best.cost), *moved(best.x)
 
 
 def rough_orientations(problem: Problem, rng: np.random.Generator) -> list[Floats]:
     """Orientations in which fits of all terms up to a degree look sparse, for degrees as needed."""
-    collocation = problem.collocation(problem.segments())
-    control, history = fit_curves(collocation, problem.curves), History()
     degrees = problem.exponents.sum(axis=1)
     found: list[Floats] = []
     for degree in range(1, problem.form.degree + 1):
-        fit, weight = unpruned(problem, collocation, control, degrees <= degree, history)
-        if weight < FIRST_WEIGHTS[-1]:  # too many terms for these data
+        fit, converged = unpruned(problem, degrees <= degree)
+        if not converged:  # too many terms for these data
             continue
         for turn in sparse_orientations(TurnedLaw.of(problem, fit), found, rng):
             if all(apart(turn, other) > ALIKE for other in found):
@@ -161,18 +127,18 @@ def refined(problem: Problem, fit: Fit) -> Floats:
     """The small turn, (m, m), after which the small terms of a law are not needed any more.
 
     Axes that are off by a fraction of a degree leave small terms, which clean data tell: below .05
-    in standard units. The law is fitted without them, and the axes are those in which all that it
-    lacks is nothing.
+    in standard units. The law is fitted without them, and the turn is the best step from there.
     """
-    state, units = fit.state, problem.units
-    unit = replace(units, scale=_unit(problem))
-    sizes = state.coefficients * units.factors(problem.exponents) / unit.factors(problem.exponents)
-    state, collocation = state.of_terms(state.active & (np.abs(sizes) > 0.05)), fit.collocation
+    sizes = fit.state.coefficients * _in_one_unit(problem)
+    state = fit.state.of_terms(fit.state.active & (np.abs(sizes) > 0.05))
     if not state.active.any():
-        return np.eye(problem.measured[0][1].shape[1])
-    fit = tightened(problem, collocation, state)
-    law = TurnedLaw.of(problem, fit)
-    return law.freed(fit.state.active[_rows(fit)][:, -len(law.origin) :])
+        return np.eye(_places(problem))
+    fit = tightened(problem, fit.collocation, state)
+    model = problem.model(fit)
+    own = np.eye(len(model.columns))[fit.state.free()[model.columns]]
+    ways = np.vstack([own, _turns(problem, fit.state)[model.columns].T])
+    step = inverse(ways @ model.information @ ways.T) @ (ways @ model.gradient)
+    return turned(step[len(own) :], _places(problem))
 
 
 def with_turns(problem: Problem, fit: Fit, chosen: float = 1e-8) -> Linearisation:
@@ -205,31 +171,39 @@ def _turns(problem: Problem, state: State) -> Floats:
 
     With the generator K of a turn it is ``K f(x) - f'(x) K x``.
     """
-    m, scale, exponents = problem.measured[0][1].shape[1], problem.units.scale, problem.exponents
+    scale, exponents = problem.units.scale, problem.exponents
     y = np.random.default_rng(0).uniform(-1, 1, (POINTS * len(exponents), problem.d))
     values, law = monomials(y, exponents), state.coefficients + problem.known
     slopes = np.einsum("nlk,lj->njk", monomial_gradients(y, exponents), law)
     changes = []
-    for i, j in combinations(range(m), 2):
-        generator = np.zeros((m, m))
-        generator[[i, j], [j, i]] = 1.0, -1.0
-        turn = np.kron(np.eye(problem.d // m), generator) * scale / scale[:, None]
-        moved = np.einsum("njk,nk->nj", slopes, (y + state.offset - problem.home) @ turn.T)
+    for generator in _generators(_places(problem)):
+        copies = problem.d // len(generator)
+        turn = np.kron(np.eye(copies), generator) * scale / scale[:, None]
+        moved = np.einsum("njk,nk->nj", slopes, (y + state.offset - problem.origin) @ turn.T)
         change = np.linalg.pinv(values) @ (values @ law @ turn.T - moved)
         changes.append(np.append(change.T, np.zeros(problem.d)))
     return np.column_stack(changes)
 
 
-def _rows(fit: Fit) -> Bools:
-    """Terms, (l,), up to the highest degree of a law: these are mixed by turns and shifts."""
-    degrees = fit.collocation.exponents.sum(axis=1)
-    return np.asarray(degrees <= degrees[fit.state.active.any(axis=1)].max())
+def _generators(m: int) -> Floats:
+    """How axes change as they are `turned` back by a small angle about each, (k, m, m)."""
+    back = np.cross(np.eye(3), np.eye(3)[:, None]).swapaxes(1, 2)
+    return back if m == 3 else back[2:, :2, :2]
 
 
-def _unit(problem: Problem) -> Floats:
-    """One unit of length for all coordinates, and one for all velocities, (d,)."""
-    m, scale = problem.measured[0][1].shape[1], problem.units.scale
-    return np.repeat(np.sqrt(np.mean(scale.reshape(-1, m) ** 2, axis=1)), m)
+def _places(problem: Problem) -> int:
+    """How many coordinates a place has."""
+    return problem.measured[0][1].shape[1]
+
+
+def _in_one_unit(problem: Problem) -> Floats:
+    """What turns coefficients into those of one unit for all places and one for velocities, (l, d).
+
+    Each is the root mean square of its scales.
+    """
+    m, units = _places(problem), problem.units
+    sizes = np.repeat(np.sqrt(np.mean(units.scale.reshape(-1, m) ** 2, axis=1)), m)
+    return units.factors(problem.exponents) / replace(units, scale=sizes).factors(problem.exponents)
 
 
 def turned(angles: ArrayLike, m: int) -> Floats:
@@ -247,7 +221,7 @@ def sparse_orientations(
     largest directions of uncertainty.
     """
     law, m = replace(law, estimates=law.estimates[:41]), law.estimates.shape[2]
-    starts = [*known, np.eye(m), *(random_turn(m, rng) for _ in range(20))]
+    starts = [*known, np.eye(m), *special_ortho_group.rvs(m, 20, rng)]
     # A coefficient counts from a tenth of its standard size on, at the end from a hundredth.
     coarse = sorted((law.descended(turn, np.zeros(m), 0.1) for turn in starts), key=itemgetter(0))
     fine = [law.descended(turn, origin, 0.01) for _, turn, origin in coarse[: 2 * most]]
@@ -257,13 +231,6 @@ def sparse_orientations(
         if all(apart(near, other) > ALIKE for other in found):
             found.append(near)
     return found[:most]
-
-
-def random_turn(m: int, rng: np.random.Generator) -> Floats:
-    """A rotation of two or three axes, (m, m), any as likely."""
-    if m == 3:
-        return Rotation.random(random_state=rng).as_matrix()
-    return turned(rng.uniform(0, 2 * np.pi), m)
 
 
 def apart(turn: Floats, other: Floats) -> float:

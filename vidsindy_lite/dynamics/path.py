@@ -3,10 +3,10 @@
 One objective, in standard units, with ``s`` the error that is tolerated over that of the data::
 
     J_s = s^-2 (sum w r^2 / sigma^2 + sum |x' - Theta(x - Delta) Lambda|^2 / q)
-          + price (|Lambda|_0 + |Delta|_0)
+          + penalty (|Lambda|_0 + |Delta|_0)
 
 A smooth error of a thousandth (of an integrator, of a lens) is a small change of the law: terms
-that no noise model refuses, each worth its price. Raise the error that is tolerated, and the law
+that no noise model refuses, each worth its penalty. Raise the error that is tolerated, and the law
 changes at every step until only the terms remain that the motion needs; then it stays the same over
 a wide range. So each equation has a *path* of laws over ``s``, and the widest plateau, in decades,
 is the law (stability selection). To tolerate an error is to divide the quadratic model of a fit by
@@ -19,29 +19,46 @@ path around a law leads to that law.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import BSpline, CubicHermiteSpline
-from scipy.special import chdtri
-from tqdm import tqdm
+from scipy.interpolate import BSpline, make_interp_spline
 
 from ..arrays import Bools, Floats
 from .bspline import Segment
-from .collocation import Collocation, Fit, State, Status, WithCurve
+from .collocation import Fit, State, Status
 from .data import Trajectory
-from .frames import Origin, as_shifted, at_home, cheapest_at, closed, off_home, one_by_one, together
-from .l0 import PLATEAU, inverse, minimiser, subset_path, subset_search
+from .frames import (
+    Origin,
+    cheapest,
+    closed,
+    free_offsets,
+    with_fewer_axes,
+    with_free_axis,
+)
+from .l0 import NEGLIGIBLE, inverse, minimiser, subset_path, subset_search
 from .model import PolynomialSystem, runge_kutta_4
-from .noise import effective_noise, errors_left, residual_noise, smoother_weights, time_inflation
-from .problem import COARSE, Problem, fit_curves
-from .result import Plateau, Step
+from .noise import (
+    CONSISTENT,
+    TOLERATED,
+    effective_noise,
+    errors_left,
+    residual_noise,
+    time_inflation,
+)
+from .problem import (
+    FINAL_WEIGHT,
+    FIRST_WEIGHTS,
+    WEIGHTS,
+    Problem,
+    fit_curves,
+    leaves_something_over,
+    tightened,
+    unpruned,
+)
+from .result import History, Path, Plateau
 
-TOLERATED = 0.03
-"""Error that a first law tolerates, relative to the spread of the data: finer terms come after
-those that make the motion."""
 SMOOTH = 0.1
 """Where errors are smooth, a plateau may begin here: terms below are as likely made by the errors.
 Independent errors average out, and whatever they do not explain is a term."""
@@ -49,16 +66,6 @@ LARGEST, STEP = 1.0, 0.1
 """Largest error on a path, that of no law at all; and decades between two laws of a path."""
 ROUNDS = 6
 """Most laws to which paths lead, each followed around the law before."""
-CONSISTENT = 1.5
-"""Errors that a law leaves, over those tolerated when it was chosen, that are still the same."""
-RESOLVED = 1e-2
-"""Error, relative to the spread of the data, below which a misfit does not matter."""
-FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
-"""Physics weights of a fit of all terms, relative to the misfit of a plain regression."""
-WEIGHTS = (1e2, 1e4, 1e8)
-"""Physics weights of a search."""
-FINAL_WEIGHT = WEIGHTS[-1]
-"""Weight at which the law holds exactly for all that the data can tell."""
 ENOUGH_SAMPLES, ENOUGH_TURNS, LARGEST_SHARE = 3000, 30, 0.5
 """A first law is sought on so many samples and turns of the motion, if they are no more than that
 share of the data."""
@@ -68,87 +75,23 @@ EXACT = 1e-4
 """Tolerance of the last fits: a hundredth of a standard error, squared."""
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
-    """The laws of all equations around a fit, from the errors that it leaves up to no law at all.
-
-    Parameters
-    ----------
-    fit : Fit
-        Around which the laws are found.
-    model : WithCurve
-        Its quadratic model: `Problem.model`.
-    own : float
-        The errors that the fit was weighted with; those of the law, where kicks are larger.
-    level : float
-        Errors that have to be tolerated: a plateau that begins above them is no law of these data.
-    plateaus : tuple of tuple of Plateau
-        Of each equation, from the smallest tolerated error up.
-    """
-
-    fit: Fit
-    model: WithCurve
-    own: float
-    level: float
-    plateaus: tuple[tuple[Plateau, ...], ...]
-
-    @property
-    def lowest(self) -> float:
-        """The smallest tolerated error."""
-        return self.plateaus[0][0].low
-
-    @property
-    def tolerated(self) -> float:
-        """Errors that have to be tolerated, times those that the fit was weighted with."""
-        return max(self.level / self.own, 1.0)
-
-    def width(self, plateau: Plateau) -> float:
-        """How far a plateau reaches beyond the errors there are, in decades."""
-        return max(replace(plateau, low=max(plateau.low, self.own)).decades, 0.0)
-
-    def ranked(self) -> list[list[Plateau]]:
-        """The plateaus of each equation that begin at or below the level, the widest first."""
-        return [
-            sorted((p for p in path if p.low <= self.level), key=lambda p: -p.decades)
-            for path in self.plateaus
-        ]
-
-    def widest(self) -> list[Plateau]:
-        """The widest plateau of each equation, of those that begin at or below the level."""
-        return [ranked[0] for ranked in self.ranked()]
-
-    def of(self, active: Bools) -> list[Plateau]:
-        """The lowest plateau with the terms of each equation of a law, or the lowest of all."""
-        return [
-            next((p for p in path if (p.terms == terms).all()), path[0])
-            for path, terms in zip(self.plateaus, active.T, strict=True)
-        ]
-
-    def restricted(self, active: Bools) -> State:
-        """The state that the quadratic model promises for other terms, (l, d)."""
-        support = np.append(active.T.ravel(), self.fit.state.moving)[self.model.columns]
-        present = self.fit.state.flat()[self.model.columns]
-        solution = minimiser(self.model.information, self.model.gradient, present, support)
-        return self.model.along(self.fit.state, solution - present, 1.0).of_terms(active)
-
-
 def follow(problem: Problem, fit: Fit) -> Path:
     """The path of laws around a fit at a physics weight at which the law holds exactly.
 
     Parameters
     ----------
     problem : Problem
-        Its prices.
+        Its penalties.
     fit : Fit
         Around which.
     """
     model, terms_end = problem.model(fit), len(problem.form.searched)
     columns = model.columns
-    prices = np.append(problem.prices, np.full(problem.d, -np.inf))[columns]
+    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))[columns]
     present, support = fit.state.flat()[columns], fit.state.free()[columns]
     own = typical(np.maximum(fit.collocation.data_weights**-0.5, problem.process_noise))
-    single = np.full(problem.d, own) if problem.kicked else residual_noise(fit)
-    lasting = single if problem.kicked else effective_noise(fit)
+    single = np.full(problem.d, own) if problem.has_process_noise else residual_noise(fit)
+    lasting = single if problem.has_process_noise else effective_noise(fit)
     lowest = min(typical(single), LARGEST / 10**STEP)
     # No measurement is as good as a ten-thousandth, but a simulation may be: its errors are smooth.
     smooth = bool((lasting > 2 * single).any() or typical(single) <= 1e-4)
@@ -163,7 +106,7 @@ def follow(problem: Problem, fit: Fit) -> Path:
     functions = [
         (m.information, m.gradient, share) for m, share in zip(tolerating, shares, strict=True)
     ]
-    searched = subset_path(functions, present, prices, support)
+    searched = subset_path(functions, present, penalties, support)
     for low, high, support in zip(lows, highs, searched, strict=True):
         active = np.zeros(problem.form.candidates.T.shape, dtype=bool)
         active.flat[problem.form.searched] = support[:terms_end]
@@ -193,19 +136,18 @@ def first_law(problem: Problem, history: History, tolerated: float | None = None
     the terms once more.
     """
     least = TOLERATED if tolerated is None else tolerated
-    noise = problem.noise if problem.kicked else np.maximum(problem.noise, least)
+    noise = problem.noise if problem.has_process_noise else np.maximum(problem.noise, least)
     tolerant, stretches = replace(problem, noise=noise), enough(problem)
-    part = replace(tolerant, stretches=stretches)
-    collocation, found = part.collocation(part.segments()), []
-    control = fit_curves(collocation, part.curves)
+    part, found = replace(tolerant, stretches=stretches), []
     degrees, implicit = part.exponents.sum(axis=1), part.form.implicit
     # Terms of denominators come last: a factor above and below the line changes nothing.
     stages = [~implicit & (degrees <= 2), ~implicit, np.ones_like(implicit)]
     for k, rows in enumerate(stages):
         if k and (rows == stages[k - 1]).all():
             continue
-        whole, _ = unpruned(part, collocation, control, rows, history)
-        fit = at_home(part, whole)
+        whole, _ = unpruned(part, rows)
+        history.add("all terms", part, whole, FIRST_WEIGHTS[-1])
+        fit = cheapest(part, whole, [(part.origin, np.zeros(part.d, dtype=bool))])
         for weight in WEIGHTS:
             fit = select(part, fit, weight, "subset search", history)
         found.append(framed(part, fit, history))
@@ -234,61 +176,6 @@ def enough(problem: Problem) -> list[tuple[int, Trajectory]]:
     return cut
 
 
-def unpruned(
-    problem: Problem,
-    collocation: Collocation,
-    control: Floats,
-    rows: Bools,
-    history: History,
-) -> tuple[Fit, float]:
-    """Fit all terms of some rows of the library, (l,), while the physics weight rises.
-
-    The last weight comes back, too. Many terms that the data hardly tell apart cannot be fitted at
-    a large one: such a fit does not converge, and even those before it lean on the terms. Then the
-    first fit is the start.
-    """
-    d = problem.d
-    x, slope = collocation.node_states(control)
-    coefficients = np.zeros(problem.known.shape)
-    terms = problem.terms(x)
-    left = slope - terms @ problem.known
-    coefficients[rows] = np.linalg.lstsq(terms[:, rows], left, rcond=problem.noise.min())[0]
-    active = rows[:, None] & problem.form.candidates
-    coefficients[~active] = 0.0
-    still, shared = np.zeros(d, dtype=bool), problem.form.shared
-    state = State(control, coefficients, active, np.zeros(d), still, shared)
-    fits: list[tuple[Fit, float]] = []
-    for weight in FIRST_WEIGHTS:
-        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
-        state = fit.state
-        history.add("all terms", problem, fit, weight)
-        fits.append((fit, weight))
-        if fit.status is not Status.CONVERGED:
-            return fits[0]
-    return fits[-1]
-
-
-def leaves_something_over(problem: Problem, fit: Fit, chance: float = 0.1) -> bool:
-    """Would the other terms together explain more of the data than chance does?"""
-    searched = problem.form.searched
-    left_out = len(searched) - int(fit.state.free()[searched].sum())
-    if not left_out:
-        return False
-    _, gain = fit.collocation.linearise(fit.state, searched).newton()
-    return bool(gain > chdtri(left_out, chance))
-
-
-def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
-    """The fit of a state's terms while the physics weight rises to its last.
-
-    At that weight alone the law holds so exactly that a state far from the minimum creeps.
-    """
-    for weight in WEIGHTS:
-        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=10)
-        state = fit.state
-    return fit
-
-
 def select(problem: Problem, start: Fit, weight: float, stage: str, history: History) -> Fit:
     """Alternate between the subset search and Gauss-Newton until the criterion stops falling.
 
@@ -303,20 +190,20 @@ def select(problem: Problem, start: Fit, weight: float, stage: str, history: His
 
     best = refit(start.state)
     history.add(stage, problem, best, weight)
-    prices = np.append(problem.prices, np.full(problem.d, -np.inf))
+    penalties = np.append(problem.entry_penalties, np.full(problem.d, -np.inf))
     for _ in range(LONGEST_SEARCH):
         state = best.state
         columns = problem.columns(state)
         model = weighted.linearise(state, columns)
         support, solution, _ = subset_search(
-            model.information, model.gradient, state.flat()[columns], prices[columns],
+            model.information, model.gradient, state.flat()[columns], penalties[columns],
             state.free()[columns],
         )  # fmt: skip
         if (support == state.free()[columns]).all():
             break
         promised = model.along(state, solution - state.flat()[columns], 1.0)
         trial = refit(replace(promised, active=promised.coefficients != 0))
-        if not trial.criterion < best.criterion - PLATEAU or history.over:
+        if not trial.criterion < best.criterion - NEGLIGIBLE or history.over:
             break
         best = trial
         history.add(stage, problem, best, weight)
@@ -328,12 +215,16 @@ def framed(problem: Problem, fit: Fit, history: History) -> Fit:
 
     Axes move together, to where a term vanishes; only if that does not pay, one by one.
     """
+    movable = problem.form.movable
     for _ in range(LONGEST_SEARCH):
         if fit.status is not Status.CONVERGED or history.over:
             break  # what has not converged is no law whose terms could tell
-        trial = _moved(problem, fit, together(problem, fit.state), history)
+        together = free_offsets(problem, fit.state, movable)
+        fewer = with_fewer_axes(problem, fit.state.offset)
+        trial = _moved(problem, fit, [*together, *fewer], history)
         if not trial.criterion < fit.criterion:
-            trial = _moved(problem, fit, list(one_by_one(problem, fit.state)), history)
+            alone = [free_offsets(problem, fit.state, a) for a in np.diag(movable)[movable]]
+            trial = _moved(problem, fit, [origin for one in alone for origin in one], history)
         if not trial.criterion < fit.criterion:
             break
         fit = trial
@@ -345,16 +236,14 @@ def _moved(problem: Problem, fit: Fit, origins: Sequence[Origin], history: Histo
     others = [there for there in origins if (there[1] != fit.state.moving).any()]
     if not others:
         return fit
-    whole = closed(problem, fit, FINAL_WEIGHT)
-    law = as_shifted(problem, whole)
-    starts = [cheapest_at(problem, whole, law, there) for there in others]
-    start = min(starts, key=lambda candidate: candidate.criterion)
+    start = cheapest(problem, closed(problem, fit, FINAL_WEIGHT), others)
     if not start.criterion < fit.criterion + problem.penalties.max():
         return fit
     start = start.collocation.solve(start.state)  # its curve is still that of the frame before
     trial = select(problem, start, FINAL_WEIGHT, "another frame", history)
-    cheaper = trial.criterion < fit.criterion - PLATEAU
-    return trial if cheaper and problem.holds_origin(trial.state.offset) else fit
+    low, high = problem.box
+    inside = ((low <= trial.state.offset) & (trial.state.offset <= high)).all()
+    return trial if inside and trial.criterion < fit.criterion - NEGLIGIBLE else fit
 
 
 # ---------------------------------------------------------------------------- the law that persists
@@ -372,7 +261,7 @@ def persistent(
         A first law.
     history : History
     free : bool
-        Whether an axis that is at home by chance may leave it.
+        Whether an axis that is where the data have it by chance may be freed.
 
     Returns
     -------
@@ -382,7 +271,8 @@ def persistent(
     persists : bool
         Whether the path leads to the law; else it is the last to which one led.
     """
-    crossed = not gaps(fit.collocation.segments)
+    open_gaps = gaps(fit.collocation.segments)
+    crossed = not open_gaps
     for k in range(ROUNDS):
         coarse = k > 0 or not crossed or not near(problem, fit, TOLERATED)
         fit = at_own_errors(problem, fit) if coarse else polish(problem, fit, history)
@@ -398,15 +288,15 @@ def persistent(
                 break  # what cannot be fitted is no law
             fit = other
         elif not crossed:
-            fit, crossed = bridged(problem, fit), True
+            fit, crossed = bridged(problem, fit, open_gaps), True
         else:
-            state = off_home(problem.cautious, fit.state, path.model, path.tolerated)
-            if not free or state is fit.state:
+            state = with_free_axis(problem.cautious, fit.state, path.model, path.tolerated)
+            if not free or state is None:
                 return fit, path, fit.status is Status.CONVERGED
             fit = replace(fit, state=state)
         if not history.another():
             break
-    fit = polish(problem, fit if crossed else bridged(problem, fit), history)
+    fit = polish(problem, fit if crossed else bridged(problem, fit, open_gaps), history)
     path = follow(problem, fit)
     return fit, path, fit.status is Status.CONVERGED and has_terms(fit, path.widest())
 
@@ -489,12 +379,21 @@ def _refitted(problem: Problem, path: Path, goal: Sequence[Plateau], history: Hi
     tolerated = max(max(plateau.low for plateau in goal) / path.own, 1.0)
     tolerant = replace(problem, noise=errors_left(problem, fit) * tolerated)
     collocation = fit.collocation.weighted(tolerant.noise**-2, fit.collocation.physics_weights)
-    trial = tightened(tolerant, collocation, path.restricted(active))
+    trial = tightened(tolerant, collocation, _restricted(path, active))
     trial = replace(trial, criterion=tolerant.criterion(trial.collocation, trial.state))
     if not np.isfinite(trial.criterion):
         return trial
     history.add("another law of the path", tolerant, trial, FINAL_WEIGHT)
     return framed(tolerant, trial, history)
+
+
+def _restricted(path: Path, active: Bools) -> State:
+    """The state that the quadratic model around a fit promises for other terms, (l, d)."""
+    model, state = path.model, path.fit.state
+    support = np.append(active.T.ravel(), state.moving)[model.columns]
+    present = state.flat()[model.columns]
+    solution = minimiser(model.information, model.gradient, present, support)
+    return model.along(state, solution - present, 1.0).of_terms(active)
 
 
 def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
@@ -528,98 +427,42 @@ def polish(problem: Problem, fit: Fit, history: History, most: int = 4) -> Fit:
     return fit
 
 
-def bridged(problem: Problem, fit: Fit) -> Fit:
-    """Integrate the law across gaps and fit again with the physics enforced there.
+def bridged(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
+    """The fit with the law across these gaps, or those of them that the data allow.
 
-    A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut
-    at gaps. Groups of gaps are tried, shortest first; a group whose bridges spoil the fit is
-    halved, down to single gaps.
+    A smoothing spline crosses a gap on the wrong branch, so until here the physics was cut at gaps.
+    The law is integrated across all, and fitted again with the physics enforced there; a group
+    whose bridges spoil the fit is halved, down to single gaps.
     """
-    return _bridge_group(problem, fit, gaps(fit.collocation.segments))
-
-
-def _bridge_group(problem: Problem, fit: Fit, group: list[Gap]) -> Fit:
-    """The fit with these gaps crossed, or those of them that the data allow."""
     law = problem.law(fit.state).shift(fit.state.offset)
     splines = fit.collocation.grid.splines(fit.state.control_points)
-    joined, curves = join(
-        fit.collocation.segments, splines, group, problem.trajectories, law, problem.spacing,
-        problem.jumps,
-    )  # fmt: skip
-    bridged = problem.collocation(joined)
-    start = replace(fit.state, control_points=fit_curves(bridged, curves))
-    trial = tightened(problem, bridged, start)
+    joined, curves = join(problem, fit.collocation.segments, splines, law, group)
+    whole = problem.collocation(joined)
+    start = replace(fit.state, control_points=fit_curves(whole, curves))
+    trial = tightened(problem, whole, start)
     # A bridge takes away the freedom of one initial condition: so much may the fit lose.
-    freedom = problem.d * len(group) + (bridged.counts - fit.collocation.counts).sum()
+    freedom = problem.d * len(group) + (whole.counts - fit.collocation.counts).sum()
     loss = trial.collocation.objective(trial.state) - fit.collocation.objective(fit.state)
     if loss < freedom + 4 * np.sqrt(2 * freedom):
         return replace(fit, state=trial.state, collocation=trial.collocation)
     if len(group) > 1:
         for half in (group[: len(group) // 2], group[len(group) // 2 :]):
-            fit = _bridge_group(problem, fit, half)
+            fit = bridged(problem, fit, half)
     return fit
 
 
-# --------------------------------------------------------------------------------------------------
-# Noise of data with few samples a turn, told by candidate terms together.
-#
-# A curve without a law has as much freedom as there are samples a turn. Where these are few, it
-# takes motion for noise, or gives the motion up and is flat. So terms are fitted at once, as many
-# as converge, and what they leave is the noise; each of the two noises has its law.
-
-
-def views(pose: Callable[..., Problem]) -> list[Problem]:
-    """A problem with the noise that its curves leave, and others where that may be wrong.
-
-    Where the curves drop measurements, one with all of them; where terms leave far less than the
-    curves, one with what these leave.
-
-    Parameters
-    ----------
-    pose : callable
-        Poses the problem: with smoothed curves, or, if ``True`` is passed, with curves through
-        the samples, which serve where smoothed ones leave out a part of the motion.
-    """
-    whole = pose()
-    problem = smoother_weights(whole)
-    # What no smooth curve explains may still be the law's: a transient that a sample or two show.
-    found = [problem] if (problem.counts == whole.counts).all() else [problem, whole]
-    # A curve that has given the motion up, and leaves nearly all of its spread, has no turns.
-    enough = problem.samples_a_turn > COARSE and problem.noise.max() < 0.9
-    if not (enough or problem.measured_errors or (problem.noise <= TOLERATED).all()):
-        told = _by_terms(problem) or _by_terms(pose(True))
-        found += [] if told is None else [told]
-    return found
-
-
-def _by_terms(problem: Problem) -> Problem | None:
-    """The problem with the noise that terms leave, as many as converge, if it is far less."""
-    collocation = problem.collocation(problem.segments())
-    control = fit_curves(collocation, problem.curves)
-    degrees = problem.exponents.sum(axis=1)
-    for degree in range(problem.form.degree, 0, -1):
-        rows = ~problem.form.implicit & (degrees <= degree)
-        fit, weight = unpruned(problem, collocation, control, rows, History())
-        left = residual_noise(fit)
-        over = CONSISTENT * left < problem.noise
-        if weight == FIRST_WEIGHTS[-1] and over.any():
-            return replace(problem, noise=np.where(over, left, problem.noise))
-    return None
-
-
-def evidence(problem: Problem, fit: Fit) -> float:
-    """What a law costs whose noise is its own: n log variance, and the price of its terms.
+def information_criterion(problem: Problem, fit: Fit) -> float:
+    """What a law costs whose noise is its own: n log variance, and the penalty of its terms.
 
     The lower, the better (Bayesian information criterion); of laws of the same data. Measurements
     that are dropped are as likely anywhere in the spread of the data.
     """
     counts = fit.collocation.counts
     seen = counts > 0
-    # Of a law that is kicked, what is not foretold: the curve follows its data.
-    single = (
-        np.hypot(problem.noise, problem.process_noise) if problem.kicked else residual_noise(fit)
-    )
-    return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.price(fit.state)
+    # Under process noise, what is not foretold: the curve follows its data.
+    foretold = np.hypot(problem.noise, problem.process_noise)
+    single = foretold if problem.has_process_noise else residual_noise(fit)
+    return float(counts[seen] @ np.log(single[seen] ** 2)) + problem.penalty(fit.state)
 
 
 # --------------------------------------------------------------------------------------------------
@@ -642,170 +485,59 @@ def gaps(segments: Sequence[Segment]) -> list[Gap]:
     return sorted(lengths, key=lengths.__getitem__)
 
 
-@dataclass(frozen=True)
-class Joined:
-    """A curve made of splines, with the gaps between them crossed by a law.
+def cross(law: PolynomialSystem, left: BSpline, right: BSpline, spacing: float) -> BSpline:
+    """The motion from the end of a curve to where the next one begins.
 
-    Parameters
-    ----------
-    splines : sequence of scipy.interpolate.BSpline
-        Pieces in the order of time, with values of shape (d,).
-    law : PolynomialSystem
-        Integrated forward from the left end and backward from the right end of each gap; the two
-        are blended linearly.
+    The law is integrated from both sides, and the two are blended linearly.
     """
-
-    splines: Sequence[BSpline]
-    law: PolynomialSystem
-
-    def __call__(self, t: Floats) -> Floats:
-        """Evaluate at increasing times, shape (n, d)."""
-        values = np.empty((len(t), self.law.d))
-        ends = [(spline.t[0], spline.t[-1]) for spline in self.splines]
-        for (low, high), spline in zip(ends, self.splines, strict=True):
-            inside = (t >= low) & (t <= high)
-            values[inside] = spline(t[inside])
-        crossed = [(low, high) for (_, low), (high, _) in zip(ends[:-1], ends[1:], strict=True)]
-        inside = [(t > low) & (t < high) for low, high in crossed]
-        steps = 1 + max(rows.sum() for rows in inside)
-        forward, backward = self._crossings(np.array(crossed), steps)
-        for (low, high), rows, left, right in zip(crossed, inside, forward, backward, strict=True):
-            share = (t[rows] - low) / (high - low)
-            values[rows] = (1 - share[:, None]) * left(share) + share[:, None] * right(1 - share)
-        return values
-
-    def _crossings(
-        self, crossed: Floats, steps: int
-    ) -> tuple[list[CubicHermiteSpline], list[CubicHermiteSpline]]:
-        """Each gap from its left and from its right end, as functions of the share covered."""
-        x0 = np.array(
-            [spline(low) for spline, (low, _) in zip(self.splines[:-1], crossed, strict=True)]
-            + [spline(high) for spline, (_, high) in zip(self.splines[1:], crossed, strict=True)]
-        )
-        length = np.diff(crossed)
-        pace = np.concatenate([length, -length])
-        share = np.linspace(0, 1, steps + 1)
-
-        def rate(x: Floats) -> Floats:
-            return pace * self.law(x)
-
-        with np.errstate(over="ignore", invalid="ignore"):
-            paths = runge_kutta_4(rate, share, x0, substeps=1)
-            slopes = np.array([rate(x) for x in paths])
-        # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
-        lost = ~(np.isfinite(paths) & np.isfinite(slopes)).all(axis=(0, 2))
-        paths[:, lost], slopes[:, lost] = x0[lost], 0.0
-        curves = [CubicHermiteSpline(share, paths[:, i], slopes[:, i]) for i in range(len(x0))]
-        return curves[: len(crossed)], curves[len(crossed) :]
+    low, high = left.t[-1], right.t[0]
+    t, ends = np.linspace(low, high, 4 + 4 * int((high - low) / spacing)), [left(low), right(high)]
+    onward = np.array([[1.0], [-1.0]])
+    with np.errstate(over="ignore", invalid="ignore"):
+        paths = runge_kutta_4(lambda x: onward * law(x), t, np.array(ends), substeps=1)
+    # Where the law blows up the curve stays at the end: the fit will refuse the bridge.
+    paths = np.where(np.isfinite(paths).all(axis=(0, 2), keepdims=True), paths, ends)
+    share = np.linspace(0, 1, len(t))[:, None]
+    return make_interp_spline(t, (1 - share) * paths[:, 0] + share * paths[::-1, 1])
 
 
 def join(
-    segments: Sequence[Segment],
-    splines: Sequence[BSpline],
-    bridged: Sequence[Gap],
-    trajectories: Sequence[Trajectory],
-    law: PolynomialSystem,
-    spacing: float,
-    jumps: Sequence[Floats] | None = None,
-) -> tuple[list[Segment], list[BSpline | Joined]]:
-    """Join segments across the named gaps.
+    problem: Problem, segments: Sequence[Segment], splines: Sequence[BSpline],
+    law: PolynomialSystem, bridged: Sequence[Gap],
+) -> tuple[list[Segment], list[Callable[[Floats], Floats]]]:  # fmt: skip
+    """Join segments across the named gaps, with a first curve for each.
 
     Parameters
     ----------
+    problem : Problem
+        With all data, also samples that were too few to make a segment of their own.
     segments, splines
         The present pieces and their fitted curves.
+    law : PolynomialSystem
+        In the frame of the data.
     bridged : sequence of Gap
         Which gaps to cross.
-    trajectories : sequence of Trajectory
-        All data, including samples that were too few to make a segment of their own.
-    law : PolynomialSystem
-        The law, in the frame of the trajectories.
-    spacing : float
-        Length of a knot span.
-    jumps : sequence of ndarray, optional
-        Times of each trajectory at which a slope may jump.
-
-    Returns
-    -------
-    segments : list of Segment
-    curves : list of callable
-        A first curve for each of them.
     """
-    groups: list[list[int]] = []
-    for i, segment in enumerate(segments):
-        left = segments[i - 1]
-        if i and left.trajectory == segment.trajectory and (left.trajectory, left.t[-1]) in bridged:
-            groups[-1].append(i)
+    joined: list[Segment] = []
+    curves: list[list[BSpline]] = []
+    for segment, spline in zip(segments, splines, strict=True):
+        if joined and (joined[-1].trajectory, joined[-1].t[-1]) in bridged:
+            (t, x), k = problem.trajectories[segment.trajectory], segment.trajectory
+            inside = (t >= joined[-1].t[0]) & (t <= segment.t[-1])
+            joined[-1] = Segment.even(t[inside], x[inside], problem.spacing, k, problem.jumps[k])
+            curves[-1] += [cross(law, curves[-1][-1], spline, problem.spacing), spline]
         else:
-            groups.append([i])
-    joined, curves = [], []
-    for group in groups:
-        first, last = segments[group[0]], segments[group[-1]]
-        if len(group) == 1:
-            joined.append(first)
-            curves.append(splines[group[0]])
-            continue
-        t, x = trajectories[first.trajectory]
-        inside = (t >= first.t[0]) & (t <= last.t[-1])
-        kinks = None if jumps is None else jumps[first.trajectory]
-        joined.append(Segment.even(t[inside], x[inside], spacing, first.trajectory, kinks))
-        curves.append(Joined([splines[i] for i in group], law))
-    return joined, curves
+            joined.append(segment)
+            curves.append([spline])
+    return joined, [_end_to_end(pieces) for pieces in curves]
 
 
-# --------------------------------------------------------------------------------------------------
-# How a discovery went: the steps of its fits, in the order of time.
+def _end_to_end(pieces: Sequence[BSpline]) -> Callable[[Floats], Floats]:
+    """Curves one after the other as a function of increasing times, (n,)."""
+    ends = [piece.t[-1] for piece in pieces[:-1]]
 
+    def states(t: Floats) -> Floats:
+        parts = np.split(t, np.searchsorted(t, ends, side="right"))
+        return np.concatenate([piece(part) for piece, part in zip(pieces, parts, strict=True)])
 
-@dataclass(frozen=True)
-class History:
-    """The steps of a discovery so far, in the order of time, and how much of it is left.
-
-    Parameters
-    ----------
-    steps : list of Step
-    began : float
-        On the clock of `time.perf_counter`.
-    end : float
-        When no further round begins, on that clock.
-    bar : tqdm, optional
-        Moves with every round.
-    """
-
-    steps: list[Step] = field(default_factory=list)
-    began: float = field(default_factory=time.perf_counter)
-    end: float = np.inf
-    bar: tqdm | None = None
-
-    @property
-    def over(self) -> bool:
-        """Whether there is no time left."""
-        return time.perf_counter() > self.end
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is to be told if the time was not enough."""
-        told = "the time limit ended the search: this is the best law so far; raise time_limit"
-        return (told,) if self.over else ()
-
-    def another(self) -> bool:
-        """Count a round, and say whether there is time for another."""
-        if self.bar is not None:
-            self.bar.update()
-        return not self.over
-
-    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
-        """Add what a fit at a relative physics weight has reached."""
-        state, collocation = fit.state, fit.collocation
-        data = collocation.data_loss(collocation.curve(state.control_points))
-        self.steps.append(
-            Step(
-                stage=stage,
-                seconds=time.perf_counter() - self.began,
-                physics_weight=weight,
-                data_loss=data / collocation.counts.sum(),
-                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
-                terms=int(state.active.sum()),
-                offset=problem.units.point(state.offset),
-            )
-        )
+    return states

@@ -1,7 +1,7 @@
 """The problem that a discovery solves: the data in standard units, and what is known before a law.
 
 In standard units every coordinate has mean 0 and variance 1, and time runs so that the
-root-mean-square speed is 1. `pose` makes it from data: units, gaps, the noise, prices, and first
+root-mean-square speed is 1. `pose` makes it from data: units, gaps, the noise, penalties, and first
 guesses of the states that nobody has measured.
 """
 
@@ -17,29 +17,28 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.special import chdtri
 
 from ..arrays import Bools, Floats, Ints
-from .bspline import DEGREE, WIDTH, Segment, basis, normal_band
-from .collocation import CLEANEST, Collocation, Fit, State, WithCurve
+from .bspline import DEGREE, PENALTIES, WIDTH, Segment, basis, normal_band, smooth
+from .collocation import CLEANEST, Collocation, Fit, State, Status, WithCurve
 from .data import Trajectory, Units, cut, typical_step, typical_steps
 from .l0 import LEAST
 from .library import Function, extended, jumps, law_variables, monomials
 from .model import Form, PolynomialSystem
-from .smoothing import PENALTIES, smooth
 
 FALSE_ALARM = 0.02
 """Chance of a false term in a law, if all candidates were independent: where random laws have
 about the fewest wrong terms (notebook 04b)."""
 SURE = 0.004
 """The same where samples share errors, which look like evidence for small terms, and elsewhere for
-a law that is not to be doubted: a term that is only worth the price above is told."""
+a law that is not to be doubted: a term that is only worth the penalty above is told."""
 OFFSET_PENALTY = 0.95
-"""Price of a moved axis, in constant terms: of two laws alike, the one with fewer terms wins."""
+"""Penalty of a free axis, in constant terms: of two laws alike, the one with fewer terms wins."""
 COARSE = 20
 """Samples a turn from which on a curve tells the noise to a tenth, and kicks from a drive."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One discovery's data and prices; all but ``measured`` in standard units.
+    """One discovery's data and penalties; all but ``measured`` in standard units.
 
     Parameters
     ----------
@@ -66,7 +65,7 @@ class Problem:
     form : Form
         Which terms the law may have, and which it has.
     penalties : ndarray, shape (l,)
-        Price of a term; see `term_penalties`.
+        Penalty of a term; see `term_penalties`.
     slack : ndarray, shape (d,)
         Misfit of a plain regression on the smoothed curves: the scale of physics weights.
     process_noise : ndarray, shape (d,)
@@ -122,7 +121,7 @@ class Problem:
         return self.form.known / self.units.factors(self.exponents)
 
     @property
-    def prices(self) -> Floats:
+    def entry_penalties(self) -> Floats:
         """The penalties of all terms, equation by equation, shape (l d,)."""
         return np.tile(self.penalties, self.d)
 
@@ -133,7 +132,7 @@ class Problem:
 
     @property
     def cautious(self) -> Problem:
-        """The same at the prices of `SURE`, at which a law is compared with its rivals."""
+        """The same at the penalties of `SURE`, at which a law is compared with its rivals."""
         equations = self.measured[0][1].shape[1]
         return replace(self, penalties=term_penalties(self.exponents, equations, SURE))
 
@@ -147,7 +146,7 @@ class Problem:
         return fit.collocation.linearise(fit.state, self.columns(fit.state))
 
     @property
-    def home(self) -> Floats:
+    def origin(self) -> Floats:
         """The origin of the data's frame, shape (d,)."""
         return self.units.standard(np.zeros(self.d))
 
@@ -155,24 +154,19 @@ class Problem:
     def box(self) -> tuple[Floats, Floats]:
         """Corners of the box in which a law has its origin, each (d,).
 
-        It holds the data and home, and a spread more: a motion need not pass its centre.
+        It holds the data and their origin, and a spread more: a motion need not pass its centre.
         """
         x = np.concatenate([values for _, (_, values) in self.stretches])
-        movable, home = self.form.movable, self.home
+        movable, given = self.form.movable, self.origin
         low, high = (
-            np.where(movable, extreme(extreme.reduce(x), home) + more, home)
+            np.where(movable, extreme(extreme.reduce(x), given) + more, given)
             for extreme, more in ((np.fmin, -1.0), (np.fmax, 1.0))
         )
         return low, high
 
-    def holds_origin(self, origin: Floats) -> bool:
-        """Whether an origin is in the box of data and home."""
-        low, high = self.box
-        return bool(((low <= origin) & (origin <= high)).all())
-
     @property
     def axis_penalty(self) -> float:
-        """Price of an axis along which the law's origin is not at home."""
+        """Penalty of an axis along which the law's origin is not that of the data."""
         return float(OFFSET_PENALTY * self.penalties[0])
 
     @property
@@ -244,17 +238,17 @@ class Problem:
         return collocation.weighted(collocation.data_weights, physics)
 
     @property
-    def kicked(self) -> bool:
+    def has_process_noise(self) -> bool:
         """Whether the law holds but for random kicks."""
         return bool(self.process_noise.any())
 
     def criterion(self, collocation: Collocation, state: State) -> float:
         """What a discovery minimises: the objective and the penalties of terms and axes."""
-        return collocation.objective(state) + self.price(state)
+        return collocation.objective(state) + self.penalty(state)
 
-    def price(self, state: State) -> float:
+    def penalty(self, state: State) -> float:
         """The penalties of the terms and axes of a law."""
-        terms = self.prices @ state.free()[: len(self.prices)]
+        terms = self.entry_penalties @ state.free()[: len(self.entry_penalties)]
         return float(terms + self.axis_penalty * state.moving.sum())
 
     def law(self, state: State) -> PolynomialSystem:
@@ -279,7 +273,7 @@ def fit_curves(collocation: Collocation, curves: Sequence[Callable[[Floats], Flo
 def term_penalties(
     exponents: Ints, equations: int | None = None, false_alarm: float = FALSE_ALARM
 ) -> Floats:
-    """Price of a term of each kind: how much of the chi-square it has to explain, shape (l,).
+    """Penalty of a term of each kind: how much of the chi-square it has to explain, shape (l,).
 
     Half of the chance of a false alarm goes to the constants, half of the rest to the linear
     terms, and so on; the terms of one degree in all equations share evenly (Bonferroni). So a term
@@ -300,42 +294,76 @@ def spread_to_unseen(noise: Floats, seen: Bools) -> Floats:
 
 
 # --------------------------------------------------------------------------------------------------
+# Penalty continuation: fits while the physics weight rises.
+
+FIRST_WEIGHTS = (1e-1, 1e0, 1e1, 1e2)
+"""Physics weights of a fit of all terms, relative to the misfit of a plain regression."""
+WEIGHTS = (1e2, 1e4, 1e8)
+"""Physics weights of a search."""
+FINAL_WEIGHT = WEIGHTS[-1]
+"""Weight at which the law holds exactly for all that the data can tell."""
+
+
+def unpruned(problem: Problem, rows: Bools) -> tuple[Fit, bool]:
+    """Fit all terms of some rows of the library, (l,), while the physics weight rises.
+
+    And whether all fits converge. Many terms that the data hardly tell apart cannot be fitted at a
+    large weight: such a fit does not converge, and even those before it lean on the terms. Then the
+    first fit is the start.
+    """
+    collocation = problem.collocation(problem.segments())
+    control = fit_curves(collocation, problem.curves)
+    x, slope = collocation.node_states(control)
+    coefficients, terms = np.zeros(problem.known.shape), problem.terms(x)
+    left = slope - terms @ problem.known
+    coefficients[rows] = np.linalg.lstsq(terms[:, rows], left, rcond=problem.noise.min())[0]
+    active = rows[:, None] & problem.form.candidates
+    coefficients[~active] = 0.0
+    still, shared = np.zeros(problem.d, dtype=bool), problem.form.shared
+    state, fits = State(control, coefficients, active, np.zeros(problem.d), still, shared), []
+    for weight in FIRST_WEIGHTS:
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=15)
+        state = fit.state
+        fits.append(fit)
+        if fit.status is not Status.CONVERGED:
+            return fits[0], False
+    return fit, True
+
+
+def leaves_something_over(problem: Problem, fit: Fit, chance: float = 0.1) -> bool:
+    """Would the other terms together explain more of the data than chance does?"""
+    searched = problem.form.searched
+    left_out = len(searched) - int(fit.state.free()[searched].sum())
+    if not left_out:
+        return False
+    _, gain = fit.collocation.linearise(fit.state, searched).newton()
+    return bool(gain > chdtri(left_out, chance))
+
+
+def tightened(problem: Problem, collocation: Collocation, state: State) -> Fit:
+    """The fit of a state's terms while the physics weight rises to its last.
+
+    At that weight alone the law holds so exactly that a state far from the minimum creeps.
+    """
+    for weight in WEIGHTS:
+        fit = problem.weighted(collocation, weight).solve(state, tolerance=1.0, max_steps=10)
+        state = fit.state
+    return fit
+
+
+# --------------------------------------------------------------------------------------------------
 # States that nobody has measured: velocities, the time, and what a known equation tells.
 #
 # They are tied to the others by equations that are known, so that a fit finds them; here they are
 # given a curve to begin with.
 
 
-def with_velocities(problem: Problem, positions: Sequence[BSpline]) -> Problem:
-    """The same with velocities as further states: a velocity of zero stays what it is."""
-    units = problem.units
-    slopes = [spline.derivative()(spline.t[DEGREE:-DEGREE]) for spline in positions]
-    rms = np.sqrt((np.concatenate(slopes) ** 2).mean(axis=0))
+def with_unseen(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Problem:
+    """The same with the states that nobody has measured, in standard units with mean 0.
 
-    def with_velocity(position: BSpline) -> Callable[[Floats], Floats]:
-        velocity = position.derivative()
-        return lambda t: np.hstack([position(t), velocity(t) / rms])
-
-    curves = [with_velocity(spline) for spline in positions]
-    seen = np.repeat([True, False], len(rms))
-    return _with_states(problem, curves, rms * units.scale / units.time, seen)
-
-
-def with_time(problem: Problem) -> Problem:
-    """The same with the time as a last state, in time units."""
-
-    def with_clock(curve: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-        return lambda t: np.column_stack([curve(t), t])
-
-    curves = [with_clock(curve) for curve in problem.curves]
-    seen = np.append(np.ones(len(problem.noise), dtype=bool), False)
-    return _with_states(problem, curves, np.array([problem.units.time]), seen)
-
-
-def with_hidden(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Problem:
-    """The same with coordinates that were never seen, each told by an equation that is known.
-
-    Of a seen coordinate y with ``y' = g + b u``, with b and g known, it is ``u = (y' - g) / b``.
+    Coordinates that were never seen, each told by an equation that is known: of a seen coordinate
+    y with ``y' = g + b u``, with b and g known, it is ``u = (y' - g) / b``. Then velocities, and
+    last the time.
 
     Parameters
     ----------
@@ -351,38 +379,60 @@ def with_hidden(problem: Problem, curves: Sequence[BSpline], seen: Bools) -> Pro
     ValueError
         If no equation tells a coordinate, or the law is of second order.
     """
-    form, units, m = problem.form, problem.units, len(seen)
-    if form.states > m:
-        name = form.names[int(np.argmin(seen))]
+    form, units, m, d = problem.form, problem.units, len(seen), problem.d
+    hidden, moves, timed = np.flatnonzero(~seen), form.states > m, form.states < d
+    if hidden.size and moves:
+        name = form.names[hidden[0]]
         raise ValueError(f"x: of a law of order 2 every position must be seen, got none of {name}")
-    telling = [_telling(form, seen, u) for u in np.flatnonzero(~seen).tolist()]
+    telling = [_telling(form, seen, u) for u in hidden.tolist()]
+    measured = np.append(seen, np.zeros(d - m, dtype=bool))
 
-    def with_told(curve: BSpline) -> Callable[[Floats], Floats]:
-        slope = curve.derivative()
+    def whole(curve: BSpline, t: Floats) -> Floats:
+        """All states in units of the data."""
+        x, slopes = np.zeros((len(t), d)), np.zeros((len(t), m))
+        x[:, measured] = units.point(curve(t))
+        slopes[:, seen] = curve(t, 1) * units.scale / units.time
+        for u, (j, term) in zip(hidden, telling, strict=True):
+            rest = form.known[:, j].copy()
+            rest[term] = 0.0
+            known = monomials(x[:, :m], form.exponents[:, :m]) @ rest
+            x[:, u] = (slopes[:, j] - known) / form.known[term, j]
+        if moves:
+            x[:, m : 2 * m] = slopes
+        if timed:
+            x[:, -1] = t * units.time
+        return x
 
+    values = np.concatenate([whole(curve, curve.t[DEGREE:-DEGREE]) for curve in curves])
+    centre, scale = np.zeros(d), np.sqrt((values**2).mean(axis=0))
+    centre[measured], scale[measured] = units.centre, units.scale
+    scale[-1] = units.time if timed else scale[-1]
+
+    def standard(curve: BSpline) -> Callable[[Floats], Floats]:
         def states(t: Floats) -> Floats:
-            x, slopes = np.zeros((len(t), m)), np.zeros((len(t), m))
-            x[:, seen] = units.point(curve(t))
-            slopes[:, seen] = slope(t) * units.scale / units.time
-            for u, (j, term) in zip(np.flatnonzero(~seen), telling, strict=True):
-                rest = form.known[:, j].copy()
-                rest[term] = 0.0
-                known = monomials(x, form.exponents[:, :m]) @ rest
-                x[:, u] = (slopes[:, j] - known) / form.known[term, j]
+            x = (whole(curve, t) - centre) / scale
+            x[:, measured] = curve(t)
             return x
 
         return states
 
-    told = [with_told(curve) for curve in curves]
-    values = [states(c.t[DEGREE:-DEGREE])[:, ~seen] for states, c in zip(told, curves, strict=True)]
-    scale = np.sqrt((np.concatenate(values) ** 2).mean(axis=0))
-    whole = np.ones(m)
-    whole[seen], whole[~seen] = units.scale, scale
+    def among(values: Floats, filling: float) -> Floats:
+        every = np.full((len(values), d, *values.shape[2:]), filling)
+        every[:, measured] = values
+        return every
 
-    def standard(states: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-        return lambda t: states(t) / whole
-
-    return _with_states(problem, [standard(states) for states in told], scale, seen)
+    return replace(
+        problem,
+        trajectories=[(t, among(x, np.nan)) for t, x in problem.trajectories],
+        systematic=[among(modes, 0.0) for modes in problem.systematic],
+        smoothed=[among(x, np.nan) for x in problem.smoothed],
+        pulls=np.moveaxis(among(np.moveaxis(among(problem.pulls, 0.0), 1, 0), 0.0), 0, 1),
+        precision=[among(precision, 0.0) for precision in problem.precision],
+        stretches=[(i, (t, among(x, np.nan))) for i, (t, x) in problem.stretches],
+        curves=[standard(curve) for curve in curves],
+        units=Units(centre, scale, units.time),
+        noise=spread_to_unseen(problem.noise, measured),
+    )
 
 
 def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
@@ -403,37 +453,6 @@ def _telling(form: Form, seen: Bools, u: int) -> tuple[int, int]:
     )
 
 
-def _with_states(
-    problem: Problem, curves: Sequence[Callable[[Floats], Floats]], scale: Floats, seen: Bools
-) -> Problem:
-    """The same with further states, of curves and scales (k,), which nobody has measured.
-
-    ``seen``, (m + k,), says where the others stand among all; the standard units of the new ones
-    have mean 0.
-    """
-    units = problem.units
-
-    def among(values: Floats, filling: float) -> Floats:
-        whole = np.full((len(values), len(seen), *values.shape[2:]), filling)
-        whole[:, seen] = values
-        return whole
-
-    centres, scales = np.zeros(len(seen)), np.empty(len(seen))
-    centres[seen], scales[seen], scales[~seen] = units.centre, units.scale, scale
-    return replace(
-        problem,
-        trajectories=[(t, among(x, np.nan)) for t, x in problem.trajectories],
-        systematic=[among(modes, 0.0) for modes in problem.systematic],
-        smoothed=[among(x, np.nan) for x in problem.smoothed],
-        pulls=np.moveaxis(among(np.moveaxis(among(problem.pulls, 0.0), 1, 0), 0.0), 0, 1),
-        precision=[among(precision, 0.0) for precision in problem.precision],
-        stretches=[(i, (t, among(x, np.nan))) for i, (t, x) in problem.stretches],
-        curves=curves,
-        units=Units(centres, scales, units.time),
-        noise=spread_to_unseen(problem.noise, seen),
-    )
-
-
 # --------------------------------------------------------------------------------------------------
 # Poses the problem of a discovery: standard units, gaps, the noise, and the library's units.
 
@@ -449,7 +468,7 @@ def pose(
     sigma: list[Floats] | None = None,
     through: bool = False,
 ) -> Problem:
-    """Pose the problem of a discovery: standard units, gaps, noise, prices.
+    """Pose the problem of a discovery: standard units, gaps, noise, penalties.
 
     The noise is as given by ``sigma``, (n, d) for each trajectory, or as the smoothing estimates;
     the curves are smoothed, or go ``through`` the samples.
@@ -513,12 +532,8 @@ def pose(
     )
     if problem.shared:
         problem = problem.cautious
-    if not seen.all():
-        problem = with_hidden(problem, curves, seen)
-    elif form.states > len(seen):
-        problem = with_velocities(problem, curves)
-    if form.states < len(form.names):
-        problem = with_time(problem)
+    if seen.sum() < problem.d:
+        problem = with_unseen(problem, curves, seen)
     if form.exponents.shape[1] > len(form.names):
         problem = _with_functions(problem, rng)
     return replace(problem, slack=_slack(problem))

@@ -6,25 +6,29 @@ from __future__ import annotations
 import json
 import os
 import re
+import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
+from tqdm import tqdm
 
 from ..arrays import Bools, Floats
-from ..checks import MALFORMED, check_array, check_output, shown
+from ..checks import MALFORMED, check_array, check_choice, check_output, shown
 from ..reading import check_file, read_tree
 from ..repository import write_file
 from ..values import built, decoded, encoded
+from .bspline import smooth
+from .collocation import Fit, WithCurve
 from .data import Trajectory
 from .library import Function, Library, extended, harmonic
 from .mechanics import Physics, Quantity, Round, on_circle, physics_of
 from .model import PolynomialSystem, place, with_error
-from .smoothing import smooth
+from .problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,6 +57,63 @@ class Plateau:
     def decades(self) -> float:
         """Width of the range in decades."""
         return float(np.log10(self.high / self.low))
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The laws of all equations around a fit, from the errors that it leaves up to no law at all.
+
+    Parameters
+    ----------
+    fit : Fit
+        Around which the laws are found.
+    model : WithCurve
+        Its quadratic model: `Problem.model`.
+    own : float
+        The errors that the fit was weighted with; those of the law, where kicks are larger.
+    level : float
+        Errors that have to be tolerated: a plateau that begins above them is no law of these data.
+    plateaus : tuple of tuple of Plateau
+        Of each equation, from the smallest tolerated error up.
+    """
+
+    fit: Fit
+    model: WithCurve
+    own: float
+    level: float
+    plateaus: tuple[tuple[Plateau, ...], ...]
+
+    @property
+    def lowest(self) -> float:
+        """The smallest tolerated error."""
+        return self.plateaus[0][0].low
+
+    @property
+    def tolerated(self) -> float:
+        """Errors that have to be tolerated, times those that the fit was weighted with."""
+        return max(self.level / self.own, 1.0)
+
+    def width(self, plateau: Plateau) -> float:
+        """How far a plateau reaches beyond the errors there are, in decades."""
+        return max(replace(plateau, low=max(plateau.low, self.own)).decades, 0.0)
+
+    def ranked(self) -> list[list[Plateau]]:
+        """The plateaus of each equation that begin at or below the level, the widest first."""
+        return [
+            sorted((p for p in path if p.low <= self.level), key=lambda p: -p.decades)
+            for path in self.plateaus
+        ]
+
+    def widest(self) -> list[Plateau]:
+        """The widest plateau of each equation, of those that begin at or below the level."""
+        return [ranked[0] for ranked in self.ranked()]
+
+    def of(self, active: Bools) -> list[Plateau]:
+        """The lowest plateau with the terms of each equation of a law, or the lowest of all."""
+        return [
+            next((p for p in path if (p.terms == terms).all()), path[0])
+            for path, terms in zip(self.plateaus, active.T, strict=True)
+        ]
 
 
 @dataclass(frozen=True)
@@ -84,6 +145,60 @@ class Step:
     physics_loss: float
     terms: int
     offset: Floats
+
+
+@dataclass(frozen=True)
+class History:
+    """The steps of a discovery so far, in the order of time, and how much of it is left.
+
+    Parameters
+    ----------
+    steps : list of Step
+    began : float
+        On the clock of `time.perf_counter`.
+    end : float
+        When no further round begins, on that clock.
+    bar : tqdm, optional
+        Moves with every round.
+    """
+
+    steps: list[Step] = field(default_factory=list)
+    began: float = field(default_factory=time.perf_counter)
+    end: float = np.inf
+    bar: tqdm | None = None
+
+    @property
+    def over(self) -> bool:
+        """Whether there is no time left."""
+        return time.perf_counter() > self.end
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be told if the time was not enough."""
+        told = "the time limit ended the search: this is the best law so far; raise time_limit"
+        return (told,) if self.over else ()
+
+    def another(self) -> bool:
+        """Count a round, and say whether there is time for another."""
+        if self.bar is not None:
+            self.bar.update()
+        return not self.over
+
+    def add(self, stage: str, problem: Problem, fit: Fit, weight: float) -> None:
+        """Add what a fit at a relative physics weight has reached."""
+        state, collocation = fit.state, fit.collocation
+        data = collocation.data_loss(collocation.curve(state.control_points))
+        self.steps.append(
+            Step(
+                stage=stage,
+                seconds=time.perf_counter() - self.began,
+                physics_weight=weight,
+                data_loss=data / collocation.counts.sum(),
+                physics_loss=float((collocation.physics_residual(state) ** 2).mean()),
+                terms=int(state.active.sum()),
+                offset=problem.units.point(state.offset),
+            )
+        )
 
 
 @dataclass(frozen=True)
@@ -212,8 +327,7 @@ class Discovery:
         frame : {"data", "native"}
             Which frame.
         """
-        if frame not in ("data", "native"):
-            raise ValueError(f"frame: must be 'data' or 'native', got {frame!r}")
+        check_choice("frame", frame, ("data", "native"))
         native = frame == "native"
         law = self.native if native else self.system
         errors = self.native_standard_errors if native else self.standard_errors

@@ -1,7 +1,7 @@
 """Spline-enhanced sparse regression: a noisy trajectory goes in, the governing equations come out.
 
 The objective is the paper's (Eqs. 8-9): data loss of a cubic B-spline, physics loss at collocation
-points, a price per term. What differs is how it is minimised: banded Gauss-Newton steps with the
+points, a penalty per term. What differs is how it is minimised: banded Gauss-Newton steps with the
 curve eliminated (`collocation`), a search over supports in the small algebra that remains
 (`l0`), the offset as the origin in which the law is sparsest (`frames`), a physics weight
 that is raised until the law holds exactly, and an error that is tolerated (`path`). Nothing is set
@@ -15,23 +15,21 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from threading import Lock
-from typing import cast
 
 import numpy as np
 from scipy.interpolate import BSpline
 from threadpoolctl import OpenBLASController, threadpool_limits
 
 from ..arrays import Floats
-from ..checks import check_array, check_choice, check_integer, check_number, check_positive, shown
+from ..checks import check_choice, check_integer, check_positive, shown
 from ..progress import bar
-from .bspline import DEGREE, WIDTH
+from .bspline import DEGREE
 from .collocation import Fit
 from .data import (
     Trajectory,
     check_sigma,
     check_systematic,
     check_trajectories,
-    check_trajectory,
     coordinate_names,
 )
 from .diagnostics import diagnose, is_on_circle
@@ -42,8 +40,8 @@ from .library import (
     monomial_exponents,
     monomials,
 )
-from .model import Form, PolynomialSystem
-from .noise import rebalanced, smoother_weights, with_process_noise
+from .model import Form
+from .noise import TOLERATED, rebalanced, smoother_weights, views, with_process_noise
 from .orientation import (
     Measured,
     Solved,
@@ -54,21 +52,16 @@ from .orientation import (
 )
 from .path import (
     ROUNDS,
-    TOLERATED,
-    History,
-    Path,
-    evidence,
     first_law,
+    information_criterion,
     near,
     persistent,
-    views,
 )
 from .problem import Problem, pose
-from .result import LIBRARY, NAME, Discovery, Swing, swinging
-from .smoothing import smooth
+from .result import LIBRARY, NAME, Discovery, History, Path, Swing, swinging
 
 MOST_LAWS = 3
-"""Most laws to which a path is followed: a first, one under kicks, and one at larger errors."""
+"""Most laws to which paths are followed: a first, one under process noise, one at larger errors."""
 
 
 _lock = Lock()
@@ -176,7 +169,7 @@ def discover(
     >>> print(vl.discover(t, x).equations())
     """
     library, seed = check_library(degree, library), check_integer("seed", seed)
-    check_order(order, origin, library)
+    check_order(order, origin)
     trajectories = check_trajectories(t, x)
     check_orientation(orientation, library, trajectories[0][1].shape[1], origin)
     names = coordinate_names(t, x)
@@ -290,7 +283,7 @@ def _solved(task: _Task, form: Form) -> Solved:
         history = History(end=task.end, bar=shown_bar)
         laws = [_law(problem, probes, history, not task.turned) for problem in problems]
         shown_bar.update(rounds - shown_bar.n)
-    problem, fit, path = min(laws, key=lambda law: evidence(*law[:2]))
+    problem, fit, path = min(laws, key=lambda law: information_criterion(*law[:2]))
     model = path.model if path.fit is fit else problem.model(fit)
     found = infer(problem, fit, model, path, history)
     doubts = diagnose(problem, fit, model, path, found.system)
@@ -302,39 +295,39 @@ def _law(
 ) -> tuple[Problem, Fit, Path]:
     """The law that persists: the problem as that tells it, the last fit, and the path of laws.
 
-    Where a first law does not fit, the motion may be kicked; where no path leads to a law, errors
+    Where a first law does not fit, there may be process noise; where no path leads to a law, errors
     that last may have made terms of the first, and one that tolerates them is the start.
     """
     fit = first_law(problem, history)
     asked = not near(problem, fit, TOLERATED)
     if asked and not history.over:
-        problem, fit = _kicked(problem, fit, probes, history)
+        problem, fit = _under_process_noise(problem, fit, probes, history) or (problem, fit)
     fit, path, persists = persistent(problem, fit, history, free)
     if not (asked or history.over or near(problem, fit, 0.0)):
-        kicked, law = _kicked(problem, fit, probes, history)
-        if kicked.kicked:
-            return kicked, *persistent(kicked, law, history, free)[:2]
-    if not (persists or problem.kicked or history.over):
+        found = _under_process_noise(problem, fit, probes, history)
+        if found is not None:
+            return found[0], *persistent(*found, history, free)[:2]
+    if not (persists or problem.has_process_noise or history.over):
         law = first_law(problem, history, path.level)
-        other, around, found = persistent(problem, law, history, free)
-        fit, path = (other, around) if found else (fit, path)
+        other, around, leads = persistent(problem, law, history, free)
+        fit, path = (other, around) if leads else (fit, path)
     return problem, fit, path
 
 
-def _kicked(
+def _under_process_noise(
     problem: Problem, fit: Fit, probes: np.random.Generator, history: History
-) -> tuple[Problem, Fit]:
-    """The problem with the kicks that its data show, and the law under them; else both as given.
+) -> tuple[Problem, Fit] | None:
+    """The problem with the process noise that its data show, and the law under it; else none.
 
-    A poor law shows kicks that are none: the law that is found under them must not hold exactly.
+    A poor law shows some where there is none: a law that is found under it must not hold exactly.
     """
-    kicked = with_process_noise(problem, fit, probes)
-    if kicked is problem:
-        return problem, fit
-    law = first_law(kicked, history)
-    if with_process_noise(problem, law, probes) is problem:
-        return problem, fit
-    return rebalanced(kicked, law, probes), law
+    noisy = with_process_noise(problem, fit, probes)
+    if noisy is None:
+        return None
+    law = first_law(noisy, history)
+    if with_process_noise(problem, law, probes) is None:
+        return None
+    return rebalanced(noisy, law, probes), law
 
 
 # --------------------------------------------------------------------------------------------------
@@ -345,8 +338,8 @@ def _kicked(
 # how it moves. In the flows that people write down as x' = f(x) it is not.
 
 
-def check_order(order: object, origin: str, library: Library) -> None:
-    """Refuse what is no order of a law or no origin, or does not go with what is given of it."""
+def check_order(order: object, origin: str) -> None:
+    """Refuse what is no order of a law, or no origin."""
     if isinstance(order, bool | float) or order not in (1, 2, "auto"):
         raise ValueError(f"order: must be 1, 2 or 'auto', got {shown(order)}")
     check_choice("origin", origin, ("learn", "data"))
@@ -403,177 +396,3 @@ def better(first: Discovery, second: Discovery) -> Discovery:
         return replace(second, note=f"order 2: {cause}")
     doubt = "is doubtful, too" if second.warnings else f"has {others} terms, not {terms}"
     return replace(first, note=f"order 1: the law of order 2 {doubt}")
-
-
-# --------------------------------------------------------------------------------------------------
-# `discover` behind the interface of `pysindy.SINDy`, for code that is written for that.
-
-
-class SplineSINDy:
-    """A model that is fitted as `pysindy.SINDy` is, by `discover`.
-
-    There is nothing to choose but the degree: no threshold, no differentiation method. Rows of NaN
-    are missing samples.
-
-    Parameters
-    ----------
-    degree : int
-        Highest degree of the candidate terms.
-    seed : int
-        See `discover`.
-
-    Attributes
-    ----------
-    discovery : Discovery
-        After `fit`: the law with error bars, status and warnings.
-    """
-
-    def __init__(self, degree: int = 3, seed: int = 0) -> None:
-        self.degree = check_integer("degree", degree, 1)
-        self.seed = check_integer("seed", seed)
-        self._law: PolynomialSystem | None = None
-
-    def __repr__(self) -> str:
-        return f"SplineSINDy(degree={self.degree}, seed={self.seed})"
-
-    def fit(
-        self,
-        x: Floats | Sequence[Floats],
-        t: float | Floats | Sequence[Floats] = 1.0,
-        feature_names: Sequence[str] | None = None,
-    ) -> SplineSINDy:
-        """Discover the law of one trajectory or of several.
-
-        Parameters
-        ----------
-        x : array_like, shape (n, d), or list of such
-            States.
-        t : float, array_like, shape (n,), or list of such
-            Time step, or times.
-        feature_names : sequence of str, optional
-            Of the state variables; x0, x1, ... by default.
-
-        Raises
-        ------
-        ValueError
-            As `discover`, or if there are not as many names as variables.
-        """
-        runs = _runs(x, t)
-        d = runs[0][1].shape[-1]
-        names = tuple(f"x{i}" for i in range(d)) if feature_names is None else tuple(feature_names)
-        if len(names) != d:
-            raise ValueError(f"feature_names: must name {d} variables, got {names}")
-        found = discover(runs, degree=self.degree, seed=self.seed, order=1)
-        self._law = PolynomialSystem(names, found.system.exponents, found.coefficients)
-        self.discovery: Discovery = found
-        return self
-
-    @property
-    def law(self) -> PolynomialSystem:
-        """The law in the model's own names."""
-        if self._law is None:
-            raise ValueError("model: must be fitted first: call fit(x, t)")
-        return self._law
-
-    def predict(self, x: Floats | Sequence[Floats]) -> Floats | list[Floats]:
-        """Time derivative at states, shape (n, d), or a list of such."""
-        if _are_several(x):
-            return [self.law(check_array("x", run)) for run in x]
-        return self.law(check_array("x", x))
-
-    def simulate(self, x0: Floats, t: Floats) -> Floats:
-        """The path from ``x0``, shape (n, d); NaN after a blow-up."""
-        return self.law.simulate(t, x0)
-
-    def score(
-        self, x: Floats | Sequence[Floats], t: float | Floats | Sequence[Floats] = 1.0
-    ) -> float:
-        """Coefficient of determination of the slopes of smoothed data, mean over the variables.
-
-        NaN if a variable stands still.
-        """
-        measured, slopes, predicted = [], [], []
-        for times, states in _runs(x, t):
-            seen, values = check_trajectory(times, states)
-            if len(seen) < WIDTH:
-                raise ValueError(f"x: must hold at least {WIDTH} samples, got {len(seen)}")
-            (spline,) = smooth([(seen, values)], np.random.default_rng(self.seed)).splines
-            measured.append(values)
-            slopes.append(spline.derivative()(seen))
-            predicted.append(self.law(spline(seen)))
-        truth, guess = np.concatenate(slopes), np.concatenate(predicted)
-        left, total = (
-            ((truth - middle) ** 2).sum(axis=0) for middle in (guess, truth.mean(axis=0))
-        )
-        moves = np.ptp(np.concatenate(measured), axis=0) > 0
-        return float((1 - left / np.where(moves, total, np.nan)).mean())
-
-    def coefficients(self) -> Floats:
-        """One row an equation, one column a feature, shape (d, l)."""
-        return self.law.coefficients.T.copy()
-
-    def get_feature_names(self) -> list[str]:
-        """Names of the features, e.g. ``["1", "x0", "x1", "x0^2", "x0 x1", "x1^2"]``."""
-        return [
-            " ".join(
-                name if power == 1 else f"{name}^{power}"
-                for name, power in zip(self.law.names, powers, strict=True)
-                if power
-            )
-            or "1"
-            for powers in self.law.exponents.tolist()
-        ]
-
-    def equations(self, precision: int = 3) -> list[str]:
-        """The right-hand sides as text, with so many decimals, or digits where these were zeros."""
-        features = self.get_feature_names()
-        return [
-            " + ".join(
-                f"{_number(value, precision)} {feature}"
-                for value, feature in zip(row, features, strict=True)
-                if value
-            )
-            or f"{0:.{precision}f}"
-            for row in self.coefficients()
-        ]
-
-    def print(self, lhs: Sequence[str] | None = None, precision: int = 3) -> None:
-        """Print the equations, and warnings if any."""
-        left = [f"({name})'" for name in self.law.names] if lhs is None else lhs
-        for name, right in zip(left, self.equations(precision), strict=True):
-            print(f"{name} = {right}")
-        for warning in self.discovery.warnings:
-            print(f"warning: {warning}")
-
-
-def _number(value: float, precision: int) -> str:
-    text = f"{value:.{precision}f}"
-    return text if float(text) else f"{value:.{precision}g}"
-
-
-def _are_several(x: Floats | Sequence[Floats]) -> bool:
-    """Whether states are those of several trajectories."""
-    return isinstance(x, list | tuple) and all(np.ndim(run) == 2 for run in x)
-
-
-def _runs(
-    x: Floats | Sequence[Floats], t: float | Floats | Sequence[Floats]
-) -> list[tuple[Floats, Floats]]:
-    """Times and states of each trajectory."""
-    several = _are_several(x)
-    states = [check_array("x", run) for run in (x if several else [x])]
-    if not states or any(run.ndim != 2 for run in states):
-        shapes = [run.shape for run in states]
-        raise ValueError(f"x: must have shape (n, d), or be a list of such, got shapes {shapes}")
-    if several and isinstance(t, list | tuple) and all(np.ndim(times) == 1 for times in t):
-        times = list(t)
-    elif np.ndim(t) == 0:
-        step = check_number("t", np.asarray(t).item())
-        if not step > 0:
-            raise ValueError(f"t: must be a positive time step or increasing times, got {step:g}")
-        times = [np.arange(len(run), dtype=float) * step for run in states]
-    else:
-        times = [cast(Floats, t)] * len(states)
-    if len(times) != len(states):
-        raise ValueError(f"t: must hold times for {len(states)} trajectories, got {len(times)}")
-    return list(zip(times, states, strict=True))

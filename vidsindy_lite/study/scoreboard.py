@@ -517,16 +517,16 @@ def _own(problem: Any, fit: Any, *_: Any) -> Any:
 WITHOUT: dict[str, tuple[tuple[Any, str, Any], ...]] = {
     NOTHING: (),
     "support path": ((solver, "persistent", _first_law_alone),),
-    "first tolerance": ((path, "TOLERATED", 0.0), (solver, "TOLERATED", 0.0)),
+    "first tolerance": tuple((where, "TOLERATED", 0.0) for where in (path, solver, noise)),
     "floor for smooth errors": ((path, "SMOOTH", 0.0),),
     "integrated autocorrelation time": ((noise, "effective_noise", noise.residual_noise),
                                         (path, "effective_noise", noise.residual_noise)),
     "errors of the times": ((path, "time_inflation", lambda fit: 1.0),),
-    "weights from the smoother": ((path, "smoother_weights", _same),),
-    "noise told by all terms": ((solver, "views", lambda pose: [path.smoother_weights(pose())]),),
-    "process noise": ((solver, "with_process_noise", _same),),
+    "weights from the smoother": ((noise, "smoother_weights", _same),),
+    "noise told by all terms": ((solver, "views", lambda pose: [noise.smoother_weights(pose())]),),
+    "process noise": ((solver, "with_process_noise", lambda *_: None),),
     "free offset": ((path, "framed", _own),),
-    "offset freed at the end": ((path, "off_home", lambda problem, state, *_: state),),
+    "offset freed at the end": ((path, "with_free_axis", lambda *_: None),),
     "richer laws": ((path, "deepest", lambda problem, around, history: around),),
 }  # fmt: skip
 """Of each mechanism, what takes the place of what."""
