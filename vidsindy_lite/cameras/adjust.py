@@ -78,7 +78,7 @@ _ENOUGH = 1e-7  # ... of sigma, by which a last step moves the images, or ...
 _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
 _LOST = 0.05  # share of what is seen that a step in time may lead out of the video
-_PROBE = 1e-6  # of a unit: slopes are taken over twice that
+_PROBE = 1e-6  # of a unit: slopes are taken over twice that, and less is no change
 _BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
 _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
@@ -288,17 +288,23 @@ def adjust(
     change = np.zeros(errors.shape) if begin is None else begin
     problem, state = _Problem.of(footage, start, errors, change)
     noise = _noise(state.misses)
-    settled, steps = False, 0
+    settled, steps, earlier = False, 0, np.full(errors.shape, np.inf)
     while not settled and steps < most:
         moved, step = _downhill(problem, state, noise)
         steps += 1
         if moved is None:  # rounding is all that is left, or points ran out of numbers
             settled = step == 0
             break
-        state, before = moved, noise
+        # A frame at the end of a video may come and go with a lag, for ever.
+        to_and_fro = (
+            problem.timed and (np.abs(moved.change - earlier) <= _BACK * problem.unit).all()
+        )
+        earlier, state, before = state.change, moved, noise
         noise = _noise(state.misses)
         enough = max(_SETTLED, (_IN_TIME if problem.timed else _ENOUGH) * noise)
-        settled = step <= enough and noise >= before * (1 - 1e-3)
+        settled = bool(step <= enough or (problem.timed and back.all())) and noise >= before * (
+            1 - 1e-3
+        )
     reduced = _Reduced.of(*problem.slopes(state), state.misses)
     return Adjustment(
         state.cameras, state.footage, errors, state.change, state.points, state.misses,
