@@ -296,15 +296,12 @@ def adjust(
             settled = step == 0
             break
         # A frame at the end of a video may come and go with a lag, for ever.
-        to_and_fro = (
-            problem.timed and (np.abs(moved.change - earlier) <= _BACK * problem.unit).all()
-        )
+        back = (np.abs(moved.change - earlier) <= _PROBE * problem.unit).all()
         earlier, state, before = state.change, moved, noise
         noise = _noise(state.misses)
         enough = max(_SETTLED, (_IN_TIME if problem.timed else _ENOUGH) * noise)
-        settled = bool(step <= enough or (problem.timed and back.all())) and noise >= before * (
-            1 - 1e-3
-        )
+        still = step <= enough or bool(problem.timed and back)
+        settled = still and noise >= before * (1 - 1e-3)
     reduced = _Reduced.of(*problem.slopes(state), state.misses)
     return Adjustment(
         state.cameras, state.footage, errors, state.change, state.points, state.misses,
