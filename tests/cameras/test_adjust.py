@@ -1,17 +1,26 @@
-"""Bundle adjustment: rigs measured by hand, lenses and shutters learned, outliers, what remains."""
+"""Bundle adjustment: what is learned, what is told of it, and errors that depend on others."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import HAND, aligned_error, by_hand, room, walk
+from helpers import HAND, aligned_error, by_hand, dependent, room, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidsindy_lite as vl
 from vidsindy_lite.cameras import Lags, learn_cameras, systematic_errors
-from vidsindy_lite.cameras.adjust import PARTS, SIZE, adjust, changed, known_to, linearised
-from vidsindy_lite.cameras.alignment import Footage
+from vidsindy_lite.cameras.adjust import (
+    PARTS,
+    SIZE,
+    NearCamera,
+    adjust,
+    changed,
+    fitted_factor,
+    known_to,
+    long_run_covariance,
+)
+from vidsindy_lite.cameras.clocks import Footage
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -214,7 +223,7 @@ def test_the_noise_is_that_of_the_tracks_however_many_views_there_are(views):
     for rng in np.random.default_rng(6).spawn(8):
         rig = room(rng, views)
         _, tracks = film(rng, rig, noise=0.4, n=1500)
-        told += [linearised(Footage.of(tracks), rig.cameras, np.zeros((views, SIZE))).noise]
+        told += [adjust(Footage.of(tracks), rig.cameras, np.zeros((views, SIZE)), most=0).noise]
     assert np.mean(told) == pytest.approx(0.4, rel=0.04)
 
 
@@ -246,3 +255,132 @@ def test_the_unit_of_length_does_not_matter():
         changes.append(change)
     assert np.abs(changes[0]).max() > 0.01
     np.testing.assert_allclose(changes[1], changes[0], rtol=0, atol=1e-5)
+
+
+CAMERA = room(np.random.default_rng(3), principal_point=(630.0, 350.0), readout=0.3).cameras[0]
+
+
+def after(camera=CAMERA, **parts):
+    change = np.zeros(SIZE)
+    for name, values in parts.items():
+        change[PARTS[name.replace("_", " ")]] = values
+    return changed(camera, change)
+
+
+def test_a_position_moves_along_the_axes_of_the_image():
+    moved = after(position=(0.1, -0.2, 0.3)).position - CAMERA.position
+    along, across = CAMERA.normal @ moved, CAMERA.rows @ moved
+    np.testing.assert_allclose([*across, along], (0.1, -0.2, 0.3), atol=1e-12)
+
+
+def test_numbers_of_the_image_are_added():
+    assert after(principal_point=(5.0, -7.0)).principal_point.tolist() == [635, 343]
+    bent = after(distortion=(0.1, -0.02, 0.001, 0.002))
+    assert bent.distortion.tolist() == [0.1, -0.02, 0.001, 0.002, 0]
+    twice = after(bent, distortion=(0.1, 0, 0, 0))
+    np.testing.assert_allclose(twice.distortion, [0.2, -0.02, 0.001, 0.002, 0])
+
+
+@pytest.mark.parametrize(("by", "readout"), [(0.2, 0.5), (-0.4, -0.1), (0.9, 1.0), (-2, -1.0)])
+def test_a_shutter_rolls_over_one_frame_at_most(by, readout):
+    assert after(readout=by).readout == pytest.approx(readout)
+
+
+def test_a_scale_grows_by_a_factor_and_an_angle_by_a_sum():
+    turned = after(scale=0.1, angle=0.2)
+    assert turned.scale == pytest.approx(CAMERA.scale * np.exp(0.1))
+    assert np.exp(1j * turned.angle) == pytest.approx(np.exp(1j * (CAMERA.angle + 0.2)))
+
+
+def test_a_nearer_camera_sees_what_is_close_larger():
+    about = np.array([1.0, 2.0, 3.0])
+    near = NearCamera(
+        position=about, normal=(0.6, 0, 0.8), scale=1.0, angle=0.0, about=about, nearness=0.01
+    )
+    nearer = after(near, nearness=0.04)
+    assert nearer.nearness == pytest.approx(0.05)
+    right = near.rows[0]
+    at = [about, about + right, about + right + 4 * near.normal]  # the last one 4 nearer, of 20
+    middle, beside, close = nearer.image(np.array(at))
+    assert np.linalg.norm(beside - middle) > 0.1
+    np.testing.assert_allclose(close - middle, (beside - middle) / 0.8, atol=1e-9)
+
+
+def test_how_well_a_camera_is_known():
+    """A tangential distortion is ten times as small as a radial one."""
+    image = {"principal_point_error": 4.0, "distortion_error": 0.3, "readout_error": 0.2}
+    errors = {"normal_error": 2.0, "scale_error": 0.03, "position_error": 0.5, **image}
+    place = {"position": (0, 0, 9), "normal": (0, 0, 1)}
+    known = known_to(vl.PerspectiveCamera(**place, scale=1, angle=0, **errors))
+    two = np.deg2rad(2)
+    expected = [two, two, two, 0.03, *[0.5] * 3, 4, 4, 0.3, 0.3, 0.03, 0.03, 0.2, 0, 0, 0]
+    np.testing.assert_allclose(known, expected)
+    unknown = known_to(vl.PerspectiveCamera(**place))
+    assert np.flatnonzero(unknown).tolist() == [2, 3]
+    assert np.isinf(unknown[2:4]).all()
+    flat = known_to(vl.OrthographicCamera(normal=(0, 0, 1), scale=1, angle=0))
+    assert np.flatnonzero(np.isinf(flat)).tolist() == [4, 5]  # along its axis it sees the same
+
+
+def test_long_run_covariance_by_the_book():
+    """Newey and West 1987 with the width of Andrews 1991, written out."""
+    series = dependent(np.random.default_rng(2), 60, 0.5)
+    n = len(series)
+    parts = []
+    for column in series.T:
+        rho = sum(column[t] * column[t - 1] for t in range(1, n)) / sum(column**2)
+        parts.append(4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2))
+    width = 1.1447 * (np.mean(parts) * n) ** (1 / 3)
+    assert 2 < width < 20
+    total = np.zeros((2, 2))
+    for s in range(n):
+        for t in range(n):
+            total += max(0, 1 - abs(s - t) / (width + 1)) * np.outer(series[s], series[t])
+    found = long_run_covariance(series)
+    # The last weight that counts is the first one that is zero or less.
+    lag = int(np.ceil(width))
+    product = series[lag:].T @ series[:-lag]
+    total += min(0, 1 - lag / (width + 1)) * (product + product.T)
+    np.testing.assert_allclose(found, total / n, rtol=1e-10)
+
+
+def test_covariance_of_independent_residuals_is_that_of_least_squares():
+    rng = np.random.default_rng(3)
+    slope = rng.normal(size=(4000, 3, 2))
+    missed = 0.2 * rng.normal(size=(4000, 3))
+    factor = fitted_factor(missed, slope, np.zeros(2), 0.2)
+    flat = slope.reshape(-1, 2)
+    expected = 0.2**2 * np.linalg.inv(flat.T @ flat)
+    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.abs(factor @ factor.T - expected).max() < 0.15 * size.max()
+    # Every residual three times in a row: three times the variance for as many numbers.
+    thrice = np.repeat(missed, 3, 0), np.repeat(slope, 3, 0)
+    tripled = fitted_factor(*thrice, np.zeros(2), 0.2)
+    grown = np.trace(tripled @ tripled.T) / np.trace(factor @ factor.T)
+    assert 0.6 < grown < 1.1  # and a third if they were taken as independent
+
+
+def test_measurements_and_residuals_add_up():
+    """One parameter, slope 2 in 25 residuals of noise .5, measured with a standard error of .1."""
+    missed, slopes = np.full((25, 1), 0.0), np.full((25, 1, 1), 2.0)
+    factor = fitted_factor(missed, slopes, np.array([0.1**-2]), 0.5)
+    np.testing.assert_allclose(factor @ factor.T, 1 / (25 * 4 / 0.25 + 100))
+
+
+def test_residuals_that_stay_tell_less():
+    """All alike, they are as good as one per width of the weights: the sandwich counts."""
+    n = 400
+    missed, slopes = np.ones((n, 1)), np.ones((n, 1, 1))
+    found = fitted_factor(missed, slopes, np.zeros(1), 1.0) ** 2
+    expected = long_run_covariance(np.ones((n, 1))) / n  # W = 1 / n, M = n times it
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert found[0, 0] > 50 / n
+
+
+def test_a_direction_that_nothing_tells_of_is_left_out():
+    slopes = np.ones((30, 1, 1)) * [1.0, 1.0]  # only the sum of both is seen
+    factor = fitted_factor(np.zeros((30, 1)), slopes, np.zeros(2), 0.3)
+    sums = np.array([1.0, 1.0]) @ factor
+    np.testing.assert_allclose(sums @ sums, 0.3**2 / 30)
+    difference = np.array([1.0, -1.0]) @ factor
+    np.testing.assert_allclose(difference, 0, atol=1e-12)

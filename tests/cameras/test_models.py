@@ -1,17 +1,31 @@
-"""What cameras share: values computed once and read-only, and arguments checked once."""
+"""Models of cameras: planes, the convention, lenses, shutters, and what bad input is told."""
 
 import cProfile
 import pickle
 import pstats
-from dataclasses import replace
+import warnings
+from dataclasses import FrozenInstanceError, replace
 
+import cv2
 import numpy as np
 import pytest
-from helpers import trajectory
+from helpers import scene, trajectory
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import vidsindy_lite as vl
 from vidsindy_lite import cameras
+from vidsindy_lite.cameras import OrthographicCamera, PerspectiveCamera, Rig
+from vidsindy_lite.cameras.models import (
+    distorted,
+    plane_projection,
+    plane_through,
+    rodrigues,
+    rotation_to_z,
+    signed_distance,
+    undistorted,
+)
 
 
 @pytest.fixture
@@ -54,18 +68,6 @@ def test_the_base_is_no_camera():
         vl.Camera(normal=(0, 0, 1))
 
 
-def test_pixels_by_hand(camera):
-    """The pinhole as three rotations by scipy: no line of the formula of the package."""
-    x = np.random.default_rng(0).normal(size=(20, 3))
-    axis = np.cross(camera.normal, [0, 0, 1])
-    angle = np.arccos(camera.normal[2])
-    turned = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).apply(x - camera.position)
-    plane = turned[:, :2] / -turned[:, 2:]
-    back = Rotation.from_euler("z", camera.angle).apply(np.column_stack((plane, 0 * x[:, 0])))
-    u, v = back[:, :2].T / camera.scale
-    np.testing.assert_allclose(camera.project(x), np.column_stack((31.5 + u, 23.5 - v)), rtol=1e-9)
-
-
 def test_arguments_are_checked_once():
     """Learning, lags and errors of 300 frames once made 46,609 checks of arrays."""
     x = trajectory(np.random.default_rng(4), 300)
@@ -87,3 +89,516 @@ def test_arguments_are_checked_once():
     stats = pstats.Stats(profile).stats
     checks = sum(v[0] for (_, _, name), v in stats.items() if name == "check_array")
     assert 0 < checks < 200
+
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@pytest.fixture
+def small():
+    return scene(7, n=40)
+
+
+def test_convention_by_hand():
+    # Looking down the z axis, unturned: x to the right, y up, so v falls as y grows.
+    camera = OrthographicCamera(position=(1, 2, 50), normal=(0, 0, 1), scale=0.5, angle=0.0)
+    np.testing.assert_allclose(camera.project([[1, 2, -9]]), [[255.5, 255.5]])
+    np.testing.assert_allclose(camera.project([[2, 2, 0]]), [[257.5, 255.5]])
+    np.testing.assert_allclose(camera.project([[1, 3, 0]]), [[255.5, 253.5]])
+
+
+@given(SEEDS)
+@settings(max_examples=20)
+def test_project_satisfies_the_camera_equation(seed):
+    x, rig, _, _ = scene(seed, n=5)
+    for camera in rig.cameras:
+        u, v = camera.project(x).T
+        x_c = np.array([u - 511 / 2, 511 / 2 - v])
+        c, s = np.cos(camera.angle), np.sin(camera.angle)
+        left = camera.scale * np.array([[c, s], [-s, c]]) @ x_c + camera.offset[:, None]
+        right = rotation_to_z(camera.normal)[:2] @ x.T
+        np.testing.assert_allclose(left, right, atol=1e-10 * np.abs(x).max())
+
+
+def test_plane_coordinates_undo_project(small):
+    x, rig, tracks, _ = small
+    for camera, track in zip(rig.cameras, tracks, strict=True):
+        seen = camera.plane_coordinates(track)
+        np.testing.assert_allclose(seen, x @ camera.rows.T, atol=1e-10 * np.abs(x).max())
+
+
+def test_depth_is_not_seen(small):
+    x, rig, tracks, _ = small
+    for camera, track in zip(rig.cameras, tracks, strict=True):
+        on_plane = plane_projection(x, camera.normal, -camera.normal @ camera.position)
+        np.testing.assert_allclose(camera.project(on_plane), track, atol=1e-9)
+        nearer = replace(camera, position=camera.position + 3 * camera.normal)
+        np.testing.assert_allclose(nearer.project(x), track, atol=1e-9)
+
+
+def test_nan_rows_pass_through():
+    camera = OrthographicCamera(position=(0, 0, 0), normal=(1, 1, 1), scale=1, angle=0)
+    pixels = camera.project([[np.nan, 0, 0], [0, 0, 0]])
+    assert np.isnan(pixels[0]).all()
+    np.testing.assert_allclose(pixels[1], 255.5)
+
+
+def test_is_frozen_and_normalises():
+    camera = OrthographicCamera(position=[1, 2, 3], normal=[0, 3, 4])
+    np.testing.assert_allclose(camera.normal, [0, 0.6, 0.8], rtol=1e-15)
+    assert not camera.is_calibrated
+    with pytest.raises(FrozenInstanceError):
+        camera.scale = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        camera.normal[0] = 1.0
+
+
+def test_does_not_share_memory_with_its_arguments():
+    position = np.zeros(3)
+    camera = OrthographicCamera(position=position, normal=[0, 0, 1])
+    position[0] = 9
+    assert camera.position[0] == 0
+
+
+def test_hash_agrees_with_equality():
+    camera = OrthographicCamera(position=[1, 2, 0.0], normal=[0, 3, 4], scale=1, angle=0)
+    twin = OrthographicCamera(position=(1, 2, -0.0), normal=(0, 3.0, 4), scale=1.0, angle=-0.0)
+    assert camera == twin
+    assert len({camera, twin, replace(camera, scale=2), replace(camera, angle=1)}) == 3
+    rig = Rig([camera, replace(camera, normal=(1, 0, 0))])
+    assert len({rig, Rig(rig.cameras), rig.uncalibrated()}) == 2
+
+
+@pytest.mark.parametrize("length", [1e-200, 1e200, 5e-324])
+def test_normals_of_any_length(length):
+    camera = OrthographicCamera(position=[0, 0, 0], normal=[0, 0, length])
+    assert camera.normal.tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"position": (1, 2)}, "position: must be 3 finite numbers, got"),
+        ({"position": (1, 2, np.inf)}, "position: must be 3 finite numbers, got"),
+        ({"normal": (0, 0, 0)}, "normal: must not be the zero vector, got"),
+        ({"normal": "up"}, "normal: must be an array of real numbers, got 'up'"),
+        ({"angle": None}, "scale and angle: give both .* or neither .* got scale=1.0, angle=N"),
+        ({"scale": 0}, "scale: must be positive, got 0"),
+        ({"scale": -1}, "scale: must be positive, got -1"),
+        ({"scale": True}, "scale: must be a finite number, got True"),
+        ({"scale": np.nan}, "scale: must be a finite number, got nan"),
+        ({"angle": "left"}, "angle: must be a finite number, got 'left'"),
+        ({"image_size": (512, 0)}, r"image_size: must be two integers .*, got \(512, 0\)"),
+        ({"image_size": (512.5, 512)}, "image_size: must be two integers of at least 1, got"),
+        ({"image_size": 512}, "image_size: must be two integers of at least 1, got 512"),
+    ],
+)
+def test_bad_camera(change, message):
+    good = {"position": (0, 0, 0), "normal": (0, 0, 1), "scale": 1.0, "angle": 0.0}
+    with pytest.raises(ValueError, match=message):
+        OrthographicCamera(**good | change)
+
+
+def test_bad_points(small):
+    camera = small[1].cameras[0]
+    with pytest.raises(ValueError, match=r"x: must have shape \(n, 3\), got \(4, 2\)"):
+        camera.project(np.zeros((4, 2)))
+    with pytest.raises(ValueError, match="x: must be finite or NaN, got 1 infinite values"):
+        camera.project([[0, np.inf, 0]])
+    with pytest.raises(ValueError, match=r"pixels: must have shape \(n, 2\), got \(2,\)"):
+        camera.plane_coordinates([1, 2])
+
+
+def test_uncalibrated_camera_cannot_project():
+    camera = OrthographicCamera(position=(0, 0, 0), normal=(0, 0, 1))
+    for use in (camera.project, camera.plane_coordinates):
+        with pytest.raises(ValueError, match="scale and angle must be known, got None"):
+            use(np.zeros((1, 3)))
+
+
+def test_the_offset_is_where_the_position_lies_in_the_plane():
+    camera = OrthographicCamera(position=(2, -3, 7), normal=(0, 0, 1), scale=1, angle=0)
+    np.testing.assert_allclose(camera.offset, [2, -3])
+    there = camera.placed(np.array([5.0, 6.0]))
+    np.testing.assert_allclose(there.position, [5, 6, 0], atol=1e-15)
+    np.testing.assert_allclose(there.offset, [5, 6])
+
+
+def test_pixels_of_an_oblong_image_and_back():
+    """A pixel is 1.25 times as high as wide, and (10, 20) is the middle."""
+    camera = OrthographicCamera(
+        position=(1, 2, 3), normal=(0, 0, 1), scale=0.5, angle=0, principal_point=(10, 20),
+        aspect=1.25,
+    )  # fmt: skip
+    np.testing.assert_allclose(camera.project([[2, 3, 0]]), [[12, 17.5]])
+    np.testing.assert_allclose(camera.centred(np.array([[12, 17.5]])), [[2, 2]])
+    np.testing.assert_allclose(camera.plane_coordinates([[12, 17.5]]), [[2, 3]])
+
+
+@pytest.mark.parametrize("readout", [-1, 1])
+def test_readouts_are_a_frame_at_most(readout):
+    assert OrthographicCamera(normal=(0, 0, 1), readout=readout).readout == readout
+    with pytest.raises(ValueError, match="readout: must be between -1 and 1 frames, got"):
+        OrthographicCamera(normal=(0, 0, 1), readout=1.01 * readout)
+
+
+@pytest.mark.parametrize("name", ["position_error", "normal_error", "readout_error"])
+def test_errors_of_measurements_are_not_negative(name):
+    camera = OrthographicCamera(normal=(0, 0, 1), **{name: 0.5})
+    assert camera.errors[name] == 0.5
+    assert sum(camera.errors.values()) == 0.5
+    with pytest.raises(ValueError, match=f"{name}: must be zero or positive, got -0.5"):
+        OrthographicCamera(normal=(0, 0, 1), **{name: -0.5})
+
+
+E_Z = np.array([0.0, 0.0, 1.0])
+
+
+def vectors(size):
+    return st.tuples(*[st.floats(-size, size, allow_subnormal=False)] * 3).map(np.array)
+
+
+def directions():
+    return vectors(1.0).filter(lambda v: np.linalg.norm(v) > 1e-3)
+
+
+@given(directions(), st.floats(-10, 10))
+def test_rodrigues_agrees_with_scipy(axis, angle):
+    expected = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+    np.testing.assert_allclose(rodrigues(axis, angle), expected, atol=1e-14)
+
+
+@given(directions())
+def test_rotation_to_z_is_a_rotation_of_the_normal_to_z(normal):
+    rotation = rotation_to_z(normal)
+    unit = normal / np.linalg.norm(normal)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(rotation) == pytest.approx(1, abs=1e-14)
+    np.testing.assert_allclose(rotation @ unit, E_Z, atol=1e-14)
+    np.testing.assert_allclose(rotation[2], unit, atol=1e-14)
+
+
+@given(directions())
+def test_rotation_to_z_is_the_shortest(normal):
+    # No rotation that takes n to e_z turns by less than the angle between them.
+    unit = normal / np.linalg.norm(normal)
+    angle = np.arctan2(np.hypot(unit[0], unit[1]), unit[2])
+    turned = Rotation.from_matrix(rotation_to_z(normal)).magnitude()
+    assert turned == pytest.approx(angle, abs=1e-7)
+
+
+def test_rotation_to_z_by_hand():
+    np.testing.assert_allclose(
+        rotation_to_z([1, 0, 0]), [[0, 0, -1], [0, 1, 0], [1, 0, 0]], atol=1e-15
+    )
+    np.testing.assert_allclose(
+        rotation_to_z([0, 1, 0]), [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15
+    )
+
+
+def test_normals_along_z():
+    np.testing.assert_array_equal(rotation_to_z([0, 0, 2]), np.eye(3))
+    np.testing.assert_allclose(rotation_to_z([0, 0, -2]), np.diag([1, -1, -1]), atol=1e-15)
+
+
+@pytest.mark.parametrize("tilt", 10.0 ** np.arange(-300, 0, 23))
+def test_continuous_near_parallel(tilt):
+    rotation = rotation_to_z([tilt, -2 * tilt, 1])
+    np.testing.assert_allclose(rotation, np.eye(3), atol=2.5 * tilt)
+    # The tilt itself is not rounded away.
+    np.testing.assert_allclose(rotation[:2, 2], [-tilt, 2 * tilt], rtol=3 * tilt + 1e-14)
+
+
+@pytest.mark.parametrize("tilt", 10.0 ** np.arange(-300, 0, 23))
+def test_accurate_near_antiparallel(tilt):
+    normal = np.array([tilt, tilt, -1])
+    rotation = rotation_to_z(normal)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(rotation @ (normal / np.linalg.norm(normal)), E_Z, atol=1e-14)
+
+
+@given(vectors(100.0), directions(), st.floats(-100, 100))
+def test_projection_is_the_nearest_point_of_the_plane(x, normal, d):
+    foot = plane_projection(x, normal, d)
+    length = np.linalg.norm(normal)
+    assert normal @ foot + d == pytest.approx(0, abs=1e-10)
+    np.testing.assert_allclose(np.cross(x - foot, normal / length), 0, atol=1e-10 / length)
+    np.testing.assert_allclose(plane_projection(foot, normal, d), foot, atol=1e-10 / length)
+
+
+def test_projection_is_equation_s3():
+    x, y, z = point = np.array([1.0, -2.0, 3.0])
+    a, b, c, d = 0.5, 2.0, -1.0, 4.0
+    expected = np.array(
+        [
+            x * (b**2 + c**2) - a * (b * y + c * z + d),
+            y * (a**2 + c**2) - b * (a * x + c * z + d),
+            z * (a**2 + b**2) - c * (a * x + b * y + d),
+        ]
+    ) / (a**2 + b**2 + c**2)
+    np.testing.assert_allclose(plane_projection(point, (a, b, c), d), expected, rtol=1e-14)
+
+
+@given(vectors(100.0), directions(), st.floats(-100, 100), st.floats(-100, 100))
+def test_in_plane_coordinates_do_not_depend_on_d(x, normal, d1, d2):
+    unit = normal / np.linalg.norm(normal)
+    rotation = rotation_to_z(unit)
+    first = rotation @ plane_projection(x, unit, d1)
+    second = rotation @ plane_projection(x, unit, d2)
+    np.testing.assert_allclose(first[:2], second[:2], atol=1e-11)
+    np.testing.assert_allclose(first[:2], rotation[:2] @ x, atol=1e-11)
+    assert first[2] - second[2] == pytest.approx(d2 - d1, abs=1e-11)
+
+
+@given(vectors(100.0), directions())
+def test_offset_is_the_signed_distance_to_the_turned_coordinate_planes(position, normal):
+    x_axis, y_axis, z_axis = rotation_to_z(normal)
+    to_yz = signed_distance(position, *plane_through((0, 0, 0), y_axis, z_axis))
+    to_xz = signed_distance(position, *plane_through((0, 0, 0), z_axis, x_axis))
+    offset = OrthographicCamera(position=position, normal=normal).offset
+    np.testing.assert_allclose(offset, [to_yz, to_xz], atol=1e-11)
+
+
+def test_plane_through_by_hand():
+    normal, d = plane_through((1, 0, 2), (0, 1, 2), (-1, -1, 2))
+    np.testing.assert_allclose(normal, E_Z, atol=1e-15)
+    assert d == pytest.approx(-2)
+
+
+def test_a_small_triangle_far_away_is_a_plane():
+    normal, d = plane_through((1e6, 0, 0), (1e6, 1e-6, 0), (1e6, 0, 1e-6))
+    np.testing.assert_allclose(normal, [1, 0, 0], atol=1e-15)
+    assert d == pytest.approx(-1e6)
+    for size in (1e-6, 1e6):
+        with pytest.raises(ValueError, match="must not lie on one line"):
+            plane_through((0, 0, 0), (size, size, 0), (3 * size, 3 * size, 1e-13 * size))
+
+
+def test_distance_does_not_depend_on_the_length_of_the_equation():
+    x = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(signed_distance(x, (0, 0, 2), -4), [1, -2])
+    np.testing.assert_allclose(signed_distance(x, (0, 0, -2), 4), [-1, 2])
+
+
+def test_planes_pass_nan_rows_through():
+    projected = plane_projection([[np.nan] * 3, [1.0, 2.0, 3.0]], (0, 0, 1), 0)
+    assert np.isnan(projected[0]).all()
+    np.testing.assert_array_equal(projected[1], [1, 2, 0])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: rotation_to_z([0, 0, 0]), "normal: must not be the zero vector, got"),
+        (lambda: rotation_to_z([1, 2]), "normal: must be 3 finite numbers, got"),
+        (lambda: rotation_to_z([1, np.nan, 0]), "normal: must be 3 finite numbers, got"),
+        (lambda: rodrigues([0, 0, 0], 1.0), "axis: must not be the zero vector, got"),
+        (lambda: rodrigues([0, 0, 1], np.inf), "angle: must be a finite number, got inf"),
+        (lambda: plane_projection([1, 2], [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
+        (lambda: signed_distance(1.0, [0, 0, 1], 0), r"x: must have shape \(\.\.\., 3\), got"),
+        (lambda: plane_through((0, 0, 0), (1, 1, 1), (2, 2, 2)), "must not lie on one line"),
+    ],
+)
+def test_bad_input(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def any_camera(rng, **more):
+    """A 60 degree lens with everything that a lens may have."""
+    strength = np.array([0.2, 0.05, 0.01, 0.01, 0.02])
+    return PerspectiveCamera(
+        position=rng.normal(size=3),
+        normal=rng.normal(size=3),
+        scale=1 / rng.uniform(500, 600),
+        angle=rng.uniform(-np.pi, np.pi),
+        image_size=(640, 480),
+        principal_point=(320, 240) + 20 * rng.normal(size=2),
+        aspect=rng.uniform(0.9, 1.1),
+        distortion=strength * rng.uniform(-1, 1, 5),
+        **more,
+    )
+
+
+def in_view(rng, camera, n=50):
+    """Points in front of a camera, within 45 degrees of its axis."""
+    sideways = 0.5 * rng.uniform(-1, 1, (n, 2))
+    depth = rng.uniform(1, 5, (n, 1))
+    return camera.position + depth * (sideways @ camera.rows - camera.normal)
+
+
+@given(SEEDS)
+@settings(max_examples=40)
+def test_agrees_with_opencv(seed):
+    rng = np.random.default_rng(seed)
+    camera = any_camera(rng)
+    x = in_view(rng, camera)
+    # OpenCV's camera looks along +z, with y down; T^-1 turns the image.
+    axis = np.cross(camera.normal, [0, 0, 1])
+    tilt = np.arctan2(np.linalg.norm(axis), camera.normal[2])
+    flat = Rotation.from_rotvec(tilt * axis / np.linalg.norm(axis))
+    turn = Rotation.from_rotvec([0, 0, camera.angle])
+    rotation = (Rotation.from_euler("x", np.pi) * turn * flat).as_matrix()
+    f, (u, v) = 1 / camera.scale, camera.principal_point
+    inner = np.array([[f, 0, u], [0, f * camera.aspect, v], [0, 0, 1]])
+    shift = -rotation @ camera.position
+    expected, _ = cv2.projectPoints(x, cv2.Rodrigues(rotation)[0], shift, inner, camera.distortion)
+    np.testing.assert_allclose(camera.project(x), expected[:, 0], atol=1e-9, rtol=0)
+
+
+@given(SEEDS)
+@settings(max_examples=40)
+def test_the_ideal_image_is_found_again(seed):
+    rng = np.random.default_rng(seed)
+    camera = any_camera(rng)
+    x = in_view(rng, camera)
+    pinhole = replace(camera, distortion=None, principal_point=None, aspect=1.0)
+    ideal = pinhole.centred(pinhole.project(x))
+    np.testing.assert_allclose(camera.centred(camera.project(x)), ideal, atol=1e-9, rtol=0)
+
+
+def test_where_the_model_folds_there_is_no_ideal_image():
+    # With k1 = -1/3 the image of the radius r is r - r^3/3, largest (2/3) at r = 1.
+    coefficients = np.array([-1 / 3, 0, 0, 0, 0])
+    points = np.array([[0.6, 0.0], [0.66, 0.0], [0.7, 0.0], [np.nan, 0.0]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = undistorted(points, coefficients)
+    assert np.isnan(found).all(axis=1).tolist() == [False, False, True, True]
+    np.testing.assert_allclose(distorted(found[:2], coefficients)[0], points[:2], atol=1e-13)
+
+
+@pytest.mark.parametrize(("power", "which"), [(1, 0), (2, 1), (3, 4)])
+def test_every_power_of_the_radius_folds_where_its_image_is_largest(power, which):
+    # With k = -1/(2p + 1) the image of the radius r is r + k r^(2p + 1), largest at r = 1.
+    coefficients = np.zeros(5)
+    coefficients[which] = -1 / (2 * power + 1)
+    largest = 1 - 1 / (2 * power + 1)
+    radii = np.array([0.5, 0.9, 0.999])
+    points = np.outer(radii * (1 + coefficients[which] * radii ** (2 * power)), [0.6, -0.8])
+    found = undistorted(points, coefficients)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), radii, rtol=1e-9)
+    assert np.isnan(undistorted(np.array([[0.0, 1.001 * largest]]), coefficients)).all()
+
+
+def test_principal_point_and_aspect_by_hand():
+    camera = OrthographicCamera(
+        position=(0, 0, 0), normal=(0, 0, 1), scale=0.5, angle=0.0,
+        principal_point=(100, 50), aspect=2.0,
+    )  # fmt: skip
+    np.testing.assert_allclose(camera.project([[0, 0, 0], [1, 0, 0]]), [[100, 50], [102, 50]])
+    np.testing.assert_allclose(camera.project([[0, 1, 0]]), [[100, 46]])
+    np.testing.assert_allclose(camera.plane_coordinates([[102, 46]]), [[1, 1]])
+
+
+@given(SEEDS)
+@settings(max_examples=20)
+def test_a_file_keeps_every_digit(tmp_path_factory, seed):
+    rng = np.random.default_rng(seed)
+    errors = rng.uniform(0, 1, 6)
+    names = ("position", "normal", "scale", "principal_point", "readout", "distortion")
+    more = {f"{name}_error": error for name, error in zip(names, errors, strict=True)}
+    rig = Rig([any_camera(rng, readout=rng.uniform(-1, 1), **more), any_camera(rng)])
+    path = tmp_path_factory.mktemp("rig") / "rig.toml"
+    rig.save(path)
+    assert Rig.load(path) == rig
+    assert len({rig, Rig.load(path), Rig((rig.cameras[0], any_camera(rng)))}) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"principal_point": (1, 2, 3)}, "principal_point: must be 2 finite numbers, got"),
+        ({"aspect": 0}, "aspect: must be positive, got 0"),
+        ({"readout": 1.5}, "readout: must be between -1 and 1 frames, got 1.5"),
+        ({"normal_error": -2}, "normal_error: must be zero or positive, got -2"),
+        ({"position_error": "far"}, "position_error: must be a finite number, got 'far'"),
+        ({"distortion": range(9)}, "distortion: must be at most 8 finite numbers, k1"),
+        ({"distortion": (np.nan,)}, "distortion: must be at most 8 finite numbers"),
+        ({"distortion": 0.1}, "distortion: must be at most 8 finite numbers"),
+    ],
+)
+def test_bad_input_is_named(change, message):
+    good = {"position": (0, 0, 0), "normal": (0, 0, 1), "scale": 1.0, "angle": 0.0}
+    with pytest.raises(ValueError, match=message):
+        PerspectiveCamera(**good | change)
+
+
+def test_an_orthographic_camera_has_no_distortion(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text("[[camera]]\nnormal = [0, 0, 1]\ndistortion = [0.1]\n", encoding="utf-8")
+    message = "camera 0: distortion: must be one of model, target, position"
+    with pytest.raises(ValueError, match=message):
+        Rig.load(path)
+
+
+def test_short_distortion_is_filled_with_zeros():
+    camera = PerspectiveCamera(position=(0, 0, 0), normal=(0, 0, 1), distortion=(-0.1, 0.02))
+    assert camera.distortion.tolist() == [-0.1, 0.02, 0, 0, 0]
+
+
+def test_a_ball_through_a_lens():
+    """Its image is where its outline is seen, and its shape that of the outline."""
+    rng = np.random.default_rng(3)
+    camera = any_camera(rng)
+    plain = replace(camera, distortion=None, principal_point=None, aspect=1.0)
+    x = in_view(rng, camera, 10)
+    radius = 1e-3
+    centroids, shapes = camera.ball_image(x, radius)
+    circle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    circle = np.column_stack((np.cos(circle), np.sin(circle)))
+    for at, shape, ideal, outline in zip(
+        centroids, shapes, *plain.ball_image(x, radius), strict=True
+    ):
+        seen = camera.seen(plain.centred(ideal + circle @ outline.T))
+        np.testing.assert_allclose(at + circle @ shape.T, seen, atol=2e-3)
+
+
+def steadied(track, readout, height):
+    camera = OrthographicCamera(normal=(0, 0, 1), readout=readout, image_size=(100, height))
+    return camera.steadied(track)
+
+
+def test_a_global_shutter_and_gaps_stay_as_they_are():
+    track = np.cumsum(np.ones((9, 2)), axis=0)
+    track[4] = np.nan
+    assert steadied(track, 0.0, 100) is track
+    assert (
+        np.isnan(steadied(track, 0.5, 100)).any(axis=1).tolist()
+        == [False] * 4 + [True] + [False] * 4
+    )
+    short = np.full((9, 2), np.nan)
+    short[:3] = 1.0
+    assert steadied(short, 0.5, 100) is short
+
+
+@given(st.floats(-0.9, 0.9), st.integers(100, 1000))
+def test_a_steady_motion_is_put_back_in_time(readout, height):
+    """A point at row v is seen readout (v - (H - 1) / 2) / H frames late."""
+    k = np.arange(30.0)
+    # Rows v = a + b (k + late(v)), solved for v.
+    a, b = 0.3 * height, 0.01 * height
+    share = readout / height
+    row = (a + b * (k - share * (height - 1) / 2)) / (1 - b * share)
+    late = readout * (row - (height - 1) / 2) / height
+    seen = np.column_stack((5 - 2 * (k + late), row))
+    np.testing.assert_allclose(seen[:, 1], a + b * (k + late), atol=1e-9 * height)
+    expected = np.column_stack((5 - 2 * k, a + b * k))
+    np.testing.assert_allclose(steadied(seen, readout, height), expected, atol=1e-8 * height)
+
+
+def test_the_middle_row_is_on_time():
+    track = np.column_stack((np.arange(9.0) ** 2, np.full(9, 49.5)))
+    np.testing.assert_allclose(steadied(track, 0.8, 100), track, atol=1e-12)
+
+
+@pytest.mark.parametrize("readout", [0.8, -0.8])
+def test_an_outlier_does_not_overtake_its_neighbours(readout):
+    track = np.column_stack((np.arange(20.0), np.full(20, 99.0)))
+    track[9, 1] = 5000.0
+    found = steadied(track, readout, 100)
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(found[0:4, 0], np.arange(4) - readout * 49.5 / 100, atol=0.05)

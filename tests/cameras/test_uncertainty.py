@@ -6,8 +6,7 @@ from helpers import dependent, trajectory
 
 import vidsindy_lite as vl
 from vidsindy_lite import study
-from vidsindy_lite.cameras import Lags
-from vidsindy_lite.cameras.uncertainty import systematic_errors, trailing_errors
+from vidsindy_lite.cameras import Lags, systematic_errors, trailing_errors
 
 NOISE = 0.05  # pixels
 
@@ -65,18 +64,6 @@ def test_known_cameras_share_no_errors():
     assert systematic_errors(tracks, rig, rig, still).shape == (0, 50, 3)
 
 
-def test_an_uncertain_lag_moves_the_path_along_its_motion():
-    rng = np.random.default_rng(2)
-    x = trajectory(rng, 200)
-    rig = vl.Rig.around(x)
-    tracks = [camera.project(x) + NOISE * rng.normal(size=(200, 2)) for camera in rig.cameras]
-    lags = Lags(np.zeros(3), np.ones(3), np.array([0, 0.01, np.inf]), 0.0)
-    modes = systematic_errors(tracks, rig, rig, lags)
-    assert modes.shape == (1, 200, 3)
-    speed, shift = (np.linalg.norm(part, axis=1) for part in (np.gradient(x, axis=0), modes[0]))
-    assert np.corrcoef(speed[2:-2], shift[2:-2])[0, 1] > 0.8
-
-
 def trailing(rig, x, trail, noise=NOISE, seed=0):
     """Tracks that stay behind the motion by so many pixels."""
     rng = np.random.default_rng(seed)
@@ -87,17 +74,6 @@ def trailing(rig, x, trail, noise=NOISE, seed=0):
         + noise * rng.normal(size=track.shape)
         for track, step in zip(clean, steps, strict=True)
     ]  # fmt: skip
-
-
-def test_trails_are_half_the_noise_of_the_tracks():
-    x = trajectory(np.random.default_rng(3), 400)
-    rig = vl.Rig.around(x)
-    modes = trailing_errors(trailing(rig, x, 0), rig)
-    assert modes.shape == (3, 400, 3)
-    behind = vl.reconstruct(trailing(rig, x, NOISE / 2, noise=0), rig) - x
-    apart = modes.sum(axis=0) - behind
-    assert np.sqrt(np.mean(apart**2)) < 0.2 * np.sqrt(np.mean(behind**2))
-    np.testing.assert_allclose(trailing_errors(trailing(rig, x, 0, noise=0), rig), 0, atol=1e-9)
 
 
 def test_no_trail_where_nothing_moves_or_is_seen():

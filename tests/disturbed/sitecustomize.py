@@ -17,7 +17,7 @@ from tempfile import gettempdir
 # What returns a track or a trajectory, by the module that defines it.
 TARGETS = {
     "vidsindy_lite.vision.tracking": ["track"],
-    "vidsindy_lite.cameras.triangulate": ["reconstruct"],
+    "vidsindy_lite.cameras.rig": ["reconstruct"],
     "vidsindy_lite.dynamics.model": ["PolynomialSystem.simulate", "runge_kutta_4"],
 }
 

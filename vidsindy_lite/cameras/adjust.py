@@ -46,9 +46,9 @@ from scipy.ndimage import minimum_filter1d
 from scipy.special import gammaincinv
 
 from ..arrays import Bools, Floats
-from .alignment import Footage
-from .models import USUAL, Camera, OrthographicCamera, PerspectiveCamera, frozen, steadied
-from .sight import Views, points_of_views
+from .clocks import Footage
+from .models import USUAL, Camera, OrthographicCamera, PerspectiveCamera, frozen
+from .triangulate import at_once, intersect
 
 _UNTOLD = 1e-15  # of the largest information of any direction: rounding
 PARTS = {
@@ -66,25 +66,24 @@ PARTS = {
 """Which components of the vector belong to what."""
 
 SIZE = 17
+STEPS = 60
+"""That a search takes at most."""
 _LARGEST = 50.0  # logarithm of a scale: a step that leads there is not taken
 _TANGENTIAL = 0.1  # p1 and p2 of a lens, in units of k1
 _OUTLIER = 6.0  # sigma
 _FINEST = 1e-6  # pixels; noise below that is rounding
 _PRIOR_NOISE = 0.02  # pixels; no track is better than that beside a measurement
-_STEPS = 60
 _SETTLED = 1e-11  # pixels, or ...
 _ENOUGH = 1e-7  # ... of sigma, by which a last step moves the images, or ...
 _IN_TIME = 1e-4  # ... if clocks move, whose slopes are rough, and in frames
-_BACK = 1e-6  # of a unit: nearer to where it was two steps before, a search goes to and fro
 _LONGEST = 1.0  # frames: further than that, the slope in a lag does not hold
-_RIPPLES = 1.05  # noise is less between frames than at them, so that a better lag may cost more
 _LOST = 0.05  # share of what is seen that a step in time may lead out of the video
-_PROBE = 1e-6  # of a unit: slopes are taken over twice that
+_PROBE = 1e-6  # of a unit: slopes are taken over twice that, and less is no change
 _BESIDE = 2  # frames around an outlier into which interpolation carries a part of it
 _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
-_LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
+LAG, DRIFT = PARTS["lag"].start, PARTS["drift"].start
 
 
 def fitted_factor(missed: Floats, slopes: Floats, prior: Floats, noise: float) -> Floats:
@@ -223,6 +222,8 @@ class Adjustment:
         As they were given.
     change : ndarray, shape (m, SIZE)
         Of each camera and its clock, from the start.
+    points : ndarray, shape (n, 3)
+        NaN where none is found.
     misses : ndarray, shape (n, 2 m)
         Residuals, pixels; NaN where nothing is seen or no point is found.
     weights : ndarray, shape (n,)
@@ -241,6 +242,7 @@ class Adjustment:
     footage: Footage
     errors: Floats
     change: Floats
+    points: Floats
     misses: Floats
     weights: Floats
     noise: float
@@ -267,8 +269,7 @@ def adjust(
     errors: Floats,
     *,
     begin: Floats | None = None,
-    used: Bools | None = None,
-    most: int | None = None,
+    most: int = STEPS,
 ) -> Adjustment:
     """The cameras and clocks of the smallest errors near a start, see the module.
 
@@ -281,40 +282,36 @@ def adjust(
         Standard errors of the start: zero what is exactly known, infinite what is not at all.
     begin : ndarray, shape (m, SIZE), optional
         Changes from which the search begins; by default none.
-    used : ndarray of bool, shape (n,), optional
-        Which instants count; by default all.
-    most : int, optional
-        Steps.
+    most : int
+        Steps; with none, what is known near cameras that were adjusted before.
     """
     change = np.zeros(errors.shape) if begin is None else begin
-    problem, state = _Problem.of(footage, start, errors, change, used)
+    problem, state = _Problem.of(footage, start, errors, change)
     noise = _noise(state.misses)
-    settled, steps, earlier = False, 0, np.full(problem.unit.shape, np.inf)
-    while not settled and steps < (_STEPS if most is None else most):
-        weights = problem.weights(state, noise)
-        moved, step = _downhill(problem, state, weights, noise)
+    settled, steps, earlier = False, 0, np.full(errors.shape, np.inf)
+    while not settled and steps < most:
+        moved, step = _downhill(problem, state, noise)
         steps += 1
         if moved is None:  # rounding is all that is left, or points ran out of numbers
             settled = step == 0
             break
         # A frame at the end of a video may come and go with a lag, for ever.
-        to_and_fro = bool((np.abs(moved.change - earlier) <= _BACK * problem.unit).all())
+        back = (np.abs(moved.change - earlier) <= _PROBE * problem.unit).all()
         earlier, state, before = state.change, moved, noise
         noise = _noise(state.misses)
-        enough = _IN_TIME if problem.timed else _ENOUGH
-        still = step <= max(_SETTLED, enough * noise) or (problem.timed and to_and_fro)
+        enough = max(_SETTLED, (_IN_TIME if problem.timed else _ENOUGH) * noise)
+        still = step <= enough or bool(problem.timed and back)
         settled = still and noise >= before * (1 - 1e-3)
-    return problem.result(state, noise, settled, steps)
-
-
-def linearised(footage: Footage, cameras: Sequence[Camera], errors: Floats) -> Adjustment:
-    """What is known near cameras and clocks that were adjusted before."""
-    return adjust(footage, cameras, errors, most=0)
+    reduced = _Reduced.of(*problem.slopes(state), state.misses)
+    return Adjustment(
+        state.cameras, state.footage, errors, state.change, state.points, state.misses,
+        problem.weights(state, noise), noise, reduced.slopes, reduced.follow, settled, steps,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _State:
-    """Changes, (p,), points, (n, 3), cameras, clocks, and by how much they miss the tracks."""
+    """Changes, (m, SIZE), points, (n, 3), cameras, clocks, and by how much they miss the tracks."""
 
     change: Floats
     points: Floats
@@ -325,102 +322,83 @@ class _State:
 
 @dataclass(frozen=True)
 class _Problem:
-    """What was filmed, the start, what is free of it, and the frames in which a point is found."""
+    """What was filmed, the start, and what is free of it."""
 
     footage: Footage
     start: tuple[Camera, ...]
     errors: Floats
-    found: Bools  # which frames
-    unit: Floats  # of each free change, and ...
+    unit: Floats  # of each change, (m, SIZE), and ...
     reach: float  # ... of points
 
     @classmethod
     def of(
-        cls,
-        footage: Footage,
-        start: Sequence[Camera],
-        errors: Floats,
-        change: Floats,
-        used: Bools | None,
+        cls, footage: Footage, start: Sequence[Camera], errors: Floats, change: Floats
     ) -> tuple[_Problem, _State]:
         """Units from the size of the path, and the first state."""
-        every = np.ones(len(footage.instants), bool)
-        blank = cls(footage, tuple(start), errors, every, np.ones(0), 1.0)
+        blank = cls(footage, tuple(start), errors, errors, 1.0)
         cameras, moved = blank.changed(change)
-        seen = [blank.shown(moved, i, camera) for i, camera in enumerate(cameras)]
-        points = points_of_views(Views.of(seen), cameras)
-        found = np.asarray(np.isfinite(points).all(axis=1)) & (every if used is None else used)
-        points = points[found]
-        reach = float(np.sqrt(np.mean(np.var(points, axis=0)))) if len(points) else 1.0
-        reach = reach or 1.0
+        points, _ = intersect(cameras, at_once(cameras, moved.aligned))
+        seen = points[np.isfinite(points).all(axis=1)]
+        reach = (float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else 1.0) or 1.0
         sizes = np.array([units(reach, float(camera.image_size[0])) for camera in start])
-        problem = replace(blank, found=found, unit=sizes[errors > 0], reach=reach)
-        return problem, problem.at(change[errors > 0], points)
+        problem = replace(blank, unit=sizes, reach=reach)
+        return problem, problem.at(change, points)
+
+    @property
+    def free(self) -> Bools:
+        """What may change, (m, SIZE)."""
+        return self.errors > 0
+
+    @property
+    def prior(self) -> Floats:
+        """The inverse of the errors of what is free, (p,)."""
+        return 1 / self.errors[self.free]
 
     @property
     def timed(self) -> bool:
         """Whether a clock is unknown."""
-        return bool(self.errors[:, [_LAG, _DRIFT]].any())
-
-    def full(self, change: Floats) -> Floats:
-        """Changes of all components, (m, SIZE), from those of the free ones."""
-        every = np.zeros(self.errors.shape)
-        every[self.errors > 0] = change
-        return every
+        return bool(self.errors[:, [LAG, DRIFT]].any())
 
     def changed(self, change: Floats) -> tuple[tuple[Camera, ...], Footage]:
-        """Cameras and clocks after changes (m, SIZE)."""
+        """Cameras and clocks after changes."""
         pairs = zip(self.start, change, strict=True)
         moved = self.footage
-        if change[:, [_LAG, _DRIFT]].any():
-            moved = moved.later(change[:, _LAG], change[:, _DRIFT])
+        if change[:, [LAG, DRIFT]].any():
+            moved = moved.later(change[:, LAG], change[:, DRIFT])
         return tuple(changed(camera, part) for camera, part in pairs), moved
-
-    def shown(self, footage: Footage, i: int, camera: Camera) -> Floats:
-        """The track of one camera in all frames, its rows read at once."""
-        return steadied(footage.aligned[i], camera.readout, camera.image_size[1])
 
     def at(self, change: Floats, points: Floats) -> _State:
         """What the cameras miss after a change."""
-        cameras, footage = self.changed(self.full(change))
-        missed = np.stack(
-            [self._missed(footage, i, c, points) for i, c in enumerate(cameras)], axis=1
-        )
+        cameras, footage = self.changed(change)
+        pairs = zip(cameras, footage.aligned, strict=True)
+        missed = np.stack([c.steadied(track) - c.image(points) for c, track in pairs], axis=1)
         seen = np.isfinite(missed).all(axis=-1)
         missed[~seen | (seen.sum(axis=1) < 2)[:, None]] = np.nan  # one view has no say
         return _State(change, points, cameras, footage, missed.reshape(len(points), -1))
 
-    def _missed(self, footage: Footage, i: int, camera: Camera, points: Floats) -> Floats:
-        """Track minus image of one camera, (n, 2)."""
-        return self.shown(footage, i, camera)[self.found] - camera.image(points)
-
     def weights(self, state: _State, noise: float) -> Floats:
-        """Of each frame, (n,): one, unless it is missed by far, ..."""
+        """Of each frame, (n,): one, unless nothing is seen, it is missed by far, ..."""
         worst = np.nanmax(np.abs(state.misses), axis=1, initial=0.0)
         weights = np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2
         if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
             weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
-        return weights
+        return np.where(np.isfinite(state.misses).any(axis=1), weights, 0.0)
 
     def slopes(self, state: _State) -> tuple[Floats, Floats]:
         """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
-        count = len(self.start)
-        free = np.argwhere(self.errors > 0)
-        in_change = np.zeros((len(state.points), 2 * count, len(free)))
-        every = self.full(state.change)
+        free = np.argwhere(self.free)
+        in_change = np.zeros((*state.misses.shape, len(free)))
         for k, (i, part) in enumerate(free):
             columns = slice(2 * i, 2 * i + 2)
-            if part in (_LAG, _DRIFT):
-                in_lag, in_drift = state.footage.slopes(i)
-                in_change[:, columns, k] = (in_lag if part == _LAG else in_drift)[self.found]
+            if part in (LAG, DRIFT):
+                in_change[:, columns, k] = state.footage.slopes(i)[int(part == DRIFT)]
                 continue
-            ends, step = [], _PROBE * self.unit[k]
-            for sign in (1, -1):
-                moved = every[i].copy()
-                moved[part] += sign * step
-                camera = changed(self.start[i], moved)
-                ends.append(self._missed(state.footage, i, camera, state.points))
-            in_change[:, columns, k] = (ends[0] - ends[1]) / (2 * step)
+            step = np.zeros(SIZE)
+            step[part] = _PROBE * self.unit[i, part]
+            ends = [changed(self.start[i], state.change[i] + sign * step) for sign in (1, -1)]
+            track = state.footage.aligned[i]
+            high, low = (c.steadied(track) - c.image(state.points) for c in ends)
+            in_change[:, columns, k] = (high - low) / (2 * step[part])
         probe = _PROBE * self.reach
         in_points = np.stack([
             np.hstack([c.image(state.points - e) - c.image(state.points + e)
@@ -430,19 +408,6 @@ class _Problem:
         seen = np.isfinite(state.misses)[..., None]
         in_change, in_points = np.nan_to_num(in_change), np.nan_to_num(in_points)
         return np.where(seen, in_change, 0.0), np.where(seen, in_points, 0.0)
-
-    def result(self, state: _State, noise: float, settled: bool, steps: int) -> Adjustment:
-        """All of it, in all frames."""
-        reduced = _Reduced.of(*self.slopes(state), state.misses)
-        frames, (count, width) = len(self.found), reduced.slopes.shape[1:]
-        misses, weights = np.full((frames, count), np.nan), np.zeros(frames)
-        slopes, path = np.zeros((frames, count, width)), np.zeros((frames, 3, width))
-        misses[self.found], weights[self.found] = state.misses, self.weights(state, noise)
-        slopes[self.found], path[self.found] = reduced.slopes, reduced.follow
-        return Adjustment(
-            state.cameras, state.footage, self.errors, self.full(state.change), misses, weights,
-            noise, slopes, path, settled, steps,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -479,49 +444,45 @@ class _Reduced:
         )
 
 
-def _downhill(
-    problem: _Problem, state: _State, weights: Floats, noise: float
-) -> tuple[_State | None, float]:
+def _downhill(problem: _Problem, state: _State, noise: float) -> tuple[_State | None, float]:
     """The state after a step that lessens the errors, and how far it moved images, pixels."""
+    weights, sigma = problem.weights(state, noise), max(noise, _PRIOR_NOISE)
     reduced = _Reduced.of(*problem.slopes(state), state.misses)
-    root = np.sqrt(weights)[:, None] / max(noise, _PRIOR_NOISE)
-    design = (root[..., None] * reduced.slopes).reshape(-1, len(state.change))
-    prior = 1 / problem.errors[problem.errors > 0]
-    rows = np.vstack((design, np.diag(prior)))
-    target = -np.append((root * reduced.misses).ravel(), prior * state.change)
+    root, prior, free = np.sqrt(weights)[:, None] / sigma, problem.prior, problem.free
+    rows = np.vstack(((root[..., None] * reduced.slopes).reshape(-1, len(prior)), np.diag(prior)))
+    target = -np.append((root * reduced.misses).ravel(), prior * state.change[free])
     size = np.sqrt(np.sum(rows**2, axis=0))
     if not np.isfinite(size).all():
         return None, np.inf
     size[size == 0] = 1.0
     factor, triangle = np.linalg.qr(rows / size)
-    aim = factor.T @ target
-    lags = np.argwhere(problem.errors > 0)[:, 1] == _LAG
-    here = _cost(problem, state, state, weights, noise)
+    aim = np.append(factor.T @ target, np.zeros(len(size)))
+    lags = np.argwhere(free)[:, 1] == LAG
+    seen = np.isfinite(state.misses)
+
+    def cost(other: _State) -> float:
+        """What is to be smallest; infinite if points that were seen before would not be."""
+        lost = ~np.isfinite(other.misses[seen])
+        if lost.any() and lost.mean() > (_LOST if problem.timed else 0.0):
+            return np.inf
+        squares = np.nansum(np.where(seen, other.misses, 0.0) ** 2, axis=1)
+        off = prior * other.change[free]
+        return float(np.sum(weights * squares) / sigma**2 + np.sum(off**2))
+
+    here = cost(state)
     for damping in _DAMPING:
         damped = np.vstack((triangle, np.sqrt(damping) * np.eye(len(size))))
-        full = np.append(aim, np.zeros(len(size)))
-        step = np.linalg.lstsq(damped, full, rcond=1e-13)[0] / size
+        step = np.linalg.lstsq(damped, aim, rcond=1e-13)[0] / size
         step /= max(np.abs(step[lags]).max(initial=0) / _LONGEST, 1.0)
-        points = state.points + reduced.own + reduced.follow @ step
-        moved = problem.at(state.change + step, points)
-        shift = float(np.sqrt(np.mean((reduced.slopes @ step) ** 2))) if len(step) else 0.0
-        slack = _RIPPLES if problem.timed else 1 + 1e-12
-        if _cost(problem, moved, state, weights, noise) <= here * slack + 1e-18:
-            late = noise * float(np.abs(step[lags]).max(initial=0))
-            return moved, max(shift, late, float(np.abs(reduced.along).max(initial=0)))
+        change = state.change.copy()
+        change[free] += step
+        moved = problem.at(change, state.points + reduced.own + reduced.follow @ step)
+        if cost(moved) <= here * (1 + 1e-12) + 1e-18:
+            told = seen.any(axis=1)
+            shift = np.sqrt(np.mean((reduced.slopes[told] @ step) ** 2)) if told.any() else 0.0
+            late = noise * np.abs(step[lags]).max(initial=0)
+            return moved, float(max(shift, late, np.abs(reduced.along).max(initial=0)))
     return None, 0.0
-
-
-def _cost(problem: _Problem, state: _State, before: _State, weights: Floats, noise: float) -> float:
-    """What is to be smallest; infinite if points that were seen before would not be."""
-    seen = np.isfinite(before.misses)
-    lost = ~np.isfinite(state.misses[seen])
-    if lost.any() and lost.mean() > (_LOST if problem.timed else 0.0):
-        return np.inf
-    squares = np.nansum(np.where(seen, state.misses, 0.0) ** 2, axis=1)
-    prior = 1 / problem.errors[problem.errors > 0]
-    sigma = max(noise, _PRIOR_NOISE)
-    return float(np.sum(weights * squares) / sigma**2 + np.sum((prior * state.change) ** 2))
 
 
 def _noise(misses: Floats) -> float:

@@ -45,9 +45,11 @@ from functools import cached_property
 from math import hypot
 from typing import Any, ClassVar, Self
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation
 
 from ..arrays import Floats
 from ..checks import (
@@ -93,15 +95,8 @@ def rodrigues(axis: ArrayLike, angle: float) -> Floats:
     ValueError
         If the axis is not a finite non-zero vector of shape (3,), or the angle is not finite.
     """
-    return _rotation(unit_vector("axis", axis), check_number("angle", angle))
-
-
-def _rotation(axis: Floats | tuple[float, ...], angle: float) -> Floats:
-    """`rodrigues` of a unit vector."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # 1 - cos(a) = 2 sin(a/2)^2 keeps its digits at small angles.
-    return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
+    turn = check_number("angle", angle) * unit_vector("axis", axis)
+    return Rotation.from_rotvec(turn).as_matrix()
 
 
 def rotation_to_z(normal: ArrayLike) -> Floats:
@@ -130,7 +125,7 @@ def rotation_to_z(normal: ArrayLike) -> Floats:
     horizontal = np.hypot(a, b)
     axis = (b / horizontal, -a / horizontal, 0.0) if horizontal > 0 else (1.0, 0.0, 0.0)
     # arctan2 is accurate at every angle; arccos(c) loses half its digits near 0 and pi.
-    return _rotation(axis, np.arctan2(horizontal, c))
+    return rodrigues(axis, float(np.arctan2(horizontal, c)))
 
 
 def plane_projection(x: ArrayLike, normal: ArrayLike, d: float) -> Floats:
@@ -468,6 +463,18 @@ class Camera(ABC):
         """The ideal image of what is seen."""
         return centred
 
+    def steadied(self, track: Floats) -> Floats:
+        """What it would have seen if it read all rows at once: the track at whole frames."""
+        shown = np.flatnonzero(np.isfinite(track).all(axis=1))
+        if self.readout == 0 or len(shown) < 4:
+            return track
+        height = self.image_size[1]
+        behind = self.readout * (track[shown, 1] - (height - 1) / 2) / height
+        instants = shown + np.clip(behind, -_LARGEST, _LARGEST)
+        still = track.copy()
+        still[shown] = make_interp_spline(instants, track[shown], k=3)(shown)
+        return still
+
     def calibrated(self, turned: complex) -> Self:
         """The same camera with s exp(i theta)."""
         twin = copy(self)  # and what was computed of it: none of that hangs on scale or angle
@@ -499,11 +506,6 @@ def frozen(array: Floats) -> Floats:
     return array
 
 
-def distorted(points: Floats, coefficients: Floats) -> Floats:
-    """Where points of the ideal image, (n, 2), are seen through the lens."""
-    return _distorted(points, coefficients)[0]
-
-
 def undistorted(points: Floats, coefficients: Floats) -> Floats:
     """Points of the ideal image that are seen at `points`, (n, 2).
 
@@ -512,7 +514,7 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
     ideal = points.copy()
     missed = np.zeros_like(points)
     for _ in range(_STEPS):
-        seen, slope = _distorted(ideal, coefficients)
+        seen, slope = distorted(ideal, coefficients)
         missed = points - seen
         with np.errstate(over="ignore", invalid="ignore"):
             determinant = slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] ** 2
@@ -527,40 +529,14 @@ def undistorted(points: Floats, coefficients: Floats) -> Floats:
     return ideal
 
 
-def _distorted(points: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
-    """Where points are seen, (n, 2), and the slope of that, (n, 2, 2)."""
-    k1, k2, p1, p2, k3, k4, k5, k6 = np.pad(coefficients, (0, len(LENS) - len(coefficients)))
-    x, y = points.T
-    with np.errstate(all="ignore"):  # a step of Newton's may lead far away
-        r2 = x**2 + y**2
-        below = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
-        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / below
-        growth = k1 + r2 * (2 * k2 + r2 * 3 * k3) - radial * (k4 + r2 * (2 * k5 + r2 * 3 * k6))
-        growth *= 2 / below  # of radial, along x: x times this
-        seen = np.column_stack(
-            (
-                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2),
-                y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y,
-            )
-        )
-        across = x * y * growth + 2 * p1 * x + 2 * p2 * y
-        slope = np.empty((len(points), 2, 2))
-        slope[:, 0, 0] = radial + x**2 * growth + 2 * p1 * y + 6 * p2 * x
-        slope[:, 0, 1] = slope[:, 1, 0] = across
-        slope[:, 1, 1] = radial + y**2 * growth + 6 * p1 * y + 2 * p2 * x
-    return seen, slope
-
-
-def steadied(track: Floats, readout: float, height: int) -> Floats:
-    """What a camera that reads all rows at once would have seen: the track at whole frames."""
-    seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    if readout == 0 or len(seen) < 4:
-        return track
-    behind = readout * (track[seen, 1] - (height - 1) / 2) / height
-    instants = seen + np.clip(behind, -_LARGEST, _LARGEST)
-    still = track.copy()
-    still[seen] = make_interp_spline(instants, track[seen], k=3)(seen)
-    return still
+def distorted(points: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
+    """Where points of the ideal image, (n, 2), are seen through the lens; slopes, (n, 2, 2)."""
+    if not len(points):  # which OpenCV refuses
+        return points, np.zeros((0, 2, 2))
+    ahead, still = np.column_stack((points, np.ones(len(points)))), np.zeros(3)
+    seen, slope = cv2.projectPoints(ahead[:, None], still, still, np.eye(3), coefficients)
+    # To move the image of a point at distance 1 is to move the point as far.
+    return np.asarray(seen[:, 0], float), np.asarray(slope[:, 3:5].reshape(-1, 2, 2), float)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -696,7 +672,7 @@ class PerspectiveCamera(Camera):
         if self.distortion is None:
             return centred
         scale, _ = self.calibration
-        return distorted(scale * centred * _DOWN, self.distortion) * _DOWN / scale
+        return distorted(scale * centred * _DOWN, self.distortion)[0] * _DOWN / scale
 
     def _unbent(self, centred: Floats) -> Floats:
         if self.distortion is None or self.scale is None:

@@ -34,27 +34,29 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from ..progress import bar
-from .adjust import PARTS, Adjustment, adjust, fitted_factor, known_to
-from .alignment import Curve, Footage, Lags, align, check_clocks, check_lags, check_rates, list_lags
-from .calibrate import Unknowns, agreement, calibrated, check_learnable, posed
-from .models import Camera, all_orthographic, steadied
-from .rig import Rig
-from .sight import (
-    TRIMMED,
-    Views,
-    epipolar_equations,
-    epipolar_lines,
-    epipolar_rows,
-    residuals_of_views,
-    trimmed,
+from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, fitted_factor, known_to
+from .clocks import (
+    INSTANTS,
+    OVERLAP,
+    Curve,
+    Footage,
+    Lags,
+    align,
+    check_clocks,
+    check_lags,
+    check_rates,
+    list_lags,
 )
-from .triangulate import ALIKE, DISAGREEMENT, FINE, GROSS, check_seen
+from .eq4 import Unknowns, check_learnable, closed_form
+from .models import Camera
+from .rig import ALIKE, DISAGREEMENT, FINE, GROSS, Rig, check_seen
+from .triangulate import TRIMMED, at_once, epipolar_lines, epipolar_rows, trimmed
+from .triangulate import missed as missed_by
+from .unmeasured import posed
 
-_OVERLAP = 0.5  # share of the shorter of two videos that both must show
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
 _PROMISING = 4  # lags of each camera, with and without a shift
 _NEAR = 4.0  # frames
-_ROUNDS = 5  # of leaving the others out
 _BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
@@ -62,56 +64,14 @@ _CLEAR = 4.0  # standard errors by which a clock must drift, ...
 _ENOUGH = 0.05  # ... and frames over the whole video
 _LEAST = 1e-6  # share of a slope that is motion
 _USED = 0.5  # weight of an instant that holds no outlier
-_TIMES = _LAG, _DRIFT = PARTS["lag"].start, PARTS["drift"].start
+_TIMES = LAG, DRIFT
 BLURRED = 0.5
 """Standard error of a lag, in frames, beyond which it counts as unknown."""
 
-_INSTANTS = 300  # at which views are compared before all frames are
 _ROUGH_STEPS = 8  # of the second step
 _SHOWN = 3  # of the lags that fit equally well
 _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three degrees, 5 %
 _BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
-
-
-def rough_cameras(views: Views, unknowns: Unknowns) -> tuple[Camera, ...] | None:
-    """Cameras to start a search from, however badly they fit; None if there is no telling.
-
-    What learning asks for, that the motion determines a camera and that no view contradicts it, is
-    not asked for here: it would not hold at a wrong lag, nor with a wrong normal.
-    """
-    cameras = unknowns.cameras
-    if not unknowns.any:
-        return cameras
-    turns = unknowns.uncalibrated
-    if all_orthographic(cameras):
-        equations, _ = agreement(views, unknowns)
-        if len(equations.design) <= equations.design.shape[1]:
-            return None
-        solution = np.linalg.lstsq(equations.design, equations.target)[0]
-        turned = solution[: 2 * len(turns)].view(complex)
-        widths = np.array([cameras[i].image_size[0] for i in unknowns.unplaced])
-        offsets = solution[2 * len(turns) :].reshape(-1, 2) * widths[:, None] / 2
-        return unknowns.filled(turned, offsets) if turned.all() else None
-    for i in turns:
-        one = _turned(views, cameras, int(i))
-        if one == 0:
-            return None
-        cameras = calibrated(cameras, [i], [one])
-    return cameras
-
-
-def _turned(views: Views, cameras: Sequence[Camera], i: int) -> complex:
-    """s exp(i theta) of a camera from those that are calibrated; zero if there is no telling."""
-    design, target = epipolar_equations(cameras, views.tracks, i)
-    fits = np.ones(len(target), bool)
-    turned = 0j
-    for _ in range(_ROUNDS):
-        if fits.sum() <= 4:
-            break
-        solution = np.linalg.lstsq(design[fits], target[fits])[0]
-        missed = np.abs(design @ solution - target)
-        fits, turned = missed <= np.quantile(missed, _BETTER_PART), complex(*solution)
-    return turned
 
 
 def promising_lags(curves: Sequence[Curve], rates: Floats, unknowns: Unknowns) -> list[list[float]]:
@@ -128,7 +88,7 @@ def lag_misses(
     curves: Sequence[Curve],
     rates: Floats,
     unknowns: Unknowns,
-    most: int = _INSTANTS,
+    most: int = INSTANTS,
     shifts: Sequence[bool] = (False, True),
 ) -> Iterator[tuple[Floats, Floats]]:
     """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
@@ -142,7 +102,7 @@ def lag_misses(
     for other in range(len(curves)):
         if other == known:
             continue
-        margin = _OVERLAP * min(ends[known], ends[other])
+        margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
         first, second = unknowns.cameras[known], unknowns.cameras[other]
         placed = first.is_placed and second.is_placed
@@ -226,7 +186,7 @@ class Timing:
         errors: Floats,
         *,
         begin: Floats | None = None,
-        most: int | None = None,
+        most: int = STEPS,
     ) -> Timing | None:
         """None if the views have too little in common."""
         fit = adjust(footage, cameras, errors, begin=begin, most=most)
@@ -286,7 +246,7 @@ class Timing:
         fit, used = self.fit, self.used
         slopes = fit.slopes[used].reshape(-1, fit.slopes.shape[-1])
         parts = np.argwhere(fit.errors > 0)[:, 1]
-        lags, others = slopes[:, parts == _LAG], slopes[:, ~np.isin(parts, _TIMES)]
+        lags, others = slopes[:, parts == LAG], slopes[:, ~np.isin(parts, _TIMES)]
         lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
         # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
         seen = np.isfinite(self.missed[:, used, 0])
@@ -312,16 +272,16 @@ class Timing:
     def drifted(self) -> Timing:
         """The same with drifts of clocks, if any are clear and large enough to matter."""
         errors, change = self.fit.errors.copy(), self.fit.change
-        errors[1:, _DRIFT] = np.inf
+        errors[1:, DRIFT] = np.inf
         free = Timing.of(self.footage, self.cameras, errors, begin=change)
         if free is None:
             return self
-        drift, off = free.fit.change[:, _DRIFT], np.zeros(len(errors))
+        drift, off = free.fit.change[:, DRIFT], np.zeros(len(errors))
         off[1:] = np.sqrt(np.diag(free.covariance))[len(off) - 1 :]
         clear = np.abs(drift) > np.maximum(_CLEAR * off, _ENOUGH)
         if not clear.any():
             return self
-        errors[~clear, _DRIFT] = 0.0
+        errors[~clear, DRIFT] = 0.0
         begin = np.where(errors > 0, free.fit.change, 0.0)
         return Timing.of(self.footage, self.cameras, errors, begin=begin) or self
 
@@ -410,37 +370,34 @@ class _Videos:
         bar: tqdm,
     ) -> _Videos:
         """Of tracks as they are given."""
-        still = [
-            steadied(track, camera.readout, camera.image_size[1])
-            for track, camera in zip(tracks, rig.cameras, strict=True)
-        ]
-        at_once = Rig(tuple(replace(camera, readout=0.0) for camera in rig.cameras))
+        still = at_once(rig.cameras, tracks)
+        instant = Rig(tuple(replace(camera, readout=0.0) for camera in rig.cameras))
         curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
-        return cls(curves, Unknowns.of(at_once), rates, bar)
-
-    @property
-    def step(self) -> int:
-        """Frames from one to the next of those in which all cameras are compared."""
-        return -(-len(self.curves[0].clock) // _INSTANTS)
+        return cls(curves, Unknowns.of(instant), rates, bar)
 
     def footage(self, lags: Floats, rough: bool = False) -> Footage:
         """All instants, or some."""
-        instants = self.curves[0].clock[:: self.step if rough else 1]
-        return Footage(self.curves, instants, lags, self.rates)
+        every = Footage(self.curves, self.curves[0].clock, lags, self.rates)
+        return every.some if rough else every
 
     def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
         """Those that the closed form finds; None if it finds none."""
         tracks = footage.aligned
         if not all(np.isfinite(track).any() for track in tracks):
             return None
-        return rough_cameras(Views.of(tracks), self.unknowns)
+        try:
+            return closed_form(tracks, self.unknowns, checked=False)[0]
+        except ValueError:
+            return None
 
     def errors(self, rough: bool = False, loose: bool = False) -> Floats:
         """What is known of cameras, and of all lags but the first one's nothing."""
         errors = np.array([known_to(camera) for camera in self.unknowns.cameras])
-        if rough and self.step > 1:  # which are too few to tell where the target was between two
+        if (
+            rough and len(self.curves[0].clock) > INSTANTS
+        ):  # which are too few to tell where the target was between two
             errors[:, PARTS["readout"]] = 0.0
-        errors[1:, PARTS["lag"]] = np.inf
+        errors[1:, LAG] = np.inf
         if loose:
             ways = np.zeros(errors.shape, bool)
             for what in ("normal", "angle", "scale"):
@@ -456,7 +413,7 @@ class _Videos:
         if cameras is None:
             return None
         errors = self.errors(rough, loose)
-        return Timing.of(footage, cameras, errors, most=_ROUGH_STEPS if rough else None)
+        return Timing.of(footage, cameras, errors, most=_ROUGH_STEPS if rough else STEPS)
 
 
 # ------------------------------------------------------------------------------------- the search
@@ -561,7 +518,7 @@ def _told(videos: _Videos, found: Timing, first: Floats) -> Lags:
     if not found.shares.all():
         return _untold(videos, first, found.score <= DISAGREEMENT)
     covariance, rate_errors = found.covariance, np.zeros(len(lags))
-    drifting = fit.errors[:, PARTS["drift"].start] > 0
+    drifting = fit.errors[:, DRIFT] > 0
     rate_errors[drifting] = np.sqrt(np.diag(covariance)[count:]) / fit.footage.span
     # Lags are those of the first instant, those of the fit of the middle.
     moved = np.hstack((np.eye(count), -np.eye(count)[:, drifting[1:]] * fit.footage.middle
@@ -591,7 +548,7 @@ def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
     residual, footage = np.inf, videos.footage(lags)
     cameras = videos.cameras(footage)
     if cameras is not None:
-        missed = residuals_of_views(Views.of(footage.aligned), cameras)
+        missed = missed_by(cameras, footage.aligned)
         residual = max(map(trimmed, missed))
     warnings = [_blurred(i, lags) for i in range(1, len(lags))]
     if not agree:

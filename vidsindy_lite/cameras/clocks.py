@@ -20,6 +20,10 @@ from scipy.interpolate import BSpline, make_interp_spline
 from ..arrays import Bools, Floats
 from ..checks import check_items, check_positive, check_times, check_tracks, check_vector, shown
 
+INSTANTS = 300
+"""At which views are compared before all frames are."""
+OVERLAP = 0.5
+"""Share of the shorter of two videos that both must show."""
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _WIDEST = 2.5  # frames between two that a track is interpolated from: one of them may be dropped
@@ -217,6 +221,12 @@ class Footage:
         """The tracks at the instants, (n, 2)."""
         frames = map(self.frames, range(len(self.curves)))
         return tuple(curve.at(at) for curve, at in zip(self.curves, frames, strict=True))
+
+    @property
+    def some(self) -> Footage:
+        """The same at some of the instants."""
+        step = -(-len(self.instants) // INSTANTS)
+        return replace(self, instants=self.instants[::step])
 
     def frames(self, i: int) -> Floats:
         """What video i shows at the instants: which of its frames."""

@@ -19,15 +19,12 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from .calibrate import learn_cameras
-from .rig import Rig
-from .triangulate import reconstruct, residuals
+from .rig import ALIKE, Rig, reconstruct, residuals
 
 _SHORTEST = 4  # frames of a run, and of what two runs have in common
 _NEAR, _NOISE = 2.0, 2.0  # by how much closer, in times and pixels, a target is to where it goes
-_CLEAR = 2.0  # factor between the misfits of two orders, from which the better one is sure
 _FEW = 0.05  # share of the frames
 _AHEAD, _DEGREE = 6, 4  # frames on both sides of a gap, through which a target goes like t^4
-_FARTHEST = 4 * _AHEAD  # frames of a gap that these can tell anything about
 
 
 class Identities(NamedTuple):
@@ -165,7 +162,7 @@ def _cameras(views: Sequence[Floats], runs: Sequence[_Run], rig: Rig) -> Rig:
             continue
         tried.append((_misfit(here, learned), learned))
     tried.sort(key=lambda one: one[0])
-    if not tried or (len(tried) > 1 and not tried[0][0] * _CLEAR < tried[1][0]):
+    if not tried or (len(tried) > 1 and not tried[0][0] * ALIKE < tried[1][0]):
         sizes = ", ".join(f"{size:.2g}" for size, _ in tried[:2]) or "none"
         raise ValueError(
             "targets: one order of the targets in the views must fit the rig far better than all "
@@ -228,7 +225,7 @@ def _link(one: _Run, other: _Run, cameras: Rig) -> tuple[float, Sequence[int]] |
         return 1.0, orders[0]
     best, second = np.argsort(misfits)[:2]
     sure = float(misfits[second] / max(misfits[best], 1e-9))
-    return (sure, orders[best]) if sure > _CLEAR else None
+    return (sure, orders[best]) if sure > ALIKE else None
 
 
 def _on_from(
@@ -243,12 +240,14 @@ def _on_from(
     orders = list(permutations(range(y.shape[1])))
     if len(orders) == 1:
         return orders[0], True
-    if min(len(x), len(y)) < _DEGREE or here[0] - there[-1] > _FARTHEST:
+    if (
+        min(len(x), len(y)) < _DEGREE or here[0] - there[-1] > 4 * _AHEAD
+    ):  # too long for these to tell anything
         return orders[0], False
     frames = np.concatenate((there, here))
     rough = [_roughness(frames, np.concatenate((x, y[:, list(order)]))) for order in orders]
     best, second = np.argsort(rough)[:2]
-    return orders[best], bool(rough[best] * _CLEAR < rough[second])
+    return orders[best], bool(rough[best] * ALIKE < rough[second])
 
 
 def _in_space(runs: Sequence[_Run], cameras: Rig) -> tuple[Ints, Floats]:

@@ -1,0 +1,462 @@
+"""Rigs of which nothing is measured but perhaps the lenses: where they stand, or an affine map.
+
+Two pinholes that see the same points determine where they stand relative to each other, but for the
+unit of length (the essential matrix, by the five-point method); of the points that they see, any
+other camera's place follows. From far away, three images or more of a path are a linear map of it,
+which is factorised; that start and its mirror image in depth are tried as well. A focal length of
+which nothing is known is tried from long lenses to wide ones. From the starts with the smallest
+residuals all cameras, and their focal lengths as far as they are uncertain, are adjusted
+(`adjust`), and the best is taken.
+
+Nothing in the images tells the unit of length, nor how the rig stands in the room. So the first
+camera gives the axes, x to the right and y up in its image and z towards it; the middle of the path
+is the origin, and the distance from the first camera to the second is the unit. Handedness is told
+by perspective; where that is too weak, a warning says so.
+
+Where even that leads to no rig, as of cameras far away whose frames were cut out: parallel
+projections of one path make a matrix of rank three of the centred tracks of all views, whatever the
+lenses, where the cameras stand, and which part of their frames was cut out; of rank two if the path
+lies in a plane, of rank one on a line. So the lags are those that leave least beyond the smallest
+rank that leaves about as little as three, and the path is known but for an affine map of space.
+What no such map changes is known: frequencies and dampings of a linear law.
+
+Hartley and Zisserman 2004, "Multiple View Geometry"; Nister 2004, PAMI 26 (five points); Tomasi and
+Kanade 1992, IJCV 9 (factorisation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations, product
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from ..arrays import Floats
+from .adjust import PARTS, Adjustment, adjust, known_to
+from .clocks import OVERLAP, Curve, Footage, Lags, check_clocks
+from .models import AffineCamera, PerspectiveCamera
+from .rig import ALIKE, FINE, GROSS, Rig, check_views
+from .triangulate import at_once, missed
+
+_FEWEST = 8  # frames in common of a pair
+_UNKNOWN = 45.0  # degrees
+_VIEWS = np.geomspace(2, 90, 15)  # degrees across an image: what lenses have
+_ANY = 0.5  # error of the logarithm of an unknown focal length
+_STARTS, _LAGS = 4, 10  # of all, from which a search begins
+_STEPS = 30  # of each such search
+_WIDE = 0.01  # OpenCV refuses points that are close together, in whatever unit
+_FLAT = 1e-3  # of the largest axis: what rounding leaves of a motion in a plane
+_TOLD = 25.0  # chi-squared by which the mirror image must be worse
+
+_EITHER_HAND = (
+    "whether the path is the true one or its mirror image cannot be told, as the cameras are "
+    "too far away: measure roughly where they stand, or come closer"
+)
+_Pose = tuple[NDArray[Any], NDArray[Any]]  # OpenCV's rotation and shift
+_PROMISING = 20  # lags of each view
+_BETTER = 1.25  # times less noise is a reason for one more direction of motion
+_MOVES = 5.0  # times what is left by which a target must move, rms, in every view
+_NOTE = (
+    "nothing is known of the cameras: the path is known but for an affine map, its axes are those "
+    "of its spread, largest first; of a linear law frequencies and dampings do not depend on it"
+)
+
+
+def posed(tracks: Sequence[Floats], rig: Rig, synchronous: bool = True, most: float = GROSS) -> Rig:
+    """The rig with places and directions found from tracks, if it has none.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n, 2)
+        At the same instants, ...
+    rig : Rig
+        See `Rig.is_measured`.
+    synchronous : bool
+        ... or but for small lags, which are then learned as well, and forgotten.
+    most : float
+        Noise that may be left, pixels.
+
+    Raises
+    ------
+    ValueError
+        If the tracks do not tell where the cameras stand.
+    """
+    if rig.is_measured:
+        return rig
+    check_views(tracks, rig)
+    starts = sorted(_starts(tracks, rig), key=lambda start: start[0])
+    footage, fits = Footage.of(tracks), []
+    for _, cameras in starts[:_STARTS]:
+        # Known are the place of the first camera, and of all others only their lenses.
+        errors = np.array([known_to(camera) for camera in cameras])
+        for part in ("normal", "angle", "position"):
+            errors[:, PARTS[part]] = np.where(np.arange(len(errors))[:, None] > 0, np.inf, 0.0)
+        errors[1, PARTS["position"]] = 1.0  # or nothing would hold the unit of length
+        if not synchronous:
+            errors[1:, PARTS["lag"]] = np.inf
+        fit = adjust(footage, cameras, errors, most=_STEPS)
+        if np.isfinite(fit.misses).any():
+            fits.append(fit)
+    best = min(fits, key=lambda fit: fit.noise, default=None)
+    if best is None or best.noise > most:
+        left = "no start" if best is None else f"views that are {best.noise:.1f} pixels apart"
+        raise ValueError(
+            "rig: the tracks must tell where the cameras stand, as nothing of it is measured, got "
+            f"{left} (videos that do not start within a frame or two of each other, a focal length "
+            "that is far off, or a target that moves on a line or in a plane?)"
+        )
+    return _framed(rig, best, any(_mirrored(best, fit) for fit in fits))
+
+
+def _starts(
+    tracks: Sequence[Floats], rig: Rig
+) -> Iterator[tuple[float, tuple[PerspectiveCamera, ...]]]:
+    """Cameras by any pair, and as if far away, with each choice of unknown lenses.
+
+    And by how many pixels they miss the tracks; the first one is at home.
+    """
+    some = Footage.of(tracks).some.aligned
+    given = [camera for camera in rig.cameras if isinstance(camera, PerspectiveCamera)]
+    for view in _VIEWS if any(camera.scale is None for camera in given) else _VIEWS[:1]:
+        lenses = [_lens(camera, view) for camera in given]
+        views = at_once(lenses, some)
+        # Directions (X, Y) / Z in OpenCV's axes, right and down.
+        rays = [
+            lens.centred(track) / lens.focal_length * [1, -1]
+            for lens, track in zip(lenses, views, strict=True)
+        ]
+        pairs = (_around(rays, lenses, pair) for pair in combinations(range(len(rays)), 2))
+        for poses in (*pairs, *_far_away(rays, lenses)):
+            if poses is None:
+                continue
+            cameras = _homed(lenses, poses)
+            misses = np.hstack(missed(cameras, views))
+            seen = np.isfinite(misses)
+            if seen.any():  # points that none can see are missed, too
+                yield float(np.median(np.abs(misses[seen])) / seen.mean()), cameras
+
+
+def _lens(camera: PerspectiveCamera, view: float) -> PerspectiveCamera:
+    """A camera of such a field of view, if that is unknown."""
+    if camera.scale is not None:
+        return camera
+    scale = 2 * np.tan(np.deg2rad(view) / 2) / camera.image_size[0]
+    return camera.moved(scale=float(scale), angle=0.0, scale_error=_ANY)
+
+
+def _around(
+    rays: Sequence[Floats], cameras: Sequence[PerspectiveCamera], pair: tuple[int, int]
+) -> list[_Pose] | None:
+    """Poses of cameras around what two of them see; None if they tell nothing."""
+    i, j = pair
+    both = np.isfinite(rays[i]).all(axis=1) & np.isfinite(rays[j]).all(axis=1)
+    if both.sum() < _FEWEST:
+        return None
+    seen, centre = (rays[i][both], rays[j][both]), np.eye(3)
+    essential, mask = cv2.findEssentialMat(
+        *seen, centre, method=cv2.USAC_ACCURATE, prob=0.9999,
+        threshold=GROSS / min(cameras[k].focal_length for k in pair),
+    )  # fmt: skip
+    if essential is None or essential.shape != (3, 3):
+        return None
+    _, turn, shift, front, homogeneous = cv2.recoverPose(
+        essential, *seen, centre, distanceThresh=50.0, mask=mask
+    )
+    points, there = np.full((len(rays[0]), 3), np.nan), np.flatnonzero(both)[front[:, 0] > 0]
+    points[there] = (homogeneous[:3] / homogeneous[3]).T[front[:, 0] > 0]
+    poses: dict[int, _Pose] = {
+        i: (np.eye(3), np.zeros(3)), j: (np.asarray(turn), np.asarray(shift)[:, 0])
+    }  # fmt: skip
+    for k in set(range(len(cameras))) - set(pair):
+        told = np.isfinite(points).all(axis=1) & np.isfinite(rays[k]).all(axis=1)
+        if told.sum() < _FEWEST:
+            return None
+        wide = _WIDE * float(np.ptp(points[told], axis=0).max())
+        try:
+            done, axis, place, _ = cv2.solvePnPRansac(
+                points[told] / wide, rays[k][told], centre, None, flags=cv2.SOLVEPNP_SQPNP,
+                reprojectionError=3 * GROSS / cameras[k].focal_length,
+            )  # fmt: skip
+        except cv2.error:  # points of one draw lie too close together
+            return None
+        if not done:
+            return None
+        poses[k] = np.asarray(cv2.Rodrigues(axis)[0]), wide * np.asarray(place)[:, 0]
+    return [poses[k] for k in sorted(poses)]
+
+
+def _far_away(
+    rays: Sequence[Floats], cameras: Sequence[PerspectiveCamera]
+) -> Iterator[list[_Pose]]:
+    """Poses as if no camera were near: two, the mirror images of each other in depth.
+
+    Centred images are then a matrix M (2 m, 3) times the path, and M A holds the rows of scaled
+    rotations. With Q = A A', m1' Q m2 = 0 and m1' Q m1 = m2' Q m2 in each camera, linear in Q.
+    """
+    images = [c.focal_length * seen for c, seen in zip(cameras, rays, strict=True)]
+    every = np.hstack(images)
+    every = every[np.isfinite(every).all(axis=1)]
+    if len(every) < _FEWEST:
+        return
+    middle = every.mean(axis=0)
+    left, singular, _ = np.linalg.svd((every - middle).T, full_matrices=False)
+    motion = (left[:, :3] * singular[:3]).reshape(-1, 2, 3)
+    sizes = np.linalg.norm(motion, axis=(1, 2), keepdims=True)
+    if not sizes.all():  # nothing moves in some view
+        return
+    up = np.triu_indices(3)
+    twice = 2 - np.eye(3)[up]  # what is off the diagonal stands there twice
+    equations = []
+    for one, other in motion / sizes:
+        crossed = np.outer(one, other) + np.outer(other, one)
+        unlike = np.outer(one, one) - np.outer(other, other)
+        equations += [crossed[up] * twice, unlike[up] * twice]
+    q = np.zeros((3, 3))
+    q[up] = np.linalg.svd(np.array(equations))[2][-1]
+    values, axes = np.linalg.eigh(q + np.triu(q, 1).T)
+    values = values * np.sign(values.sum())
+    root = axes * np.sqrt(np.maximum(values, _FLAT * values.max()))
+    for mirror in ([1, 1, 1], [1, 1, -1]):
+        poses = []
+        for rows, camera, centre in zip(
+            motion @ root * mirror, cameras, middle.reshape(-1, 2), strict=True
+        ):
+            turned, lengths, back = np.linalg.svd(rows, full_matrices=False)
+            right, down = turned @ back
+            shift = np.append(centre, camera.focal_length) / lengths.mean()
+            poses.append((np.array([right, down, np.cross(right, down)]), shift))
+        yield poses
+
+
+def _homed(
+    cameras: Sequence[PerspectiveCamera], poses: Sequence[_Pose]
+) -> tuple[PerspectiveCamera, ...]:
+    """The cameras at poses of which the first is at home, and the second a unit from it."""
+    home, place = poses[0]
+    turns = [turn @ home.T for turn, _ in poses]
+    shifts = [shift - turn @ place for turn, (_, shift) in zip(turns, poses, strict=True)]
+    unit = np.linalg.norm(shifts[1])
+    return tuple(
+        camera.posed(turn * [1, -1, -1], shift / unit)
+        for camera, turn, shift in zip(cameras, turns, shifts, strict=True)
+    )
+
+
+def _mirrored(best: Adjustment, other: Adjustment) -> bool:
+    """Whether other cameras explain the tracks as well, by the mirror image of the path."""
+    left = [np.nansum(fit.weights[:, None] * fit.misses**2) for fit in (best, other)]
+    if left[1] - left[0] > _TOLD * best.noise**2:
+        return False
+    both = np.isfinite(best.points + other.points).all(axis=1)
+    x, y = (fit.points[both] - fit.points[both].mean(axis=0) for fit in (best, other))
+    return bool(np.linalg.det(x.T @ y) < 0)
+
+
+def _framed(rig: Rig, fit: Adjustment, mirrored: bool) -> Rig:
+    """The cameras around the middle of the path, the second one so far from the first as is known.
+
+    They are as good as measured by eye: what the tracks tell is learned later.
+    """
+    cameras, middle = fit.cameras, np.nanmean(fit.points, axis=0)
+    between = np.asarray(cameras[1].position) - np.asarray(cameras[0].position)
+    apart = float(np.linalg.norm(between))
+    unit = (1.0 if rig.distance is None else rig.distance) / apart
+    first, *others = (
+        replace(camera, position=unit * (np.asarray(camera.position) - middle))
+        for camera in cameras
+    )
+    loose = [
+        replace(camera, position_error=unit * apart, normal_error=_UNKNOWN) for camera in others
+    ]
+    doubts = (_EITHER_HAND,) if mirrored else ()
+    return Rig((first, *loose), doubts, _note(rig))
+
+
+def _note(rig: Rig) -> str:
+    """What cannot be known of a rig that nobody has measured."""
+    length = (
+        "the unit of length is the distance from the first camera to the second"
+        if rig.distance is None
+        else f"the first camera is {rig.distance:g} from the second"
+    )
+    lenses = (
+        "; focal lengths are those that the tracks tell"
+        if any(camera.scale is None for camera in rig.cameras)
+        else ""
+    )
+    return (
+        "nothing is measured of where the cameras stand: x is to the right and y up in the image "
+        "of the first camera, z points towards it, the origin is the middle of the path, "
+        f"{length}{lenses}"
+    )
+
+
+class Factorised(NamedTuple):
+    """Cameras of one affine frame, when their videos began, and along how many axes it moves."""
+
+    rig: Rig
+    lags: Lags
+    moving: int
+
+
+def factorised(
+    tracks: Sequence[Floats],
+    rig: Rig,
+    rates: Floats,
+    clocks: Sequence[Floats] | None,
+    lags: Floats | None = None,
+) -> Factorised | None:
+    """Cameras of which nothing is known as affine maps; None if no lags make the views agree.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n_i, 2)
+        One per camera, NaN where the target was not seen.
+    rig : Rig
+        See `Rig.is_measured`; of its cameras the sizes of the images count.
+    rates, clocks, lags
+        See `align`; lags are found if they are not given.
+    """
+    ticks = check_clocks(clocks, tracks)
+    films = Footage(tuple(map(Curve, tracks, ticks)), ticks[0], np.zeros(len(tracks)), rates)
+    views = _Views(films.some)
+    ranks = range(1, 4)
+    found = [
+        views.best(rank) if lags is None else (views.left(lags, range(len(tracks)), rank), lags)
+        for rank in ranks
+    ]
+    enough = max(_BETTER * found[-1][0], FINE)
+    rank = next(rank for rank, (left, _) in zip(ranks, found, strict=True) if left <= enough)
+    left, best = found[rank - 1]
+    if not np.isfinite(left):
+        return None
+    every = np.hstack(replace(films, lags=best).aligned)
+    every = every[np.isfinite(every).all(axis=1)]
+    count, middle = len(tracks), every.mean(axis=0)
+    moved = every - middle
+    axes = np.linalg.svd(moved, full_matrices=False)[2]
+    missed = moved - moved @ axes[:rank].T @ axes[:rank]
+    of_views = [
+        (part**2).reshape(len(every), count, 2).mean(axis=(0, 2)) for part in (moved, missed)
+    ]
+    if not (of_views[0] > _MOVES**2 * of_views[1]).all():
+        return None
+    cameras = [
+        AffineCamera.of(
+            np.sqrt(count) * axes[:3, 2 * i : 2 * i + 2].T, middle[2 * i : 2 * i + 2],
+            camera.image_size,
+        )
+        for i, camera in enumerate(rig.cameras)
+    ]  # fmt: skip
+    errors = views.errors(best, rank) if lags is None else np.zeros(count)
+    doubts = () if left <= GROSS else (
+        f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
+    )  # fmt: skip
+    told = Lags(best, rates, errors, left, doubts, clocks=() if clocks is None else ticks)
+    return Factorised(Rig(tuple(cameras), note=_NOTE), told, rank)
+
+
+@dataclass(frozen=True, eq=False)
+class _Views:
+    """All views at some instants, (n,), as a function of their lags."""
+
+    footage: Footage
+
+    def matrix(self, lags: Floats, places: Sequence[int]) -> Floats:
+        """Tracks of some views side by side, (n, 2 m)."""
+        late = replace(self.footage, lags=lags)
+        return np.hstack([late.curves[i].at(late.frames(i)) for i in places])
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """Of all videos, in frames of the first."""
+        frames = [np.ptp(curve.clock) + 1 for curve in self.footage.curves]
+        return np.array(frames) / self.footage.rates
+
+    @cached_property
+    def least(self) -> float:
+        """Frames of the first video that all must show."""
+        return OVERLAP * float(self.lengths.min())
+
+    def left(self, lags: Floats, places: Sequence[int], rank: int) -> float:
+        """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
+        matrix = self.matrix(lags, places)
+        seen = matrix[np.isfinite(matrix).all(axis=1)]
+        step = self.footage.span / max(len(self.footage.instants) - 1, 1)
+        if len(seen) <= matrix.shape[1] or len(seen) * step < self.least:
+            return np.inf
+        values = np.linalg.eigvalsh(np.cov(seen.T, bias=True))
+        return float(np.sqrt(max(values[:-rank].mean(), 0.0)))
+
+    def best(self, rank: int) -> tuple[float, Floats]:
+        """What the lags leave beyond a rank that leave least, and those lags.
+
+        Of two views, lags are promising that leave less than their neighbours; of three, these are
+        tried together, and further views one by one. Of those that leave about as little, the
+        shortest count.
+        """
+        count = len(self.lengths)
+        lags = np.zeros(count)
+        promising = [self._promising(i, rank) for i in range(1, count)]
+        for last in range(3, count + 1):
+            tried = []
+            for new in product(*promising[:2]) if last == 3 else product(promising[last - 2]):
+                lags[last - len(new) : last] = new
+                tried.append((self.left(lags, range(last), rank), tuple(lags)))
+            starts = [np.array(one) for _, one in sorted(tried)[:_LAGS]]
+            found = [self._polished(one, last, rank) for one in starts]
+            left = np.array([self.left(one, range(last), rank) for one in found])
+            alike = np.flatnonzero(left <= max(ALIKE * left.min(), FINE))
+            shortest = min(alike, key=lambda k: np.abs(found[k]).sum())
+            lags, least = found[shortest], float(left[shortest])
+        return least, lags
+
+    def _promising(self, i: int, rank: int) -> list[float]:
+        """Whole lags of a view at which less is left than at their neighbours, the best first."""
+        first, last = self.least - self.lengths[i], self.lengths[0] - self.least
+        tried = np.arange(np.ceil(first), last + 1)
+        lags = np.zeros(len(self.lengths))
+        left = np.full(len(tried) + 2, np.inf)
+        for k, lags[i] in enumerate(tried):
+            left[k + 1] = self.left(lags, (0, i), rank)
+        lowest = np.flatnonzero((left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:]))
+        return tried[lowest[np.argsort(left[1 + lowest])][:_PROMISING]].tolist()
+
+    def _polished(self, lags: Floats, count: int, rank: int) -> Floats:
+        """The lags of so many views, to fractions of a frame, that leave least near by."""
+
+        def beyond(others: Floats) -> Floats:
+            return self._beyond(np.concatenate(([0.0], others, lags[count:])), range(count), rank)
+
+        found = least_squares(beyond, lags[1:count], diff_step=1e-3, max_nfev=_STEPS)
+        return np.concatenate(([0.0], found.x, lags[count:]))
+
+    def _beyond(self, lags: Floats, places: Sequence[int], rank: int) -> Floats:
+        """What is left of every frame beyond a rank, pixels; zero where a view is missing."""
+        matrix = self.matrix(lags, places)
+        seen = np.isfinite(matrix).all(axis=1)
+        beyond = np.zeros_like(matrix)
+        if seen.any():
+            centred = matrix[seen] - matrix[seen].mean(axis=0)
+            axes = np.linalg.svd(centred, full_matrices=False)[2][:rank]
+            beyond[seen] = centred - centred @ axes.T @ axes
+        return beyond.ravel()
+
+    def errors(self, lags: Floats, rank: int) -> Floats:
+        """Standard errors of the lags, if what is left is independent noise, (m,)."""
+        every, step = range(len(lags)), 1e-2
+        here = self._beyond(lags, every, rank)
+        moves = step * np.eye(len(lags))[1:]
+        ends = [[self._beyond(lags + s * move, every, rank) for s in (1, -1)] for move in moves]
+        slopes = np.array([(later - sooner) / (2 * step) for later, sooner in ends])
+        information = slopes @ slopes.T
+        if np.linalg.cond(information) > 1 / np.finfo(float).eps:
+            return np.append(0.0, np.full(len(slopes), np.inf))
+        variance = (here**2).sum() / max(np.count_nonzero(here) / 2, 1)
+        return np.append(0.0, np.sqrt(variance * np.diag(np.linalg.inv(information))))
