@@ -15,7 +15,7 @@ import pytest
 from helpers import TinyRepository
 from hypothesis import settings
 
-from vidsindy_lite import observation
+from vidsindy_lite import pipeline
 
 # The same examples in every run, so that a red test stays red; no deadline on a busy machine.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(items):
 def tracked_once():
     """Tracks each video file once, however many tests of a module discover from it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(observation, "track", cache(observation.track))
+        patch.setattr(pipeline, "track", cache(pipeline.track))
         yield
 
 

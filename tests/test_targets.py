@@ -10,8 +10,7 @@ from scipy.linalg import expm
 import vidsindy_lite as vl
 from vidsindy_lite.__main__ import main
 from vidsindy_lite.companion.report import write_refusal, write_report
-from vidsindy_lite.observation import check_found
-from vidsindy_lite.pipeline import _driven
+from vidsindy_lite.pipeline import _driven, check_found
 from vidsindy_lite.refusal import Refused
 
 FRAMES, STEP = 260, 0.05

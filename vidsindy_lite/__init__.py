@@ -4,7 +4,6 @@
 
     video files --vision--> pixel tracks --cameras--> path in space --dynamics--> equations
                                                       and its errors
-    `------------------ observation ------------------'
     `----------------------------------- pipeline ------------------------------------'
 
 `discover_from_videos` goes all the way, and `discover_from_video` of one camera, where the motion

@@ -16,12 +16,12 @@ from .dynamics import PolynomialSystem as PolynomialSystem
 from .dynamics import discover as discover
 from .dynamics import on_circle as on_circle
 from .dynamics import on_sphere as on_sphere
-from .observation import Observation as Observation
-from .observation import observe as observe
-from .observation import observe_tracks as observe_tracks
+from .pipeline import Observation as Observation
 from .pipeline import VideoDiscovery as VideoDiscovery
 from .pipeline import discover_from_tracks as discover_from_tracks
 from .pipeline import discover_from_videos as discover_from_videos
+from .pipeline import observe as observe
+from .pipeline import observe_tracks as observe_tracks
 from .plane import discover_from_video as discover_from_video
 from .vision import Hint as Hint
 from .vision import Scene as Scene

@@ -1,7 +1,13 @@
-"""From video files to equations: `observe`, then `discover` on the path that it reconstructs."""
+"""From video files to a path in space, and on to its equations.
+
+`observe` tracks, synchronises, learns the cameras and reconstructs the path; `discover_from_videos`
+looks for the law that it obeys.
+"""
+
+from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -10,8 +16,47 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Floats
-from .cameras import AffineCamera, Rig
-from .checks import check_instance, check_integer, check_positive, check_rows, shown
+from .cameras import (
+    ALIKE,
+    DISAGREEMENT,
+    GROSS,
+    AffineCamera,
+    Clock,
+    Factorised,
+    Lags,
+    PerspectiveCamera,
+    Rig,
+    align,
+    check_learnable,
+    disagreement,
+    explain,
+    factorised,
+    find_mistake,
+    identify,
+    learn_cameras,
+    learn_lags,
+    list_lags,
+    posed,
+    reconstruct,
+    residuals,
+    side_by_side,
+    smooth,
+    stacked,
+    systematic_errors,
+    trailing_errors,
+)
+from .checks import (
+    check_choice,
+    check_instance,
+    check_integer,
+    check_items,
+    check_path,
+    check_positive,
+    check_rows,
+    check_tracks,
+    check_vector,
+    shown,
+)
 from .dynamics import (
     Discovery,
     Form,
@@ -25,9 +70,525 @@ from .dynamics import (
     discover,
     variable_names,
 )
-from .observation import Observation, observe, observe_tracks
-from .refusal import refusing
-from .vision import Hint, TrackFile, read_tracks
+from .dynamics import smooth as smooth_curves
+from .progress import bar
+from .refusal import Refused, refusing, stands_still
+from .vision import (
+    Hint,
+    Track,
+    TrackFile,
+    VideoInfo,
+    check_detector,
+    frame_clock,
+    read_tracks,
+    track,
+    track_targets,
+    video_info,
+)
+
+_OTHER_LAG = 0.02  # frames by which it may differ without a word
+_SMOOTHED = 8  # frames of a stretch, from which its curve can be told from noise
+_WRONG_LAG = 0.5  # frames by which a lag that is given may differ from what the tracks say
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What the videos of one target tell before any law is asked for.
+
+    Parameters
+    ----------
+    tracks : tuple of ndarray, shape (n, 2)
+        Pixels of the target in each video at the instants ``t``; NaN where it was not seen. Of k
+        targets (n, 2 k), side by side, as are their paths and errors below.
+    rig : Rig
+        The cameras, all calibrated.
+    lags : Lags
+        When each video started.
+    t : ndarray, shape (n,)
+        Time of each frame of the first video.
+    x : ndarray, shape (n, 3)
+        Reconstructed path in scene units; NaN where fewer than two cameras saw the target.
+    systematic : ndarray, shape (k, n, 3)
+        Errors of the path that all frames share: what k independent causes, each off by one
+        standard error, add to it, in scene units. See `discover`.
+    warnings : tuple of str
+        Why the result should not be trusted, with advice; empty if nothing was found.
+    """
+
+    tracks: tuple[Floats, ...]
+    rig: Rig
+    lags: Lags
+    t: Floats
+    x: Floats
+    systematic: Floats
+    warnings: tuple[str, ...]
+
+    @property
+    def status(self) -> str:
+        """``"ok"``, or ``"suspect"`` if there is a warning."""
+        return "suspect" if self.warnings else "ok"
+
+    @property
+    def targets(self) -> int:
+        """How many targets there are."""
+        return self.x.shape[1] // 3
+
+    @property
+    def residuals(self) -> list[Floats]:
+        """Tracks minus what the cameras see of the path, in the shape of the tracks."""
+        missed = residuals([stacked(track, 2) for track in self.tracks], self.rig)
+        return [side_by_side(one, self.targets) for one in missed]
+
+
+def observe(
+    paths: Sequence[str | Path],
+    rig: Rig | None = None,
+    t: ArrayLike | None = None,
+    *,
+    lags: Sequence[float] | None = None,
+    detector: str | os.PathLike = "auto",
+    hints: Sequence[Hint | None] | None = None,
+    targets: int = 1,
+    progress: bool | None = None,
+) -> Observation:
+    """Track a target in the videos of several fixed cameras and reconstruct its path.
+
+    The frames of the first video are the clock; the others may start earlier or later, differ in
+    length, and in frame rate if their files state it. Frames that were dropped, or taken at uneven
+    times, count at the times that the files state.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        One video per camera of the rig: a file, a folder of images, or a pattern of their names,
+        see `read_video`.
+    rig : Rig, optional
+        Positions and normals of all cameras, scale and angle of at least one. Or of three or more
+        perspective cameras nothing, the default, or the scale, which may be rough; then the videos
+        must start within a frame or two of each other, or their lags be given. Where that leads to
+        no rig, as for cameras far away or pictures that were cut out, the path is known but for an
+        affine map, and the note of the result's rig says what that leaves of a law.
+    t : array_like, shape (n,), optional
+        Time of each frame of the first video, increasing; all videos then have the same frame rate.
+        By default as the file states, in seconds from its first frame.
+    lags : array_like, shape (m,), optional
+        By how many frames of the first video each one starts later; only differences count. By
+        default they are learned, see `learn_lags`.
+    detector : str or path
+        See `track`.
+    hints : sequence of Hint or None, optional
+        Which of the things that move is the target, one per video: see `track`.
+    targets : int
+        How many targets there are. Several are followed wherever they are apart, and told from each
+        other by geometry: in three or more views of a measured rig that start together, or whose
+        lags are given. The first is furthest left where the first view first tells them apart.
+    progress : bool, optional
+        Whether progress bars are shown; by default after two seconds, if a person watches.
+
+    Returns
+    -------
+    Observation
+        Its first warnings are that the rig does not agree with the tracks, if it does not, and
+        which backgrounds are not at rest.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If a file is missing, cut off or no video, if the numbers of files and cameras disagree, if
+        ``t`` is given for files that state different frame rates, if a target is not found, if the
+        given lags are clearly wrong, or if the cameras cannot be learned (see `learn_cameras`).
+        What can be told before a video is tracked is.
+    """
+    if rig is not None:
+        check_learnable(rig)
+    check_detector(detector)
+    check_integer("targets", targets, least=1)
+    if targets > 1:
+        _check_several(targets, rig, detector, hints)
+    files = _check_paths(paths, rig)
+    shots = [video_info(path) for path in files]
+    if rig is None:
+        rig = Rig(tuple(PerspectiveCamera(image_size=shot.size) for shot in shots))
+    _check_shots(files, shots, rig)
+    names = [path.name for path in files]
+    clocks = [frame_clock(path) for path in files]
+    clock = Clock.of_videos([shot.fps for shot in shots], clocks, t)
+    given = _check_lags(lags, clock, names)
+    films = bar(progress, "track", iterable=list(zip(files, shots, strict=True)))
+    told = _check_hints(hints, files)
+    seen = [
+        _track_one(path, shot.frames, detector, hint, targets)
+        for (path, shot), hint in zip(films, told, strict=True)
+    ]
+    tracks = [np.hstack([track.pixels for track in found]) for found in seen]
+    check_found(tracks, names, targets)
+    doubts = [warning for found in seen for track in found for warning in track.warnings]
+    conclude = _observed if targets == 1 else _several_observed
+    return conclude(tracks, rig, clock, given, names, doubts, progress)
+
+
+def observe_tracks(
+    tracks: Sequence[ArrayLike],
+    rig: Rig,
+    t: ArrayLike | Sequence[ArrayLike],
+    *,
+    lags: Sequence[float] | str | None = None,
+    names: Sequence[str] | None = None,
+    progress: bool | None = None,
+) -> Observation:
+    """Reconstruct the path of a target from tracks: `observe` for who has tracked it already.
+
+    Parameters
+    ----------
+    tracks : sequence of array_like, shape (n_i, 2)
+        Pixels of the target, one track per camera of the rig, each from its own first frame. NaN
+        where it was not seen.
+    rig
+        See `observe`.
+    lags : sequence of float or "synchronous", optional
+        See `observe`. Synchronous are cameras that share a trigger: no other lags are tried, which
+        takes most of the time where tracks are noisy, nor what mistake would make views agree.
+    t : array_like, shape (n_0,), or a sequence of such
+        Time of each frame of the first track, increasing; all cameras then have its frame rate. Or
+        the times of each track by its own clock, if rates differ or frames are missing.
+    names : sequence of str, optional
+        What messages call the tracks.
+    progress : bool, optional
+        Whether progress bars are shown; by default after two seconds, if a person watches.
+
+    Returns
+    -------
+    Observation
+
+    Raises
+    ------
+    ValueError
+        If the numbers of tracks, cameras and times disagree, or as `observe` does.
+    """
+    check_learnable(rig)
+    raw = check_tracks(tracks, len(rig.cameras))
+    if min(map(len, raw)) < 2:
+        raise ValueError(f"tracks: must have two frames or more, got {[*map(len, raw)]}")
+    clock = Clock.of_tracks(t, raw)
+    called = [f"tracks[{i}]" for i in range(len(raw))] if names is None else names
+    names = [str(name) for name in check_items("names", called)]
+    if len(names) != len(raw):
+        raise ValueError(f"names: must be one per track, got {len(names)} for {len(raw)}")
+    if isinstance(lags, str):
+        check_choice("lags", lags, ["synchronous"])
+        return _observed(raw, rig, clock, np.zeros(len(raw)), names, synchronous=True)
+    given = _check_lags(lags, clock, names)
+    return _observed(raw, rig, clock, given, names, progress=progress)
+
+
+def _observed(
+    raw: Sequence[Floats],
+    rig: Rig,
+    clock: Clock,
+    lags: Floats | None,
+    names: Sequence[str],
+    doubts: Sequence[str] = (),
+    progress: bool | None = None,
+    synchronous: bool = False,
+) -> Observation:
+    """What the tracks of videos of these names tell, with the tracker's doubts about them."""
+    begun = np.zeros(len(raw)) if lags is None else lags
+    with refusing("lags", raw, names):
+        for seen, name in zip(raw, names, strict=True):
+            if lags is None and stands_still(seen):
+                raise ValueError(f"lags: must be given where a track stands still, as {name} does")
+    if not rig.is_measured:
+        with refusing("cameras", raw, names):
+            far = factorised(raw, rig, clock.rates, clock.uneven, lags)
+            most = GROSS if far is None else min(GROSS, ALIKE * far.lags.residual)
+            at_once = align(raw, begun, clock.rates, clock.uneven)
+            try:
+                if far is not None and far.moving == 1:  # a line tells of no lens
+                    return _from_afar(raw, far, clock, doubts)
+                rig = posed(at_once, rig, lags is not None, most)
+            except ValueError:
+                if far is None:
+                    raise
+                return _from_afar(raw, far, clock, doubts)
+            doubts = (*rig.warnings, *doubts)
+    first: list[str] = []
+    start = lags
+    if not synchronous:
+        mistake = find_mistake(raw, rig, clock.rates, clock.uneven, begun, names)
+        if mistake is not None:  # and is put right, as nothing can be learned with it
+            first, raw = [mistake.text], mistake.tracks
+            clock = clock.mended(mistake.rates, mistake.clocks)
+            lags, start = None, mistake.lags.frames
+    with refusing("lags", raw, names):
+        if synchronous:
+            nothing = np.zeros(len(raw))
+            best = Lags(nothing, clock.rates, nothing, 0.0, clocks=tuple(clock.uneven or ()))
+        else:
+            uneven = clock.uneven
+            best = learn_lags(raw, rig, clock.rates, start=start, clocks=uneven, progress=progress)
+        if lags is not None:
+            _refuse_wrong(lags, best)
+    used = best.frames if lags is None else lags
+    tracks = align(raw, used, best.rates, clock.uneven)
+    with refusing("cameras", raw, names):
+        learned = learn_cameras(tracks, rig)
+    missed = disagreement(tracks, learned)
+    told = best
+    if lags is not None:
+        told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
+    x = reconstruct(tracks, learned)
+    learning = systematic_errors(raw, rig, learned, told)
+    motion = [_smoothed(clock.times, track) for track in tracks]
+    trails = trailing_errors(tracks, learned, motion)
+    return Observation(
+        tracks=tracks,
+        rig=learned,
+        lags=told,
+        t=clock.times,
+        x=x,
+        systematic=np.concatenate((learning, trails)),
+        warnings=(
+            *first,
+            *_rig_warnings(missed, tracks, rig, learned, names, used, best),
+            *learned.warnings,
+            *doubts,
+            *told.warnings,
+        ),
+    )
+
+
+def _from_afar(
+    raw: Sequence[Floats], found: Factorised, clock: Clock, doubts: Sequence[str]
+) -> Observation:
+    """What far cameras of which nothing is known tell of a path."""
+    tracks = align(raw, found.lags.frames, clock.rates, clock.uneven)
+    motion = [_smoothed(clock.times, track) for track in tracks]
+    moves = np.arange(3) < found.moving
+    return Observation(
+        tracks=tracks,
+        rig=found.rig,
+        lags=found.lags,
+        t=clock.times,
+        x=reconstruct(tracks, found.rig) * moves,
+        systematic=trailing_errors(tracks, found.rig, motion) * moves,
+        warnings=(*found.lags.warnings, *doubts),
+    )
+
+
+def _several_observed(
+    raw: Sequence[Floats],
+    rig: Rig,
+    clock: Clock,
+    lags: Floats | None,
+    names: Sequence[str],
+    doubts: Sequence[str],
+    progress: bool | None,
+) -> Observation:
+    """What the tracks (n_i, 2 k) of k targets tell: once told apart, they are one long track."""
+    count, begun = raw[0].shape[1] // 2, np.zeros(len(raw)) if lags is None else lags
+    each = [np.split(track, count, axis=1) for track in raw]
+    aligned = [align(one, begun, clock.rates, clock.uneven) for one in zip(*each, strict=True)]
+    tracks = [np.hstack(views) for views in zip(*aligned, strict=True)]
+    with refusing("cameras", tracks, names):
+        who = identify(tracks, rig)
+    rows = [stacked(track, 2) for track in who.tracks]
+    t, step = clock.times, np.diff(clock.times).min()
+    later = (t[-1] - t[0] + 2 * step) * np.arange(count)[:, None]
+    long = Clock.of_tracks((np.append(t, t[-1] + step) + later).ravel()[:-1], rows)
+    seen = _observed(rows, rig, long, 0 * begun, names, (*doubts, *who.doubts), progress)
+    modes = [side_by_side(mode, count) for mode in seen.systematic]
+    return replace(
+        seen,
+        tracks=tuple(side_by_side(track, count) for track in seen.tracks),
+        lags=replace(seen.lags, frames=begun, rates=clock.rates),
+        t=t,
+        x=side_by_side(seen.x, count),
+        systematic=np.reshape(modes, (len(modes), len(t), 3 * count)),
+    )
+
+
+def _check_lags(lags: Sequence[float] | None, clock: Clock, names: Sequence[str]) -> Floats | None:
+    """By how much each video starts later than the first, if that is given.
+
+    Each must share half of the shorter one's time with the first.
+    """
+    if lags is None:
+        return None
+    given = check_vector("lags", lags, len(names))
+    given -= given[0]
+    frames, ends = [len(one) for one in clock.frames], clock.ends
+    common = np.minimum(given + ends, ends[0]) - np.maximum(given, 0)
+    few = common < np.minimum(ends, ends[0]) / 2
+    if few.any():
+        i = int(few.argmax())
+        raise ValueError(
+            "lags: every video must have half of the shorter of the two in common with the first "
+            f"({frames[0]} frames), got {given[i]:g} for {names[i]} ({frames[i]} frames)"
+        )
+    return given
+
+
+def _check_paths(paths: Sequence[str | Path], rig: Rig | None) -> list[Path]:
+    """One file name per camera."""
+    if isinstance(paths, str) or not isinstance(paths, Iterable):
+        raise ValueError(f"paths: must be a list of files, one per camera, got {shown(paths)}")
+    files = [check_path(f"paths[{i}]", path) for i, path in enumerate(paths)]
+    if rig is not None and len(files) != len(rig.cameras):
+        raise ValueError(
+            f"paths: there must be one video per camera of the rig ({len(rig.cameras)}), "
+            f"got {len(files)}"
+        )
+    return files
+
+
+def _check_several(
+    targets: int, rig: Rig | None, detector: str | os.PathLike, hints: Sequence[Hint | None] | None
+) -> None:
+    """That several targets can be told apart."""
+    if rig is None:
+        raise ValueError(f"rig: must be given to tell {targets} targets apart, got None")
+    if len(rig.cameras) < 3 or not rig.is_measured:
+        known = "known" if rig.is_measured else "unknown"
+        raise ValueError(
+            f"targets: {targets} need three cameras of known places and directions, got "
+            f"{len(rig.cameras)} of {known} ones"
+        )
+    if detector != "auto" or any(hints or ()):
+        raise ValueError(
+            f"targets: {targets} are found by detector='auto' alone, without hints, got "
+            f"detector={shown(detector)}, hints={shown(hints)}"
+        )
+
+
+def _check_shots(files: Sequence[Path], shots: Sequence[VideoInfo], rig: Rig) -> None:
+    """That each file is a video of the size that its camera has."""
+    for path, shot, camera in zip(files, shots, rig.cameras, strict=True):
+        if shot.frames < 2:
+            raise ValueError(f"paths: {path.name} must be a video, got a single frame")
+        if shot.size != camera.image_size:
+            raise ValueError(
+                f"paths: {path.name} must have the image size of its camera in the rig, "
+                f"{camera.image_size}, got {shot.size}"
+            )
+
+
+def _check_hints(
+    hints: Sequence[Hint | None] | None, files: Sequence[Path]
+) -> Sequence[Hint | None]:
+    """One hint per video, or none."""
+    if hints is None:
+        return [None] * len(files)
+    if not isinstance(hints, Sequence) or len(hints) != len(files):
+        raise ValueError(f"hints: must be one per video ({len(files)}) or None, got {shown(hints)}")
+    return hints
+
+
+def _smoothed(t: Floats, values: Floats) -> Floats:
+    """What (n, k) values that change with the motion would be without the noise of its frames."""
+    clean, rng = values.copy(), np.random.default_rng(0)
+    seen = np.flatnonzero(np.isfinite(values).all(axis=1))
+    for stretch in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1):
+        if len(stretch) >= _SMOOTHED:
+            curve = smooth_curves([(t[stretch], values[stretch])], rng).splines[0]
+            clean[stretch] = curve(t[stretch])
+    return clean
+
+
+def _track_one(
+    path: Path, frames: int, detector: str | os.PathLike, hint: Hint | None, targets: int
+) -> tuple[Track, ...]:
+    """Track the targets of a video that should have so many frames."""
+    found = (track(path, detector, hint),) if targets == 1 else track_targets(path, targets)
+    if len(found[0].pixels) != frames:
+        raise ValueError(
+            f"paths: {path.name} must hold the {frames} frames that its header states, got "
+            f"{len(found[0].pixels)} that can be read: the file is cut off or damaged, or its "
+            "header wrong"
+        )
+    return found
+
+
+def check_found(tracks: Sequence[Floats], names: Sequence[str], targets: int) -> None:
+    """That each video shows its targets: all are tracked first, so that all can be looked at.
+
+    Raises
+    ------
+    Refused
+        If one does not.
+    """
+    wanted = "one moving target" if targets == 1 else f"{targets} moving targets"
+    for pixels, name in zip(tracks, names, strict=True):
+        found = int(np.isfinite(pixels).any(axis=0).sum()) // 2
+        if found < targets:
+            raise Refused(
+                f"paths: {name} must show {wanted}, got {found or 'none'} in any frame: what "
+                "moves by less than a tenth of its own width is taken for background",
+                "track",
+                tracks,
+            )
+
+
+def _refuse_wrong(lags: Floats, learned: Lags) -> None:
+    """Refuse given lags if others are clearly those of the tracks."""
+    if _apart(lags, learned, _WRONG_LAG):
+        raise ValueError(
+            f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
+            f"({list_lags(learned.frames)}) do: leave them out, or check them"
+        )
+
+
+def _apart(lags: Floats, learned: Lags, limit: float) -> bool:
+    """Whether lags differ clearly, and by more than so many frames, from those of the tracks."""
+    apart = np.abs(learned.frames - lags) > limit + 5 * learned.errors
+    return learned.agree and bool(apart.any())
+
+
+def _rig_warnings(
+    missed: Sequence[float],
+    tracks: Sequence[Floats],
+    given: Rig,
+    learned: Rig,
+    names: Sequence[str],
+    lags: Floats,
+    best: Lags,
+) -> list[str]:
+    """Do the cameras agree on the target to within what tracking can be blamed for?
+
+    They miss it by `missed` pixels. The tracks are those at the lags, `best` are the lags that the
+    tracks themselves tell.
+    """
+    wrong_lag = _apart(lags, best, _OTHER_LAG)
+    if wrong_lag and max(missed) <= DISAGREEMENT:
+        return [
+            "the lags that are given differ from those of the tracks: "
+            f"({list_lags(lags)}) for ({list_lags(best.frames)}) frames: leave them out, or check"
+        ]
+    sizes = ", ".join(f"{size:.1f}" for size in missed)
+    apart = (
+        f"in one frame of ten, tracked and reconstructed target lie more than {sizes} pixels apart"
+    )
+    if wrong_lag:  # by too little to refuse them
+        return [
+            f"the rig does not agree with the tracks at the lags that are given: {apart}: the lags "
+            f"({list_lags(best.frames)}) would explain it best"
+        ]
+    why = explain(tracks, given, learned)
+    if why is not None and why.left <= max(GROSS, max(missed) / 3):
+        advice = f"{why.text(names)} would explain it best"
+    elif max(missed) > GROSS and smooth(tracks, learned):
+        advice = (
+            "no single cause explains it; check the positions and normals, the scales and angles "
+            "that are given, and that at least half of the shortest video is in common with the "
+            "others; what was measured by hand needs its errors in the rig file, as a number "
+            "without one is exact: normal_error = 2, position_error = 0.03 (if in metres), "
+            "scale_error = 0.03"
+        )
+    else:
+        return []
+    return [f"the rig does not agree with the tracks: {apart}: {advice}"]
+
+
+# ---------------------------------------------------------------------------------------- the law
 
 _OTHER_CLOCK = 1e-3  # share by which given and stated frame rates may differ without a word
 
@@ -249,16 +810,16 @@ def _read(
     if not isinstance(tracks, list | tuple | np.ndarray):
         raise ValueError(f"tracks: must be a list of arrays or of files, got {shown(tracks)}")
     read: list[TrackFile] = []
-    for track in tracks:
-        if isinstance(track, str | os.PathLike):
-            read += read_tracks(track, individual)
+    for given in tracks:
+        if isinstance(given, str | os.PathLike):
+            read += read_tracks(given, individual)
         else:
             name = f"tracks[{len(read)}]"
-            read.append(TrackFile(name, check_rows(name, cast("ArrayLike", track), 2), None))
+            read.append(TrackFile(name, check_rows(name, cast("ArrayLike", given), 2), None))
     # Files that count frames from the start of their videos may begin at different ones.
     first = min((track.start for track in read), default=0)
-    for i, (track, camera) in enumerate(zip(read, rig.cameras, strict=False)):
-        read[i] = replace(track, pixels=track.downwards(camera.image_size[1]))
+    for i, (one, camera) in enumerate(zip(read, rig.cameras, strict=False)):
+        read[i] = replace(one, pixels=one.downwards(camera.image_size[1]))
     return [replace(track, pixels=_later(track.pixels, track.start - first)) for track in read]
 
 

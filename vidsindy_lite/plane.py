@@ -35,8 +35,7 @@ from .dynamics import (
     on_circle,
     smooth,
 )
-from .observation import check_found
-from .pipeline import VideoDiscovery
+from .pipeline import VideoDiscovery, check_found
 from .refusal import refusing
 from .vision import Hint, check_detector, frame_clock, track, video_info
 

@@ -10,7 +10,7 @@ import vidsindy_lite as vl
 from vidsindy_lite import study
 from vidsindy_lite.cameras import Lags
 from vidsindy_lite.companion.pages import law_over_videos
-from vidsindy_lite.observation import Observation
+from vidsindy_lite.pipeline import Observation
 
 LATER = 4  # frames
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import discover
-from vidsindy_lite.observation import Observation
+from vidsindy_lite.pipeline import Observation
 from vidsindy_lite.refusal import Refused
 from vidsindy_lite.study import score, spline_ado
 from vidsindy_lite.study import trials as experiments

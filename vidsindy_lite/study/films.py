@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Floats
 from ..cameras import Rig
 from ..checks import check_choice, check_integer
-from ..observation import Observation, observe
+from ..pipeline import Observation, observe
 from ..vision import LearnedDetector, Scene, detections, read_video, render_video
 from .metrics import trajectory_error
 from .paper import REFERENCE_OFFSET, SYSTEMS, Benchmark

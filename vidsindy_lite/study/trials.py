@@ -26,7 +26,7 @@ import numpy as np
 from ..arrays import Floats
 from ..checks import check_choice
 from ..dynamics import Discovery, PolynomialSystem, discover
-from ..observation import observe_tracks
+from ..pipeline import observe_tracks
 from ..refusal import Refused
 from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import FilmTask, film_result
