@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from vidsindy_lite import write_video
-from vidsindy_lite.vision.background import ReducedFrames
 from vidsindy_lite.vision.candidates import Appearance, Candidates, followed
+from vidsindy_lite.vision.video import Reel
 
 N = 40
 PLACES = np.column_stack([60 + 30 * np.sin(np.arange(N) / 6), 50 + 0.5 * np.arange(N)])
@@ -48,7 +48,7 @@ def test_what_is_of_another_colour_or_not_there_fits_less():
 def test_it_is_followed_both_ways_from_where_it_is_known(tmp_path):
     hidden = (20, 21, 22)
     film = [drawn(place, shown=i not in hidden) for i, place in enumerate(PLACES)]
-    frames = ReducedFrames.of(write_video(tmp_path / "film.mov", iter(film)))
+    frames = Reel(write_video(tmp_path / "film.mov", iter(film)))
     maps = np.tile(np.eye(3), (N, 1, 1))
     two = np.array([*PLACES[5:6], [20.0, 20]])  # the target and a piece of ground
     found = Candidates.of(5, np.eye(3), np.column_stack(

@@ -9,7 +9,6 @@ import pytest
 from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
-    ReducedFrames,
     _largest_component,
     _others,
     _shape,
@@ -23,7 +22,7 @@ from vidsindy_lite.vision.background import (
     whole_views,
 )
 from vidsindy_lite.vision.rendering import Scene, render
-from vidsindy_lite.vision.video import write_video
+from vidsindy_lite.vision.video import Reel, write_video
 
 SIZE = (128, 96)
 
@@ -449,7 +448,7 @@ def test_faint_coverage_counts_up_to_two_pixels_beyond_the_outline(plain, distan
 def test_samples_are_spread_from_the_first_frame_to_the_last(tmp_path):
     for n in (50, 21, 3):
         frames = [np.full((64, 64, 3), 4 * i, np.uint8) for i in range(n)]
-        samples = sample_frames(ReducedFrames.of(write_video(tmp_path / "clip.mov", frames)))
+        samples = sample_frames(Reel(write_video(tmp_path / "clip.mov", frames)))
         numbers = samples[:, 0, 0, 0] // 4
         np.testing.assert_array_equal(numbers, np.unique(np.linspace(0, n - 1, 21).round()))
 

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from vidsindy_lite.vision import camera
-from vidsindy_lite.vision.background import ReducedFrames
 from vidsindy_lite.vision.camera import camera_motion
 from vidsindy_lite.vision.steadying import CameraMotion, corners_tell
 from vidsindy_lite.vision.video import Reel, write_video
@@ -35,7 +34,7 @@ def asked(tmp_path, monkeypatch):
     """Asks witnesses that say what they are told to, and returns the motion and who was asked."""
 
     def ask(corners, **errors):
-        film = ReducedFrames(Reel(write_video(tmp_path / "clip.mov", views(2.5))), 1)
+        film = Reel(write_video(tmp_path / "clip.mov", views(2.5)))
         order = []
 
         def witness(name):
@@ -82,7 +81,7 @@ def test_without_a_witness_the_camera_is_at_rest_and_its_frames_say_how_sure_tha
 
 
 def test_a_camera_that_trembles_before_grains_is_followed(tmp_path):
-    film = ReducedFrames(Reel(write_video(tmp_path / "clip.mov", views(2.5))), 1)
+    film = Reel(write_video(tmp_path / "clip.mov", views(2.5)))
     small = np.array(list(film))
     motion, sure = camera_motion(film, small, np.arange(len(small)))
     assert sure

@@ -11,7 +11,6 @@ from helpers import real
 
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import moving
-from vidsindy_lite.vision.background import ReducedFrames
 from vidsindy_lite.vision.candidates import Candidates
 from vidsindy_lite.vision.moving import Film, expected, finished
 from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
@@ -23,6 +22,7 @@ from vidsindy_lite.vision.steadying import (
     carry,
     stands_still,
 )
+from vidsindy_lite.vision.video import Reel
 
 SMALL = {"image_size": (320, 240), "frames": 60}
 
@@ -201,7 +201,7 @@ def test_the_colour_that_is_expected_is_half_that_of_the_path_and_half_the_neare
 
 def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch):
     ground = np.full((48, 64, 3), 100, np.uint8)
-    frames = ReducedFrames.of(write_video(tmp_path / "clip.mov", [ground] * 41))
+    frames = Reel(write_video(tmp_path / "clip.mov", [ground] * 41))
     samples = np.array([ground] * 21)
     film = Film.of(frames, samples, rests=True)
     np.testing.assert_array_equal(film.sampled, np.arange(0, 41, 2))

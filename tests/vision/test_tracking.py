@@ -1,7 +1,6 @@
 """The tracker against the exact positions of rendered targets, and what it must not invent."""
 
 import re
-from itertools import combinations, pairwise
 
 import cv2
 import numpy as np
@@ -13,7 +12,6 @@ from tiny_onnx import write_red_detector
 from vidsindy_lite import Hint
 from vidsindy_lite.cameras import Rig
 from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS
-from vidsindy_lite.vision import tracking
 from vidsindy_lite.vision.background import _shape
 from vidsindy_lite.vision.detector import LEAST, Detection
 from vidsindy_lite.vision.rendering import (
@@ -471,46 +469,11 @@ def test_a_chain_takes_the_target_up_again():
 def test_a_single_sighting_in_a_long_gap_is_not_believed():
     motion = [[seen(100 + 5.0 * i)] for i in range(20)] + [[] for _ in range(30)]
     motion += [[seen(200 + 5.0 * i)] for i in range(20)]
-    motion[35] = [seen(300)]
+    motion[35] = [seen(220)]
     assert link(motion)[35] is None
 
 
-@pytest.mark.parametrize(("away", "belongs"), [(60.0, True), (68.0, False)])
-def test_a_motion_of_more_than_two_sizes_and_24_pixels_a_frame_is_a_jump(away, belongs):
+def test_a_target_that_jumps_for_one_frame_does_not():
     motion = [[seen(100.0)] for _ in range(20)]
-    motion[10] = [seen(100.0 + away)]
-    assert (link(motion)[10] is not None) == belongs
-
-
-@pytest.mark.parametrize(("again", "believed"), [(1, False), (2, True)])
-def test_after_a_long_gap_one_sighting_is_too_few(again, believed):
-    motion = [[seen(100.0)] for _ in range(20)] + [[]] * 40 + [[seen(400.0)]] * again
-    assert (link(motion)[-1] is not None) == believed
-
-
-def worth(chain):
-    """Of sightings (frame, place, size, confidence): what each adds, less gaps and jumps."""
-    total = sum(confidence - tracking._GAIN for *_, confidence in chain)
-    for (i, here, size, _), (j, there, _, _) in pairwise(chain):
-        far = np.hypot(*(there - here)) > (j - i) * (2 * size + 24)
-        total -= tracking._GAP * (j - i > 1) + tracking._JUMP * (far and j - i <= tracking._MEMORY)
-    return total
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_no_other_chain_is_worth_more(seed):
-    """Of all there are; what nothing shows for a long time may be anywhere."""
-    rng = np.random.default_rng(seed)
-    starts = np.cumsum([0, *rng.integers(5, 45, 2)])
-    frames = [int(start) + k for start in starts for k in range(3)]
-    seen = [(i, rng.uniform(0, 2000, 2), 2.0, rng.uniform(0.6, 1)) for i in frames]
-    for one, first in enumerate(seen):  # those of a group are near each other
-        seen[one] = (first[0], seen[one // 3 * 3][1] + one % 3, *first[2:])
-    sightings = [
-        [Detection(place, np.full(2, size), sure) for k, place, size, sure in seen if k == i]
-        for i in range(frames[-1] + 1)
-    ]
-    found = [k for k, one in enumerate(seen) if link(sightings)[one[0]] is not None]
-    chains = (c for n in range(1, 10) for c in combinations(range(9), n))
-    best = max(chains, key=lambda chain: worth([seen[k] for k in chain]))
-    assert found == list(best)
+    motion[10] = [seen(160.0)]
+    assert [i for i, one in enumerate(link(motion)) if one is None] == [10]

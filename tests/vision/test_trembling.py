@@ -6,10 +6,10 @@ from footage import Phone, render_phone, write_phone
 
 from vidsindy_lite import track, write_video
 from vidsindy_lite.vision import camera as trembling_module
-from vidsindy_lite.vision.background import ReducedFrames, reduce, sample_frames
+from vidsindy_lite.vision.background import sample_frames
 from vidsindy_lite.vision.camera import trembling
 from vidsindy_lite.vision.steadying import carry
-from vidsindy_lite.vision.video import Reel
+from vidsindy_lite.vision.video import Reel, reduce
 
 SKY = Phone("sky", 40, noise=3, image_size=(320, 240), frames=60)
 
@@ -23,7 +23,7 @@ def film(folder, seed, **change):
 
 
 def found(path):
-    return trembling(ReducedFrames(Reel(path), 1), sample_frames(ReducedFrames.of(path)))
+    return trembling(Reel(path), sample_frames(Reel(path)))
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -61,8 +61,8 @@ def test_what_is_too_plain_or_moves_too_far_is_not_told(tmp_path, background):
 
 def test_maps_are_those_of_whole_frames(tmp_path):
     path, here, there = film(tmp_path, 1, camera="trembling", image_size=(640, 480))
-    samples = np.array([reduce(sample, 2) for sample in sample_frames(ReducedFrames.of(path))])
-    motion = trembling(ReducedFrames(Reel(path), 2), samples)
+    samples = np.array([reduce(sample, 2) for sample in sample_frames(Reel(path))])
+    motion = trembling(Reel(path, 160), samples)
     error = np.linalg.norm(carry(motion.maps, there) - here, axis=1)
     assert np.median(error[np.isfinite(motion.errors)]) < 0.5
 

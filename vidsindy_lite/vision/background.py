@@ -18,10 +18,8 @@ that is how `view_distances` tells the one from the other.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import cv2
 import numpy as np
@@ -30,10 +28,9 @@ from scipy import ndimage
 from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .video import Reel
+from .video import Reel, reduce
 
 _SATURATED = 250  # 255, but for compression
-_ROOM = 96_000_000  # bytes of reduced frames that are kept
 LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 _STRIP = 32  # rows of an image that are sorted at once
@@ -89,73 +86,6 @@ def hull(mask: Bools) -> Ints:
     return np.asarray(cv2.convexHull(ends.astype(np.int32))[:, 0], int)
 
 
-def reduction(size: tuple[int, int]) -> int:
-    """By how much frames of this size are reduced."""
-    return max(1, -(-max(size) // LONGEST))
-
-
-def reduce(image: Image, factor: int) -> Image:
-    """The means over squares of `factor` pixels, also over what is left of squares at the edges."""
-    size = (-(-image.shape[1] // factor), -(-image.shape[0] // factor))
-    right, bottom = size[0] * factor - image.shape[1], size[1] * factor - image.shape[0]
-    if right or bottom:
-        padded = cv2.copyMakeBorder(image, 0, bottom, 0, right, cv2.BORDER_REPLICATE)
-        image = np.asarray(padded, np.uint8)
-    while factor % 2 == 0:  # OpenCV halves an image much faster than it quarters one
-        factor //= 2
-        half = (image.shape[1] // 2, image.shape[0] // 2)
-        image = np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
-    if factor == 1:
-        return image
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-class ReducedFrames:
-    """The frames of a film, reduced by a factor once if they are few."""
-
-    def __init__(self, reel: Reel, factor: int) -> None:
-        self.reel, self.factor = reel, factor
-        width, height = reel.info.size
-        self._few = 3 * width * height * reel.info.frames <= _ROOM * factor**2
-        self._kept: list[Image] | None = None
-
-    @classmethod
-    def of(cls, path: str | os.PathLike) -> Self:
-        """The frames of a film, reduced as is usual for their size."""
-        reel = Reel(path)
-        return cls(reel, reduction(reel.info.size))
-
-    def pick(self, numbers: Sequence[int]) -> Iterator[Image]:
-        """The whole frames of these increasing numbers; on the way the reduced ones are kept."""
-        if self.reel.few or not self._few:
-            yield from self.reel.pick(numbers)
-            return
-        yield from (frame for i, (frame, _) in enumerate(self._both()) if i in numbers)
-
-    def __iter__(self) -> Iterator[Image]:
-        if self._kept is not None:
-            yield from self._kept
-        else:
-            yield from (small for _, small in self._both())
-
-    def some(self, numbers: Sequence[int]) -> Iterator[Image]:
-        """The reduced frames of these increasing numbers, as far as the film holds them."""
-        if self._kept is not None:
-            yield from (self._kept[i] for i in numbers if i < len(self._kept))
-        else:
-            yield from (reduce(frame, self.factor) for frame in self.reel.pick(numbers))
-
-    def _both(self) -> Iterator[tuple[Image, Image]]:
-        """All frames, whole and reduced; of these few are kept."""
-        kept: list[Image] = []
-        for frame in self.reel:
-            small = reduce(frame, self.factor)
-            if self._few:
-                kept.append(small)
-            yield frame, small
-        self._kept = kept if self._few else None
-
-
 def enlarged(factor: float) -> Floats:
     """The map of pixels of an image reduced by a factor to those of the image."""
     k = factor
@@ -173,12 +103,12 @@ def sampled(frames: int) -> Ints:
     return np.unique(np.linspace(0, frames - 1, 21).round().astype(int))
 
 
-def sample_frames(frames: ReducedFrames) -> NDArray[np.uint8]:
+def sample_frames(frames: Reel) -> NDArray[np.uint8]:
     """The frames that are `sampled`, as far as the clip holds them, (m, height, width, 3)."""
-    info = frames.reel.info
+    info = frames.info
     spread = sampled(info.frames).tolist()
     samples, count = np.empty((len(spread), *info.size[::-1], 3), np.uint8), 0
-    for count, frame in enumerate(frames.pick(spread), 1):
+    for count, frame in enumerate(frames.whole.pick(spread), 1):
         samples[count - 1] = frame
     return samples[:count]
 

@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import ReducedFrames, changes, enlarged, lengths, light, reduced
+from .background import changes, enlarged, lengths, light, reduced
 from .plate import Plate
 from .steadying import (
     PLAINLY,
@@ -41,6 +41,7 @@ from .steadying import (
     pyramid,
     stands_still,
 )
+from .video import Reel
 
 _PARTS = 12  # into which each side of an image is cut
 _FAINT = 0.1  # grey levels; a difference without any noise
@@ -121,7 +122,7 @@ def _gain(one: Floats32, other: Floats32) -> float:
     return float(ratios[aside : len(ratios) - aside].mean())
 
 
-def trembling(frames: ReducedFrames, samples: Image) -> CameraMotion | None:
+def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
     """The motion of a camera that trembles, None if that is not sure; `samples` are reduced."""
     views = [pyramid(sample) for sample in samples]
     maps = np.tile(np.eye(3), (len(samples), 1, 1))
@@ -192,7 +193,7 @@ def _halves(
     return float(alike), float(np.sqrt(np.mean((one - other) ** 2)) / 2)
 
 
-def _motion(ground: list[Ground], frames: ReducedFrames, larger: float) -> CameraMotion:
+def _motion(ground: list[Ground], frames: Reel, larger: float) -> CameraMotion:
     """All frames laid on the ground, and so on the first; errors are `larger` than they tell."""
     laid = [_laid(ground, pyramid(frame), np.eye(3)) for frame in frames]
     maps, errors = _maps(laid), np.array([one.error for one in laid])
@@ -203,7 +204,7 @@ def _motion(ground: list[Ground], frames: ReducedFrames, larger: float) -> Camer
     return CameraMotion(steady / steady[:, 2:, 2:], frames.factor * sure)
 
 
-def camera_motion(frames: ReducedFrames, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
+def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
     If the sampled frames do not tell that the camera is at rest, all frames are asked where they
@@ -226,14 +227,14 @@ def camera_motion(frames: ReducedFrames, small: Image, sampled: Ints) -> tuple[C
                 break
     if found:
         return min(found, key=_usual_error), True
-    return at_rest(frames.reel.info.frames), still is True or rests(small)
+    return at_rest(frames.info.frames), still is True or rests(small)
 
 
 def _usual_error(motion: CameraMotion) -> float:
     return float(np.median(motion.errors))
 
 
-def _steadied(frames: ReducedFrames, small: Image, sampled: Ints) -> CameraMotion | None:
+def _steadied(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
     """Frames laid on each other, one after the other.
 
     None if these maps say no more than their errors: then they only add these. None, too, if the
@@ -243,7 +244,7 @@ def _steadied(frames: ReducedFrames, small: Image, sampled: Ints) -> CameraMotio
     for frame in frames:
         steadying.add(frame)
     motion = steadying.motion()
-    if not _plainly(motion, frames.reel.info.size, frames.factor):
+    if not _plainly(motion, frames.info.size, frames.factor):
         return None
     at = np.minimum(sampled, len(motion.maps) - 1)
     known = np.isfinite(motion.errors[at])

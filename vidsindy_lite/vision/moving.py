@@ -17,7 +17,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .background import ReducedFrames, reduce, reduced, sampled
+from .background import reduced, sampled
 from .camera import LOOSE, camera_motion
 from .candidates import (
     TOLD,
@@ -34,6 +34,7 @@ from .hints import Hint
 from .plate import Plate, lights_of, noise_of
 from .refining import Lens, View, entire, fitting, hidden, scatter, swapped
 from .steadying import CameraMotion, at_rest, carry
+from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
 _ROUGHLY = 2.0  # pixels, about, to which a target is known that is not seen whole
@@ -58,7 +59,7 @@ class Film(NamedTuple):
     camera is known to be at rest, or to move as `motion` says.
     """
 
-    frames: ReducedFrames
+    frames: Reel
     motion: CameraMotion
     maps: Floats
     small: Image
@@ -72,9 +73,9 @@ class Film(NamedTuple):
         return self.frames.factor
 
     @classmethod
-    def of(cls, frames: ReducedFrames, samples: Image, rests: bool = False) -> Self:
+    def of(cls, frames: Reel, samples: Image, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
-        info, factor = frames.reel.info, frames.factor
+        info, factor = frames.info, frames.factor
         numbers = sampled(info.frames)[: len(samples)]
         small = np.array([reduce(sample, factor) for sample in samples])
         motion, sure = at_rest(info.frames), True
@@ -102,13 +103,13 @@ class Ways(NamedTuple):
     colour: Floats
 
 
-def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> Followed:
+def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Followed:
     """Track what moves in a film, the target if there is a hint which it is.
 
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(frames, samples)
-    shape = frames.reel.info.size, len(film.maps), film.factor
+    shape = frames.info.size, len(film.maps), film.factor
     seed = None if hint is None else hint.boxed(*shape)
     n, boxes = len(film.maps), None
     for _ in range(4):  # of a target that covers its own ground, until the ground is without it
@@ -294,7 +295,7 @@ def lens_of(samples: Image, film: Film, *ways: Ways) -> Lens:
 def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
     views = []
-    for i, (frame, here) in enumerate(zip(film.frames.reel, film.motion.maps, strict=False)):
+    for i, (frame, here) in enumerate(zip(film.frames.whole, film.motion.maps, strict=False)):
         view = None
         if i < len(ways.centre) and np.isfinite(ways.centre[i, 0]):
             view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])

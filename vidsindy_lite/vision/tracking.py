@@ -29,14 +29,14 @@ from numpy.typing import DTypeLike, NDArray
 from ..arrays import Bools, Floats, Image
 from ..checks import check_instance, check_integer, shown
 from .background import (
+    LONGEST,
     BackgroundModel,
-    ReducedFrames,
     sample_frames,
     track_blobs,
     view_distances,
     whole_views,
 )
-from .candidates import Candidates, plainest_paths
+from .candidates import Candidates, best_path, plainest_paths
 from .candidates import Path as Motion
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
@@ -57,12 +57,6 @@ from .steadying import carry
 from .video import Reel, read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
-
-_GAIN = 0.15  # of confidence, that a sighting has to exceed to be worth anything
-_GAP = 1.0  # price of a gap, in units of confidence: what is seen for a single frame is an error
-_JUMP = 2.0  # price of a jump
-_REACH = 2.0, 24.0  # target sizes plus pixels per frame from which a motion is a jump
-_MEMORY = 25  # frames after which the target may be anywhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +159,7 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     """The track, its doubts without the name of the file."""
     if detector not in ("auto", "background"):
         return _link_detections(path, detector)
-    frames = ReducedFrames.of(path)
+    frames = Reel(path, LONGEST)
     samples = sample_frames(frames)
     model = BackgroundModel(samples)
     if detector == "auto" and model.unrest:
@@ -174,7 +168,7 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     model.learn_target(samples)
     if detector == "auto" and model.several_colours:
         return _follow(frames, samples, target)
-    found, blurred = _track_blobs(frames.reel, model)
+    found, blurred = _track_blobs(frames.whole, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
         return _follow(frames, samples, target)
     found = replace(found, warnings=model.unrest)
@@ -199,7 +193,7 @@ def _lost(found: Track) -> tuple[str, ...]:
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
 
 
-def _follow(frames: ReducedFrames, samples: Image, hint: Hint | None) -> Track:
+def _follow(frames: Reel, samples: Image, hint: Hint | None) -> Track:
     """The plainest motion, with the camera's taken out."""
     return Track.of_motion(follow(frames, samples, hint))
 
@@ -269,8 +263,8 @@ def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:
 def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
     """At most one sighting of each frame, such that together they are one motion.
 
-    A chain gains the confidence of its sightings and pays for gaps and for jumps, so that one wrong
-    sighting, however sure, does not pay. Dynamic programming finds the best chain.
+    They are candidates as good as the detector is sure of them, see `best_path`; a target may be
+    away for any time.
 
     Parameters
     ----------
@@ -282,37 +276,16 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
     chain : list of Detection or None
         One entry a frame.
     """
-    # One row a sighting: frame, centre, size, gain.
-    rows = np.array(
-        [
-            (i, *d.centre, d.size.mean(), d.confidence - _GAIN)
-            for i, seen in enumerate(sightings)
-            for d in seen
-        ]
-    ).reshape(-1, 5)
-    frame, centre, size, value = rows[:, 0], rows[:, 1:3], rows[:, 3], rows[:, 4].copy()
-    before = np.full(len(rows), -1)
-    old, oldest = -1, 0  # the best end of a chain that is longer ago than the memory
-    for j in range(len(rows)):
-        while frame[oldest] < frame[j] - _MEMORY:
-            old = oldest if old < 0 or value[oldest] > value[old] else old
-            oldest += 1
-        recent = np.arange(oldest, np.searchsorted(frame, frame[j]))
-        gap = frame[j] - frame[recent]
-        distance = np.hypot(*(centre[recent] - centre[j]).T)
-        jump = distance > gap * (_REACH[0] * size[recent] + _REACH[1])
-        worth = value[recent] - _GAP * (gap > 1) - _JUMP * jump
-        if old >= 0:
-            recent, worth = np.append(recent, old), np.append(worth, value[old] - _GAP)
-        if len(worth) and worth.max() > 0:
-            before[j] = recent[worth.argmax()]
-            value[j] += worth.max()
+    flat = [(i, d) for i, seen in enumerate(sightings) for d in seen]
+    rows = [
+        (*d.centre, *(d.centre - d.size / 2), *d.size, d.size.prod(), *np.zeros(6), d.confidence)
+        for _, d in flat
+    ]
+    frames = np.array([i for i, _ in flat], int)
+    seen = Candidates.of(frames, np.eye(3), np.array(rows, float).reshape(-1, 14))
     chain: list[Detection | None] = [None] * len(sightings)
-    flat = [d for seen in sightings for d in seen]
-    j = int(value.argmax()) if len(rows) else -1
-    while j >= 0:
-        chain[int(frame[j])] = flat[j]
-        j = before[j]
+    for row in best_path(seen, len(sightings))[0]:
+        chain[flat[row][0]] = flat[row][1]
     return chain
 
 
@@ -338,7 +311,7 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
         If the file is missing or no video.
     """
     check_integer("count", count, least=1)
-    frames = ReducedFrames.of(path)
+    frames = Reel(path, LONGEST)
     samples = sample_frames(frames)
     # Before a plain background, all that could tell of a camera's motion may be the targets.
     film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
