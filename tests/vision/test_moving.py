@@ -319,14 +319,14 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
     errors = np.zeros(20)
     maps = np.tile(np.eye(3), (20, 1, 1))
-    assert finished(views, CameraMotion(maps, errors), ()).doubts == ()
+    assert finished(views, CameraMotion(maps, errors), ()).warnings == ()
     larger = [replace(view, area=300.0) for view in views[12:]]
-    (doubt,) = finished(views[:12] + larger, CameraMotion(maps, errors), ()).doubts
+    (doubt,) = finished(views[:12] + larger, CameraMotion(maps, errors), ()).warnings
     assert doubt.startswith("from frame 12 on, what is followed has another size at once")
     errors[16:] = np.inf
     found = finished(views, CameraMotion(maps, errors), ())
     assert np.isfinite(found.pixels[:, 0]).sum() == 16
-    (doubt,) = found.doubts
+    (doubt,) = found.warnings
     assert doubt.startswith("in 4 frames of 20 the target is seen")
     assert "16 to 19" in doubt
 
@@ -341,8 +341,8 @@ def test_an_outline_that_changes_from_frame_to_frame_is_told(part, told):
         for place, area in zip(places, areas, strict=True)
     ]
     found = finished(views, at_rest(40), ())
-    assert any("outline of the target" in doubt for doubt in found.doubts) == told
-    assert (np.median(found.errors) > 2) == told
+    assert any("outline of the target" in doubt for doubt in found.warnings) == told
+    assert (np.median(found.confidence) < np.exp(-2 / 3)) == told
 
 
 def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are():

@@ -101,9 +101,9 @@ class Asked(Plate):
     def __init__(self, image):
         super().__init__(np.stack([image] * 3), np.stack([np.eye(3)] * 3), np.ones(3, bool))
 
-    def seen_from(self, here, corner, size, step=1):
-        self.window = [*map(int, corner), *map(int, size)]
-        return super().seen_from(here, corner, size, step)
+    def seen_from(self, here, low=None, high=None, step=1):
+        self.window = [*map(int, low), *map(int, high - low)]
+        return super().seen_from(here, low, high, step)
 
 
 @pytest.mark.parametrize(

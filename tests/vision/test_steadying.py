@@ -26,7 +26,6 @@ from vidsindy_lite.vision.steadying import (
     _similar,
     _widespread,
     carry,
-    corners_tell,
     displacement,
     grounds,
     pyramid,
@@ -217,15 +216,6 @@ def test_a_camera_stands_still_if_most_pairs_say_so_and_none_the_contrary(
     told = iter(pairs)
     monkeypatch.setattr(steadying, "_moved", lambda before, after: next(told))
     assert stands_still([np.zeros((48, 64, 3), np.uint8)] * 3) is still
-
-
-def test_corners_tell_the_motion_if_they_do_between_most_samples():
-    full, plain = grains()[:240, :320], np.full((240, 320, 3), 128, np.uint8)
-    for samples, told in (
-        ([full, full], True), ([full, full, full, plain], True), ([full, full, plain], False),
-        ([full, full, plain, plain], False), ([plain, plain], False),
-    ):  # fmt: skip
-        assert corners_tell(samples) is told
 
 
 @pytest.mark.parametrize(("half", "wide"), [((60, 66), True), ((60, 57), False), ((0, 92), True),

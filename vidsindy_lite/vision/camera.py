@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import changes, enlarged, lengths, light, reduced
+from .background import changes, lengths, light
 from .plate import Plate
 from .steadying import (
     PLAINLY,
@@ -35,10 +35,10 @@ from .steadying import (
     align,
     at_rest,
     carry,
-    corners_tell,
     displacement,
     grounds,
     pyramid,
+    rescaled,
     stands_still,
 )
 from .video import Reel
@@ -63,8 +63,10 @@ def explains(samples: Image, maps: Floats, known: Bools) -> bool:
     all_known = np.ones(len(maps), bool)
     plates = Plate(samples, maps, all_known), Plate(samples, rest, all_known)
     gains = [
-        _gain(_misses(sample, *_seen(plates[0], here)), _misses(sample, *_seen(plates[1], there)))
-        for sample, here, there in zip(samples, maps, rest, strict=True)
+        _gain(
+            *(_misses(sample, *plate.seen_from(at)) for plate, at in zip(plates, both, strict=True))
+        )
+        for sample, *both in zip(samples, maps, rest, strict=True)
     ]
     # Of a gain: the noise of a median of 21 frames adds that, and maps smooth it.
     return bool(weights @ gains > 0.04 * weights.sum())
@@ -87,11 +89,6 @@ def rests(samples: Image) -> bool:
         least.append(min(_gain(here, there) for there in off))
     # Share of the frames that say so, if the camera is at rest.
     return bool(np.mean(np.array(least) > 0) >= 0.9)
-
-
-def _seen(plate: Plate, here: Floats) -> tuple[Image, Bools]:
-    """A plate as a whole frame shows it, and where it is known."""
-    return plate.seen_from(here, np.zeros(2), (int(plate.size[0]), int(plate.size[1])))
 
 
 def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
@@ -147,7 +144,7 @@ def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
 
 def _ground(plate: Plate) -> list[Ground]:
     """A plate as the first frame shows it, to lay others on."""
-    image, known = plate.seen_from(np.eye(3), np.zeros(2), (int(plate.size[0]), int(plate.size[1])))
+    image, known = plate.seen_from(np.eye(3))
     return [_limited(level, known) for level in grounds(pyramid(image))]
 
 
@@ -197,28 +194,24 @@ def _motion(ground: list[Ground], frames: Reel, larger: float) -> CameraMotion:
     """All frames laid on the ground, and so on the first; errors are `larger` than they tell."""
     laid = [_laid(ground, pyramid(frame), np.eye(3)) for frame in frames]
     maps, errors = _maps(laid), np.array([one.error for one in laid])
-    whole = enlarged(frames.factor)
-    steady = whole @ np.linalg.inv(maps[0]) @ maps @ np.linalg.inv(whole)
+    steady = rescaled(np.linalg.inv(maps[0]) @ maps, 1 / frames.factor)
     sure = larger * np.hypot(errors, errors[0])
     sure[0] = 0.0
-    return CameraMotion(steady / steady[:, 2:, 2:], frames.factor * sure)
+    return CameraMotion(steady, frames.factor * sure)
 
 
 def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
     If the sampled frames do not tell that the camera is at rest, all frames are asked where they
-    lie: one after the other, and all on what they show together, first where corners are few. If
-    that is not exact, the other is asked, too.
+    lie: one after the other, and, if that is not exact, all on what they show together.
     """
     still = stands_still(small)
-    ways: list[Callable[[], CameraMotion | None]] = []
-    if still is not True:
-        ways = [partial(trembling, frames, small)]
+    if still is True:
+        return at_rest(frames.info.frames), True
+    ways: list[Callable[[], CameraMotion | None]] = [partial(trembling, frames, small)]
     if still is False:
-        ways += [partial(_steadied, frames, small, sampled)]
-        if corners_tell(small):
-            ways.reverse()
+        ways.insert(0, partial(_steadied, frames, small, sampled))
     found: list[CameraMotion] = []
     for way in ways:
         if (motion := way()) is not None:
@@ -227,7 +220,7 @@ def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMoti
                 break
     if found:
         return min(found, key=_usual_error), True
-    return at_rest(frames.info.frames), still is True or rests(small)
+    return at_rest(frames.info.frames), rests(small)
 
 
 def _usual_error(motion: CameraMotion) -> float:
@@ -248,7 +241,7 @@ def _steadied(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
         return None
     at = np.minimum(sampled, len(motion.maps) - 1)
     known = np.isfinite(motion.errors[at])
-    return motion if explains(small, reduced(motion.maps[at], frames.factor), known) else None
+    return motion if explains(small, rescaled(motion.maps[at], frames.factor), known) else None
 
 
 def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:

@@ -101,7 +101,7 @@ def candidates(
     bound, lights, found = tolerance(plate, noise), [], []
     for i, (frame, here, others) in enumerate(_with_neighbours(frames, maps)):
         height, width = frame.shape[:2]
-        ground, known = plate.seen_from(here, np.zeros(2), (width, height))
+        ground, known = plate.seen_from(here)
         allowed = bound
         if plate.moves:
             back = np.linalg.inv(plate.shift @ here)

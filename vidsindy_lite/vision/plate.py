@@ -104,18 +104,19 @@ class Plate:
             )
 
     def seen_from(
-        self, here: Floats, corner: Floats, size: tuple[int, int], step: int = 1
+        self, here: Floats, low: Floats | None = None, high: Floats | None = None, step: int = 1
     ) -> tuple[Image, Bools]:
-        """The background in a window of the frame that the map carries; where it is known.
+        """The background in the frame that the map carries, or a window of it; where it is known.
 
         Only every pixel of some `step` in each row and column.
         """
-        left, top = (int(x) for x in corner)
+        left, top = np.zeros(2, int) if low is None else low
+        size = (self.size if high is None else high) - [left, top]
         if not self.moves:
             window = np.s_[top : top + size[1] : step, left : left + size[0] : step]
             return self.image[window], self.valid[window] > 0
         to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, step]]) / step
-        size = -(-size[0] // step), -(-size[1] // step)
+        size = (-(-size // step)).tolist()
         back = to_window @ np.linalg.inv(self.shift @ here)
         image = cv2.warpPerspective(self.image, back, size, flags=cv2.INTER_LINEAR)
         valid = cv2.warpPerspective(self.valid, back, size, flags=cv2.INTER_NEAREST)
@@ -163,8 +164,7 @@ def _masked_median(
 def lights_of(samples: Image, maps: Floats, known: Bools) -> Floats32:
     """How much brighter (m, 3) each of the samples of a film is than most of them."""
     plate = Plate(samples, maps, known)
-    size = samples.shape[2], samples.shape[1]
-    return np.array([light(sample, *plate.seen_from(here, np.zeros(2), size))
+    return np.array([light(sample, *plate.seen_from(here))
                      for sample, here in zip(samples, maps, strict=True)])  # fmt: skip
 
 
@@ -185,7 +185,7 @@ def noise_of(samples: Image, maps: Floats, plate: Plate) -> float:
     found = []
     step = max(3, samples.shape[2] // 640)
     for sample, here in zip(samples, maps, strict=True):
-        then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1], step)
+        then, known = plate.seen_from(here, step=step)
         now = sample[::step, ::step]
         if known.any():
             differs = changes(now, then, light(now, then, known))[known]

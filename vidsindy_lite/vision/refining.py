@@ -155,7 +155,7 @@ class Lens:
         spare = 0.5 * box[2:].max() + 8
         low = np.clip(np.floor(box[:2] - spare), 0, self.plate.size - 1).astype(int)
         high = np.clip(np.ceil(box[:2] + box[2:] + spare), low + 1, self.plate.size).astype(int)
-        then, known = self.plate.seen_from(here, low, tuple(high - low))
+        then, known = self.plate.seen_from(here, low, high)
         now = relit(frame[low[1] : high[1], low[0] : high[0]], np.reciprocal(gain))
         ground = then.astype(np.float32)
         change = now - ground

@@ -147,7 +147,9 @@ def _fit(
     framed[inner] = view[inner]
     within = framed >= 0
     for step in range(6):
-        shown = _resampled(framed, here[:2])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        laid = cv2.warpAffine(framed, here[:2], (width, height), flags=flags, borderValue=_BEYOND)
+        shown = np.asarray(laid, np.float32)
         known = within & (shown >= 0)
         if np.count_nonzero(known) < 0.3 * known.size:
             return None
@@ -175,7 +177,8 @@ def _fit(
     miss = miss - np.tensordot(delta.astype(np.float32), slopes, 1)
     seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32), u, v)
     # Noise has slopes, too, but not the same in both views.
-    value, direction = np.linalg.eigh(_symmetric(heavy @ seen.reshape(6, -1).T))
+    told = heavy @ seen.reshape(6, -1).T
+    value, direction = np.linalg.eigh((told + told.T) / 2)
     information = (direction * np.maximum(value, 0)) @ direction.T / spread**2 + prior
     telling = _by_blocks(weight * (seen[0] * slopes[0] + seen[1] * slopes[1]))
     # Blocks of mere noise tell as much for the map as against it.
@@ -193,10 +196,6 @@ def _middle(values: Floats | Floats32) -> float:
     return float(parts[k] if len(half) % 2 else (parts[:k].max() + parts[k]) / 2)
 
 
-def _symmetric(matrix: Floats) -> Floats:
-    return (matrix + matrix.T) / 2
-
-
 def _by_blocks(values: Floats32) -> Floats32:
     """The means (12, 12) of an image over its blocks."""
     blocks = cv2.resize(values, (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA)
@@ -207,14 +206,6 @@ def _slopes(view: Floats32, u: Floats32, v: Floats32) -> Floats32:
     """By what each pixel changes with shift, turn, scale and light, (6, h, w)."""
     gu, gv = (0.5 * cv2.Sobel(view, cv2.CV_32F, *by, ksize=1) for by in ((1, 0), (0, 1)))
     return np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)])
-
-
-def _resampled(view: Floats32, here: Floats) -> Floats32:
-    """A view laid on the other by a map (2, 3)."""
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    size = view.shape[::-1]
-    moved = cv2.warpAffine(view, here, size, flags=flags, borderValue=_BEYOND)
-    return np.asarray(moved, np.float32)
 
 
 def _error(
@@ -262,6 +253,13 @@ def carry(maps: NDArray, points: Floats) -> Floats:
     """Points (n, 2) taken through one map (3, 3), or each through its own (n, 3, 3)."""
     ends = np.einsum("...ij,...j->...i", maps, np.column_stack([points, np.ones(len(points))]))
     return ends[:, :2] / ends[:, 2:]
+
+
+def rescaled(maps: Floats, factor: float) -> Floats:
+    """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
+    larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
+    found = np.linalg.inv(larger) @ maps @ larger
+    return np.asarray(found / found[:, 2:, 2:], float)
 
 
 class _Relief(NamedTuple):
@@ -323,16 +321,6 @@ def stands_still(samples: Iterable[Image]) -> bool | None:
         if found[-1]:
             return False
     return True if 2 * found.count(None) < len(found) else None
-
-
-def corners_tell(samples: Iterable[Image]) -> bool:
-    """Do corners alone tell how most reduced samples lie on the next one?"""
-    reliefs = [_Relief.of(sample) for sample in samples]
-    told = [
-        _by_corners(before, _corners(before.fine), after, np.eye(3)).alone
-        for before, after in zip(reliefs, reliefs[1:], strict=False)
-    ]
-    return sum(told) > len(told) / 2
 
 
 def _moved(before: _Relief, after: _Relief) -> bool | None:
@@ -488,7 +476,5 @@ class Steadying:
 
     def motion(self) -> CameraMotion:
         """The motion so far, in pixels of the frames."""
-        k = self.factor
-        enlarge = np.array([[k, 0, (k - 1) / 2], [0, k, (k - 1) / 2], [0, 0, 1]])
-        maps = enlarge @ np.array(self.maps) @ np.linalg.inv(enlarge)
-        return CameraMotion(maps / maps[:, 2:, 2:], k * np.array(self.errors))
+        maps = rescaled(np.array(self.maps), 1 / self.factor)
+        return CameraMotion(maps, self.factor * np.array(self.errors))

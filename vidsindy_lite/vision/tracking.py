@@ -19,14 +19,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Self
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
 
-from ..arrays import Bools, Floats, Image
+from ..arrays import Bools
 from ..checks import check_instance, check_integer, shown
 from .background import (
     LONGEST,
@@ -42,7 +40,7 @@ from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
 from .moving import (
     Film,
-    Followed,
+    Track,
     Ways,
     expected,
     finished,
@@ -53,55 +51,9 @@ from .moving import (
     viewed,
 )
 from .refining import scatter
-from .steadying import carry
 from .video import Reel, read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """The target in each frame of a video; `np.asarray` of it is its pixels.
-
-    Parameters
-    ----------
-    pixels : ndarray, shape (n, 2)
-        Centroid of the target, (u right, v down) in pixels of the first frame, pixel centres at
-        integers; NaN in frames where it is not seen, or only a part of it, or not for sure.
-    confidence : ndarray, shape (n,)
-        From 0, nothing seen, to 1. A detector says how sure it is of each frame; the background
-        model how much the view is like those of the whole target.
-    detector : str
-        What found it: "background", "motion", "learned" or the name of an .onnx file.
-    warnings : tuple of str
-        Reasons not to trust the track.
-    maps : ndarray, shape (n, 3, 3), optional
-        Where each frame lies in the first one, homogeneous, if the camera moved.
-    """
-
-    pixels: Floats
-    confidence: Floats
-    detector: str
-    warnings: tuple[str, ...] = ()
-    maps: Floats | None = None
-
-    @classmethod
-    def of_motion(cls, found: Followed) -> Self:
-        """The track of something that was followed, with the camera's motion taken out."""
-        seen = np.isfinite(found.pixels[:, 0])
-        confidence = np.where(seen, np.exp(-found.errors / 3), 0.0)
-        moves = not np.array_equal(found.maps, np.broadcast_to(np.eye(3), found.maps.shape))
-        return cls(found.pixels, confidence, "motion", found.doubts, found.maps if moves else None)
-
-    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray:
-        return np.array(self.pixels, dtype, copy=copy)
-
-    @property
-    def in_frames(self) -> Floats:
-        """The target in the pixels of each frame itself, (n, 2): to be drawn there."""
-        if self.maps is None:
-            return self.pixels
-        return carry(np.linalg.inv(self.maps), self.pixels)
 
 
 def track(
@@ -122,8 +74,8 @@ def track(
           frames in which a part of it shows are filled where its motion leads.
         * "background": for a camera at rest, the most exact. The target may turn and change its
           size, not its shape, and is whole in at least a quarter of the frames that show any of
-          it. It must stay away from each place for at least a fifth of the frames: what never
-          moves away by about its own width is background here, not for "auto".
+          it. It must stay away from each place for more than half of the frames: what does
+          not move away by about its own width is background here, not for "auto".
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
@@ -164,16 +116,16 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     model = BackgroundModel(samples)
     if detector == "auto" and model.unrest:
         del model  # its images are large
-        return _follow(frames, samples, target)
+        return follow(frames, samples, target)
     model.learn_target(samples)
     if detector == "auto" and model.several_colours:
-        return _follow(frames, samples, target)
+        return follow(frames, samples, target)
     found, blurred = _track_blobs(frames.whole, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
-        return _follow(frames, samples, target)
+        return follow(frames, samples, target)
     found = replace(found, warnings=model.unrest)
     if detector == "auto" and _seen(found) < 0.75 and model.shows_target():
-        other = _follow(frames, samples, target)
+        other = follow(frames, samples, target)
         return other if _seen(other) > _seen(found) + 0.1 else found
     return found
 
@@ -191,11 +143,6 @@ def _lost(found: Track) -> tuple[str, ...]:
         return ()
     lost = between - len(at)
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
-
-
-def _follow(frames: Reel, samples: Image, hint: Hint | None) -> Track:
-    """The plainest motion, with the camera's taken out."""
-    return Track.of_motion(follow(frames, samples, hint))
 
 
 def _plausible(found: Track, hint: Hint | None) -> bool:
@@ -327,11 +274,9 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     lens = lens_of(samples, film, *ways)
     for way, hidden in zip(ways, touching, strict=True):
         way.centre[hidden] = np.nan
-        followed = finished(viewed(film, lens, way, lights), film.motion, doubts)
-        tracks.append(Track.of_motion(followed))
+        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts))
         doubts = ()
-    missing = Track.of_motion(nothing(film.motion, n))
-    return (*tracks, *[missing] * (count - len(tracks)))
+    return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
 
 
 def _lanes(

@@ -117,10 +117,7 @@ def upper_field(frame: VideoFrame) -> Image:
     source = graph.add_buffer(
         width=frame.width, height=frame.height, format=frame.format, time_base=frame.time_base
     )
-    field, sink = graph.add("field", "type=top"), graph.add("buffersink")
-    source.link_to(field)
-    field.link_to(sink)
-    graph.configure()
+    graph.link_nodes(source, graph.add("field", "type=top"), graph.add("buffersink")).configure()
     graph.push(frame)
     lines = cast("VideoFrame", graph.pull()).to_ndarray(format="bgr24", threads=1)
     return with_lines_between(_turned(cast("Image", lines)))[: frame.height]
