@@ -8,11 +8,11 @@ import pytest
 from helpers import one_a_frame
 
 from vidsindy_lite import write_video
+from vidsindy_lite.vision.background import shadowed
 from vidsindy_lite.vision.candidates import (
     TOLD,
     Appearance,
     Candidates,
-    _are_shadows,
     _with_neighbours,
     best_path,
     candidates,
@@ -143,12 +143,12 @@ def test_a_shadow_is_worth_half():
 def test_shadows_are_darker_by_about_the_same_factor_in_all_colours():
     ground = np.array([100, 150, 200.0])
     for share, is_shadow in ((0.3, False), (0.4, True), (0.6, True), (0.9, True), (0.98, False)):
-        assert _are_shadows(share * ground[None], ground[None]).item() == is_shadow
+        assert shadowed(share * ground[None], ground[None]).item() == is_shadow
     coloured = ground * [0.55, 0.65, 0.6]
-    assert not _are_shadows(coloured[None], ground[None]).item()
+    assert not shadowed(coloured[None], ground[None]).item()
     # The darker the ground, the less its colours tell.
-    assert _are_shadows(np.array([[3, 10, 3.5]]), np.array([[6, 16, 6.0]])).item()
-    assert not _are_shadows(10 * np.array([[3, 10, 3.5]]), 10 * np.array([[6, 16, 6.0]])).item()
+    assert shadowed(np.array([[3, 10, 3.5]]), np.array([[6, 16, 6.0]])).item()
+    assert not shadowed(10 * np.array([[3, 10, 3.5]]), 10 * np.array([[6, 16, 6.0]])).item()
 
 
 # ---- the best path through candidates: smooth, of one thing, whatever else there is

@@ -128,21 +128,6 @@ def test_a_box_is_looked_at_with_its_surroundings_as_far_as_the_image_goes(box, 
     assert plate.window == list(window)
 
 
-def test_what_differs_grows_with_the_noise_and_with_the_edges_of_the_ground():
-    ground = np.full((60, 80, 3), 90, np.uint8)
-    ground[:, 40:] = 130
-    resting = Asked(ground)
-    for noise, least in ((0.0, 8), (1.0, 8), (2.5, 10), (5.0, 20), (40.0, 60)):
-        assert Lens(resting, noise).least == least
-    assert Lens(resting, 3.0).blur > Lens(resting, 1.0).blur
-    moving = Plate(np.stack([ground] * 3), np.stack([np.eye(3), np.diag([1.1, 1, 1]), np.eye(3)]),
-                   np.ones(3, bool))  # fmt: skip
-    for plate, share in ((resting, 0.15), (moving, 0.35)):
-        found = Lens(plate, 2.5)._tolerance(ground)
-        np.testing.assert_allclose(found[:, [10, 70]], 10)
-        np.testing.assert_allclose(found[:, 39:41], 10 + share * 40, rtol=1e-5)
-
-
 GROUND = np.full((60, 80, 3), (60, 90, 120), np.uint8)
 
 

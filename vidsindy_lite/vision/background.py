@@ -35,7 +35,7 @@ LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 _STRIP = 32  # rows of an image that are sorted at once
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
-_OFTEN = 0.1  # share of the samples that must differ to cast doubt on a place of the background
+_OFTEN = 0.1  # share of the samples in which other things differ: more are unrest
 _NEAR = 16  # coarse pixels, within which several things that differ may be one target
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
 _TOO_LARGE = 0.25  # share of the image that no target fills
@@ -57,6 +57,13 @@ def dot(a: Floats32, b: Floats32) -> Floats32:
 def lengths(a: Floats32) -> Floats32:
     """Root of the sum of the squares of the colours of each pixel."""
     return np.sqrt(dot(a, a))
+
+
+def shadowed(now: Floats | Floats32, ground: Floats | Floats32) -> Bools:
+    """Where (...) the same surface is seen in less light: darker by the same in all colours."""
+    ratio = (now + 4) / (ground + 4)
+    mean, apart = ratio.mean(axis=-1), ratio.max(axis=-1) - ratio.min(axis=-1)
+    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < 0.12 * mean))
 
 
 def relit(image: Image, factor: Floats32) -> Floats32:

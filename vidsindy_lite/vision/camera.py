@@ -197,7 +197,7 @@ def _motion(ground: list[Ground], frames: Reel, larger: float) -> CameraMotion:
     steady = rescaled(np.linalg.inv(maps[0]) @ maps, 1 / frames.factor)
     sure = larger * np.hypot(errors, errors[0])
     sure[0] = 0.0
-    return CameraMotion(steady, frames.factor * sure)
+    return CameraMotion(steady / steady[:, 2:, 2:], frames.factor * sure)
 
 
 def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:

@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import changes, lengths, light
-from .plate import Plate, tolerance
+from .background import changes, lengths, light, shadowed
+from .plate import Plate, least_difference, tolerance
 from .steadying import carry
 from .video import Reel
 
@@ -98,7 +98,10 @@ def candidates(
     frames: Iterable[Image], maps: Floats, plate: Plate, noise: float
 ) -> tuple[Candidates, list[Floats32]]:
     """The candidates of all frames, and how much brighter each frame is than the ground."""
-    bound, lights, found = tolerance(plate, noise), [], []
+    lights, found = [], []
+    bound = tolerance(plate.image, least_difference(noise), moves=plate.moves)
+    if plate.moves:
+        bound[plate.valid == 0] = 1e3
     for i, (frame, here, others) in enumerate(_with_neighbours(frames, maps)):
         height, width = frame.shape[:2]
         ground, known = plate.seen_from(here)
@@ -196,7 +199,7 @@ def components(
     quality = worth * np.tanh(mean / 4) * np.minimum(area / (0.7 * box[:, 2:].prod(axis=1)), 1)
     quality *= np.minimum(area / 8, 1)
     cut = (box[:, :2] <= 0).any(axis=1) | (box[:, :2] + box[:, 2:] >= mask.shape[::-1]).any(axis=1)
-    quality *= np.where(cut, 0.6, 1) * np.where(_are_shadows(colour, behind), 0.5, 1)
+    quality *= np.where(cut, 0.6, 1) * np.where(shadowed(colour, behind), 0.5, 1)
     return np.column_stack([centre, box, area, colour, behind, quality])
 
 
@@ -204,13 +207,6 @@ def _means(colours: Image, part: Ints, count: int) -> Floats:
     """Mean colours (count, 3) of the parts to which pixels (m, 3) belong."""
     sums = np.column_stack([np.bincount(part, x, count) for x in colours.T])
     return sums / np.maximum(np.bincount(part, minlength=count), 1)[:, None]
-
-
-def _are_shadows(colours: Floats, grounds: Floats) -> Bools:
-    """The same surfaces (m, 3) in less light: darker by about the same factor in all colours."""
-    ratio = (colours + 4) / (grounds + 4)
-    mean = ratio.mean(axis=1)
-    return (mean > 0.35) & (mean < 0.95) & (np.ptp(ratio, axis=1) < 0.1 * mean)
 
 
 def _distinct(rows: Floats) -> Floats:

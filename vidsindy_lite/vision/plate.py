@@ -168,16 +168,19 @@ def lights_of(samples: Image, maps: Floats, known: Bools) -> Floats32:
                      for sample, here in zip(samples, maps, strict=True)])  # fmt: skip
 
 
-def tolerance(plate: Plate, noise: float) -> Floats32:
-    """Grey levels by which reduced frames may differ from each place of their plate."""
-    grey = cv2.cvtColor(plate.image, cv2.COLOR_RGB2GRAY)
+def least_difference(noise: float) -> float:
+    """Grey levels below which nothing differs from the ground, in this noise of a pixel."""
+    return float(np.clip(5 * noise, 8.0, 60.0))
+
+
+def tolerance(ground: Image, least: float, *, moves: bool) -> Floats32:
+    """Grey levels by which frames may differ from each place of their ground.
+
+    An edge may be displaced, by more if the camera moves.
+    """
+    grey = cv2.cvtColor(ground, cv2.COLOR_RGB2GRAY)
     slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
-    # Pixels by which an edge may be displaced, and levels below which nothing differs.
-    edge = 0.5 if plate.moves else 0.12
-    bound = np.clip(5 * noise, 8.0, 60.0) + edge * slope.astype(np.float32)
-    if plate.moves:
-        bound[plate.valid == 0] = 1e3
-    return np.asarray(bound, np.float32)
+    return np.asarray(least + (0.5 if moves else 0.12) * slope.astype(np.float32), np.float32)
 
 
 def noise_of(samples: Image, maps: Floats, plate: Plate) -> float:

@@ -258,8 +258,7 @@ def carry(maps: NDArray, points: Floats) -> Floats:
 def rescaled(maps: Floats, factor: float) -> Floats:
     """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
     larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
-    found = np.linalg.inv(larger) @ maps @ larger
-    return np.asarray(found / found[:, 2:, 2:], float)
+    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
 
 
 class _Relief(NamedTuple):
@@ -477,4 +476,4 @@ class Steadying:
     def motion(self) -> CameraMotion:
         """The motion so far, in pixels of the frames."""
         maps = rescaled(np.array(self.maps), 1 / self.factor)
-        return CameraMotion(maps, self.factor * np.array(self.errors))
+        return CameraMotion(maps / maps[:, 2:, 2:], self.factor * np.array(self.errors))
