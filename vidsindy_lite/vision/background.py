@@ -33,7 +33,7 @@ from .video import Reel, reduce
 _SATURATED = 250  # 255, but for compression
 LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
-_STRIP = 32  # rows of an image that are sorted at once
+STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
 _OFTEN = 0.1  # share of the samples in which other things differ: more are unrest
 _NEAR = 16  # coarse pixels, within which several things that differ may be one target
@@ -113,14 +113,14 @@ def median_image(frames: Image) -> Image:
     Strip by strip: what is sorted stays in the cache, and the memory is not filled by copies.
     """
     result = np.empty_like(frames[0])
-    for top in range(0, len(result), _STRIP):
-        images = [frame[top : top + _STRIP] for frame in frames]
+    for top in range(0, len(result), STRIP):
+        images = [frame[top : top + STRIP] for frame in frames]
         for step in range(len(images)):
             for j in range(step % 2, len(images) - 1, 2):
                 low = np.minimum(images[j], images[j + 1])
                 images[j + 1] = np.maximum(images[j], images[j + 1])
                 images[j] = low
-        result[top : top + _STRIP] = images[len(images) // 2]
+        result[top : top + STRIP] = images[len(images) // 2]
     return result
 
 

@@ -27,6 +27,7 @@ from ..arrays import Bools, Floats, Floats32, Image, Ints
 from .background import changes, lengths, light
 from .plate import Plate
 from .steadying import (
+    PARTS,
     PLAINLY,
     Aligned,
     CameraMotion,
@@ -43,7 +44,6 @@ from .steadying import (
 )
 from .video import Reel
 
-_PARTS = 12  # into which each side of an image is cut
 _FAINT = 0.1  # grey levels; a difference without any noise
 _RIM = np.ones((9, 9), np.uint8)  # around what is not known, where smoothing is wrong
 _EDGE = np.ones((5, 5), np.uint8)  # around what a plate does not show
@@ -100,7 +100,7 @@ def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
     apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
     use = cv2.erode(known.astype(np.uint8), _RIM).astype(np.float32)
     parts, share = (
-        cv2.resize(x, (_PARTS, _PARTS), interpolation=cv2.INTER_AREA) for x in (apart * use, use)
+        cv2.resize(x, (PARTS, PARTS), interpolation=cv2.INTER_AREA) for x in (apart * use, use)
     )
     return np.where(share > 0.5, parts / np.maximum(share, 0.5), np.nan).astype(np.float32)
 

@@ -38,15 +38,11 @@ from .plate import Plate, least_difference, tolerance
 from .steadying import carry
 from .video import Reel
 
-LEVELS = 1.0, 2.5, 6.0
-"""Tolerances by which what is connected differs."""
-APART = 3
-"""Frames to the neighbours with which a frame is compared."""
+_LEVELS = 1.0, 2.5, 6.0  # tolerances by which what is connected differs
+_APART = 3  # frames to the neighbours with which a frame is compared
 _KEPT = 16  # candidates of a frame
-GAP = 15
-"""Frames that a path may miss."""
-TOLD = 20.0
-"""Quality of a candidate that somebody points at."""
+GAP = 15  # frames that a path may miss
+TOLD = 20.0  # quality of a candidate that somebody points at
 _SIDE = 40  # pixels of a patch
 _WIDE = 2.6  # width of the patch, in widths of the target
 _BINS = 4096  # of a histogram: 16 levels a colour
@@ -125,7 +121,7 @@ def candidates(
         rows = [
             components(strength, level, frame, ground, worth)
             for strength, worth in zip(strengths, (1.0, 0.7), strict=False)
-            for level in LEVELS
+            for level in _LEVELS
         ]
         found.append(Candidates.of(i, here, _distinct(np.concatenate(rows))))
         found[-1].colour[:] /= lit
@@ -138,13 +134,13 @@ def _with_neighbours(
     frames: Iterable[Image], maps: Floats
 ) -> Iterator[tuple[Image, Floats, list[tuple[Image, Floats]]]]:
     """Each frame and its map, and some frames before and after it with maps that lay them on it."""
-    window: deque[tuple[Image, Floats] | None] = deque([None] * APART, maxlen=2 * APART + 1)
-    for one in chain(zip(frames, maps, strict=False), repeat(None, APART)):
+    window: deque[tuple[Image, Floats] | None] = deque([None] * _APART, maxlen=2 * _APART + 1)
+    for one in chain(zip(frames, maps, strict=False), repeat(None, _APART)):
         window.append(one)
-        if len(window) <= APART or (middle := window[-1 - APART]) is None:
+        if len(window) <= _APART or (middle := window[-1 - _APART]) is None:
             continue
         back = np.linalg.inv(middle[1])
-        beside = [window[0] if len(window) > 2 * APART else None, window[-1]]
+        beside = [window[0] if len(window) > 2 * _APART else None, window[-1]]
         yield *middle, [(other[0], back @ other[1]) for other in beside if other is not None]
 
 

@@ -13,11 +13,10 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import changes, light, median_image
+from .background import STRIP, changes, light, median_image
 from .steadying import carry
 
 _SHOWN = 3  # samples that must show a place of the plate
-_STRIP = 128  # rows of a canvas whose median is taken at once
 
 
 class Plate:
@@ -144,8 +143,8 @@ def _masked_median(
     width, height = size
     result = np.zeros((height, width, 3), np.uint8)
     count = np.zeros((height, width), np.uint8)
-    for top in range(0, height, _STRIP):
-        strip = (width, min(_STRIP, height - top))
+    for top in range(0, height, STRIP):
+        strip = (width, min(STRIP, height - top))
         up = np.array([[1, 0, 0], [0, 1, -top], [0, 0, 1.0]])
         layers = np.empty((len(samples), strip[1], width, 3), np.uint8)
         here = np.zeros((strip[1], width), np.uint8)

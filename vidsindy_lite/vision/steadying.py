@@ -28,8 +28,7 @@ _RIM = 2  # pixels of each level that depend on what lies beyond the image
 _BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
 _LOOSE, _FIRM = 40.0, 3.0  # grey levels, and deviations, from which on a pixel is left aside
 _STEP, _TURN = 8.0, 0.03  # pixels and radians by which the guess may be wrong
-_BLOCKS = 12  # into which each side is cut: errors within one may be the same
-_PARTS = 12  # parts into which each side of the image is cut; one corner is followed in each
+PARTS = 12  # into which each side of an image is cut: of one corner, and of one error, each
 _WIDTH = 21  # reduced pixels: what is smoother than this is light
 _CONTRAST, _DARK = 250.0, 20.0  # of the relief; grey levels below which all is dark
 _EXACT = 1.0  # reduced pixels by which a corner may miss its place
@@ -198,7 +197,7 @@ def _middle(values: Floats | Floats32) -> float:
 
 def _by_blocks(values: Floats32) -> Floats32:
     """The means (12, 12) of an image over its blocks."""
-    blocks = cv2.resize(values, (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA)
+    blocks = cv2.resize(values, (PARTS, PARTS), interpolation=cv2.INTER_AREA)
     return np.asarray(blocks, np.float32)
 
 
@@ -215,10 +214,10 @@ def _error(
 
     `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
     """
-    height, width = (side // _BLOCKS for side in pull.shape)
+    height, width = (side // PARTS for side in pull.shape)
     if not height or not width:
         return np.inf
-    pulls = (slopes * pull)[:, : height * _BLOCKS, : width * _BLOCKS]
+    pulls = (slopes * pull)[:, : height * PARTS, : width * PARTS]
     means = np.array([_by_blocks(by) for by in pulls], float).reshape(6, -1)
     sums = height * width * means
     covariance = np.linalg.inv(information)
@@ -279,13 +278,13 @@ class _Relief(NamedTuple):
 def _corners(grey: Image) -> Floats:
     """The best corner of each part of the image that has one, (m, 2): none counts twice."""
     sharp = cv2.cornerMinEigenVal(grey, 9, ksize=3)
-    height, width = (side // _PARTS for side in grey.shape)
+    height, width = (side // PARTS for side in grey.shape)
     if not height or not width:
         return np.zeros((0, 2))
-    whole = np.asarray(sharp)[: height * _PARTS, : width * _PARTS]
-    parts = whole.reshape(_PARTS, height, _PARTS, width).swapaxes(1, 2).reshape(_PARTS**2, -1)
+    whole = np.asarray(sharp)[: height * PARTS, : width * PARTS]
+    parts = whole.reshape(PARTS, height, PARTS, width).swapaxes(1, 2).reshape(PARTS**2, -1)
     best = parts.argmax(axis=1)
-    row, column = np.divmod(np.arange(_PARTS**2), _PARTS)
+    row, column = np.divmod(np.arange(PARTS**2), PARTS)
     found = np.column_stack([column * width + best % width, row * height + best // width])
     # Smallest eigenvalue of the gradient's covariance in a corner, grey levels squared.
     return found[parts.max(axis=1) > 2.0 / 255**2].astype(float)

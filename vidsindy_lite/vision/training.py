@@ -28,8 +28,7 @@ SEEN_SHAPES = ("disc", "polygon")
 """What the detector is trained on. The other backgrounds and shapes are kept to test it."""
 STEPS = 2000
 BATCH = 16
-SIDE = 96
-"""Width and height of a training frame, pixels."""
+SIDE = 96  # pixels; width and height of a training frame
 
 _POOLED = 512  # pixels; width and height of the backgrounds that frames are cut from
 _EACH = 12  # such backgrounds of each kind

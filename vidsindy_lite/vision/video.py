@@ -35,30 +35,21 @@ from ..arrays import Floats, Image
 from ..checks import check_choice, check_instance, check_integer, check_number, check_path
 
 if TYPE_CHECKING:
-    from av.container import InputContainer
-    from av.video.stream import VideoStream
-
-Shown = tuple[int | None, bool]
-"""When a packet's frame is shown, in ticks of the stream, and whether decoding can begin there."""
-
-_LESS = (
-    1 - 1e-6
-)  # of a tick by which rounded times may be off: a whole one is a frame in some files
-if TYPE_CHECKING:
-    from av import VideoFrame
-SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
-
-
-_BITS = (8, 10, 12, 14, 16)  # of cameras
-_LOOKED_AT = 9  # images that tell how many bits a film uses
-if TYPE_CHECKING:
     from av import VideoFrame
     from av.container import InputContainer, OutputContainer
     from av.video.stream import VideoStream
 
-LOSSLESS = {".mov": "qtrle", ".mkv": "FFV1"}
-"""The codec of a file's suffix, unless another is asked for."""
+SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
+LOSSLESS = {".mov": "qtrle", ".mkv": "FFV1"}  # codecs, unless another is asked for
+
+# Of a tick by which rounded times may be off: a whole one is a frame in some files.
+_LESS = 1 - 1e-6
+_BITS = (8, 10, 12, 14, 16)  # of cameras
+_LOOKED_AT = 9  # images that tell how many bits a film uses
 _ROOM = 300_000_000  # bytes of frames that are kept, whole or reduced
+
+# When a packet's frame is shown, in ticks of the stream, and whether decoding can begin there.
+Shown = tuple[int | None, bool]
 
 
 def timing(packets: Sequence[Shown], stream: VideoStream) -> tuple[Floats, float]:
