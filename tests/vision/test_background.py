@@ -9,7 +9,6 @@ import pytest
 from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
-    _largest_component,
     _others,
     _shape,
     _unrest,
@@ -130,16 +129,6 @@ def test_light_is_measured_where_most_of_the_image_agrees():
     np.testing.assert_array_equal(light(now, then, know), 1)
     dark = np.full((60, 80, 3), 5, np.float32)
     np.testing.assert_array_equal(light(2 * dark, dark, np.ones((60, 80), bool)), 1)
-
-
-def test_the_largest_component_by_area_or_by_weight():
-    mask = np.zeros((10, 10), np.uint8)
-    mask[1:3, 1:3] = mask[5:8, 5:8] = 1
-    weight = np.ones((10, 10), np.float32)
-    weight[1:3, 1:3] = 10
-    assert _largest_component(mask)[0].sum() == 9
-    assert _largest_component(mask, weight)[0].sum() == 4
-    assert _largest_component(0 * mask) is None
 
 
 def blob(shape=(0, 0, 0, 0), area=400.0, inside=True, sound=True):
@@ -327,17 +316,6 @@ def test_a_pixel_half_covered_counts_half(plain):
 def test_a_square_at_the_border_of_the_image_may_go_on_beyond_it(plain, left, top):
     blob = plain.measure(squares((left, top, 16)), np.array([left + 7.5, top + 7.5]), 14)
     assert not blob.inside
-
-
-def test_a_window_holds_all_pixels_near_a_place_and_at_least_one(plain):
-    low, high, window = plain._window(np.array([50.0, 40.0]), 10.0)
-    assert (low.tolist(), high.tolist()) == ([40, 30], [61, 51])
-    assert window == np.s_[30:51, 40:61]
-    low, high, _ = plain._window(np.array([3.5, 94.2]), 5.0)
-    assert (low.tolist(), high.tolist()) == ([0, 89], [10, 96])
-    for place, corner in (((-30.0, -30.0), [0, 0]), ((500.0, 500.0), [127, 95])):
-        low, high, _ = plain._window(np.array(place), 5.0)
-        assert (low.tolist(), (high - low).tolist()) == (corner, [1, 1])
 
 
 @pytest.mark.parametrize("off", [(9, 0), (-9, 0), (0, 9), (0, -9)])

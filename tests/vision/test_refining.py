@@ -231,13 +231,6 @@ def test_a_larger_part_is_taken_unless_it_is_much_farther_away(apart, large):
     np.testing.assert_array_equal(found, parts(big if large else small))
 
 
-@pytest.mark.parametrize("place", [(20.5, 12.5), (80.5, 50.5)])
-def test_of_parts_that_are_as_large_the_nearer_one_is_taken(place):
-    here = (int(place[0]) - 2, int(place[1]) - 2, 6, 6)
-    mask = parts((18, 10, 6, 6), (78, 48, 6, 6), (48, 30, 6, 6))
-    np.testing.assert_array_equal(_nearest(mask, np.array(place)), parts(here))
-
-
 def test_a_part_of_less_than_four_pixels_is_none():
     assert _nearest(parts(), np.zeros(2)) is None
     assert _nearest(parts((40, 30, 3, 1)), np.array([41.0, 30])) is None
@@ -363,38 +356,6 @@ def test_the_time_between_two_views_is_that_before_the_change():
     for pause, at in ((19, 20), (20, None), (21, 20), (22, 20)):
         frames = np.arange(40) + 10 * (np.arange(40) >= pause)
         assert swapped(frames, areas) == at
-
-
-def test_a_place_on_a_quartic_is_where_the_others_say():
-    frames = np.array([3.0, 4, 6, 7, 8, 10, 11, 13, 14])
-    t = frames - 7
-    places = np.column_stack([5 + t - 0.2 * t**3, 30 - 2 * t**2 + 0.01 * t**4])
-    every = np.arange(9)
-    off, unsure = _leave_out(frames, places, 3, every)
-    assert off == pytest.approx(0, abs=1e-9)
-    # By hand: at the frames 3, 4, 6, 8, 10, 11 the parabola is off by what is cubic and quartic.
-    use = [0, 1, 2, 4, 5, 6]
-    rest = places[3] - [np.polyval(np.polyfit(t[use], x[use], 2), 0) for x in places.T]
-    assert unsure == pytest.approx(np.linalg.norm(rest))
-    moved = places.copy()
-    moved[3] += [3, -4]
-    assert _leave_out(frames, moved, 3, every)[0] == pytest.approx(5)
-    assert _leave_out(frames, moved, 3, every)[1] == pytest.approx(unsure)
-    moved[[7, 8]] += 100  # beyond the three on each side
-    assert _leave_out(frames, moved, 3, every)[0] == pytest.approx(5)
-    moved[2] += 10  # the nearest of them
-    assert _leave_out(frames, moved, 3, every)[0] > 6
-
-
-@pytest.mark.parametrize("i", [0, 8])
-def test_beyond_the_first_and_the_last_of_the_others_a_place_is_twice_as_unsure(i):
-    frames = np.arange(9.0)
-    places = np.column_stack([0.1 * (frames - 4) ** 3, 0 * frames])
-    off, unsure = _leave_out(frames, places, i, np.arange(9))
-    use = np.delete(np.arange(9), i)[:6] if i == 0 else np.arange(2, 8)
-    parabola = np.polyval(np.polyfit(frames[use], places[use, 0], 2), frames[i])
-    assert off == pytest.approx(0, abs=1e-7)
-    assert unsure == pytest.approx(2 * abs(parabola - places[i, 0]))
 
 
 @pytest.mark.parametrize(

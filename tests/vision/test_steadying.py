@@ -4,8 +4,6 @@ import cv2
 import numpy as np
 import pytest
 from footage import Phone, write_phone
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vidsindy_lite import track
 from vidsindy_lite.vision import steadying
@@ -14,17 +12,14 @@ from vidsindy_lite.vision.steadying import (
     Aligned,
     Ground,
     Steadying,
-    _as_similarity,
     _by_corners,
     _ByCorners,
     _corners,
     _drifted,
     _error,
     _follow,
-    _middle,
     _Relief,
     _similar,
-    _widespread,
     carry,
     displacement,
     grounds,
@@ -218,14 +213,6 @@ def test_a_camera_stands_still_if_most_pairs_say_so_and_none_the_contrary(
     assert stands_still([np.zeros((48, 64, 3), np.uint8)] * 3) is still
 
 
-@pytest.mark.parametrize(("half", "wide"), [((60, 66), True), ((60, 57), False), ((0, 92), True),
-                                            ((92, 0), True), ((80, 0), False)])  # fmt: skip
-def test_points_that_are_wide_spread_have_six_tenths_of_the_spread_of_the_image(half, wide):
-    # The diagonal, of 500, by the root of twelve, is 144; six tenths of it are 87.
-    points = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) * half + np.array([40, 200.0])
-    assert _widespread(points, (300, 400)) is wide
-
-
 def clouds(u, noise, contrast, seed):
     """A picture of clouds without corners, moved to the right; new noise each."""
     scene = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(240, 320)), (0, 0), 12)
@@ -280,16 +267,6 @@ def test_the_error_of_a_map_by_corners_is_that_of_the_mean_of_a_quarter_of_them(
 def test_corners_need_no_other_witness_if_they_are_many_and_exact(agreeing, error, alone):
     assert _ByCorners(Aligned(np.eye(3), error), agreeing).alone is alone
     assert not _ByCorners(None, agreeing).alone
-
-
-@pytest.mark.parametrize("u", [-0.7, -0.3, 0.0, 0.45, 0.9, 1.2])
-@pytest.mark.parametrize("v", [-0.55, 0.0, 0.2])
-def test_the_share_of_a_key_frame_that_is_in_view(u, v):
-    followed = Steadying(1)
-    followed.add(grains())
-    here = np.array([[1, 0, u * SIZE[0]], [0, 1, v * SIZE[1]], [0, 0, 1]])
-    share = max(1 - abs(u), 0) * (1 - abs(v))
-    assert followed._shared(here) == pytest.approx(share, abs=0.22 * (share > 0))
 
 
 def test_the_step_of_a_map_is_by_how_much_it_differs_from_the_last_one():
@@ -508,12 +485,6 @@ def test_a_turn_alone_is_followed_to_its_end(turn):
     assert np.arctan2(found.map[1, 0], found.map[0, 0]) == pytest.approx(turn, abs=1e-4)
 
 
-@given(st.lists(st.floats(-1e3, 1e3, width=32), min_size=3, max_size=60))
-def test_the_middle_is_the_median_of_every_other_value(values):
-    values = np.array(values, np.float32)
-    assert _middle(values) == np.median(values[::2])
-
-
 def plane(width, height, right, down, middle=50.0):
     """Grey levels that grow evenly, with so much in the middle."""
     v, u = np.mgrid[:height, :width].astype(np.float32)
@@ -557,20 +528,6 @@ def test_a_pyramid_has_four_levels_as_long_as_there_are_32_pixels_to_halve(size,
     found = pyramid(image)
     assert [level.shape for level in found] == levels
     assert all(np.allclose(level, 77) for level in found)
-
-
-def test_the_similar_map_nearest_to_a_guess():
-    # Over the corners of 200 x 100 pixels the places spread four times as much along u.
-    size = np.array([200, 100])
-    same = similar(3, -7, 0.2, 1.1)
-    np.testing.assert_allclose(_as_similarity(same, size), same, atol=1e-9)
-    np.testing.assert_allclose(_as_similarity(2 * same, size), same, atol=1e-9)
-    wide = np.array([[1.2, 0, 0], [0, 1, 0], [0, 0, 1]])
-    nearest = [[1.16, 0, 120 - 116], [0, 1.16, 50 - 58], [0, 0, 1]]
-    np.testing.assert_allclose(_as_similarity(wide, size), nearest, atol=1e-9)
-    skew = np.array([[1, 0.2, 0], [0, 1, 0], [0, 0, 1]])
-    nearest = [[1, 0.04, 110 - 102], [-0.04, 1, 50 - 46], [0, 0, 1]]
-    np.testing.assert_allclose(_as_similarity(skew, size), nearest, atol=1e-9)
 
 
 def test_errors_of_one_block_add_up_and_those_of_different_ones_do_not():
