@@ -517,3 +517,14 @@ def test_the_blur_of_a_target_is_no_other_colour(level, plain):
     found = whole(own, differs, other, now, ground)
     assert found.plain == plain
     assert (found.label == differs).all()
+
+
+@pytest.mark.parametrize("i", [0, 8])
+def test_beyond_the_first_and_the_last_of_the_others_a_place_is_twice_as_unsure(i):
+    frames = np.arange(9.0)
+    places = np.column_stack([0.1 * (frames - 4) ** 3, 0 * frames])
+    off, unsure = _leave_out(frames, places, i, np.arange(9))
+    use = np.delete(np.arange(9), i)[:6] if i == 0 else np.arange(2, 8)
+    parabola = np.polyval(np.polyfit(frames[use], places[use, 0], 2), frames[i])
+    assert off == pytest.approx(0, abs=1e-7)
+    assert unsure == pytest.approx(2 * abs(parabola - places[i, 0]))

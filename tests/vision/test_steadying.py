@@ -12,6 +12,7 @@ from vidsindy_lite.vision.steadying import (
     Aligned,
     Ground,
     Steadying,
+    _as_similarity,
     _by_corners,
     _ByCorners,
     _corners,
@@ -610,3 +611,27 @@ def test_the_error_of_a_map_is_about_that_by_which_it_misses():
         errors.append(found.error)
         misses.append(np.mean(((points @ (found.map - move).T) ** 2).sum(axis=1)) / 2)
     assert 0.5 < np.sqrt(np.mean(misses) / np.mean(np.square(errors))) < 2
+
+
+def test_the_similar_map_nearest_to_a_guess():
+    # Over the corners of 200 x 100 pixels the places spread four times as much along u.
+    size = np.array([200, 100])
+    same = similar(3, -7, 0.2, 1.1)
+    np.testing.assert_allclose(_as_similarity(same, size), same, atol=1e-9)
+    np.testing.assert_allclose(_as_similarity(2 * same, size), same, atol=1e-9)
+    wide = np.array([[1.2, 0, 0], [0, 1, 0], [0, 0, 1]])
+    nearest = [[1.16, 0, 120 - 116], [0, 1.16, 50 - 58], [0, 0, 1]]
+    np.testing.assert_allclose(_as_similarity(wide, size), nearest, atol=1e-9)
+    skew = np.array([[1, 0.2, 0], [0, 1, 0], [0, 0, 1]])
+    nearest = [[1, 0.04, 110 - 102], [-0.04, 1, 50 - 46], [0, 0, 1]]
+    np.testing.assert_allclose(_as_similarity(skew, size), nearest, atol=1e-9)
+
+
+@pytest.mark.parametrize("u", [-0.7, -0.3, 0.0, 0.45, 0.9, 1.2])
+@pytest.mark.parametrize("v", [-0.55, 0.0, 0.2])
+def test_the_share_of_a_key_frame_that_is_in_view(u, v):
+    followed = Steadying(1)
+    followed.add(grains())
+    here = np.array([[1, 0, u * SIZE[0]], [0, 1, v * SIZE[1]], [0, 0, 1]])
+    share = max(1 - abs(u), 0) * (1 - abs(v))
+    assert followed._shared(here) == pytest.approx(share, abs=0.22 * (share > 0))
