@@ -59,11 +59,14 @@ def lengths(a: Floats32) -> Floats32:
     return np.sqrt(dot(a, a))
 
 
-def shadowed(now: Floats | Floats32, ground: Floats | Floats32) -> Bools:
-    """Where (...) the same surface is seen in less light: darker by the same in all colours."""
+def shadowed(now: Floats | Floats32, ground: Floats | Floats32, uneven: float) -> Bools:
+    """Where (...) the same surface is seen in less light: darker by the same in all colours.
+
+    By how much these factors may be `uneven`: of means by less than of noisy pixels.
+    """
     ratio = (now + 4) / (ground + 4)
     mean, apart = ratio.mean(axis=-1), ratio.max(axis=-1) - ratio.min(axis=-1)
-    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < 0.12 * mean))
+    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < uneven * mean))
 
 
 def relit(image: Image, factor: Floats32) -> Floats32:

@@ -195,7 +195,7 @@ def components(
     quality = worth * np.tanh(mean / 4) * np.minimum(area / (0.7 * box[:, 2:].prod(axis=1)), 1)
     quality *= np.minimum(area / 8, 1)
     cut = (box[:, :2] <= 0).any(axis=1) | (box[:, :2] + box[:, 2:] >= mask.shape[::-1]).any(axis=1)
-    quality *= np.where(cut, 0.6, 1) * np.where(shadowed(colour, behind), 0.5, 1)
+    quality *= np.where(cut, 0.6, 1) * np.where(shadowed(colour, behind, 0.1), 0.5, 1)
     return np.column_stack([centre, box, area, colour, behind, quality])
 
 

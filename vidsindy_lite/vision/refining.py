@@ -28,6 +28,7 @@ from .plate import Plate, least_difference, tolerance
 _CELLS = 32  # into which the side of a target is cut
 _REACH = 1.5  # sides of the target from its middle that its usual outline may have
 _TOUCHING = np.ones((7, 7), np.uint8)  # cells around a place that is missed: its edge is there
+_UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _FAINT, _RIM = 2.0, 0.9  # tolerances by which a ground differs from the target; share of its rim
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
@@ -169,8 +170,8 @@ class Lens:
         off = miss >= np.maximum(0.45 * np.sqrt(square), 2 * self.least)
         own = mask & (share > 0.25) & ~off
         # Where half of it over the ground would look like one, nothing is told from a shadow.
-        dark = shadowed(ground + smooth, ground)
-        own &= ~dark | shadowed(ground + np.float32(0.5) * contrast, ground)
+        dark = shadowed(ground + smooth, ground, _UNEVEN)
+        own &= ~dark | shadowed(ground + np.float32(0.5) * contrast, ground, _UNEVEN)
         label = _nearest(own, centre - low)
         part = label is not None
         if label is None and (label := _nearest(mask, centre - low)) is None:
@@ -378,7 +379,7 @@ def whole(
 
     Not all that `differs` has an `other` colour: what lies between ground and target is its blur.
     """
-    shadow = shadowed(now, ground)
+    shadow = shadowed(now, ground, _UNEVEN)
     mask = (own | (differs & ~shadow)).astype(np.uint8)
     _, labels = cv2.connectedComponents(np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, _CORE)))
     inside = np.bincount(labels[own], minlength=2)
