@@ -191,9 +191,11 @@ def test_a_target_is_expected_where_the_camera_sees_it_in_whole_frames():
     np.testing.assert_allclose(whole.box[near], 3 * plain.box[near])
 
 
-def test_the_colour_that_is_expected_is_the_usual_one_of_the_path():
+def test_the_colour_that_is_expected_is_half_that_of_the_path_and_half_the_nearest():
     # It is (50, 80, 20) in its first frame, 6, then (90, 80, 20).
-    np.testing.assert_array_equal(followed_to().colour, [[90, 80, 20]] * 30)
+    colour = followed_to().colour
+    np.testing.assert_allclose(colour[[0, 3, 6, 7, 14, 29], 0], [90, 70, 70, 90, 90, 90])
+    np.testing.assert_allclose(colour[:, 1:], [[80, 20]] * 30)
 
 
 def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch):

@@ -376,6 +376,8 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     centre[frames] = carry(np.linalg.inv(film.maps[frames]), along)
     box[frames] = np.column_stack([centre[frames] - extent / 2, extent])
     colour[:] = np.median(seen.colour[rows], axis=0)
+    near = np.column_stack([np.interp(frames, at, x) for x in seen.colour[rows].T])
+    colour[frames] = 0.5 * colour[frames] + 0.5 * near
     k = film.factor
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
