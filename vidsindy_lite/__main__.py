@@ -296,8 +296,7 @@ def _train(options: argparse.Namespace) -> int:
     """Train the learned detector from scratch on frames that the package renders.
 
     Its weights (detector.pt) and the log of the training (detector.json) go into the package. This
-    takes a few minutes on one core. Stopped, it goes on from its last checkpoint when it is started
-    again.
+    takes a few minutes on one core.
     """
     from .vision import training
 
@@ -533,7 +532,7 @@ COMMANDS = {
         "--seed": _count(0, "of weights and frames (default: 0)"),
         "--steps": _count(None, "batches of 16 frames (default: as shipped)"),
         "--output": _words("FILE", "weights (default: those of the package)"),
-    }, kept="the last checkpoint is kept: start it again to go on"),
+    }),
     "compare": _Command(_compare, "two folders of figures, by their numbers", {
         "committed": _words("COMMITTED", "a folder like figures/"),
         "regenerated": _words("REGENERATED", "the same from another run"),

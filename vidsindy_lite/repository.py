@@ -113,7 +113,7 @@ def code_hash(without: tuple[str, ...] = ()) -> str:
     for file in sorted(PACKAGE.rglob("*")):
         place = file.relative_to(PACKAGE)
         left_out = {*place.parts[:-1], place.stem} & {*without, "__pycache__"}
-        if left_out or not file.is_file() or file.suffix in (".pyc", ".checkpoint"):
+        if left_out or not file.is_file() or file.suffix == ".pyc":
             continue
         content = file.read_bytes()
         if file.suffix == ".py":

@@ -9,21 +9,24 @@ import pytest
 from vidsindy_lite.vision.background import (
     BackgroundModel,
     Blob,
-    ReducedFrames,
-    _largest_component,
     _others,
     _shape,
     _unrest,
     camera_motion,
+    changes,
+    dot,
+    hull,
+    lengths,
     light,
     median_image,
+    relit,
     sample_frames,
     track_blobs,
     view_distances,
     whole_views,
 )
 from vidsindy_lite.vision.rendering import Scene, render
-from vidsindy_lite.vision.video import write_video
+from vidsindy_lite.vision.video import Reel, write_video
 
 SIZE = (128, 96)
 
@@ -126,16 +129,6 @@ def test_light_is_measured_where_most_of_the_image_agrees():
     np.testing.assert_array_equal(light(now, then, know), 1)
     dark = np.full((60, 80, 3), 5, np.float32)
     np.testing.assert_array_equal(light(2 * dark, dark, np.ones((60, 80), bool)), 1)
-
-
-def test_the_largest_component_by_area_or_by_weight():
-    mask = np.zeros((10, 10), np.uint8)
-    mask[1:3, 1:3] = mask[5:8, 5:8] = 1
-    weight = np.ones((10, 10), np.float32)
-    weight[1:3, 1:3] = 10
-    assert _largest_component(mask)[0].sum() == 9
-    assert _largest_component(mask, weight)[0].sum() == 4
-    assert _largest_component(0 * mask) is None
 
 
 def blob(shape=(0, 0, 0, 0), area=400.0, inside=True, sound=True):
@@ -325,17 +318,6 @@ def test_a_square_at_the_border_of_the_image_may_go_on_beyond_it(plain, left, to
     assert not blob.inside
 
 
-def test_a_window_holds_all_pixels_near_a_place_and_at_least_one(plain):
-    low, high, window = plain._window(np.array([50.0, 40.0]), 10.0)
-    assert (low.tolist(), high.tolist()) == ([40, 30], [61, 51])
-    assert window == np.s_[30:51, 40:61]
-    low, high, _ = plain._window(np.array([3.5, 94.2]), 5.0)
-    assert (low.tolist(), high.tolist()) == ([0, 89], [10, 96])
-    for place, corner in (((-30.0, -30.0), [0, 0]), ((500.0, 500.0), [127, 95])):
-        low, high, _ = plain._window(np.array(place), 5.0)
-        assert (low.tolist(), (high - low).tolist()) == (corner, [1, 1])
-
-
 @pytest.mark.parametrize("off", [(9, 0), (-9, 0), (0, 9), (0, -9)])
 def test_a_square_across_the_border_of_the_window_is_not_measured(plain, off):
     frame = squares((40, 40, 16))
@@ -420,22 +402,6 @@ def test_a_camera_that_moves_now_and_then_does_not_rest(step):
     assert BackgroundModel(samples).camera_rests == (step == 0)
 
 
-@pytest.mark.parametrize(("left", "top"), [(40, 24), (37, 51), (0, 0), (112, 80)])
-def test_a_square_that_stays_in_most_samples_is_no_background(left, top):
-    stays = [squares((left, top, 16))] * 13
-    leaves = [squares((76 + i, 4 + i, 16)) for i in range(0, 16, 2)]
-    model = learned(np.array(stays + leaves))
-    np.testing.assert_array_equal(model.background, squares())
-    assert model.area == 16**2
-
-
-def test_what_moves_away_for_a_few_samples_is_background():
-    lamp = squares((40, 24, 16), colour=(250, 250, 250))
-    dark = squares((4, 60, 16))  # the target, and the lamp is off
-    model = learned(np.array([lamp] * 20 + [dark]))
-    np.testing.assert_array_equal(model.background, lamp)
-
-
 @pytest.mark.parametrize(("distance", "counts"), [(1, 1), (2, 1), (3, 0)])
 def test_faint_coverage_counts_up_to_two_pixels_beyond_the_outline(plain, distance, counts):
     faint = np.rint(np.array(GROUND) + 0.06 * np.subtract(TARGET, GROUND))
@@ -449,7 +415,7 @@ def test_faint_coverage_counts_up_to_two_pixels_beyond_the_outline(plain, distan
 def test_samples_are_spread_from_the_first_frame_to_the_last(tmp_path):
     for n in (50, 21, 3):
         frames = [np.full((64, 64, 3), 4 * i, np.uint8) for i in range(n)]
-        samples = sample_frames(ReducedFrames.of(write_video(tmp_path / "clip.mov", frames)))
+        samples = sample_frames(Reel(write_video(tmp_path / "clip.mov", frames)))
         numbers = samples[:, 0, 0, 0] // 4
         np.testing.assert_array_equal(numbers, np.unique(np.linspace(0, n - 1, 21).round()))
 
@@ -501,3 +467,45 @@ def test_a_part_of_a_target_that_is_in_the_background_shows(reach, shows):
     model = BackgroundModel(samples)
     model.learn_target(samples)
     assert model.shows_target() == shows
+
+
+# ---- what is asked of many pixels against the plain way
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_hull_of_a_mask_is_that_of_all_its_pixels(seed):
+    rng = np.random.default_rng(seed)
+    noise = cv2.GaussianBlur(rng.normal(size=(40, 60)), (0, 0), 3)
+    mask = (noise > 0.02) & (np.hypot(*np.ogrid[-20:20, -30:30]) < 19)
+    at = np.argwhere(mask)[:, ::-1].astype(np.int32)
+    plain = cv2.convexHull(at)[:, 0]
+    assert len(plain) > 4
+    assert set(map(tuple, hull(mask).tolist())) == set(map(tuple, plain.tolist()))
+    np.testing.assert_array_equal(hull(mask[[20]][:, 10:11] | True), [[0, 0]])
+
+
+def test_sums_over_the_colours():
+    a, b = np.random.default_rng(0).normal(size=(2, 4, 5, 3)).astype(np.float32)
+    np.testing.assert_allclose(dot(a, b), (a * b).sum(axis=2), rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(lengths(a), np.linalg.norm(a, axis=2), rtol=1e-5)
+
+
+def test_an_image_in_another_light():
+    image = np.random.default_rng(0).integers(0, 256, (4, 5, 3), np.uint8)
+    factor = np.array([0.5, 1.25, 2], np.float32)
+    np.testing.assert_allclose(relit(image, factor), image * factor)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 1.5])
+def test_what_is_saturated_differs_from_what_is_darker_only(factor):
+    light = np.full(3, factor, np.float32)
+    ground = np.full((1, 4, 3), 255, np.uint8)
+    grey = np.array([255.0, 200, 130, 20])
+    frame = grey.astype(np.uint8)[None, :, None].repeat(3, axis=2)
+    found = changes(frame, ground, light)[0, :, 0]
+    least = min(255 * factor, 255)  # the least that the ground may be in that light
+    np.testing.assert_allclose(found, np.minimum(grey - least, 0), atol=1e-3)
+    # What is not saturated differs from what is brighter, too, as far as a frame shows that.
+    wall = np.full((1, 4, 3), 200, np.uint8)
+    found = changes(frame, wall, light)[0, :, 0]
+    np.testing.assert_allclose(found, grey - min(200 * factor, 255), atol=1e-3)

@@ -1,17 +1,28 @@
-"""What differs from the ground or from other frames: where, how large, how plainly."""
+"""What may be the target, the best path through it, and its looks."""
 
+from itertools import product
+
+import cv2
 import numpy as np
 import pytest
+from helpers import one_a_frame
 
+from vidsindy_lite import write_video
+from vidsindy_lite.vision.background import shadowed
 from vidsindy_lite.vision.candidates import (
+    TOLD,
+    Appearance,
     Candidates,
-    _are_shadows,
     _with_neighbours,
+    best_path,
     candidates,
     components,
+    followed,
+    plainest_paths,
     uncommon,
 )
 from vidsindy_lite.vision.plate import Plate
+from vidsindy_lite.vision.video import Reel
 
 RNG = np.random.default_rng(0)
 GROUND = RNG.integers(90, 110, (120, 160, 1)).astype(np.uint8).repeat(3, axis=2)
@@ -132,9 +143,150 @@ def test_a_shadow_is_worth_half():
 def test_shadows_are_darker_by_about_the_same_factor_in_all_colours():
     ground = np.array([100, 150, 200.0])
     for share, is_shadow in ((0.3, False), (0.4, True), (0.6, True), (0.9, True), (0.98, False)):
-        assert _are_shadows(share * ground[None], ground[None]).item() == is_shadow
+        assert shadowed(share * ground[None], ground[None], 0.1).item() == is_shadow
     coloured = ground * [0.55, 0.65, 0.6]
-    assert not _are_shadows(coloured[None], ground[None]).item()
+    assert not shadowed(coloured[None], ground[None], 0.1).item()
     # The darker the ground, the less its colours tell.
-    assert _are_shadows(np.array([[3, 10, 3.5]]), np.array([[6, 16, 6.0]])).item()
-    assert not _are_shadows(10 * np.array([[3, 10, 3.5]]), 10 * np.array([[6, 16, 6.0]])).item()
+    assert shadowed(np.array([[3, 10, 3.5]]), np.array([[6, 16, 6.0]]), 0.1).item()
+    assert not shadowed(10 * np.array([[3, 10, 3.5]]), 10 * np.array([[6, 16, 6.0]]), 0.1).item()
+
+
+# ---- the best path through candidates: smooth, of one thing, whatever else there is
+
+
+RED = np.array([30.0, 30, 200])
+FRAMES = np.arange(30)
+CURVE = np.column_stack([20 + 4.0 * FRAMES, 60 + 20 * np.sin(FRAMES / 5)])
+
+
+def test_a_path_prefers_what_travels_smoothly_and_bridges_gaps():
+    rng = np.random.default_rng(0)
+    seen = one_a_frame(CURVE, np.full(30, 0.7))
+    clutter = Candidates.joined(
+        one_a_frame(rng.uniform(0, 150, (30, 2)), np.full(30, 0.8)) for _ in range(3)
+    )
+    both = Candidates.joined([seen.only(~np.isin(FRAMES, [12, 13, 14, 15])), clutter])
+    rows, value = best_path(both)
+    near = np.linalg.norm(both.place[rows] - CURVE[both.frame[rows]], axis=1) < 1
+    assert near.sum() == 26
+    assert value > 8
+
+
+@pytest.mark.parametrize(("gap", "bridged"), [(15, True), (16, False)])
+def test_what_is_longer_ago_than_fifteen_frames_is_another_path(gap, bridged):
+    frames = np.r_[0:8, 7 + gap : 15 + gap]
+    places = np.column_stack([4.0 * frames, np.full(16, 50.0)])
+    seen = one_a_frame(places, np.full(16, 0.9))._replace(frame=frames)
+    assert (len(best_path(seen)[0]) == 16) == bridged
+
+
+def test_what_falls_is_no_worse_than_what_goes_straight():
+    straight = one_a_frame(np.column_stack([6.0 * FRAMES, 50 + 0 * FRAMES]), np.full(30, 0.7))
+    falls = one_a_frame(np.column_stack([6.0 * FRAMES, 0.4 * FRAMES**2]), np.full(30, 0.7))
+    assert best_path(falls)[1] > 0.9 * best_path(straight)[1]
+
+
+def test_a_path_goes_through_what_somebody_points_at():
+    plain = one_a_frame(CURVE, np.full(30, 0.9))
+    faint = one_a_frame(CURVE + [0, 90], np.full(30, 0.5))
+    both = Candidates.joined([plain, faint])
+    assert (both.place[best_path(both)[0], 1] < 100).all()
+    told = (both.frame == 12) & (both.place[:, 1] > 100)
+    pinned = both._replace(quality=np.where(told, TOLD, both.quality))
+    assert (pinned.place[best_path(pinned)[0], 1] > 100).all()
+
+
+def test_no_candidates_are_no_path():
+    assert len(best_path(one_a_frame(np.zeros((0, 2)), []))[0]) == 0
+    assert plainest_paths(one_a_frame(np.zeros((0, 2)), [])) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_short_paths_none_is_worth_more_than_the_best(seed):
+    """Of two steps a path has no motion yet but the first: dynamic programming is exact."""
+    rng = np.random.default_rng(seed)
+    seen = Candidates.joined(
+        one_a_frame(rng.uniform(0, 30, (2, 2)), rng.uniform(0.3, 0.9, 2)) for _ in range(3)
+    )
+    value = best_path(seen)[1]
+    for one, other in product(np.flatnonzero(seen.frame == 0), np.flatnonzero(seen.frame == 1)):
+        assert best_path(seen.only(np.array([one, other])))[1] <= value + 1e-12
+
+
+def test_paths_have_nothing_in_common_and_the_plainest_comes_first():
+    plain = one_a_frame(CURVE, np.full(30, 0.9))
+    other = one_a_frame(CURVE[:, ::-1] + [200, 0], np.full(30, 0.6))
+    first, second = plainest_paths(both := Candidates.joined([plain, other]))
+    assert (both.quality[first.rows] == 0.9).all()
+    assert (both.quality[second.rows] == 0.6).all()
+    assert first.rating > second.rating > 0
+
+
+def test_what_stays_in_its_place_or_changes_its_outline_is_less_plain():
+    plain = one_a_frame(CURVE, np.full(30, 0.9))
+    stays = one_a_frame(20 + 0.02 * CURVE, np.full(30, 0.9))
+    box = plain.box.copy()
+    box[::2, 2] += 6  # of 9 pixels, in each frame: somebody who walks
+    best, *others = (
+        plainest_paths(seen)[0].rating for seen in (plain, stays, plain._replace(box=box))
+    )
+    assert max(others) < 0.5 * best
+
+
+# ---- a target by its looks: found to a fraction of a pixel, followed both ways, told from others
+
+
+N = 40
+PLACES = np.column_stack([60 + 30 * np.sin(np.arange(N) / 6), 50 + 0.5 * np.arange(N)])
+LOOKS = np.random.default_rng(0)
+WALL = LOOKS.uniform(60, 180, (120, 160, 3)).astype(np.float32)
+WALL = cv2.GaussianBlur(WALL, (0, 0), 2)
+
+
+def drawn(place, colour=(60, 200, 40), shown=True):
+    image = WALL.copy()
+    if shown:
+        at = tuple(np.rint(16 * np.asarray(place)).astype(int).tolist())
+        cv2.circle(image, at, 16 * 8, colour, -1, cv2.LINE_AA, 4)
+    return np.clip(image + LOOKS.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("off", [(0, 0), (4.3, -3.6), (-6.5, 5.2)])
+def test_a_target_is_found_near_where_it_is_expected(off):
+    size = np.array([17.0, 17])
+    looks = Appearance(drawn((60, 50)), np.array([60.0, 50]), size)
+    place, fit, colour = looks.find(drawn((70, 64)), np.array([70.0, 64]) + off, size)
+    np.testing.assert_allclose(place, [70, 64], atol=0.7)
+    assert fit > 0.3
+    assert colour > 0.5
+
+
+def test_what_is_of_another_colour_or_not_there_fits_less():
+    size = np.array([17.0, 17])
+    looks = Appearance(drawn((60, 50)), np.array([60.0, 50]), size)
+    own, other, none = (
+        looks.find(frame, np.array([62.0, 50]), size)
+        for frame in (drawn((60, 50)), drawn((60, 50), (60, 60, 200)), drawn(None, shown=False))
+    )
+    assert own[1] > 2 * none[1]
+    assert own[2] > 2 * max(other[2], none[2])
+    assert looks.likely(drawn((60, 50)))[50, 60] > 0.9 > 0.1 > looks.likely(drawn((60, 50)))[10, 9]
+
+
+def test_it_is_followed_both_ways_from_where_it_is_known(tmp_path):
+    hidden = (20, 21, 22)
+    film = [drawn(place, shown=i not in hidden) for i, place in enumerate(PLACES)]
+    frames = Reel(write_video(tmp_path / "film.mov", iter(film)))
+    maps = np.tile(np.eye(3), (N, 1, 1))
+    two = np.array([*PLACES[5:6], [20.0, 20]])  # the target and a piece of ground
+    found = Candidates.of(5, np.eye(3), np.column_stack(
+        [two, two - 8, np.full((2, 2), 17.0), np.full(2, 200.0), np.zeros((2, 6)), np.ones(2)]
+    ))  # fmt: skip
+    looks = followed(frames, maps, found, (10, PLACES[10], np.array([17.0, 17])),
+                     np.full((N, 2), np.nan))  # fmt: skip
+    shown = ~np.isin(np.arange(N), hidden)
+    assert np.linalg.norm(looks.box[shown, :2] - PLACES[shown], axis=1).max() < 1.5
+    assert looks.fit[10] == 1
+    assert looks.fit[list(hidden)].max() < looks.fit[shown].min()
+    assert looks.like[0] > 0.8
+    assert looks.like[1] < 0.4

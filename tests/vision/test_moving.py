@@ -11,18 +11,17 @@ from helpers import real
 
 from vidsindy_lite import Hint, track, write_video
 from vidsindy_lite.vision import moving
-from vidsindy_lite.vision.background import ReducedFrames
 from vidsindy_lite.vision.candidates import Candidates
 from vidsindy_lite.vision.moving import Film, expected, finished
-from vidsindy_lite.vision.refining import View, _nearest, fitting, joined, scatter
+from vidsindy_lite.vision.refining import View, fitting, joined, scatter
 from vidsindy_lite.vision.steadying import (
     CameraMotion,
     Steadying,
-    _Relief,
     at_rest,
     carry,
     stands_still,
 )
+from vidsindy_lite.vision.video import Reel
 
 SMALL = {"image_size": (320, 240), "frames": 60}
 
@@ -201,7 +200,7 @@ def test_the_colour_that_is_expected_is_half_that_of_the_path_and_half_the_neare
 
 def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch):
     ground = np.full((48, 64, 3), 100, np.uint8)
-    frames = ReducedFrames.of(write_video(tmp_path / "clip.mov", [ground] * 41))
+    frames = Reel(write_video(tmp_path / "clip.mov", [ground] * 41))
     samples = np.array([ground] * 21)
     film = Film.of(frames, samples, rests=True)
     np.testing.assert_array_equal(film.sampled, np.arange(0, 41, 2))
@@ -209,30 +208,6 @@ def test_a_film_knows_which_of_its_frames_are_its_samples(tmp_path, monkeypatch)
     monkeypatch.setattr(moving, "camera_motion", lambda *_: (at_rest(36), True))
     film = Film.of(frames, samples)
     np.testing.assert_array_equal(film.sampled, np.minimum(np.arange(0, 41, 2), 35))
-
-
-@pytest.mark.parametrize(("top", "area"), [(28, 100), (30, 56)])
-def test_of_several_parts_the_largest_for_its_distance_is_taken(top, area):
-    # 100 pixels count half where they are as far away as their side and two pixels more.
-    mask = np.zeros((60, 60), bool)
-    mask[20:27, 19:27] = True
-    mask[top : top + 10, 18:28] = True
-    assert _nearest(mask, np.array([22.5, 23.0])).sum() == area
-
-
-def test_relief_is_by_how_much_brighter_than_around_in_any_light():
-    cloud = np.random.default_rng(0).normal(size=(120, 160, 1)).astype(np.float32)
-    cloud = np.tile(cv2.GaussianBlur(cloud, (0, 0), 3)[..., None], 3)
-    cloud /= 30 * cloud.std()
-
-    def relief(light, contrast):
-        seen = np.rint(light * (1 + contrast * cloud)).astype(np.uint8)
-        return _Relief.of(seen).fine.astype(float) - 128
-
-    plain = relief(200, 1)
-    assert np.corrcoef(plain.ravel(), cloud[..., 0].ravel())[0, 1] > 0.8
-    np.testing.assert_allclose(relief(200, 2).std(), 2 * plain.std(), rtol=0.1)
-    np.testing.assert_allclose(relief(140, 1).std(), plain.std(), rtol=0.2)
 
 
 def test_partial_views_and_jumps_are_left_out():
@@ -319,14 +294,14 @@ def test_frames_that_do_not_tell_where_the_camera_is_are_counted():
     views = [View(place, 100.0, np.zeros(3), True, place + square) for place in places]
     errors = np.zeros(20)
     maps = np.tile(np.eye(3), (20, 1, 1))
-    assert finished(views, CameraMotion(maps, errors), ()).doubts == ()
+    assert finished(views, CameraMotion(maps, errors), ()).warnings == ()
     larger = [replace(view, area=300.0) for view in views[12:]]
-    (doubt,) = finished(views[:12] + larger, CameraMotion(maps, errors), ()).doubts
+    (doubt,) = finished(views[:12] + larger, CameraMotion(maps, errors), ()).warnings
     assert doubt.startswith("from frame 12 on, what is followed has another size at once")
     errors[16:] = np.inf
     found = finished(views, CameraMotion(maps, errors), ())
     assert np.isfinite(found.pixels[:, 0]).sum() == 16
-    (doubt,) = found.doubts
+    (doubt,) = found.warnings
     assert doubt.startswith("in 4 frames of 20 the target is seen")
     assert "16 to 19" in doubt
 
@@ -341,8 +316,8 @@ def test_an_outline_that_changes_from_frame_to_frame_is_told(part, told):
         for place, area in zip(places, areas, strict=True)
     ]
     found = finished(views, at_rest(40), ())
-    assert any("outline of the target" in doubt for doubt in found.doubts) == told
-    assert (np.median(found.errors) > 2) == told
+    assert any("outline of the target" in doubt for doubt in found.warnings) == told
+    assert (np.median(found.confidence) < np.exp(-2 / 3)) == told
 
 
 def test_views_before_ground_of_the_targets_colour_are_left_out_unless_all_are():
@@ -391,15 +366,6 @@ def test_of_a_fast_target_no_view_is_left_out_beside_a_gap():
         frames = np.delete(np.arange(120), np.s_[gap : gap + 3])
         places = dashing(frames, 60, 0.25)
         assert fitting(frames, places, np.full(117, 150.0), np.full(117, True)).all()
-
-
-def test_scatter_is_the_noise_of_a_smooth_motion():
-    rng = np.random.default_rng(0)
-    frames = np.arange(400)
-    places = np.column_stack([100 * np.sin(frames / 20), 0.5 * frames])
-    noisy = places + rng.normal(0, 0.2, places.shape)
-    assert scatter(frames, places) < 0.01
-    assert scatter(frames, noisy) == pytest.approx(0.2, rel=0.15)
 
 
 # --------------------------------------------------------------------------------------- real clips

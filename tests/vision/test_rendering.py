@@ -1,4 +1,4 @@
-"""Rendering against exact geometry, and bad arguments."""
+"""Rendering against exact geometry, what is drawn, and bad arguments."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidsindy_lite.vision import rendering
+from vidsindy_lite.vision import rendering as scenery
 from vidsindy_lite.vision.rendering import (
     _NORMAL,
     BACKGROUNDS,
@@ -361,3 +362,180 @@ def test_the_view_moves_over_as_much_background_as_it_needs():
     large = BACKGROUNDS["sky"](np.random.default_rng(4), (96 + 13, 80 + 13))
     for frame, (u, v) in zip(frames, [(0, 13), (13, 10), (7, 0)], strict=True):
         np.testing.assert_array_equal(frame, large[v : v + 80, u : u + 96])
+
+
+# ---- scenes: outlines against exact geometry, random scenes, and bad arguments
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("background", "moon"),
+        ("shape", "cube"),
+        ("colour", "teal"),
+        ("size", 2),
+        ("size", np.nan),
+        ("turns", np.inf),
+        ("tumbling", -1),
+        ("size_variation", 0.9),
+        ("noise_variance", -0.1),
+        ("shape_seed", -1),
+        ("shape_seed", 1.5),
+        ("size", True),
+        ("turns", "many"),
+        ("image_size", 512),
+        ("image_size", (10, 10)),
+        ("image_size", (512,)),
+        ("occluders", ((1, 2, 3),)),
+        ("occluders", ((500, 0, 50, 50),)),
+        ("occluders", ((0, 0, 1, 50),)),
+        ("trees", ((1, 2, 3),)),
+        ("trees", ((0, 500, 50, 50),)),
+    ],
+)
+def test_scene_rejects(field, value):
+    with pytest.raises(ValueError, match=f"^{field}: must|^{field}: each must"):
+        Scene(**{field: value})
+
+
+def moments(points):
+    """Area and centroid of a polygon as a fan of triangles around its first corner."""
+    a, b = points[1:-1] - points[0], points[2:] - points[0]
+    areas = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    centroids = points[0] + (a + b) / 3
+    return areas.sum(), areas @ centroids / areas.sum()
+
+
+@given(st.sampled_from(SHAPES), st.floats(4, 100), st.integers(0, 1000))
+def test_outlines_have_the_area_of_their_disc_and_their_centroid_at_zero(shape, size, seed):
+    area, centroid = moments(Scene(shape=shape, size=size, shape_seed=seed).outline())
+    assert area == pytest.approx(np.pi * size**2 / 4)
+    np.testing.assert_allclose(centroid, 0, atol=1e-9 * size)
+
+
+def test_outlines_are_of_their_kind():
+    disc = Scene(size=20).outline()
+    assert disc.shape == (128, 2)
+    np.testing.assert_allclose(np.hypot(*disc.T), 10, rtol=1e-3)
+    counts, spreads = set(), []
+    for seed in range(60):
+        corners = Scene(shape="polygon", size=20, shape_seed=seed).outline()
+        counts.add(len(corners))
+        turns = np.diff(np.unwrap(np.arctan2(*corners.T[::-1]), period=2 * np.pi))
+        # Corners are as far apart as those of a regular one, but for .4 of that.
+        spreads.append(np.abs(turns * len(corners) / (2 * np.pi) - 1).max())
+        blob = Scene(shape="irregular", size=20, shape_seed=seed).outline()
+        assert len(blob) == 128
+        assert 1.1 < np.hypot(*blob.T).max() / np.hypot(*blob.T).min() < 4
+    assert counts == {3, 4, 5, 6}
+    assert 0.2 < max(spreads) < 0.8
+
+
+def test_random_scenes_are_drawn_from_their_ranges():
+    scenes = [Scene.random(seed) for seed in range(300)]
+    assert {s.background for s in scenes} == set(BACKGROUNDS)
+    assert {s.shape for s in scenes} == set(SHAPES)
+    assert {s.colour for s in scenes} == set(COLOURS)
+    for name, low, high in (("size", 8, 40), ("turns", -10, 10), ("tumbling", 0, 1)):
+        values = np.array([getattr(s, name) for s in scenes])
+        assert low <= values.min() < low + 0.03 * (high - low)
+        assert high >= values.max() > high - 0.03 * (high - low)
+    assert Scene.random(3) == Scene.random(np.random.default_rng(3)) != Scene.random(4)
+    assert Scene.random(3, size=9, noise_variance=0.01).size == 9
+
+
+def test_the_largest_that_a_scene_may_hold():
+    scene = Scene(size=100, size_variation=0.5, noise_variance=0.1, occluders=[[0, 0, 4, 512]],
+                  trees=((508, 508, 4, 4),), image_size=(512, 512))  # fmt: skip
+    assert scene.occluders == ((0, 0, 4, 512),)
+    for wrong in (((0, 1, 4, 512),), ((509, 0, 4, 4),), ((0, 0, 3, 9),), ((-1, 0, 9, 9),)):
+        with pytest.raises(ValueError, match="occluders: "):
+            Scene(occluders=wrong)
+
+
+# ---- drawn backgrounds look as they did: figures and weights rest on them
+
+
+# Blue, green, red of pixels [25::65, 30::60] of an image of 256 x 192, seed 7.
+LOOKS = {
+    "plain": (
+        "158 154 150 162 158 154 167 163 159 172 168 164 158 154 150 162 158 154 167 163 159 "
+        "172 168 164 158 154 150 162 158 154 167 163 159 172 168 164"
+    ),
+    "sky": (
+        "215 171 135 214 170 134 216 172 136 202 158 122 222 190 163 203 171 144 203 171 144 "
+        "214 182 155 230 210 193 207 187 170 207 187 170 207 187 170"
+    ),
+    "hills": (
+        "215 171 135 214 170 134 216 172 136 202 158 122 222 190 163 203 171 144 164 152 138 "
+        "164 152 138 67 101 87 75 109 95 57 91 77 75 109 95"
+    ),
+    "sea": (
+        "215 171 135 214 170 134 216 172 136 202 158 122 153 127 83 155 129 85 153 127 83 "
+        "153 127 83 139 113 69 144 118 74 139 113 69 145 119 75"
+    ),
+    "wood": (
+        "102 136 172 111 145 181 108 142 178 103 137 173 93 127 163 93 127 163 74 108 144 82 "
+        "116 152 112 146 182 98 132 168 98 132 168 96 130 166"
+    ),
+    "bricks": (
+        "87 101 139 89 103 137 81 95 139 93 107 146 93 107 142 98 112 150 93 107 137 96 110 "
+        "142 105 119 162 91 105 148 84 98 138 80 94 130"
+    ),
+    "bark": (
+        "36 52 70 51 67 85 35 51 69 33 49 67 30 46 64 48 64 82 61 77 95 44 60 78 39 55 73 44 "
+        "60 78 43 59 77 26 42 60"
+    ),
+    "leaves": (
+        "44 74 52 54 84 62 42 72 50 19 49 27 34 64 42 48 78 56 46 76 54 37 67 45 55 85 63 47 "
+        "77 55 26 56 34 47 77 55"
+    ),
+}
+# Is there tree at pixels [7::15, 3::12] of a rectangle of 120 x 160, seed 7?
+TREE = (
+    "0 0 0 0 0 0 1 1 0 0 0 0 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 1 0 1 1 1 1 1 1 1 1 1 1 0 1 "
+    "1 1 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 0 0 0 0 1 1 1 1 1 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 "
+    "1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0 0 0 0 0 1 1 0 0 0 0"
+)
+
+
+def numbers(text):
+    return np.array(text.split(), float)
+
+
+@pytest.mark.parametrize("name", LOOKS)
+def test_what_is_drawn_looks_as_it_did(name):
+    draw = scenery.BACKGROUNDS.get(name) or getattr(scenery, name)
+    image = draw(np.random.default_rng(7), (256, 192))
+    assert image.dtype == np.uint8
+    np.testing.assert_allclose(image[25::65, 30::60, ::-1].ravel(), numbers(LOOKS[name]), atol=2)
+
+
+def test_a_tree_stands_where_it_did():
+    image, here = scenery.tree(np.random.default_rng(7), (120, 160))
+    assert image.shape == (160, 120, 3)
+    assert np.array_equal(here[7::15, 3::12].ravel(), numbers(TREE) > 0)
+
+
+def test_joints_part_all_bricks():
+    """A pale line of three pixels above each course, and before each brick of it."""
+    image = scenery.BACKGROUNDS["bricks"](np.random.default_rng(7), (256, 192)).astype(int)
+    red = image[..., 0] - image[..., 2] > 30
+    rows, columns = np.mgrid[:192, :256]
+    shifts = 32 * (rows // 32 % 2)  # every second course begins half a brick on
+    np.testing.assert_array_equal(red, (rows % 32 >= 3) & ((columns + shifts) % 64 >= 3))
+
+
+def test_joints_are_pale_and_not_all_the_same():
+    """As they were, in the second row of each course: green, from 161 to 175."""
+    image = scenery.BACKGROUNDS["bricks"](np.random.default_rng(7), (256, 192))
+    joints = (
+        "166 173 164 165 171 172 167 166 170 166 165 169 173 166 169 166 167 163 165 170 173 168 "
+        "166 164"
+    )
+    np.testing.assert_allclose(image[1::32, 30::60, 1].ravel(), numbers(joints), atol=2)
+    plain = image[1::32].astype(int)
+    assert (plain[..., 2] - plain[..., 1] == -8).all()
+    assert (plain[..., 0] - plain[..., 1] == 6).all()
+    assert 161 <= plain[..., 1].min() < 164
+    assert 173 < plain[..., 1].max() <= 175

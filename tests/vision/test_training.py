@@ -1,4 +1,4 @@
-"""The training of the detector: its frames, its loss, its log, and that it goes on where it was."""
+"""The training of the detector: its frames, its loss and its log."""
 
 import json
 
@@ -40,35 +40,21 @@ def small(monkeypatch):
     """Training that takes seconds."""
     monkeypatch.setattr(training, "BATCH", 2)
     monkeypatch.setattr(training, "_EACH", 1)
-    monkeypatch.setattr(training, "_CHECKPOINT", 2)
 
 
 @pytest.mark.slow
-def test_training_goes_on_where_it_was_stopped(small, tmp_path, monkeypatch, capsys):
-    whole = training.train(tmp_path / "whole.pt", seed=3, steps=5)
-    step, batch = [], training._batch
-
-    def stopped(seed, number, pool):
-        step.append(number)
-        if len(step) == 4:
-            raise KeyboardInterrupt
-        return batch(seed, number, pool)
-
-    monkeypatch.setattr(training, "_batch", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        training.train(tmp_path / "parts.pt", seed=3, steps=5)
-    assert not (tmp_path / "parts.pt").exists()
+def test_a_training_again_gives_the_same_weights_and_log(small, tmp_path, capsys):
+    log = training.train(tmp_path / "one.pt", seed=3, steps=5)
     command = ["train-detector", "--seed", "3", "--steps", "5", "--output"]
-    assert main([*command, str(tmp_path / "parts.pt")]) == 0
-    assert step == [0, 1, 2, 3, 2, 3, 4]
+    assert main([*command, str(tmp_path / "other.pt")]) == 0
     assert "10 frames" in capsys.readouterr().out
-    one, other = (torch.load(tmp_path / f"{n}.pt", weights_only=True) for n in ("whole", "parts"))
+    one, other = (torch.load(tmp_path / f"{n}.pt", weights_only=True) for n in ("one", "other"))
     assert all(torch.equal(one[name], other[name]) for name in one)
-    assert json.loads((tmp_path / "parts.json").read_text()) == whole
+    assert json.loads((tmp_path / "other.json").read_text()) == log
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".json", ".json", ".pt", ".pt"]
 
 
-def test_a_checkpoint_of_another_training_is_not_used(small, tmp_path):
+def test_another_seed_gives_other_weights(small, tmp_path):
     for seed in (1, 2):
         training.train(tmp_path / f"{seed}.pt", seed=seed, steps=2)
     weights = [torch.load(tmp_path / f"{s}.pt", weights_only=True)["where.1.bias"] for s in (1, 2)]
@@ -302,19 +288,3 @@ def test_middles_of_targets_are_drawn_from_one_edge_of_the_frame_to_the_other():
     pool = np.full((1, 512, 512, 3), 128, np.uint8)
     training.training_frame(Noted(np.random.PCG64(0)), pool)
     assert (-0.5, training.SIDE - 0.5, 2) in drawn
-
-
-def test_a_checkpoint_is_written_after_every_so_many_steps(tmp_path, monkeypatch):
-    saved = []
-    batch = (torch.zeros(1, 3, 32, 32), *(torch.full((1, k), 9.0) for k in (2, 2)), torch.ones(1))
-    monkeypatch.setattr(training, "background_pool", lambda rng: None)
-    monkeypatch.setattr(training, "_batch", lambda seed, step, pool: batch)
-    monkeypatch.setattr(training, "_CHECKPOINT", 3)
-    monkeypatch.setattr(
-        training,
-        "_save",
-        lambda path, state: saved.append((path.suffix, len(state.get("losses", [])))),
-    )
-    log = training.train(tmp_path / "a.pt", seed=1, steps=7)
-    assert saved == [(".checkpoint", 3), (".checkpoint", 6), (".pt", 0)]
-    assert log["steps"] == 7

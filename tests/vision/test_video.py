@@ -1,6 +1,7 @@
-"""Video files by round trip, against OpenCV's reader, and where something is wrong with them."""
+"""Video files and films of images: by round trip, against OpenCV's reader, and what is wrong."""
 
 import os
+import re
 import resource
 import struct
 import subprocess
@@ -13,14 +14,22 @@ import av
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from phones import waver, write_at
 
-from vidsindy_lite.vision import video
+import vidsindy_lite as vl
+from vidsindy_lite import track
+from vidsindy_lite.vision import frame_clock, video
 from vidsindy_lite.vision.rendering import Scene, render, render_video
 from vidsindy_lite.vision.video import (
+    Reel,
     pick_frames,
     read_frame,
     read_video,
+    reduce,
     video_info,
+    with_lines_between,
     write_video,
 )
 
@@ -190,7 +199,7 @@ def test_frames_of_a_file_with_sound_are_not_those_of_the_sound(tmp_path, second
 
 def test_frames_of_changing_duration_are_counted_and_those_that_are_cut_off(tmp_path):
     times = np.cumsum(np.random.default_rng(0).integers(5, 60, 50))
-    path = write_at(tmp_path / "clip.mkv", times, drawn(50))
+    path = write_in_ms(tmp_path / "clip.mkv", times, drawn(50))
     assert video_info(path).frames == 50
     path = write_video(tmp_path / "clip.mkv", drawn(50))
     path.write_bytes(path.read_bytes()[:-1000])
@@ -308,7 +317,7 @@ def test_the_view_of_a_turned_camera_is_upright(tmp_path, quarters):
 # ------------------------------------------------------------------------------- times and numbers
 
 
-def write_at(path, times, frames, codec="ffv1", pixels="bgr0", b_frames=0):
+def write_in_ms(path, times, frames, codec="ffv1", pixels="bgr0", b_frames=0):
     """A file whose frames are shown at these times, in milliseconds."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, 1000)
@@ -336,7 +345,7 @@ def write_at(path, times, frames, codec="ffv1", pixels="bgr0", b_frames=0):
 def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixels, b_frames):
     step = np.random.default_rng(0).integers(5, 60, 60)
     times = np.cumsum(step) if name != "b.avi" else np.arange(60)
-    path = write_at(tmp_path / name, times, drawn(60), codec, pixels, b_frames)
+    path = write_in_ms(tmp_path / name, times, drawn(60), codec, pixels, b_frames)
     frames = list(read_video(path))
     assert len(frames) >= 58
     for number in (0, 1, 7, 8, 9, 31, len(frames) - 1):
@@ -347,7 +356,7 @@ def test_one_frame_is_that_of_all_whatever_the_times(tmp_path, name, codec, pixe
 
 
 def test_frames_that_no_other_needs_are_not_decoded_on_the_way(tmp_path, monkeypatch):
-    path = write_at(tmp_path / "a.mp4", np.arange(24), drawn(24), "mpeg4", "yuv420p", 2)
+    path = write_in_ms(tmp_path / "a.mp4", np.arange(24), drawn(24), "mpeg4", "yuv420p", 2)
     decoded = []
     decode = video._decoded
     monkeypatch.setattr(
@@ -500,3 +509,372 @@ def test_import_sets_no_variable_and_loads_no_heavy_library():
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout == "[]\n"
+
+
+# ---- the clock of a file: even where it is, and right to a millisecond where it is not
+
+
+SIZE = (32, 24)
+
+
+def blank(count):
+    return [np.full((*SIZE[::-1], 3), 7 * i % 256, np.uint8) for i in range(count)]
+
+
+def clock_error(path, seconds):
+    return np.abs(frame_clock(path) / video_info(path).fps - (seconds - seconds[0])).max()
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    ("name", "codec", "pixels"),
+    [("a.mov", "qtrle", "rgb24"), ("a.mp4", "libx264", "yuv420p"), ("a.mkv", "ffv1", "bgr0")],
+)
+def test_the_clock_of_a_phone_is_right_to_a_millisecond(tmp_path, seed, name, codec, pixels):
+    seconds = waver(np.random.default_rng(seed), 90)
+    path = write_at(tmp_path / name, seconds, blank(len(seconds)), codec, pixels)
+    assert len(frame_clock(path)) == len(list(read_video(path))) == len(seconds)
+    assert clock_error(path, seconds) < 1e-3
+    assert video_info(path).fps == pytest.approx(1 / np.median(np.diff(seconds)), rel=0.05)
+
+
+@pytest.mark.parametrize("rate", [30, 29.97, 24000 / 1001, 240])
+@pytest.mark.parametrize("name", ["a.mov", "a.mkv"])
+def test_dropped_frames_are_gaps_of_an_even_clock(tmp_path, rate, name):
+    kept = np.delete(np.arange(60), [3, 20, 21, 50])
+    codec = ("qtrle", "rgb24") if name == "a.mov" else ("ffv1", "bgr0")
+    path = write_at(tmp_path / name, kept / rate, blank(len(kept)), *codec)
+    assert frame_clock(path).tolist() == kept.tolist()
+    assert video_info(path).fps == pytest.approx(rate, rel=1e-3)
+    assert clock_error(path, kept / rate) < 1e-3
+
+
+@pytest.mark.parametrize("fps", [25, 29.97, 600, 999.9, 1 / 3])
+@pytest.mark.parametrize(
+    ("name", "codec"),
+    [("a.mov", None), ("a.mkv", None), ("a.mp4", "mp4v"), ("a.avi", "MJPG"), ("a.avi", "FFV1")],
+)
+def test_even_files_have_an_even_clock_though_their_times_are_rounded(tmp_path, fps, name, codec):
+    path = write_video(tmp_path / name, blank(50), fps, codec)
+    assert frame_clock(path).tolist() == list(range(50))
+    assert video_info(path).fps == pytest.approx(fps, rel=1e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.integers(1, 400), min_size=2, max_size=30))
+def test_any_times_are_kept(tmp_path_factory, steps):
+    seconds = np.cumsum(steps) / 400
+    path = write_at(tmp_path_factory.mktemp("any") / "a.mov", seconds, blank(len(steps)))
+    assert clock_error(path, seconds) < 1e-3
+
+
+def test_the_start_that_an_editor_has_cut_off_does_not_count(tmp_path):
+    whole = write_at(tmp_path / "whole.mp4", np.arange(30) / 30, blank(30), "libx264", "yuv420p")
+    path = tmp_path / "cut.mp4"
+    with av.open(str(whole)) as source, av.open(str(path), "w") as target:
+        stream = target.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(source.streams.video[0]):
+            if packet.size:
+                packet.pts -= round(10 / 30 / packet.time_base)
+                packet.dts -= round(10 / 30 / packet.time_base)
+                packet.stream = stream
+                target.mux(packet)
+    frames = list(read_video(path))
+    assert len(frames) == len(frame_clock(path)) == video_info(path).frames == 20
+    assert frame_clock(path).tolist() == list(range(20))
+    assert np.array_equal(read_frame(path, 4), frames[4])
+    assert np.array_equal(frames[0], list(read_video(whole))[10])
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "pixels"),
+    [
+        ("a.mp4", "libx264", "yuv420p"),
+        ("a.mp4", "libx265", "yuv420p"),
+        ("a.mov", "libx265", "yuv420p10le"),
+        ("a.mov", "prores_ks", "yuv422p10le"),
+    ],
+)
+@pytest.mark.parametrize("size", [(96, 64), pytest.param((3840, 2160), marks=pytest.mark.slow)])
+def test_what_phones_code_is_read_in_eight_bits(tmp_path, name, codec, pixels, size):
+    ramp = np.linspace(30, 220, size[0]).astype(np.uint8)
+    frames = [np.tile(ramp[None, :, None], (size[1], 1, 3)) for _ in range(3)]
+    quality = {"x265-params": "log-level=none:crf=10"} if codec == "libx265" else {}
+    quality |= {"preset": "ultrafast"} if codec != "prores_ks" else {}
+    path = write_at(tmp_path / name, np.arange(3) / 30, frames, codec, pixels, **quality)
+    assert video_info(path) == (3, 30, size)
+    for ours, true in zip(read_video(path), frames, strict=True):
+        assert ours.dtype == np.uint8
+        assert np.abs(ours.astype(int) - true).mean() < 4
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "sound"),
+    [("a.avi", "mjpeg", False), ("a.webm", "libvpx", False), ("a.mkv", "ffv1", True)],
+)
+def test_half_a_file_is_told(tmp_path, name, codec, sound):
+    pixels = {"mjpeg": "yuvj420p", "ffv1": "bgr0"}.get(codec, "yuv420p")
+    with av.open(str(tmp_path / name), "w") as out:
+        stream = out.add_stream(codec, rate=30)
+        stream.width, stream.height, stream.pix_fmt = 80, 60, pixels
+        voice = out.add_stream("pcm_s16le", rate=8000, layout="mono") if sound else None
+        noise = np.random.default_rng(0).integers(0, 99, (60, 80, 3))
+        for k in range(60):
+            image = noise.copy()
+            image[20:30, 5 + k : 15 + k] = 230
+            frame = av.VideoFrame.from_ndarray(image.astype(np.uint8), format="rgb24")
+            out.mux(stream.encode(frame))
+            if voice:
+                heard = av.AudioFrame.from_ndarray(np.zeros((1, 267), np.int16), "s16", "mono")
+                heard.sample_rate, heard.pts = 8000, 267 * k
+                out.mux(voice.encode(heard))
+        out.mux(stream.encode())
+    whole = (tmp_path / name).read_bytes()
+    assert video_info(tmp_path / name).frames == 60
+    (tmp_path / name).write_bytes(whole[: len(whole) // 2])
+    assert video_info(tmp_path / name).frames == pytest.approx(60, abs=1)
+    told = track(tmp_path / name).warnings
+    assert any("frames can be read: it is cut off" in warning for warning in told)
+
+
+# ---- frames of two instants: one of them is shown, whichever it is for all frames alike
+
+
+FIELDS = (160, 120)
+INTERLACED = {"x264-params": "interlaced=1:tff=1", "crf": "6"}
+
+
+def interlaced(path, track, **options):
+    """A interlaced with two views a frame: the upper lines of one, the lower of the next."""
+    views = list(render(track, Scene("plain", size=14, image_size=FIELDS)))
+    frames = [view.copy() for view in views[::2]]
+    for frame, later in zip(frames, views[1::2], strict=True):
+        frame[1::2] = later[1::2]
+    # With colours of every line: an ordinary converter would mix those of two instants.
+    return write_at(path, np.arange(len(frames)) / 25, frames, "libx264", "yuv422p", **options)
+
+
+def test_the_target_is_where_it_was_at_one_instant(tmp_path):
+    along = np.linspace(0, 2 * np.pi, 120)
+    track = np.column_stack((80 + 45 * np.cos(along), 60 + 35 * np.sin(2 * along)))
+    found = vl.track(interlaced(tmp_path / "a.mp4", track, **INTERLACED)).pixels
+    seen = np.isfinite(found).all(axis=1)
+    assert seen.mean() > 0.7
+    assert np.sqrt(np.mean((found - track[::2])[seen] ** 2)) < 0.2
+    # The same lines in a file that does not say so are half a frame late.
+    mixed = vl.track(interlaced(tmp_path / "b.mp4", track, crf="6")).pixels
+    assert np.nanmedian(np.abs(mixed - track[::2])) > np.nanmedian(np.abs(found - track[::2]))
+
+
+def test_every_reader_sees_the_same(tmp_path):
+    track = np.linspace([30, 30], [120, 90], 40)
+    path = interlaced(tmp_path / "a.mp4", track, **INTERLACED)
+    with av.open(str(path)) as container:
+        assert all(frame.interlaced_frame for frame in container.decode(video=0))
+    frames = list(vl.read_video(path))
+    assert frames[0].shape == (120, 160, 3)
+    for number in (0, 7, 19):
+        assert np.array_equal(vl.read_frame(path, number), frames[number])
+
+
+@pytest.mark.parametrize("lines", [1, 2, 5])
+def test_a_ramp_stays_a_ramp(lines):
+    field = np.arange(0, 20 * lines, 20, np.uint8)[:, None, None] * np.ones((1, 4, 3), np.uint8)
+    full = with_lines_between(field)
+    assert full.shape == (2 * lines, 4, 3)
+    assert full[:, 0, 0].tolist() == [*range(0, 20 * lines - 19, 10), 20 * (lines - 1)]
+
+
+# ---- films that are folders of images
+
+
+def fill(folder, names, size=(32, 24)):
+    folder.mkdir(exist_ok=True, parents=True)
+    for i, name in enumerate(names):
+        image = np.full((*size[::-1], 3), 10 * (i % 25), np.uint8)
+        (folder / name).write_bytes(cv2.imencode(".png", image)[1].tobytes())
+    return folder
+
+
+def shades(path):
+    return [int(frame[0, 0, 0]) for frame in vl.read_video(path)]
+
+
+@pytest.mark.parametrize("place", ["shots", "弾む球", "it's $5"])
+def test_a_folder_is_a_film_in_the_order_of_its_numbers(tmp_path, place):
+    folder = fill(tmp_path / place, [f"f{i}.png" for i in range(1, 13)])
+    (folder / "notes.txt").write_text("no image")
+    (folder / ".hidden.png").write_text("no image")
+    assert shades(folder) == [10 * i for i in range(12)]
+    assert video_info(folder) == (12, 0, (32, 24))
+    assert frame_clock(folder).tolist() == list(range(12))
+    assert vl.read_frame(folder, 10)[0, 0, 0] == 100
+    with pytest.raises(ValueError, match="number: .* must have that frame, got 12"):
+        vl.read_frame(folder, 12)
+
+
+@pytest.mark.parametrize("pattern", ["a_%04d.png", "a_%d.png", "a_*.png", "a_????.png"])
+def test_a_pattern_leaves_the_others_aside(tmp_path, pattern):
+    fill(tmp_path / "shots", [f"b_{i:04d}.png" for i in range(3)])
+    fill(tmp_path / "shots", [f"a_{i:04d}.png" for i in range(7)])
+    assert shades(tmp_path / "shots" / pattern) == [10 * i for i in range(7)]
+
+
+def test_a_missing_image_is_a_dropped_frame(tmp_path):
+    folder = fill(tmp_path / "shots", [f"{i:03d}.png" for i in (100, 110, 130, 140, 150)])
+    assert frame_clock(folder).tolist() == [0, 1, 3, 4, 5]
+
+
+def test_names_without_numbers_are_in_the_order_of_letters(tmp_path):
+    folder = fill(tmp_path / "shots", ["a.png", "b.png", "c.png"])
+    assert shades(folder) == [0, 10, 20]
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        ([], "path: must be a video file, or a folder of images, got .* without any"),
+        (["a1.png", "b1.png", "b2.png"], "must have its own number, got .*1.png and .*1.png"),
+        (["0033.png", "0066.png", "0101.png"], "the numbers of images must count frames"),
+        (["1.png", "2.png", "900.png", "1800.png", "2700.png"], "must count frames"),
+    ],
+)
+def test_folders_that_are_no_film(tmp_path, names, message):
+    folder = fill(tmp_path / "shots", names)
+    for read in (vl.read_video, video_info, frame_clock):
+        with pytest.raises(ValueError, match=message):
+            read(folder)
+
+
+def test_a_pattern_that_nothing_fits(tmp_path):
+    path = tmp_path / "none" / "a_%04d.png"
+    with pytest.raises(
+        FileNotFoundError, match=re.escape(f"nor images of that name, got '{path}'")
+    ):
+        vl.read_video(path)
+
+
+def test_images_that_cannot_be_read(tmp_path):
+    folder = fill(tmp_path / "shots", ["1.png", "2.png", "3.png"])
+    (folder / "2.png").write_bytes(b"")
+    with pytest.raises(ValueError, match=r"must be an image that OpenCV can read, got .*2\.png"):
+        shades(folder)
+    fill(folder, ["2.png"], size=(8, 8))
+    with pytest.raises(ValueError, match=r"one size, \(32, 24\), got \(8, 8\) in .*2\.png"):
+        shades(folder)
+
+
+def test_a_folder_is_tracked_as_the_video_is(tmp_path):
+    track = np.linspace([40, 40], [200, 160], 40)
+    scene = vl.Scene(background="sky", size=14, image_size=(256, 200))
+    video = vl.render_video(tmp_path / "a.mov", track, scene)
+    (tmp_path / "a").mkdir()
+    for i, frame in enumerate(vl.read_video(video)):
+        cv2.imwrite(str(tmp_path / "a" / f"{i:05d}.png"), frame[..., ::-1])
+    np.testing.assert_array_equal(vl.track(tmp_path / "a").pixels, vl.track(video).pixels)
+
+
+def pages(dtype, shift=0):
+    """A bright disc that goes to and fro, 40 images."""
+    for k in range(40):
+        page = np.full((60, 80), 90, np.uint8)
+        cv2.circle(
+            page, (round(40 + 25 * np.cos(k / 5)), round(30 + 17 * np.sin(k / 5))), 5, 230, -1
+        )
+        yield page.astype(dtype) << shift
+
+
+@pytest.mark.parametrize("name", ["film.tif", "弾む.TIFF"])
+def test_pages_of_one_tiff_are_a_film(tmp_path, name):
+    cv2.imwritemulti(str(tmp_path / "a.tif"), list(pages(np.uint8)))
+    path = (tmp_path / "a.tif").rename(tmp_path / name)
+    assert video_info(path)[::2] == (40, (80, 60))
+    film = [page[..., 0] for page in vl.read_video(path)]
+    np.testing.assert_array_equal(film, list(pages(np.uint8)))
+    assert len(vl.track(path).pixels) == 40
+    (tmp_path / "bad.tif").write_bytes(path.read_bytes()[:100])
+    with pytest.raises(ValueError, match=r"path: must hold .* frame, got none in '.*bad.tif'"):
+        video_info(tmp_path / "bad.tif")
+
+
+@pytest.mark.parametrize("bits", [10, 12, 16])
+def test_images_of_fewer_bits_than_they_have_room_for(tmp_path, bits):
+    (tmp_path / "film").mkdir()
+    for k, page in enumerate(pages(np.uint16, bits - 8)):
+        cv2.imwrite(str(tmp_path / "film" / f"{k:03d}.png"), page)
+    film = [page[..., 0] for page in vl.read_video(tmp_path / "film")]
+    np.testing.assert_array_equal(film, list(pages(np.uint8)))
+
+
+def test_one_image_is_no_film(tmp_path):
+    (tmp_path / "one").mkdir()
+    cv2.imwrite(str(tmp_path / "one" / "1.png"), np.zeros((10, 10, 3), np.uint8))
+    with pytest.raises(ValueError, match="path: must hold two frames or more, got one in"):
+        vl.track(tmp_path / "one")
+
+
+def test_images_of_real_numbers_are_refused(tmp_path):
+    cv2.imwritemulti(str(tmp_path / "a.tif"), [np.zeros((9, 9), np.float32)] * 3)
+    with pytest.raises(ValueError, match="path: must be an image that OpenCV can read"):
+        video_info(tmp_path / "a.tif")
+
+
+# ---- frames that are looked at several times against those of the file
+
+
+def rounded(factor):
+    """By how much a mean may be off: each step, a halving or the rest, rounds to whole levels."""
+    return 0.51 * {2: 1, 3: 1, 4: 2, 6: 2, 8: 3}[factor]
+
+
+@pytest.mark.parametrize("factor", [2, 3, 4, 6, 8])
+def test_reduced_pixels_are_means(factor):
+    image = np.random.default_rng(0).integers(0, 256, (4 * factor, 6 * factor, 3), np.uint8)
+    means = image.reshape(4, factor, 6, factor, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(reduce(image, factor), means, atol=rounded(factor))
+    assert reduce(image, factor).shape == (4, 6, 3)
+    assert reduce(image, 1) is image
+
+
+@pytest.mark.parametrize("factor", [3, 4])
+def test_what_is_missing_of_the_last_squares_repeats_the_last_row_and_column(factor):
+    image = np.random.default_rng(0).integers(0, 256, (7, 10, 3), np.uint8)
+    cut = np.pad(image, ((0, -7 % factor), (0, -10 % factor), (0, 0)), mode="edge")
+    means = cut.reshape(len(cut) // factor, factor, -1, factor, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(reduce(image, factor), means, atol=rounded(factor))
+
+
+@pytest.mark.parametrize("longest", [None, 16])
+@pytest.mark.parametrize(("room", "reads", "picks"), [(1.0, 1, 0), (0.99, 2, 1)])
+def test_frames_are_read_once_if_there_is_room(tmp_path, monkeypatch, room, reads, picks, longest):
+    images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
+    path = write_video(tmp_path / "clip.mov", iter(images))
+    count = {"read_video": 0, "pick_frames": 0}
+
+    def counted(name):
+        use = getattr(video, name)
+
+        def one(*given):
+            count[name] += 1
+            return use(*given)
+
+        monkeypatch.setattr(video, name, one)
+
+    counted("read_video")
+    counted("pick_frames")
+    reel = Reel(path, longest)
+    small = np.array([reduce(image, reel.factor) for image in images])
+    monkeypatch.setattr(video, "_ROOM", room * small.nbytes)
+    reel = Reel(path, longest)
+    assert reel.whole.few == (longest is None and room == 1)
+    np.testing.assert_array_equal(list(reel.pick([0, 2, 4, 7])), small[[0, 2, 4]])
+    for _ in range(2):
+        np.testing.assert_array_equal(list(reel), small)
+    assert count == {"read_video": reads, "pick_frames": picks}
+
+
+def test_a_film_of_which_not_all_was_seen_is_read_again(tmp_path):
+    images = np.random.default_rng(0).integers(0, 256, (5, 16, 32, 3), np.uint8)
+    reel = Reel(write_video(tmp_path / "clip.mov", iter(images)))
+    next(iter(reel))
+    np.testing.assert_array_equal(list(reel), images)

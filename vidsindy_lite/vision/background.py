@@ -18,10 +18,8 @@ that is how `view_distances` tells the one from the other.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import cv2
 import numpy as np
@@ -30,16 +28,14 @@ from scipy import ndimage
 from scipy.spatial.distance import cdist
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .video import Reel
+from .video import Reel, reduce
 
 _SATURATED = 250  # 255, but for compression
-_ROOM = 96_000_000  # bytes of reduced frames that are kept
 LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
-_STRIP = 32  # rows of an image that are sorted at once
+STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
-_BORDER = 3  # coarse pixels around a place that show how its surroundings continue
-_OFTEN = 0.1  # share of the samples that must differ to cast doubt on a place of the background
+_OFTEN = 0.1  # share of the samples in which other things differ: more are unrest
 _NEAR = 16  # coarse pixels, within which several things that differ may be one target
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
 _TOO_LARGE = 0.25  # share of the image that no target fills
@@ -61,6 +57,16 @@ def dot(a: Floats32, b: Floats32) -> Floats32:
 def lengths(a: Floats32) -> Floats32:
     """Root of the sum of the squares of the colours of each pixel."""
     return np.sqrt(dot(a, a))
+
+
+def shadowed(now: Floats | Floats32, ground: Floats | Floats32, uneven: float) -> Bools:
+    """Where (...) the same surface is seen in less light: darker by the same in all colours.
+
+    By how much these factors may be `uneven`: of means by less than of noisy pixels.
+    """
+    ratio = (now + 4) / (ground + 4)
+    mean, apart = ratio.mean(axis=-1), ratio.max(axis=-1) - ratio.min(axis=-1)
+    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < uneven * mean))
 
 
 def relit(image: Image, factor: Floats32) -> Floats32:
@@ -89,96 +95,17 @@ def hull(mask: Bools) -> Ints:
     return np.asarray(cv2.convexHull(ends.astype(np.int32))[:, 0], int)
 
 
-def reduction(size: tuple[int, int]) -> int:
-    """By how much frames of this size are reduced."""
-    return max(1, -(-max(size) // LONGEST))
-
-
-def reduce(image: Image, factor: int) -> Image:
-    """The means over squares of `factor` pixels, also over what is left of squares at the edges."""
-    size = (-(-image.shape[1] // factor), -(-image.shape[0] // factor))
-    right, bottom = size[0] * factor - image.shape[1], size[1] * factor - image.shape[0]
-    if right or bottom:
-        padded = cv2.copyMakeBorder(image, 0, bottom, 0, right, cv2.BORDER_REPLICATE)
-        image = np.asarray(padded, np.uint8)
-    while factor % 2 == 0:  # OpenCV halves an image much faster than it quarters one
-        factor //= 2
-        half = (image.shape[1] // 2, image.shape[0] // 2)
-        image = np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
-    if factor == 1:
-        return image
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-class ReducedFrames:
-    """The frames of a film, reduced by a factor once if they are few."""
-
-    def __init__(self, reel: Reel, factor: int) -> None:
-        self.reel, self.factor = reel, factor
-        width, height = reel.info.size
-        self._few = 3 * width * height * reel.info.frames <= _ROOM * factor**2
-        self._kept: list[Image] | None = None
-
-    @classmethod
-    def of(cls, path: str | os.PathLike) -> Self:
-        """The frames of a film, reduced as is usual for their size."""
-        reel = Reel(path)
-        return cls(reel, reduction(reel.info.size))
-
-    def pick(self, numbers: Sequence[int]) -> Iterator[Image]:
-        """The whole frames of these increasing numbers; on the way the reduced ones are kept."""
-        if self.reel.few or not self._few:
-            yield from self.reel.pick(numbers)
-            return
-        yield from (frame for i, (frame, _) in enumerate(self._both()) if i in numbers)
-
-    def __iter__(self) -> Iterator[Image]:
-        if self._kept is not None:
-            yield from self._kept
-        else:
-            yield from (small for _, small in self._both())
-
-    def some(self, numbers: Sequence[int]) -> Iterator[Image]:
-        """The reduced frames of these increasing numbers, as far as the film holds them."""
-        if self._kept is not None:
-            yield from (self._kept[i] for i in numbers if i < len(self._kept))
-        else:
-            yield from (reduce(frame, self.factor) for frame in self.reel.pick(numbers))
-
-    def _both(self) -> Iterator[tuple[Image, Image]]:
-        """All frames, whole and reduced; of these few are kept."""
-        kept: list[Image] = []
-        for frame in self.reel:
-            small = reduce(frame, self.factor)
-            if self._few:
-                kept.append(small)
-            yield frame, small
-        self._kept = kept if self._few else None
-
-
-def enlarged(factor: float) -> Floats:
-    """The map of pixels of an image reduced by a factor to those of the image."""
-    k = factor
-    return np.array([[k, 0, (k - 1) / 2], [0, k, (k - 1) / 2], [0, 0, 1.0]])
-
-
-def reduced(maps: Floats, factor: float) -> Floats:
-    """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
-    larger = enlarged(factor)
-    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
-
-
 def sampled(frames: int) -> Ints:
     """The numbers of about 21 frames spread evenly over a clip of so many."""
     return np.unique(np.linspace(0, frames - 1, 21).round().astype(int))
 
 
-def sample_frames(frames: ReducedFrames) -> NDArray[np.uint8]:
+def sample_frames(frames: Reel) -> NDArray[np.uint8]:
     """The frames that are `sampled`, as far as the clip holds them, (m, height, width, 3)."""
-    info = frames.reel.info
+    info = frames.info
     spread = sampled(info.frames).tolist()
     samples, count = np.empty((len(spread), *info.size[::-1], 3), np.uint8), 0
-    for count, frame in enumerate(frames.pick(spread), 1):
+    for count, frame in enumerate(frames.whole.pick(spread), 1):
         samples[count - 1] = frame
     return samples[:count]
 
@@ -189,49 +116,15 @@ def median_image(frames: Image) -> Image:
     Strip by strip: what is sorted stays in the cache, and the memory is not filled by copies.
     """
     result = np.empty_like(frames[0])
-    for top in range(0, len(result), _STRIP):
-        images = [frame[top : top + _STRIP] for frame in frames]
+    for top in range(0, len(result), STRIP):
+        images = [frame[top : top + STRIP] for frame in frames]
         for step in range(len(images)):
             for j in range(step % 2, len(images) - 1, 2):
                 low = np.minimum(images[j], images[j + 1])
                 images[j + 1] = np.maximum(images[j], images[j + 1])
                 images[j] = low
-        result[top : top + _STRIP] = images[len(images) // 2]
+        result[top : top + STRIP] = images[len(images) // 2]
     return result
-
-
-def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: float) -> None:
-    """Correct in place a background that contains the target where it stayed for long.
-
-    Where many samples differ from the background, they show the same place with or without the
-    target. Of the two, the one that continues its surroundings is the background. `coarse` are the
-    samples, reduced: what continues what needs no more.
-    """
-    reduced = reduce(background, _COARSE)
-    ground = reduced.astype(np.float32)
-    differs = np.array([lengths(one - ground) > floor for one in coarse])
-    often = (differs.mean(axis=0) > _OFTEN).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(often)
-    for k in range(1, count):
-        if stats[k, cv2.CC_STAT_AREA] > _TOO_LARGE * often.size:
-            continue
-        group = differs[:, labels == k].mean(axis=1) > 0.5
-        if group.all() or not group.any():
-            continue
-        left, top, width, height = stats[k, :4]
-        right, bottom = left + width + _BORDER, top + height + _BORDER
-        left, top = max(left - _BORDER, 0), max(top - _BORDER, 0)
-        window = np.s_[top:bottom, left:right]
-        place = np.asarray(cv2.dilate((labels[window] == k).astype(np.uint8), np.ones((3, 3))))
-        inside = place > 0
-        around = cv2.inpaint(reduced[window], place, 3, cv2.INPAINT_TELEA)
-        looks = [np.median(coarse[:, *window][g], axis=0)[inside] for g in (group, ~group)]
-        off = [np.abs(look - around[inside]).sum() for look in looks]
-        window = np.s_[_COARSE * top : _COARSE * bottom, _COARSE * left : _COARSE * right]
-        view = background[window]
-        mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]] > 0
-        better = group if off[0] < off[1] else ~group
-        view[mask] = median_image(samples[:, *window][better])[mask]
 
 
 def _others(changes: list[Floats32], floor: float) -> float:
@@ -358,7 +251,6 @@ class BackgroundModel:
         self.noise = 1.4826 * float(np.median(np.maximum(few, calm) - np.minimum(few, calm)))
         self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
         coarse = np.array([reduce(sample, _COARSE) for sample in samples])
-        _remove_ghosts(self.background, samples, coarse, self.coarse_floor)
         self.size = np.array(self.background.shape[1::-1])
         self.coarse_background = reduce(self.background, _COARSE).astype(np.float32)
         changes = [one - self.coarse_background for one in coarse]

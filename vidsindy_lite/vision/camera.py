@@ -24,9 +24,10 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import ReducedFrames, changes, enlarged, lengths, light, reduced
+from .background import changes, lengths, light
 from .plate import Plate
 from .steadying import (
+    PARTS,
     PLAINLY,
     Aligned,
     CameraMotion,
@@ -35,14 +36,14 @@ from .steadying import (
     align,
     at_rest,
     carry,
-    corners_tell,
     displacement,
     grounds,
     pyramid,
+    rescaled,
     stands_still,
 )
+from .video import Reel
 
-_PARTS = 12  # into which each side of an image is cut
 _FAINT = 0.1  # grey levels; a difference without any noise
 _RIM = np.ones((9, 9), np.uint8)  # around what is not known, where smoothing is wrong
 _EDGE = np.ones((5, 5), np.uint8)  # around what a plate does not show
@@ -62,8 +63,10 @@ def explains(samples: Image, maps: Floats, known: Bools) -> bool:
     all_known = np.ones(len(maps), bool)
     plates = Plate(samples, maps, all_known), Plate(samples, rest, all_known)
     gains = [
-        _gain(_misses(sample, *_seen(plates[0], here)), _misses(sample, *_seen(plates[1], there)))
-        for sample, here, there in zip(samples, maps, rest, strict=True)
+        _gain(
+            *(_misses(sample, *plate.seen_from(at)) for plate, at in zip(plates, both, strict=True))
+        )
+        for sample, *both in zip(samples, maps, rest, strict=True)
     ]
     # Of a gain: the noise of a median of 21 frames adds that, and maps smooth it.
     return bool(weights @ gains > 0.04 * weights.sum())
@@ -88,11 +91,6 @@ def rests(samples: Image) -> bool:
     return bool(np.mean(np.array(least) > 0) >= 0.9)
 
 
-def _seen(plate: Plate, here: Floats) -> tuple[Image, Bools]:
-    """A plate as a whole frame shows it, and where it is known."""
-    return plate.seen_from(here, np.zeros(2), (int(plate.size[0]), int(plate.size[1])))
-
-
 def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
     """Grey levels by which the parts (12, 12) of a frame differ from the ground; NaN if unknown."""
     change = changes(frame, ground, light(frame, ground, known))
@@ -102,7 +100,7 @@ def _misses(frame: Image, ground: Image, known: Bools) -> Floats32:
     apart = np.minimum(lengths(np.asarray(smooth, np.float32)), 20.0)
     use = cv2.erode(known.astype(np.uint8), _RIM).astype(np.float32)
     parts, share = (
-        cv2.resize(x, (_PARTS, _PARTS), interpolation=cv2.INTER_AREA) for x in (apart * use, use)
+        cv2.resize(x, (PARTS, PARTS), interpolation=cv2.INTER_AREA) for x in (apart * use, use)
     )
     return np.where(share > 0.5, parts / np.maximum(share, 0.5), np.nan).astype(np.float32)
 
@@ -121,7 +119,7 @@ def _gain(one: Floats32, other: Floats32) -> float:
     return float(ratios[aside : len(ratios) - aside].mean())
 
 
-def trembling(frames: ReducedFrames, samples: Image) -> CameraMotion | None:
+def trembling(frames: Reel, samples: Image) -> CameraMotion | None:
     """The motion of a camera that trembles, None if that is not sure; `samples` are reduced."""
     views = [pyramid(sample) for sample in samples]
     maps = np.tile(np.eye(3), (len(samples), 1, 1))
@@ -146,7 +144,7 @@ def trembling(frames: ReducedFrames, samples: Image) -> CameraMotion | None:
 
 def _ground(plate: Plate) -> list[Ground]:
     """A plate as the first frame shows it, to lay others on."""
-    image, known = plate.seen_from(np.eye(3), np.zeros(2), (int(plate.size[0]), int(plate.size[1])))
+    image, known = plate.seen_from(np.eye(3))
     return [_limited(level, known) for level in grounds(pyramid(image))]
 
 
@@ -192,32 +190,28 @@ def _halves(
     return float(alike), float(np.sqrt(np.mean((one - other) ** 2)) / 2)
 
 
-def _motion(ground: list[Ground], frames: ReducedFrames, larger: float) -> CameraMotion:
+def _motion(ground: list[Ground], frames: Reel, larger: float) -> CameraMotion:
     """All frames laid on the ground, and so on the first; errors are `larger` than they tell."""
     laid = [_laid(ground, pyramid(frame), np.eye(3)) for frame in frames]
     maps, errors = _maps(laid), np.array([one.error for one in laid])
-    whole = enlarged(frames.factor)
-    steady = whole @ np.linalg.inv(maps[0]) @ maps @ np.linalg.inv(whole)
+    steady = rescaled(np.linalg.inv(maps[0]) @ maps, 1 / frames.factor)
     sure = larger * np.hypot(errors, errors[0])
     sure[0] = 0.0
     return CameraMotion(steady / steady[:, 2:, 2:], frames.factor * sure)
 
 
-def camera_motion(frames: ReducedFrames, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
+def camera_motion(frames: Reel, small: Image, sampled: Ints) -> tuple[CameraMotion, bool]:
     """The camera's motion, and whether that is sure.
 
     If the sampled frames do not tell that the camera is at rest, all frames are asked where they
-    lie: one after the other, and all on what they show together, first where corners are few. If
-    that is not exact, the other is asked, too.
+    lie: one after the other, and, if that is not exact, all on what they show together.
     """
     still = stands_still(small)
-    ways: list[Callable[[], CameraMotion | None]] = []
-    if still is not True:
-        ways = [partial(trembling, frames, small)]
+    if still is True:
+        return at_rest(frames.info.frames), True
+    ways: list[Callable[[], CameraMotion | None]] = [partial(trembling, frames, small)]
     if still is False:
-        ways += [partial(_steadied, frames, small, sampled)]
-        if corners_tell(small):
-            ways.reverse()
+        ways.insert(0, partial(_steadied, frames, small, sampled))
     found: list[CameraMotion] = []
     for way in ways:
         if (motion := way()) is not None:
@@ -226,14 +220,14 @@ def camera_motion(frames: ReducedFrames, small: Image, sampled: Ints) -> tuple[C
                 break
     if found:
         return min(found, key=_usual_error), True
-    return at_rest(frames.reel.info.frames), still is True or rests(small)
+    return at_rest(frames.info.frames), rests(small)
 
 
 def _usual_error(motion: CameraMotion) -> float:
     return float(np.median(motion.errors))
 
 
-def _steadied(frames: ReducedFrames, small: Image, sampled: Ints) -> CameraMotion | None:
+def _steadied(frames: Reel, small: Image, sampled: Ints) -> CameraMotion | None:
     """Frames laid on each other, one after the other.
 
     None if these maps say no more than their errors: then they only add these. None, too, if the
@@ -243,11 +237,11 @@ def _steadied(frames: ReducedFrames, small: Image, sampled: Ints) -> CameraMotio
     for frame in frames:
         steadying.add(frame)
     motion = steadying.motion()
-    if not _plainly(motion, frames.reel.info.size, frames.factor):
+    if not _plainly(motion, frames.info.size, frames.factor):
         return None
     at = np.minimum(sampled, len(motion.maps) - 1)
     known = np.isfinite(motion.errors[at])
-    return motion if explains(small, reduced(motion.maps[at], frames.factor), known) else None
+    return motion if explains(small, rescaled(motion.maps[at], frames.factor), known) else None
 
 
 def _plainly(motion: CameraMotion, size: tuple[int, int], factor: int) -> bool:

@@ -33,19 +33,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import ReducedFrames, changes, lengths, light
-from .plate import Plate, tolerance
+from .background import changes, lengths, light, shadowed
+from .plate import Plate, least_difference, tolerance
 from .steadying import carry
+from .video import Reel
 
-LEVELS = 1.0, 2.5, 6.0
-"""Tolerances by which what is connected differs."""
-APART = 3
-"""Frames to the neighbours with which a frame is compared."""
+_LEVELS = 1.0, 2.5, 6.0  # tolerances by which what is connected differs
+_APART = 3  # frames to the neighbours with which a frame is compared
 _KEPT = 16  # candidates of a frame
-GAP = 15
-"""Frames that a path may miss."""
-TOLD = 20.0
-"""Quality of a candidate that somebody points at."""
+GAP = 15  # frames that a path may miss
+TOLD = 20.0  # quality of a candidate that somebody points at
 _SIDE = 40  # pixels of a patch
 _WIDE = 2.6  # width of the patch, in widths of the target
 _BINS = 4096  # of a histogram: 16 levels a colour
@@ -85,8 +82,8 @@ class Candidates(NamedTuple):
         return whole.only(np.argsort(whole.frame, kind="stable"))
 
     @classmethod
-    def of(cls, frame: int, here: Floats, rows: Floats) -> Candidates:
-        """Of one frame, from rows (k, 14) of centre, box, area, colour, behind, quality."""
+    def of(cls, frame: int | Ints, here: Floats, rows: Floats) -> Candidates:
+        """Of a frame, or one a row: rows (k, 14) of centre, box, area, colour, behind, quality."""
         number = np.full(len(rows), frame)
         centre, box, area, colour, behind = np.split(rows[:, :13], [2, 6, 7, 10], axis=1)
         return cls(number, carry(here, centre), centre, box, area[:, 0], colour, behind,
@@ -97,10 +94,13 @@ def candidates(
     frames: Iterable[Image], maps: Floats, plate: Plate, noise: float
 ) -> tuple[Candidates, list[Floats32]]:
     """The candidates of all frames, and how much brighter each frame is than the ground."""
-    bound, lights, found = tolerance(plate, noise), [], []
+    lights, found = [], []
+    bound = tolerance(plate.image, least_difference(noise), moves=plate.moves)
+    if plate.moves:
+        bound[plate.valid == 0] = 1e3
     for i, (frame, here, others) in enumerate(_with_neighbours(frames, maps)):
         height, width = frame.shape[:2]
-        ground, known = plate.seen_from(here, np.zeros(2), (width, height))
+        ground, known = plate.seen_from(here)
         allowed = bound
         if plate.moves:
             back = np.linalg.inv(plate.shift @ here)
@@ -121,7 +121,7 @@ def candidates(
         rows = [
             components(strength, level, frame, ground, worth)
             for strength, worth in zip(strengths, (1.0, 0.7), strict=False)
-            for level in LEVELS
+            for level in _LEVELS
         ]
         found.append(Candidates.of(i, here, _distinct(np.concatenate(rows))))
         found[-1].colour[:] /= lit
@@ -134,13 +134,13 @@ def _with_neighbours(
     frames: Iterable[Image], maps: Floats
 ) -> Iterator[tuple[Image, Floats, list[tuple[Image, Floats]]]]:
     """Each frame and its map, and some frames before and after it with maps that lay them on it."""
-    window: deque[tuple[Image, Floats] | None] = deque([None] * APART, maxlen=2 * APART + 1)
-    for one in chain(zip(frames, maps, strict=False), repeat(None, APART)):
+    window: deque[tuple[Image, Floats] | None] = deque([None] * _APART, maxlen=2 * _APART + 1)
+    for one in chain(zip(frames, maps, strict=False), repeat(None, _APART)):
         window.append(one)
-        if len(window) <= APART or (middle := window[-1 - APART]) is None:
+        if len(window) <= _APART or (middle := window[-1 - _APART]) is None:
             continue
         back = np.linalg.inv(middle[1])
-        beside = [window[0] if len(window) > 2 * APART else None, window[-1]]
+        beside = [window[0] if len(window) > 2 * _APART else None, window[-1]]
         yield *middle, [(other[0], back @ other[1]) for other in beside if other is not None]
 
 
@@ -195,7 +195,7 @@ def components(
     quality = worth * np.tanh(mean / 4) * np.minimum(area / (0.7 * box[:, 2:].prod(axis=1)), 1)
     quality *= np.minimum(area / 8, 1)
     cut = (box[:, :2] <= 0).any(axis=1) | (box[:, :2] + box[:, 2:] >= mask.shape[::-1]).any(axis=1)
-    quality *= np.where(cut, 0.6, 1) * np.where(_are_shadows(colour, behind), 0.5, 1)
+    quality *= np.where(cut, 0.6, 1) * np.where(shadowed(colour, behind, 0.1), 0.5, 1)
     return np.column_stack([centre, box, area, colour, behind, quality])
 
 
@@ -203,13 +203,6 @@ def _means(colours: Image, part: Ints, count: int) -> Floats:
     """Mean colours (count, 3) of the parts to which pixels (m, 3) belong."""
     sums = np.column_stack([np.bincount(part, x, count) for x in colours.T])
     return sums / np.maximum(np.bincount(part, minlength=count), 1)[:, None]
-
-
-def _are_shadows(colours: Floats, grounds: Floats) -> Bools:
-    """The same surfaces (m, 3) in less light: darker by about the same factor in all colours."""
-    ratio = (colours + 4) / (grounds + 4)
-    mean = ratio.mean(axis=1)
-    return (mean > 0.35) & (mean < 0.95) & (np.ptp(ratio, axis=1) < 0.1 * mean)
 
 
 def _distinct(rows: Floats) -> Floats:
@@ -251,8 +244,8 @@ class Path(NamedTuple):
     rating: float
 
 
-def best_path(seen: Candidates) -> tuple[Ints, float]:
-    """The rows of the path of the highest value, and that value."""
+def best_path(seen: Candidates, longest: int = GAP) -> tuple[Ints, float]:
+    """The rows of the path of the highest value, whose gaps have a longest, and that value."""
     if not len(seen.frame):
         return np.zeros(0, int), 0.0
     size = seen.size + 2
@@ -263,12 +256,12 @@ def best_path(seen: Candidates) -> tuple[Ints, float]:
     for i in np.unique(seen.frame):
         new, old = (
             np.arange(bounds[i], bounds[i + 1]),
-            np.arange(bounds[max(i - GAP, 0)], bounds[i]),
+            np.arange(bounds[max(i - longest, 0)], bounds[i]),
         )
         if not len(old):
             continue
         gap = (i - seen.frame[old])[:, None]
-        worth = value[old][:, None] - _price(seen, size, old, new, gap, speed[old], bent[old])
+        worth = value[old][:, None] - _penalty(seen, size, old, new, gap, speed[old], bent[old])
         best = worth.argmax(axis=0)
         gain = worth[best, np.arange(len(new))]
         j, p = new[gain > 0], old[best[gain > 0]]
@@ -276,6 +269,7 @@ def best_path(seen: Candidates) -> tuple[Ints, float]:
         before[j] = p
         past = (i - seen.frame[p])[:, None]
         now = (seen.place[j] - seen.place[p]) / past
+        now[past[:, 0] > GAP] = np.nan  # since then it may have turned
         bent[j] = (now - speed[p]) / past
         # Of a slow target the places scatter more than it moves: its speed is a mean.
         fresh = 0.6 + 0.4 * np.minimum(np.linalg.norm(now, axis=1) / size[j], 1)[:, None]
@@ -287,7 +281,7 @@ def best_path(seen: Candidates) -> tuple[Ints, float]:
     return np.array(rows[::-1]), float(value.max())
 
 
-def _price(
+def _penalty(
     seen: Candidates, size: Floats, old: Ints, new: Ints, gap: Ints, speed: Floats, bent: Floats
 ) -> Floats:
     """What it costs to go on from old rows, of these motions, to new ones, (old, new)."""
@@ -306,7 +300,8 @@ def _price(
     start = np.minimum(0.25 * change / side, 0.3 + 0.05 * far)
     colour = np.linalg.norm(seen.colour[old][:, None] - seen.colour[new], axis=2)
     resize = np.abs(np.log(size[old][:, None] / size[new]))
-    return np.asarray(np.where(known, turn, start) + 0.6 * resize + colour / 120 + 0.12 * (gap - 1))
+    missed = 0.12 * np.minimum(gap - 1, GAP)
+    return np.asarray(np.where(known, turn, start) + 0.6 * resize + colour / 120 + missed)
 
 
 def plainest_paths(seen: Candidates, most: int = 3) -> list[Path]:
@@ -439,14 +434,15 @@ def _top(values: Floats) -> float:
 
 
 def followed(
-    frames: ReducedFrames, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats],
+    frames: Reel, maps: Floats, found: Candidates, seed: tuple[int, Floats, Floats],
     guide: Floats,
 ) -> Looks:  # fmt: skip
     """Follow a target by its looks, both ways.
 
     Parameters
     ----------
-    frames : ReducedFrames
+    frames : Reel
+        Reduced
     maps : ndarray, shape (n, 3, 3)
         Of reduced frames.
     found : Candidates
@@ -456,7 +452,7 @@ def followed(
         Where a path leads; NaN where none does.
     """
     n = len(maps)
-    factor = frames.factor if frames.reel.few else 1
+    factor = frames.factor if frames.whole.few else 1
     box, fit = np.full((n, 4), np.nan), np.zeros(n)
     like = np.ones(len(found.frame))  # of what is not looked at, nothing is said
     bounds = np.searchsorted(found.frame, np.arange(n + 1))
@@ -512,17 +508,15 @@ def followed(
     return Looks(box, fit, like)
 
 
-def _in_order(frames: ReducedFrames, first: int, way: int, n: int) -> Iterator[tuple[int, Image]]:
+def _in_order(frames: Reel, first: int, way: int, n: int) -> Iterator[tuple[int, Image]]:
     """The frames, reduced if they are many, with their numbers from one on, in both directions."""
-    whole = frames.reel.few
+    film = frames.whole if frames.whole.few else frames
     if way > 0:
-        forward = frames.reel if whole else frames
-        yield from ((i, frame) for i, frame in zip(range(n), forward, strict=False) if i >= first)
+        yield from ((i, frame) for i, frame in zip(range(n), film, strict=False) if i >= first)
         return
     for last in range(first + 1, 0, -50):
         numbers = range(max(last - 50, 0), last)
-        some = frames.reel.pick(numbers) if whole else frames.some(numbers)
-        yield from reversed(list(zip(numbers, some, strict=False)))
+        yield from reversed(list(zip(numbers, film.pick(numbers), strict=False)))
 
 
 def _near(found: Candidates, like: Floats, ahead: Floats, size: Floats, gap: int) -> list[Floats]:

@@ -12,12 +12,14 @@
 Somebody who points at the target in one frame decides where its looks are learned.
 """
 
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats, Floats32, Image, Ints
-from .background import ReducedFrames, reduce, reduced, sampled
+from .background import sampled
 from .camera import LOOSE, camera_motion
 from .candidates import (
     TOLD,
@@ -33,22 +35,48 @@ from .candidates import (
 from .hints import Hint
 from .plate import Plate, lights_of, noise_of
 from .refining import Lens, View, entire, fitting, hidden, scatter, swapped
-from .steadying import CameraMotion, at_rest, carry
+from .steadying import CameraMotion, at_rest, carry, rescaled
+from .video import Reel, reduce
 
 _SHORTEST = 5  # frames of a path
-_ROUGHLY = 2.0  # pixels, about, to which a target is known that is not seen whole
+_ROUGH = 0.5  # confidence in a target that is not seen whole: it is known to about two pixels
 
 
-class Followed(NamedTuple):
-    """What was found: pixels (n, 2) of the first frame, their errors (n,), doubts.
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The target in each frame of a video; `np.asarray` of it is its pixels.
 
-    `maps` (n, 3, 3) say where each frame lies in the first.
+    Parameters
+    ----------
+    pixels : ndarray, shape (n, 2)
+        Centroid of the target, (u right, v down) in pixels of the first frame, pixel centres at
+        integers; NaN in frames where it is not seen, or only a part of it, or not for sure.
+    confidence : ndarray, shape (n,)
+        From 0, nothing seen, to 1. A detector says how sure it is of each frame; the background
+        model how much the view is like those of the whole target.
+    detector : str
+        What found it: "background", "motion", "learned" or the name of an .onnx file.
+    warnings : tuple of str
+        Reasons not to trust the track.
+    maps : ndarray, shape (n, 3, 3), optional
+        Where each frame lies in the first one, homogeneous, if the camera moved.
     """
 
     pixels: Floats
-    errors: Floats
-    maps: Floats
-    doubts: tuple[str, ...]
+    confidence: Floats
+    detector: str
+    warnings: tuple[str, ...] = ()
+    maps: Floats | None = None
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray:
+        return np.array(self.pixels, dtype, copy=copy)
+
+    @property
+    def in_frames(self) -> Floats:
+        """The target in the pixels of each frame itself, (n, 2): to be drawn there."""
+        if self.maps is None:
+            return self.pixels
+        return carry(np.linalg.inv(self.maps), self.pixels)
 
 
 class Film(NamedTuple):
@@ -58,7 +86,7 @@ class Film(NamedTuple):
     camera is known to be at rest, or to move as `motion` says.
     """
 
-    frames: ReducedFrames
+    frames: Reel
     motion: CameraMotion
     maps: Floats
     small: Image
@@ -72,16 +100,16 @@ class Film(NamedTuple):
         return self.frames.factor
 
     @classmethod
-    def of(cls, frames: ReducedFrames, samples: Image, rests: bool = False) -> Self:
+    def of(cls, frames: Reel, samples: Image, rests: bool = False) -> Self:
         """From its sampled frames, and from all of them if its camera may move."""
-        info, factor = frames.reel.info, frames.factor
+        info, factor = frames.info, frames.factor
         numbers = sampled(info.frames)[: len(samples)]
         small = np.array([reduce(sample, factor) for sample in samples])
         motion, sure = at_rest(info.frames), True
         if not rests:
             motion, sure = camera_motion(frames, small, numbers)
         numbers = np.minimum(numbers, len(motion.maps) - 1)
-        maps, known = reduced(motion.maps, factor), np.isfinite(motion.errors)
+        maps, known = rescaled(motion.maps, factor), np.isfinite(motion.errors)
         lights = lights_of(small, maps[numbers], known[numbers])
         return cls(frames, motion, maps, small, numbers, lights, sure)
 
@@ -102,13 +130,13 @@ class Ways(NamedTuple):
     colour: Floats
 
 
-def follow(frames: ReducedFrames, samples: Image, hint: Hint | None = None) -> Followed:
+def follow(frames: Reel, samples: Image, hint: Hint | None = None) -> Track:
     """Track what moves in a film, the target if there is a hint which it is.
 
     `samples` are frames spread evenly over the film, see `sample_frames`.
     """
     film = Film.of(frames, samples)
-    shape = frames.reel.info.size, len(film.maps), film.factor
+    shape = frames.info.size, len(film.maps), film.factor
     seed = None if hint is None else hint.boxed(*shape)
     n, boxes = len(film.maps), None
     for _ in range(4):  # of a target that covers its own ground, until the ground is without it
@@ -294,7 +322,7 @@ def lens_of(samples: Image, film: Film, *ways: Ways) -> Lens:
 def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[View | None]:
     """The target in whole frames, near where it is expected."""
     views = []
-    for i, (frame, here) in enumerate(zip(film.frames.reel, film.motion.maps, strict=False)):
+    for i, (frame, here) in enumerate(zip(film.frames.whole, film.motion.maps, strict=False)):
         view = None
         if i < len(ways.centre) and np.isfinite(ways.centre[i, 0]):
             view = lens.look(frame, here, ways.box[i], ways.centre[i], ways.colour[i], lights[i])
@@ -302,10 +330,19 @@ def viewed(film: Film, lens: Lens, ways: Ways, lights: list[Floats32]) -> list[V
     return views
 
 
-def nothing(motion: CameraMotion, n: int) -> Followed:
+def nothing(motion: CameraMotion, n: int) -> Track:
     """Of a film of n frames in which no target was found."""
     none = "nothing was found that moves like one target"
-    return Followed(np.full((n, 2), np.nan), np.full(n, np.inf), motion.maps[:n], (none,))
+    return _as_track(np.full((n, 2), np.nan), np.full(n, np.inf), motion, (none,))
+
+
+def _as_track(
+    pixels: Floats, errors: Floats, motion: CameraMotion, doubts: tuple[str, ...]
+) -> Track:
+    """Of pixels (n, 2) of the first frame and their errors (n,), infinite where it is not seen."""
+    confidence = np.exp(-errors / 3)
+    maps = motion.maps[: len(pixels)] if motion.moves else None
+    return Track(pixels, confidence, "motion", doubts, maps)
 
 
 def _doubts(film: Film, seen: Candidates, paths: list[Path], hint: Hint | None) -> tuple[str, ...]:
@@ -345,7 +382,7 @@ def expected(seen: Candidates, rows: Ints, film: Film, n: int) -> Ways:
     return Ways(k * centre + (k - 1) / 2, k * box, colour)
 
 
-def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]) -> Followed:
+def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, ...]) -> Track:
     """The views of the whole target as a track."""
     n = len(views)
     pixels, errors = np.full((n, 2), np.nan), np.full(n, np.inf)
@@ -386,20 +423,20 @@ def finished(views: list[View | None], motion: CameraMotion, doubts: tuple[str, 
     if np.median(motion.errors[at[good]]) > LOOSE:
         error = np.median(motion.errors[at[good]])
         doubts += (f"the camera moves, and its motion is known to {error:.1f} px only",)
-    return Followed(pixels, errors, motion.maps[:n], doubts)
+    return _as_track(pixels, errors, motion, doubts)
 
 
 def _filled(
-    found: Followed, film: Film, views: list[View | None], looks: Looks, ways: Ways,
+    found: Track, film: Film, views: list[View | None], looks: Looks, ways: Ways,
     seed: tuple[int, Floats, Floats] | None,
-) -> Followed:  # fmt: skip
+) -> Track:  # fmt: skip
     """A track with its gaps filled: where its motion leads, or where it is by its looks.
 
     Where only a part of it shows, its motion is surer, if that is known; else the looks, which are
     off by the same as in the frames around.
     """
     n = len(found.pixels)
-    pixels, errors = found.pixels.copy(), found.errors.copy()
+    pixels, confidence = found.pixels.copy(), found.confidence.copy()
     k = film.factor
     alike = carry(film.motion.maps[:n], k * looks.box[:, :2] + (k - 1) / 2)
     side = k * np.sqrt(looks.box[:, 2:].prod(axis=1))
@@ -408,7 +445,7 @@ def _filled(
         on = np.linalg.norm(alike - expects, axis=1) < 0.6 * side + 2
     if seed is not None:  # of what somebody points at, no view is of something else
         stray = np.linalg.norm(pixels - alike, axis=1) > 0.5 * side + 2
-        pixels[stray], errors[stray] = np.nan, np.inf
+        pixels[stray], confidence[stray] = np.nan, 0
     good = np.isfinite(pixels[:, 0])
     usual = np.median(looks.fit[good & on]) if (good & on).any() else 0.5
     at = np.flatnonzero(good)
@@ -424,7 +461,7 @@ def _filled(
             there = carry(film.motion.maps[i], view.centroid[None])[0] if view else np.inf
             part = np.linalg.norm(there - way) < 0.75 * size
             if known and (part or (on[i] and looks.fit[i] > 0.5 * usual)):
-                pixels[i], errors[i] = way, _ROUGHLY
+                pixels[i], confidence[i] = way, _ROUGH
                 continue
         if not told and view is not None:  # what hides a part of it draws its looks aside
             continue
@@ -434,11 +471,11 @@ def _filled(
         near = at[np.argsort(np.abs(at - i), kind="stable")[:15]]
         near = near[on[near]]
         shift = np.median((found.pixels - alike)[near], axis=0) if len(near) > 2 else 0
-        pixels[i], errors[i] = alike[i] + shift, _ROUGHLY
+        pixels[i], confidence[i] = alike[i] + shift, _ROUGH
     if not len(at) and np.isfinite(pixels[:, 0]).any():
         looks_only = "no view tells it from its ground: it is followed by its looks alone"
-        return Followed(pixels, errors, found.maps, (looks_only,))
-    return found._replace(pixels=pixels, errors=errors)
+        return replace(found, pixels=pixels, confidence=confidence, warnings=(looks_only,))
+    return replace(found, pixels=pixels, confidence=confidence)
 
 
 def _curve(frames: Ints, places: Floats, degree: int) -> Floats:

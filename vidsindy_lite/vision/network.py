@@ -11,10 +11,8 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from ..arrays import Image
 
-STRIDE = 4
-"""Pixels between two anchors."""
-COARSEST = 16
-"""The sides of an image are multiples of so many pixels."""
+STRIDE = 4  # pixels between two anchors
+COARSEST = 16  # pixels, of which the sides of an image are multiples
 
 _WIDTHS = (16, 16, 32, 64)  # channels at strides 2, 4, 8, 16; multiples of 16 run fastest
 _TYPICAL = 16.0  # pixels; a size of exp(0)

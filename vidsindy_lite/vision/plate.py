@@ -13,11 +13,10 @@ import cv2
 import numpy as np
 
 from ..arrays import Bools, Floats, Floats32, Image
-from .background import changes, light, median_image
+from .background import STRIP, changes, light, median_image
 from .steadying import carry
 
 _SHOWN = 3  # samples that must show a place of the plate
-_STRIP = 128  # rows of a canvas whose median is taken at once
 
 
 class Plate:
@@ -104,18 +103,19 @@ class Plate:
             )
 
     def seen_from(
-        self, here: Floats, corner: Floats, size: tuple[int, int], step: int = 1
+        self, here: Floats, low: Floats | None = None, high: Floats | None = None, step: int = 1
     ) -> tuple[Image, Bools]:
-        """The background in a window of the frame that the map carries; where it is known.
+        """The background in the frame that the map carries, or a window of it; where it is known.
 
         Only every pixel of some `step` in each row and column.
         """
-        left, top = (int(x) for x in corner)
+        left, top = np.zeros(2, int) if low is None else low
+        size = (self.size if high is None else high) - [left, top]
         if not self.moves:
             window = np.s_[top : top + size[1] : step, left : left + size[0] : step]
             return self.image[window], self.valid[window] > 0
         to_window = np.array([[1, 0, -left], [0, 1, -top], [0, 0, step]]) / step
-        size = -(-size[0] // step), -(-size[1] // step)
+        size = (-(-size // step)).tolist()
         back = to_window @ np.linalg.inv(self.shift @ here)
         image = cv2.warpPerspective(self.image, back, size, flags=cv2.INTER_LINEAR)
         valid = cv2.warpPerspective(self.valid, back, size, flags=cv2.INTER_NEAREST)
@@ -143,8 +143,8 @@ def _masked_median(
     width, height = size
     result = np.zeros((height, width, 3), np.uint8)
     count = np.zeros((height, width), np.uint8)
-    for top in range(0, height, _STRIP):
-        strip = (width, min(_STRIP, height - top))
+    for top in range(0, height, STRIP):
+        strip = (width, min(STRIP, height - top))
         up = np.array([[1, 0, 0], [0, 1, -top], [0, 0, 1.0]])
         layers = np.empty((len(samples), strip[1], width, 3), np.uint8)
         here = np.zeros((strip[1], width), np.uint8)
@@ -163,21 +163,23 @@ def _masked_median(
 def lights_of(samples: Image, maps: Floats, known: Bools) -> Floats32:
     """How much brighter (m, 3) each of the samples of a film is than most of them."""
     plate = Plate(samples, maps, known)
-    size = samples.shape[2], samples.shape[1]
-    return np.array([light(sample, *plate.seen_from(here, np.zeros(2), size))
+    return np.array([light(sample, *plate.seen_from(here))
                      for sample, here in zip(samples, maps, strict=True)])  # fmt: skip
 
 
-def tolerance(plate: Plate, noise: float) -> Floats32:
-    """Grey levels by which reduced frames may differ from each place of their plate."""
-    grey = cv2.cvtColor(plate.image, cv2.COLOR_RGB2GRAY)
+def least_difference(noise: float) -> float:
+    """Grey levels below which nothing differs from the ground, in this noise of a pixel."""
+    return float(np.clip(5 * noise, 8.0, 60.0))
+
+
+def tolerance(ground: Image, least: float, *, moves: bool) -> Floats32:
+    """Grey levels by which frames may differ from each place of their ground.
+
+    An edge may be displaced, by more if the camera moves.
+    """
+    grey = cv2.cvtColor(ground, cv2.COLOR_RGB2GRAY)
     slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
-    # Pixels by which an edge may be displaced, and levels below which nothing differs.
-    edge = 0.5 if plate.moves else 0.12
-    bound = np.clip(5 * noise, 8.0, 60.0) + edge * slope.astype(np.float32)
-    if plate.moves:
-        bound[plate.valid == 0] = 1e3
-    return np.asarray(bound, np.float32)
+    return np.asarray(least + (0.5 if moves else 0.12) * slope.astype(np.float32), np.float32)
 
 
 def noise_of(samples: Image, maps: Floats, plate: Plate) -> float:
@@ -185,7 +187,7 @@ def noise_of(samples: Image, maps: Floats, plate: Plate) -> float:
     found = []
     step = max(3, samples.shape[2] // 640)
     for sample, here in zip(samples, maps, strict=True):
-        then, known = plate.seen_from(here, np.zeros(2), sample.shape[1::-1], step)
+        then, known = plate.seen_from(here, step=step)
         now = sample[::step, ::step]
         if known.any():
             differs = changes(now, then, light(now, then, known))[known]

@@ -22,14 +22,13 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..arrays import Bools, Floats, Floats32, Image, Ints
-from .background import dot, hull, lengths, relit
-from .plate import Plate
+from .background import dot, hull, lengths, relit, shadowed
+from .plate import Plate, least_difference, tolerance
 
 _CELLS = 32  # into which the side of a target is cut
 _REACH = 1.5  # sides of the target from its middle that its usual outline may have
 _TOUCHING = np.ones((7, 7), np.uint8)  # cells around a place that is missed: its edge is there
-_EDGE = {False: 0.15, True: 0.35}  # pixels by which an edge may be displaced; if the camera moves
-_LEAST, _COARSE = 8.0, 60.0  # grey levels, below which no difference counts
+_UNEVEN = 0.12  # share by which a shadow may darken the colours of a pixel unlike each other
 _FAINT, _RIM = 2.0, 0.9  # tolerances by which a ground differs from the target; share of its rim
 _WHOLE = 1.5  # factor by which the areas of whole views differ from those around them
 _AROUND = 9  # views around one that say how large it should be
@@ -138,7 +137,7 @@ class Lens:
 
     def __init__(self, plate: Plate, noise: float) -> None:
         self.plate = plate
-        self.least = float(np.clip(4 * noise, _LEAST, _COARSE))
+        self.least = least_difference(noise)
         self.blur = 1.0 if noise > 2 else 0.6
 
     def look(
@@ -155,13 +154,13 @@ class Lens:
         spare = 0.5 * box[2:].max() + 8
         low = np.clip(np.floor(box[:2] - spare), 0, self.plate.size - 1).astype(int)
         high = np.clip(np.ceil(box[:2] + box[2:] + spare), low + 1, self.plate.size).astype(int)
-        then, known = self.plate.seen_from(here, low, tuple(high - low))
+        then, known = self.plate.seen_from(here, low, high)
         now = relit(frame[low[1] : high[1], low[0] : high[0]], np.reciprocal(gain))
         ground = then.astype(np.float32)
         change = now - ground
         smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), self.blur), np.float32)
         differs = lengths(smooth)
-        bound = self._tolerance(then)
+        bound = tolerance(then, self.least, moves=self.plate.moves)
         mask = (differs > bound) & known
         contrast = colour.astype(np.float32) - ground
         square = dot(contrast, contrast)
@@ -171,8 +170,8 @@ class Lens:
         off = miss >= np.maximum(0.45 * np.sqrt(square), 2 * self.least)
         own = mask & (share > 0.25) & ~off
         # Where half of it over the ground would look like one, nothing is told from a shadow.
-        dark = shadowed(ground + smooth, ground)
-        own &= ~dark | shadowed(ground + np.float32(0.5) * contrast, ground)
+        dark = shadowed(ground + smooth, ground, _UNEVEN)
+        own &= ~dark | shadowed(ground + np.float32(0.5) * contrast, ground, _UNEVEN)
         label = _nearest(own, centre - low)
         part = label is not None
         if label is None and (label := _nearest(mask, centre - low)) is None:
@@ -184,11 +183,6 @@ class Lens:
         contrast = found.colours - ground
         all_ = self._measure(found.label, change, contrast, low, bound, now)
         return replace(view if part else replace(all_, area=0.0), whole=all_)
-
-    def _tolerance(self, then: Image) -> Floats32:
-        grey = cv2.cvtColor(then, cv2.COLOR_RGB2GRAY)
-        slope = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
-        return self.least + _EDGE[self.plate.moves] * slope.astype(np.float32)
 
     def _measure(
         self, label: Bools, change: Floats32, contrast: Floats32, low: Floats, bound: Floats32,
@@ -378,14 +372,6 @@ class Whole(NamedTuple):
     plain: bool
 
 
-def shadowed(now: Floats32, ground: Floats32) -> Bools:
-    """Where (h, w) the same surface is seen in less light: darker by the same in all colours."""
-    ratio = cv2.split((now + 4) / (ground + 4))
-    mean = sum(ratio) / 3
-    apart = np.maximum.reduce(ratio) - np.minimum.reduce(ratio)
-    return np.asarray((mean > 0.35) & (mean < 0.95) & (apart < 0.12 * mean))
-
-
 def whole(
     own: Bools, differs: Bools, other: Bools, now: Floats32, ground: Floats32
 ) -> Whole | None:
@@ -393,7 +379,7 @@ def whole(
 
     Not all that `differs` has an `other` colour: what lies between ground and target is its blur.
     """
-    shadow = shadowed(now, ground)
+    shadow = shadowed(now, ground, _UNEVEN)
     mask = (own | (differs & ~shadow)).astype(np.uint8)
     _, labels = cv2.connectedComponents(np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, _CORE)))
     inside = np.bincount(labels[own], minlength=2)

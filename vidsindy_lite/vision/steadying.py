@@ -28,8 +28,7 @@ _RIM = 2  # pixels of each level that depend on what lies beyond the image
 _BEYOND = -1e6  # in place of grey levels where nothing is shown: what it has a part in is below 0
 _LOOSE, _FIRM = 40.0, 3.0  # grey levels, and deviations, from which on a pixel is left aside
 _STEP, _TURN = 8.0, 0.03  # pixels and radians by which the guess may be wrong
-_BLOCKS = 12  # into which each side is cut: errors within one may be the same
-_PARTS = 12  # parts into which each side of the image is cut; one corner is followed in each
+PARTS = 12  # into which each side of an image is cut: of one corner, and of one error, each
 _WIDTH = 21  # reduced pixels: what is smoother than this is light
 _CONTRAST, _DARK = 250.0, 20.0  # of the relief; grey levels below which all is dark
 _EXACT = 1.0  # reduced pixels by which a corner may miss its place
@@ -147,7 +146,9 @@ def _fit(
     framed[inner] = view[inner]
     within = framed >= 0
     for step in range(6):
-        shown = _resampled(framed, here[:2])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        laid = cv2.warpAffine(framed, here[:2], (width, height), flags=flags, borderValue=_BEYOND)
+        shown = np.asarray(laid, np.float32)
         known = within & (shown >= 0)
         if np.count_nonzero(known) < 0.3 * known.size:
             return None
@@ -175,7 +176,8 @@ def _fit(
     miss = miss - np.tensordot(delta.astype(np.float32), slopes, 1)
     seen = _slopes(np.where(known, (shown - offset) / gain, key).astype(np.float32), u, v)
     # Noise has slopes, too, but not the same in both views.
-    value, direction = np.linalg.eigh(_symmetric(heavy @ seen.reshape(6, -1).T))
+    told = heavy @ seen.reshape(6, -1).T
+    value, direction = np.linalg.eigh((told + told.T) / 2)
     information = (direction * np.maximum(value, 0)) @ direction.T / spread**2 + prior
     telling = _by_blocks(weight * (seen[0] * slopes[0] + seen[1] * slopes[1]))
     # Blocks of mere noise tell as much for the map as against it.
@@ -193,13 +195,9 @@ def _middle(values: Floats | Floats32) -> float:
     return float(parts[k] if len(half) % 2 else (parts[:k].max() + parts[k]) / 2)
 
 
-def _symmetric(matrix: Floats) -> Floats:
-    return (matrix + matrix.T) / 2
-
-
 def _by_blocks(values: Floats32) -> Floats32:
     """The means (12, 12) of an image over its blocks."""
-    blocks = cv2.resize(values, (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA)
+    blocks = cv2.resize(values, (PARTS, PARTS), interpolation=cv2.INTER_AREA)
     return np.asarray(blocks, np.float32)
 
 
@@ -209,14 +207,6 @@ def _slopes(view: Floats32, u: Floats32, v: Floats32) -> Floats32:
     return np.stack([gu, gv, gu * u + gv * v, gv * u - gu * v, view, np.ones_like(view)])
 
 
-def _resampled(view: Floats32, here: Floats) -> Floats32:
-    """A view laid on the other by a map (2, 3)."""
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    size = view.shape[::-1]
-    moved = cv2.warpAffine(view, here, size, flags=flags, borderValue=_BEYOND)
-    return np.asarray(moved, np.float32)
-
-
 def _error(
     slopes: Floats32, pull: Floats32, information: Floats, at: tuple[Floats32, Floats32]
 ) -> float:
@@ -224,10 +214,10 @@ def _error(
 
     `pull` (h, w) of each pixel; what the pixels do not tell is known by the guess only.
     """
-    height, width = (side // _BLOCKS for side in pull.shape)
+    height, width = (side // PARTS for side in pull.shape)
     if not height or not width:
         return np.inf
-    pulls = (slopes * pull)[:, : height * _BLOCKS, : width * _BLOCKS]
+    pulls = (slopes * pull)[:, : height * PARTS, : width * PARTS]
     means = np.array([_by_blocks(by) for by in pulls], float).reshape(6, -1)
     sums = height * width * means
     covariance = np.linalg.inv(information)
@@ -264,6 +254,12 @@ def carry(maps: NDArray, points: Floats) -> Floats:
     return ends[:, :2] / ends[:, 2:]
 
 
+def rescaled(maps: Floats, factor: float) -> Floats:
+    """Maps (n, 3, 3) of pixels of an image as maps of those of the image reduced by a factor."""
+    larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]])
+    return np.asarray(np.linalg.inv(larger) @ maps @ larger, float)
+
+
 class _Relief(NamedTuple):
     """A reduced frame: what stands out from its surroundings, whatever the light; grey levels."""
 
@@ -282,13 +278,13 @@ class _Relief(NamedTuple):
 def _corners(grey: Image) -> Floats:
     """The best corner of each part of the image that has one, (m, 2): none counts twice."""
     sharp = cv2.cornerMinEigenVal(grey, 9, ksize=3)
-    height, width = (side // _PARTS for side in grey.shape)
+    height, width = (side // PARTS for side in grey.shape)
     if not height or not width:
         return np.zeros((0, 2))
-    whole = np.asarray(sharp)[: height * _PARTS, : width * _PARTS]
-    parts = whole.reshape(_PARTS, height, _PARTS, width).swapaxes(1, 2).reshape(_PARTS**2, -1)
+    whole = np.asarray(sharp)[: height * PARTS, : width * PARTS]
+    parts = whole.reshape(PARTS, height, PARTS, width).swapaxes(1, 2).reshape(PARTS**2, -1)
     best = parts.argmax(axis=1)
-    row, column = np.divmod(np.arange(_PARTS**2), _PARTS)
+    row, column = np.divmod(np.arange(PARTS**2), PARTS)
     found = np.column_stack([column * width + best % width, row * height + best // width])
     # Smallest eigenvalue of the gradient's covariance in a corner, grey levels squared.
     return found[parts.max(axis=1) > 2.0 / 255**2].astype(float)
@@ -323,16 +319,6 @@ def stands_still(samples: Iterable[Image]) -> bool | None:
         if found[-1]:
             return False
     return True if 2 * found.count(None) < len(found) else None
-
-
-def corners_tell(samples: Iterable[Image]) -> bool:
-    """Do corners alone tell how most reduced samples lie on the next one?"""
-    reliefs = [_Relief.of(sample) for sample in samples]
-    told = [
-        _by_corners(before, _corners(before.fine), after, np.eye(3)).alone
-        for before, after in zip(reliefs, reliefs[1:], strict=False)
-    ]
-    return sum(told) > len(told) / 2
 
 
 def _moved(before: _Relief, after: _Relief) -> bool | None:
@@ -488,7 +474,5 @@ class Steadying:
 
     def motion(self) -> CameraMotion:
         """The motion so far, in pixels of the frames."""
-        k = self.factor
-        enlarge = np.array([[k, 0, (k - 1) / 2], [0, k, (k - 1) / 2], [0, 0, 1]])
-        maps = enlarge @ np.array(self.maps) @ np.linalg.inv(enlarge)
-        return CameraMotion(maps / maps[:, 2:, 2:], k * np.array(self.errors))
+        maps = rescaled(np.array(self.maps), 1 / self.factor)
+        return CameraMotion(maps / maps[:, 2:, 2:], self.factor * np.array(self.errors))

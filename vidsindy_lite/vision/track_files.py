@@ -146,6 +146,8 @@ def read_tracks(path: str | os.PathLike, individual: str | None = None) -> list[
             header, rows = _of_kinovea(text)
         else:
             header, rows = _split(_cells(text))
+        if not rows:
+            raise ValueError("must hold rows of numbers, got none")
         return _tracks(path.name, header, rows, individual)
 
 
@@ -225,8 +227,6 @@ def _of_xml(text: str) -> tuple[list[list[str]], list[list[str]]]:
         for number, part in enumerate(text[whole.end() :].split("<particle")[1:])
         for one in re.findall(r"<detection\b([^>]*)>", part)
     ]
-    if not rows:
-        raise ValueError("must hold rows of numbers, got none")
     heads = ["TRACK_ID", "FRAME", "POSITION_X", "POSITION_Y"]
     return [heads, ["", "", f"({unit[1] if unit else 'pixel'})", ""]], rows
 
@@ -243,8 +243,6 @@ def _of_kinovea(text: str) -> tuple[list[list[str]], list[list[str]]]:
             rows.append([name or str(number), *cells[1:3]])
         elif not cells and rows and rows[-1][0] == (name or str(number)):
             name, number = "", number + 1
-    if not rows:
-        raise ValueError("must hold rows of numbers, got none")
     return [["of Kinovea"], ["track", "x", "y"]], rows
 
 
@@ -256,8 +254,6 @@ def _plain(cell: str) -> str:
 def _split(cells: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
     """Header and numbers."""
     start = next((i for i, row in enumerate(cells) if _is_of_numbers(row)), len(cells))
-    if start == len(cells):
-        raise ValueError("must hold rows of numbers, got none")
     return cells[:start], cells[start:]
 
 
@@ -379,19 +375,13 @@ def _of_columns(name: str, columns: Mapping[str, Floats], of_world: bool) -> Tra
     size = next((pair for pair in _WIDTH if set(pair) <= columns.keys()), None)
     corners = next((four for four in _OPPOSITE if set(four) <= columns.keys()), None)
     pair = next((pair for pair in _PIXELS if set(pair) <= columns.keys()), None)
-    if corner and size:  # edges of the first pixel are at -0.5 and 0.5
-        u, v = (columns[c] + columns[s] / 2 - 0.5 for c, s in zip(corner, size, strict=True))
-        marked = np.all([columns[key] == columns[corner[0]] for key in corner], axis=0)
-        unset = marked & np.all([columns[key] <= 0 for key in (*corner, *size)], axis=0)
-        u, v = np.where(unset, np.nan, u), np.where(unset, np.nan, v)
-        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(corner + size)}",)
-    elif corners:
-        left, top, right, bottom = (columns[key] for key in corners)
-        whole = (right > left) & (bottom > top)
-        u, v = (
-            np.where(whole, (a + b) / 2 - 0.5, np.nan) for a, b in ((left, right), (top, bottom))
-        )
-        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(corners)}",)
+    box = corner + size if corner and size else corners
+    if box:
+        low, high = (np.array([columns[key] for key in keys]) for keys in (box[:2], box[2:]))
+        sides = high if box != corners else high - low
+        # Edges of the first pixel are at -0.5 and 0.5; a box without an area is none.
+        u, v = np.where((sides > 0).all(axis=0), low + sides / 2 - 0.5, np.nan)
+        doubts += (f"{name}: the middles of its boxes are taken, of {', '.join(box)}",)
     elif pair is None:
         raise ValueError(f"must have columns u and v, got {', '.join(columns) or 'none':.80}")
     else:

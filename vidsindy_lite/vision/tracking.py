@@ -19,30 +19,28 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Self
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
 
-from ..arrays import Bools, Floats, Image
+from ..arrays import Bools
 from ..checks import check_instance, check_integer, shown
 from .background import (
+    LONGEST,
     BackgroundModel,
-    ReducedFrames,
     sample_frames,
     track_blobs,
     view_distances,
     whole_views,
 )
-from .candidates import Candidates, plainest_paths
+from .candidates import Candidates, best_path, plainest_paths
 from .candidates import Path as Motion
 from .detector import Detection, LearnedDetector, OnnxDetector, detections
 from .hints import Hint
 from .moving import (
     Film,
-    Followed,
+    Track,
     Ways,
     expected,
     finished,
@@ -53,61 +51,9 @@ from .moving import (
     viewed,
 )
 from .refining import scatter
-from .steadying import carry
 from .video import Reel, read_video, video_info
 
 DETECTORS = ("auto", "background", "learned")
-
-_GAIN = 0.15  # of confidence, that a sighting has to exceed to be worth anything
-_GAP = 1.0  # price of a gap, in units of confidence: what is seen for a single frame is an error
-_JUMP = 2.0  # price of a jump
-_REACH = 2.0, 24.0  # target sizes plus pixels per frame from which a motion is a jump
-_MEMORY = 25  # frames after which the target may be anywhere
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """The target in each frame of a video; `np.asarray` of it is its pixels.
-
-    Parameters
-    ----------
-    pixels : ndarray, shape (n, 2)
-        Centroid of the target, (u right, v down) in pixels of the first frame, pixel centres at
-        integers; NaN in frames where it is not seen, or only a part of it, or not for sure.
-    confidence : ndarray, shape (n,)
-        From 0, nothing seen, to 1. A detector says how sure it is of each frame; the background
-        model how much the view is like those of the whole target.
-    detector : str
-        What found it: "background", "motion", "learned" or the name of an .onnx file.
-    warnings : tuple of str
-        Reasons not to trust the track.
-    maps : ndarray, shape (n, 3, 3), optional
-        Where each frame lies in the first one, homogeneous, if the camera moved.
-    """
-
-    pixels: Floats
-    confidence: Floats
-    detector: str
-    warnings: tuple[str, ...] = ()
-    maps: Floats | None = None
-
-    @classmethod
-    def of_motion(cls, found: Followed) -> Self:
-        """The track of something that was followed, with the camera's motion taken out."""
-        seen = np.isfinite(found.pixels[:, 0])
-        confidence = np.where(seen, np.exp(-found.errors / 3), 0.0)
-        moves = not np.array_equal(found.maps, np.broadcast_to(np.eye(3), found.maps.shape))
-        return cls(found.pixels, confidence, "motion", found.doubts, found.maps if moves else None)
-
-    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray:
-        return np.array(self.pixels, dtype, copy=copy)
-
-    @property
-    def in_frames(self) -> Floats:
-        """The target in the pixels of each frame itself, (n, 2): to be drawn there."""
-        if self.maps is None:
-            return self.pixels
-        return carry(np.linalg.inv(self.maps), self.pixels)
 
 
 def track(
@@ -128,8 +74,8 @@ def track(
           frames in which a part of it shows are filled where its motion leads.
         * "background": for a camera at rest, the most exact. The target may turn and change its
           size, not its shape, and is whole in at least a quarter of the frames that show any of
-          it. It must stay away from each place for at least a fifth of the frames: what never
-          moves away by about its own width is background here, not for "auto".
+          it. It must stay away from each place for more than half of the frames: what does
+          not move away by about its own width is background here, not for "auto".
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
@@ -165,21 +111,21 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     """The track, its doubts without the name of the file."""
     if detector not in ("auto", "background"):
         return _link_detections(path, detector)
-    frames = ReducedFrames.of(path)
+    frames = Reel(path, LONGEST)
     samples = sample_frames(frames)
     model = BackgroundModel(samples)
     if detector == "auto" and model.unrest:
         del model  # its images are large
-        return _follow(frames, samples, target)
+        return follow(frames, samples, target)
     model.learn_target(samples)
     if detector == "auto" and model.several_colours:
-        return _follow(frames, samples, target)
-    found, blurred = _track_blobs(frames.reel, model)
+        return follow(frames, samples, target)
+    found, blurred = _track_blobs(frames.whole, model)
     if detector == "auto" and (blurred or not _plausible(found, target)):
-        return _follow(frames, samples, target)
+        return follow(frames, samples, target)
     found = replace(found, warnings=model.unrest)
     if detector == "auto" and _seen(found) < 0.75 and model.shows_target():
-        other = _follow(frames, samples, target)
+        other = follow(frames, samples, target)
         return other if _seen(other) > _seen(found) + 0.1 else found
     return found
 
@@ -197,11 +143,6 @@ def _lost(found: Track) -> tuple[str, ...]:
         return ()
     lost = between - len(at)
     return (f"the target is lost in {lost} of {between} frames, from {at[0]} to {at[-1]}",)
-
-
-def _follow(frames: ReducedFrames, samples: Image, hint: Hint | None) -> Track:
-    """The plainest motion, with the camera's taken out."""
-    return Track.of_motion(follow(frames, samples, hint))
 
 
 def _plausible(found: Track, hint: Hint | None) -> bool:
@@ -269,8 +210,8 @@ def _link_detections(path: str | os.PathLike, name: str | os.PathLike) -> Track:
 def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
     """At most one sighting of each frame, such that together they are one motion.
 
-    A chain gains the confidence of its sightings and pays for gaps and for jumps, so that one wrong
-    sighting, however sure, does not pay. Dynamic programming finds the best chain.
+    They are candidates as good as the detector is sure of them, see `best_path`; a target may be
+    away for any time.
 
     Parameters
     ----------
@@ -282,37 +223,16 @@ def link(sightings: Sequence[Sequence[Detection]]) -> list[Detection | None]:
     chain : list of Detection or None
         One entry a frame.
     """
-    # One row a sighting: frame, centre, size, gain.
-    rows = np.array(
-        [
-            (i, *d.centre, d.size.mean(), d.confidence - _GAIN)
-            for i, seen in enumerate(sightings)
-            for d in seen
-        ]
-    ).reshape(-1, 5)
-    frame, centre, size, value = rows[:, 0], rows[:, 1:3], rows[:, 3], rows[:, 4].copy()
-    before = np.full(len(rows), -1)
-    old, oldest = -1, 0  # the best end of a chain that is longer ago than the memory
-    for j in range(len(rows)):
-        while frame[oldest] < frame[j] - _MEMORY:
-            old = oldest if old < 0 or value[oldest] > value[old] else old
-            oldest += 1
-        recent = np.arange(oldest, np.searchsorted(frame, frame[j]))
-        gap = frame[j] - frame[recent]
-        distance = np.hypot(*(centre[recent] - centre[j]).T)
-        jump = distance > gap * (_REACH[0] * size[recent] + _REACH[1])
-        worth = value[recent] - _GAP * (gap > 1) - _JUMP * jump
-        if old >= 0:
-            recent, worth = np.append(recent, old), np.append(worth, value[old] - _GAP)
-        if len(worth) and worth.max() > 0:
-            before[j] = recent[worth.argmax()]
-            value[j] += worth.max()
+    flat = [(i, d) for i, seen in enumerate(sightings) for d in seen]
+    rows = [
+        (*d.centre, *(d.centre - d.size / 2), *d.size, d.size.prod(), *np.zeros(6), d.confidence)
+        for _, d in flat
+    ]
+    frames = np.array([i for i, _ in flat], int)
+    seen = Candidates.of(frames, np.eye(3), np.array(rows, float).reshape(-1, 14))
     chain: list[Detection | None] = [None] * len(sightings)
-    flat = [d for seen in sightings for d in seen]
-    j = int(value.argmax()) if len(rows) else -1
-    while j >= 0:
-        chain[int(frame[j])] = flat[j]
-        j = before[j]
+    for row in best_path(seen, len(sightings))[0]:
+        chain[flat[row][0]] = flat[row][1]
     return chain
 
 
@@ -338,7 +258,7 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
         If the file is missing or no video.
     """
     check_integer("count", count, least=1)
-    frames = ReducedFrames.of(path)
+    frames = Reel(path, LONGEST)
     samples = sample_frames(frames)
     # Before a plain background, all that could tell of a camera's motion may be the targets.
     film = Film.of(frames, samples, BackgroundModel(samples).camera_rests)
@@ -354,11 +274,9 @@ def track_targets(path: str | os.PathLike, count: int) -> tuple[Track, ...]:
     lens = lens_of(samples, film, *ways)
     for way, hidden in zip(ways, touching, strict=True):
         way.centre[hidden] = np.nan
-        followed = finished(viewed(film, lens, way, lights), film.motion, doubts)
-        tracks.append(Track.of_motion(followed))
+        tracks.append(finished(viewed(film, lens, way, lights), film.motion, doubts))
         doubts = ()
-    missing = Track.of_motion(nothing(film.motion, n))
-    return (*tracks, *[missing] * (count - len(tracks)))
+    return (*tracks, *[nothing(film.motion, n)] * (count - len(tracks)))
 
 
 def _lanes(

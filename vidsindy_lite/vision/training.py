@@ -1,14 +1,12 @@
 """Training of the package's own detector, from scratch, on frames that the package renders.
 
-Every step draws its frames and augmentations from the seed and its own number, so that a training
-that was interrupted goes on exactly as if it had not been.
+Every step draws its frames and augmentations from the seed and its own number.
 """
 
 import io
 import json
 import os
 import platform
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -30,8 +28,7 @@ SEEN_SHAPES = ("disc", "polygon")
 """What the detector is trained on. The other backgrounds and shapes are kept to test it."""
 STEPS = 2000
 BATCH = 16
-SIDE = 96
-"""Width and height of a training frame, pixels."""
+SIDE = 96  # pixels; width and height of a training frame
 
 _POOLED = 512  # pixels; width and height of the backgrounds that frames are cut from
 _EACH = 12  # such backgrounds of each kind
@@ -39,7 +36,6 @@ _RATE = 3e-3  # largest learning rate
 _WARMING = 0.05  # of the steps: the rate rises
 _ABSENT = 0.15  # of the frames show no target
 _WHOLE, _HIDDEN = 0.95, 0.6  # visible share of the target above which it is one, below which none
-_CHECKPOINT = 250  # steps between two
 _CURVE = 100  # points of the loss curve in the log
 
 # ------------------------------------------------------------------------------------------ frames
@@ -206,8 +202,7 @@ def train(
 ) -> dict[str, Any]:
     """Train the detector and write its weights, with the log of the training beside them.
 
-    Interrupted, it goes on from its last checkpoint (a file beside the weights) when it is called
-    again with the same seed and number of steps. A terminal shows how far it is.
+    It takes a few minutes, and a terminal shows how far it is.
 
     Parameters
     ----------
@@ -229,13 +224,9 @@ def train(
         network = Network().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-3)
     schedule = lr_scheduler.OneCycleLR(optimiser, _RATE, steps + 1, pct_start=_WARMING)
-    parts = {"network": network, "optimiser": optimiser, "schedule": schedule}
-    checkpoint = weights.with_suffix(f".{seed}_of_{steps}.checkpoint")
-    losses = _resume(checkpoint, parts)
     pool = background_pool(np.random.default_rng(seed))
-    done = len(losses)
-    bar = trange(done, steps, initial=done, total=steps, unit="step", disable=None)
-    for step in bar:
+    losses: list[float] = []
+    for step in trange(steps, unit="step", disable=None):
         images, *labels = _batch(seed, step, pool)
         loss = detection_loss(network(images), *labels)
         optimiser.zero_grad()
@@ -244,32 +235,12 @@ def train(
         optimiser.step()
         schedule.step()
         losses.append(loss.item())
-        if (step + 1) % _CHECKPOINT == 0:
-            bar.set_postfix(loss=f"{np.mean(losses[-_CHECKPOINT:]):.3f}")
-            state = {name: part.state_dict() for name, part in parts.items()}
-            _save(checkpoint, state | {"losses": losses})
-    _save(weights, network.state_dict())
+    memory = io.BytesIO()
+    torch.save(network.state_dict(), memory)
+    write_file(weights, memory.getvalue())
     log = _training_log(seed, losses, sum(p.numel() for p in network.parameters()))
     write_file(weights.with_suffix(".json"), (json.dumps(log, indent=1) + "\n").encode())
-    checkpoint.unlink(missing_ok=True)
     return log
-
-
-def _save(path: Path, state: dict[str, Any]) -> None:
-    """Write a file of torch in one step."""
-    memory = io.BytesIO()
-    torch.save(state, memory)
-    write_file(path, memory.getvalue())
-
-
-def _resume(checkpoint: Path, parts: dict[str, Any]) -> list[float]:
-    """Losses of the steps done before; the parts are brought to where they were."""
-    if not checkpoint.is_file():
-        return []
-    state = torch.load(checkpoint, weights_only=True)
-    for name, part in parts.items():
-        part.load_state_dict(state[name])
-    return state["losses"]
 
 
 def _training_log(seed: int, losses: list[float], parameters: int) -> dict[str, Any]:

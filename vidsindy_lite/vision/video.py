@@ -35,30 +35,21 @@ from ..arrays import Floats, Image
 from ..checks import check_choice, check_instance, check_integer, check_number, check_path
 
 if TYPE_CHECKING:
-    from av.container import InputContainer
-    from av.video.stream import VideoStream
-
-Shown = tuple[int | None, bool]
-"""When a packet's frame is shown, in ticks of the stream, and whether decoding can begin there."""
-
-_LESS = (
-    1 - 1e-6
-)  # of a tick by which rounded times may be off: a whole one is a frame in some files
-if TYPE_CHECKING:
-    from av import VideoFrame
-SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
-
-
-_BITS = (8, 10, 12, 14, 16)  # of cameras
-_LOOKED_AT = 9  # images that tell how many bits a film uses
-if TYPE_CHECKING:
     from av import VideoFrame
     from av.container import InputContainer, OutputContainer
     from av.video.stream import VideoStream
 
-LOSSLESS = {".mov": "qtrle", ".mkv": "FFV1"}
-"""The codec of a file's suffix, unless another is asked for."""
-_ROOM = 300_000_000  # bytes of frames that are kept
+SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
+LOSSLESS = {".mov": "qtrle", ".mkv": "FFV1"}  # codecs, unless another is asked for
+
+# Of a tick by which rounded times may be off: a whole one is a frame in some files.
+_LESS = 1 - 1e-6
+_BITS = (8, 10, 12, 14, 16)  # of cameras
+_LOOKED_AT = 9  # images that tell how many bits a film uses
+_ROOM = 300_000_000  # bytes of frames that are kept, whole or reduced
+
+# When a packet's frame is shown, in ticks of the stream, and whether decoding can begin there.
+Shown = tuple[int | None, bool]
 
 
 def timing(packets: Sequence[Shown], stream: VideoStream) -> tuple[Floats, float]:
@@ -117,10 +108,7 @@ def upper_field(frame: VideoFrame) -> Image:
     source = graph.add_buffer(
         width=frame.width, height=frame.height, format=frame.format, time_base=frame.time_base
     )
-    field, sink = graph.add("field", "type=top"), graph.add("buffersink")
-    source.link_to(field)
-    field.link_to(sink)
-    graph.configure()
+    graph.link_nodes(source, graph.add("field", "type=top"), graph.add("buffersink")).configure()
     graph.push(frame)
     lines = cast("VideoFrame", graph.pull()).to_ndarray(format="bgr24", threads=1)
     return with_lines_between(_turned(cast("Image", lines)))[: frame.height]
@@ -695,21 +683,41 @@ def _turned(image: Image) -> Image:
     return cast("Image", cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
 
 
+def reduce(image: Image, factor: int) -> Image:
+    """The means over squares of `factor` pixels, also over what is left of squares at the edges."""
+    size = (-(-image.shape[1] // factor), -(-image.shape[0] // factor))
+    right, bottom = size[0] * factor - image.shape[1], size[1] * factor - image.shape[0]
+    if right or bottom:
+        padded = cv2.copyMakeBorder(image, 0, bottom, 0, right, cv2.BORDER_REPLICATE)
+        image = np.asarray(padded, np.uint8)
+    while factor % 2 == 0:  # OpenCV halves an image much faster than it quarters one
+        factor //= 2
+        half = (image.shape[1] // 2, image.shape[0] // 2)
+        image = np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
+    if factor == 1:
+        return image
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
 class Reel:
-    """A film whose frames are looked at several times: some of them first, then all in order.
+    """The frames of a film that is looked at several times, whole or reduced; few are kept.
 
     Parameters
     ----------
     path : path
         See `read_video`.
+    longest : int, optional
+        Pixels of the longer side of its frames, to which they are reduced.
     """
 
-    def __init__(self, path: str | os.PathLike) -> None:
+    def __init__(self, path: str | os.PathLike, longest: int | None = None) -> None:
         self.path, self.info = path, video_info(path)
         if self.info.frames < 2:
             raise ValueError(f"path: must hold two frames or more, got one in '{path}'")
         width, height = self.info.size
-        self.few = 3 * width * height * self.info.frames <= _ROOM
+        self.factor = -(-max(width, height) // longest) if longest else 1
+        self.whole = self if self.factor == 1 else Reel(path)
+        self.few = 3 * width * height * self.info.frames <= _ROOM * self.factor**2
         self._kept: list[Image] | None = None
 
     def __iter__(self) -> Iterator[Image]:
@@ -717,14 +725,15 @@ class Reel:
             yield from self._kept
             return
         kept: list[Image] = []
-        for frame in read_video(self.path):
+        for frame in read_video(self.path) if self.factor == 1 else self.whole:
+            small = reduce(frame, self.factor)
             if self.few:
-                kept.append(frame)
-            yield frame
+                kept.append(small)
+            yield small
         self._kept = kept if self.few else None
 
     def pick(self, numbers: Sequence[int]) -> Iterator[Image]:
         """The frames of these increasing numbers, as far as the film holds them."""
         if self.few:
             return (frame for i, frame in enumerate(self) if i in numbers)
-        return pick_frames(self.path, numbers)
+        return (reduce(frame, self.factor) for frame in pick_frames(self.path, numbers))
