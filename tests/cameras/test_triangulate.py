@@ -93,6 +93,12 @@ def test_one_view_or_none_gives_no_point():
     np.testing.assert_allclose(found[~missing], x[~missing], atol=1e-9 * np.ptp(x))
 
 
+@pytest.mark.parametrize("kind", [OrthographicCamera, PerspectiveCamera])
+def test_one_camera_alone_gives_no_point(kind):
+    _, cameras, tracks = scene(kind)
+    assert np.isnan(intersect(cameras, tracks)[0]).all()
+
+
 def test_lines_that_meet_behind_a_camera_give_no_point():
     straight = {"scale": 0.001, "angle": 0.0, "image_size": (1001, 1001)}
     rig = Rig(

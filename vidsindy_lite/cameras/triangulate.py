@@ -76,7 +76,7 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     seen = np.where(visible[..., None], seen, 0)
 
     left, right = _stacked(*_lines(matrices, scales, seen), visible)
-    crossing = np.linalg.svd(left, compute_uv=False)[:, 2] > PARALLEL
+    crossing = (np.linalg.svd(left, compute_uv=False) > PARALLEL).sum(axis=1) == 3
     seen, visible = seen[crossing], visible[crossing]
 
     def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:
