@@ -77,6 +77,9 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
 
     left, right = _stacked(*_lines(matrices, scales, seen), visible)
     crossing = (np.linalg.svd(left, compute_uv=False) > PARALLEL).sum(axis=1) == 3
+    x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
+    if not crossing.any():
+        return x, ended
     seen, visible = seen[crossing], visible[crossing]
 
     def look(point: Floats, frames: Ints) -> tuple[Floats, Floats]:
@@ -87,7 +90,6 @@ def intersect(cameras: Sequence[Camera], tracks: Sequence[Floats]) -> tuple[Floa
     point, settled = _gauss_newton(look, start)
     depth = point @ matrices[:, 2, :3].T + matrices[:, 2, 3]
     point[(visible & (depth <= 0)).any(axis=1)] = np.nan
-    x, ended = np.full((len(crossing), 3), np.nan), np.ones(len(crossing), bool)
     x[crossing], ended[crossing] = point, settled
     return x, ended
 
