@@ -703,7 +703,7 @@ save_slider("solver_weight_slider", {name: fig for name, (fig, _) in pairs.items
 #
 # ## Run time and versions
 #
-# All cells take about 5 minutes on two cores, beside two other notebooks.
+# All cells take about 2 minutes on two cores, beside two other notebooks.
 
 # %%
 print(versions())
