@@ -402,6 +402,22 @@ def test_a_camera_that_moves_now_and_then_does_not_rest(step):
     assert BackgroundModel(samples).camera_rests == (step == 0)
 
 
+@pytest.mark.parametrize(("left", "top"), [(40, 24), (37, 51), (0, 0), (112, 80)])
+def test_a_square_that_stays_in_most_samples_is_no_background(left, top):
+    stays = [squares((left, top, 16))] * 13
+    leaves = [squares((76 + i, 4 + i, 16)) for i in range(0, 16, 2)]
+    model = learned(np.array(stays + leaves))
+    np.testing.assert_array_equal(model.background, squares())
+    assert model.area == 16**2
+
+
+def test_what_moves_away_for_a_few_samples_is_background():
+    lamp = squares((40, 24, 16), colour=(250, 250, 250))
+    dark = squares((4, 60, 16))  # the target, and the lamp is off
+    model = learned(np.array([lamp] * 20 + [dark]))
+    np.testing.assert_array_equal(model.background, lamp)
+
+
 @pytest.mark.parametrize(("distance", "counts"), [(1, 1), (2, 1), (3, 0)])
 def test_faint_coverage_counts_up_to_two_pixels_beyond_the_outline(plain, distance, counts):
     faint = np.rint(np.array(GROUND) + 0.06 * np.subtract(TARGET, GROUND))

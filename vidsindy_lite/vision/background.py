@@ -35,6 +35,7 @@ LONGEST = 480  # pixels of the longer side of a reduced frame
 _COARSE = 4  # factor by which the image is reduced for the search over the whole frame
 STRIP = 64  # rows of an image that are sorted at once: what they need stays in the cache
 _RING = 2  # pixels on both sides of the target's outline whose coverage is estimated
+_BORDER = 3  # coarse pixels around a place that show how its surroundings continue
 _OFTEN = 0.1  # share of the samples in which other things differ: more are unrest
 _NEAR = 16  # coarse pixels, within which several things that differ may be one target
 _SHAKY = 0.15  # pixels of displacement above which a camera is not at rest
@@ -125,6 +126,40 @@ def median_image(frames: Image) -> Image:
                 images[j] = low
         result[top : top + STRIP] = images[len(images) // 2]
     return result
+
+
+def _remove_ghosts(background: Image, samples: Image, coarse: Image, floor: float) -> None:
+    """Correct in place a background that contains the target where it stayed for long.
+
+    Where many samples differ from the background, they show the same place with or without the
+    target. Of the two, the one that continues its surroundings is the background. `coarse` are the
+    samples, reduced: what continues what needs no more.
+    """
+    reduced = reduce(background, _COARSE)
+    ground = reduced.astype(np.float32)
+    differs = np.array([lengths(one - ground) > floor for one in coarse])
+    often = (differs.mean(axis=0) > _OFTEN).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(often)
+    for k in range(1, count):
+        if stats[k, cv2.CC_STAT_AREA] > _TOO_LARGE * often.size:
+            continue
+        group = differs[:, labels == k].mean(axis=1) > 0.5
+        if group.all() or not group.any():
+            continue
+        left, top, width, height = stats[k, :4]
+        right, bottom = left + width + _BORDER, top + height + _BORDER
+        left, top = max(left - _BORDER, 0), max(top - _BORDER, 0)
+        window = np.s_[top:bottom, left:right]
+        place = np.asarray(cv2.dilate((labels[window] == k).astype(np.uint8), np.ones((3, 3))))
+        inside = place > 0
+        around = cv2.inpaint(reduced[window], place, 3, cv2.INPAINT_TELEA)
+        looks = [np.median(coarse[:, *window][g], axis=0)[inside] for g in (group, ~group)]
+        off = [np.abs(look - around[inside]).sum() for look in looks]
+        window = np.s_[_COARSE * top : _COARSE * bottom, _COARSE * left : _COARSE * right]
+        view = background[window]
+        mask = place.repeat(_COARSE, 0).repeat(_COARSE, 1)[: view.shape[0], : view.shape[1]] > 0
+        better = group if off[0] < off[1] else ~group
+        view[mask] = median_image(samples[:, *window][better])[mask]
 
 
 def _others(changes: list[Floats32], floor: float) -> float:
@@ -251,6 +286,7 @@ class BackgroundModel:
         self.noise = 1.4826 * float(np.median(np.maximum(few, calm) - np.minimum(few, calm)))
         self.coarse_floor = max(6 * self.noise / _COARSE, 8.0)
         coarse = np.array([reduce(sample, _COARSE) for sample in samples])
+        _remove_ghosts(self.background, samples, coarse, self.coarse_floor)
         self.size = np.array(self.background.shape[1::-1])
         self.coarse_background = reduce(self.background, _COARSE).astype(np.float32)
         changes = [one - self.coarse_background for one in coarse]

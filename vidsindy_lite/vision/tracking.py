@@ -74,8 +74,8 @@ def track(
           frames in which a part of it shows are filled where its motion leads.
         * "background": for a camera at rest, the most exact. The target may turn and change its
           size, not its shape, and is whole in at least a quarter of the frames that show any of
-          it. It must stay away from each place for more than half of the frames: what does
-          not move away by about its own width is background here, not for "auto".
+          it. It must stay away from each place for at least a fifth of the frames: what never
+          moves away by about its own width is background here, not for "auto".
         * "learned": the package's own network, for backgrounds that move or change.
         * the name of a YOLO-v8 model exported to ONNX (see `OnnxDetector`).
     target : Hint, optional
