@@ -324,7 +324,7 @@ def test_a_refusal_without_a_picture_is_told_all_the_same(tracked, capsys, monke
     command = ["discover", "--rig", "rig.toml", "--fps", "25", "--tracks"]
     assert main([*command, "a.csv", "still.csv", "c.csv"]) == 2
     (line,) = [one for one in capsys.readouterr().err.splitlines() if one.startswith("error:")]
-    assert "lag: must be given where a track stands still, as still.csv does" in line
+    assert "the target's motion must determine" in line
     assert "the tracks could not be drawn: [Errno 28] No space left on device" in line
 
 

@@ -26,11 +26,25 @@ def test_a_hopeless_lag_is_named(case, lag):
         vl.observe_tracks(tracks, rig, np.arange(150), lags=(0, 0, lag))
 
 
-def test_of_what_stands_still_no_lag_can_be_learned(case):
+def test_a_track_of_nothing_is_named(case):
     rig, (first, second, third) = case
-    tracks = [first, np.full_like(second, 200.0), third]
-    with pytest.raises(ValueError, match=r"lags: must be given where .* as tracks\[1\] does"):
+    tracks = [first, np.full_like(second, np.nan), third]
+    with pytest.raises(ValueError, match=r"tracks\[1\]: must see the target in some frame"):
         vl.observe_tracks(tracks, rig, np.arange(150))
+
+
+def test_a_view_along_the_motion_helps_though_its_lag_is_not_told():
+    t = np.arange(120) / 30
+    x = np.outer(3 + 2 * np.cos(4 * t), (0, 0, 1))
+    cameras = [
+        vl.OrthographicCamera(position=10 * normal, normal=normal, scale=0.01, angle=0.0)
+        for normal in np.eye(3)
+    ]
+    rng, rig = np.random.default_rng(0), vl.Rig(tuple(cameras))
+    tracks = [c.project(x) + 0.2 * rng.normal(size=(120, 2)) for c in cameras]
+    found = vl.observe_tracks(tracks, rig, t)
+    assert any("the lag of video 3 cannot be told" in warning for warning in found.warnings)
+    np.testing.assert_allclose(found.x, x, atol=0.02)
 
 
 def test_given_lags_that_are_off_by_a_fraction_are_told(case):

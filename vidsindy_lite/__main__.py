@@ -272,10 +272,11 @@ def _demo(options: argparse.Namespace) -> int:
     Two of the cameras are forgotten, too, and learned from the video files: this is the whole
     pipeline in less than a minute.
     """
-    from .checks import check_integer
+    from .checks import check_choice, check_integer
     from .pipeline import discover_from_videos
-    from .study import film, score
+    from .study import SYSTEMS, film, score
 
+    check_choice("system", options.system, SYSTEMS)
     check_integer("frames", options.frames, 2)
     with tempfile.TemporaryDirectory() as folder:
         print(f"filming {options.system}: three videos of {options.frames} frames ...", flush=True)
@@ -527,7 +528,7 @@ COMMANDS = {
         "--system": _words("NAME", "of the paper's seven (default: Lorenz)", default="Lorenz"),
         "--frames": _count(500, "per camera (default: 500)"),
         "--seed": _count(0, "of scenes and noise (default: 0)"),
-    }, {"name": "system"}),
+    }),
     "train-detector": _Command(_train, "train the learned detector from scratch", {
         "--seed": _count(0, "of weights and frames (default: 0)"),
         "--steps": _count(None, "batches of 16 frames (default: as shipped)"),

@@ -72,7 +72,7 @@ from .dynamics import (
 )
 from .dynamics import smooth as smooth_curves
 from .progress import bar
-from .refusal import Refused, refusing, stands_still
+from .refusal import Refused, refusing
 from .vision import (
     Hint,
     Track,
@@ -293,18 +293,14 @@ def _observed(
 ) -> Observation:
     """What the tracks of videos of these names tell, with the tracker's doubts about them."""
     begun = np.zeros(len(raw)) if lags is None else lags
-    with refusing("lags", raw, names):
-        for seen, name in zip(raw, names, strict=True):
-            if lags is None and stands_still(seen):
-                raise ValueError(f"lags: must be given where a track stands still, as {name} does")
     if not rig.is_measured:
         with refusing("cameras", raw, names):
             far = factorised(raw, rig, clock.rates, clock.uneven, lags)
+            if far is not None and far.moving == 1:  # a line tells of no lens
+                return _from_afar(raw, far, clock, doubts)
             most = GROSS if far is None else min(GROSS, ALIKE * far.lags.residual)
             at_once = align(raw, begun, clock.rates, clock.uneven)
             try:
-                if far is not None and far.moving == 1:  # a line tells of no lens
-                    return _from_afar(raw, far, clock, doubts)
                 rig = posed(at_once, rig, lags is not None, most)
             except ValueError:
                 if far is None:

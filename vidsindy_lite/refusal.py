@@ -81,10 +81,5 @@ def _is_strange(track: Floats) -> bool:
     if not len(turns) or seen.mean() < _SPARSE:
         return True
     jumps = np.mean(steps > _JUMP * max(np.median(steps), 1.0)) > _JUMPY
-    return bool(jumps or stands_still(track) or np.median(turns) > np.median(steps))
-
-
-def stands_still(track: Floats) -> bool:
-    """Whether all that is seen of a target, (n, 2) pixels, lies within a pixel or two."""
-    seen = track[np.isfinite(track).all(axis=1)]
-    return not len(seen) or bool(np.ptp(seen, axis=0).max() < _STILL)
+    still = np.ptp(track[seen], axis=0).max() < _STILL
+    return bool(jumps or still or np.median(turns) > np.median(steps))
