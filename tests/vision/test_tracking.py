@@ -11,7 +11,7 @@ from tiny_onnx import write_red_detector
 
 from vidsindy_lite import Hint
 from vidsindy_lite.cameras import Rig
-from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS
+from vidsindy_lite.study import REFERENCE_OFFSET, SYSTEMS, film
 from vidsindy_lite.vision import track_targets
 from vidsindy_lite.vision.background import _shape
 from vidsindy_lite.vision.detector import LEAST, Detection
@@ -177,6 +177,14 @@ def test_a_chaotic_orbit_that_turns_at_the_edge_of_a_post(tmp_path, frames):
     error = errors(render_video(tmp_path / "clip.mov", truth, scene, seed=1), truth)
     assert np.isfinite(error[distance_to_rectangle(truth, post) > 10]).mean() > 0.97
     assert np.nanmax(error) < 0.3
+
+
+@pytest.mark.slow
+def test_views_cut_by_a_post_are_not_taken_for_whole_ones_because_they_are_more(tmp_path):
+    # The film tracker sees more of this target, and says itself that it changes its size.
+    posts = ((160, 0, 40, 512), (330, 0, 40, 512))
+    shot = film("SprottF", tmp_path, 120, 1, occluders=posts)
+    assert np.nanmax(errors(shot.paths[0], shot.rig.cameras[0].project(shot.x))) < 0.3
 
 
 def test_an_occluder_of_the_colour_of_the_target(tmp_path):

@@ -126,7 +126,8 @@ def _track(path: str | os.PathLike, detector: str | os.PathLike, target: Hint | 
     found = replace(found, warnings=model.unrest)
     if detector == "auto" and _seen(found) < 0.75 and model.shows_target():
         other = follow(frames, samples, target)
-        return other if _seen(other) > _seen(found) + 0.1 else found
+        sees_more = _seen(other) > _seen(found) + 0.1
+        return other if sees_more and not other.warnings else found
     return found
 
 
