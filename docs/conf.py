@@ -7,6 +7,7 @@ The search and MathJax lie in the folder: the pages need no network and no serve
 
 import json
 import re
+import subprocess
 from pathlib import Path
 
 import jupyter_server_mathjax
@@ -116,11 +117,24 @@ def prepare(app, page, source):
     """The first page leads to all others; a notebook says how long it is, its pictures in words."""
     if page == "README":
         source[0] += CONTENTS
-    elif re.fullmatch(r"notebooks/\w+", page):
-        source[0] = json.dumps(described(json.loads(source[0])))
+    elif page.startswith("notebooks/"):
+        found = subprocess.run(
+            ["git", "remote", "get-url", "origin"], cwd=ROOT, capture_output=True, text=True
+        )
+        source[0] = json.dumps(described(json.loads(source[0]), launchers(page, found.stdout)))
 
 
-def described(notebook):
+def launchers(page, origin):
+    """Links that open a notebook on Binder and Colab, if its repository is one on GitHub."""
+    found = re.search(r"github\.com[:/]([\w.-]+/[\w.-]+?)(\.git)?$", origin.strip())
+    if not found:
+        return ""
+    binder = f"https://mybinder.org/v2/gh/{found[1]}/HEAD?urlpath=lab/tree/{page}.ipynb"
+    colab = f"https://colab.research.google.com/github/{found[1]}/blob/HEAD/{page}.ipynb"
+    return f"Open it on [Binder]({binder}) or [Colab]({colab})."
+
+
+def described(notebook, links=""):
     """A notebook with its minutes to read under its title, and its pictures with their captions."""
     captions = {
         path.stem: json.loads(path.read_text("utf-8"))["caption"]
@@ -139,7 +153,8 @@ def described(notebook):
             words += len(text.split())
     title, _, rest = "".join(notebook["cells"][0]["source"]).partition("\n")
     minutes = 5 * -(-(words / WORDS + lines / LINES) // 5)
-    notebook["cells"][0]["source"] = f"{title}\n\n*About {minutes:.0f} minutes to read.*\n{rest}"
+    told = f"*About {minutes:.0f} minutes to read.* {links}".strip()
+    notebook["cells"][0]["source"] = f"{title}\n\n{told}\n{rest}"
     return notebook
 
 

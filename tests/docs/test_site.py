@@ -1,9 +1,11 @@
 """Every page of the site in a browser, at two widths, without a network."""
 
 import re
+import runpy
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import pytest
@@ -33,6 +35,12 @@ def built(tmp_path_factory):
 def site(built):
     """The folder of the site."""
     return built[0]
+
+
+@pytest.fixture(scope="module")
+def conf():
+    """What makes the site, as a module."""
+    return SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "conf.py")))
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +104,26 @@ def test_formulas_and_figures_are_drawn(site, browser):
 def test_a_notebook_says_how_long_it_takes(site):
     page = (site / "notebooks" / "03_camera_learning.html").read_text("utf-8")
     assert re.search(r"</h1>\s*<p><em>About \d+ minutes to read.</em>", page)
+
+
+@pytest.mark.parametrize(
+    "origin",
+    ["https://github.com/some-one/film.law.git\n", "git@github.com:some-one/film.law.git"],
+)
+def test_a_notebook_of_a_repository_on_github_opens_on_binder_and_colab(conf, origin):
+    told = conf.launchers("notebooks/01_projection_proofs", origin)
+    binder, colab = re.findall(r"\((https://[^)]+)\)", told)
+    assert binder.startswith("https://mybinder.org/v2/gh/some-one/film.law/HEAD?urlpath=lab/tree/")
+    assert "/github/some-one/film.law/blob/HEAD/" in colab
+    for address in (binder, colab):
+        assert (ROOT / re.search(r"notebooks/.*", address)[0]).is_file()
+    notebook = {"cells": [{"cell_type": "markdown", "source": ["# Title\n", "Text."]}]}
+    assert told in conf.described(notebook, told)["cells"][0]["source"]
+
+
+@pytest.mark.parametrize("origin", ["", "/home/me/film", "https://example.org/github.com.git"])
+def test_elsewhere_it_opens_nowhere(conf, origin):
+    assert conf.launchers("notebooks/01_projection_proofs", origin) == ""
 
 
 @pytest.mark.slow
