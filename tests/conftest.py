@@ -23,12 +23,20 @@ settings.load_profile("repeatable")
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with the files of long tests, so that no worker ends with one of them, alone."""
-    marked = [
-        Counter(item.path for item in items if item.get_closest_marker(mark))
-        for mark in ("notebooks", "slow")
-    ]
-    items.sort(key=lambda item: [-count[item.path] for count in marked])
+    """Spread notebooks and other files over the workers, those that take long first.
+
+    A file of tests goes to one worker, so that what its tests share is made once; notebooks go
+    each to any.
+    """
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: (not is_notebook(item), -slow[item.path]))
+    for item in items:
+        group = item.name if is_notebook(item) else item.path
+        item.add_marker(pytest.mark.xdist_group(f"{group}"))
+
+
+def is_notebook(item):
+    return item.get_closest_marker("notebooks") is not None
 
 
 @pytest.fixture(scope="module")

@@ -51,6 +51,7 @@ PLACES = {
     "vidsindy_lite", "vidsindy_lite.study", "vidsindy_lite.study.plots",
     "vidsindy_lite.companion.artifacts",
 }  # fmt: skip
+LENGTH = lambda path: -path.stat().st_size  # noqa: E731
 VOLATILE = re.compile(r"0x[0-9a-f]{6,}|/(tmp|home|root|Users)/|\\Users\\")
 
 
@@ -279,14 +280,16 @@ def test_records_are_of_our_notebooks_and_hold_no_hash(folder):
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory, undisplayed):
-    """Where all quick runs go, one after the other.
+    """Where quick runs go; what one of them has computed, no worker computes again.
 
     Every track and trajectory is disturbed by a relative 1e-9, see `test_disturbed`, and the tables
     are compared with those of a run that nothing disturbs: no sentence may hold by a hair.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VIDSINDY_DISTURB", "1e-9:1")
-        patch.setenv("VIDSINDY_CACHE", str(tmp_path_factory.mktemp("cache")))
+        folder = tmp_path_factory.getbasetemp()
+        folder = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+        patch.setenv("VIDSINDY_CACHE", str(folder / "cache"))
         patch.setenv("PYTHONPATH", str(ROOT / "tests" / "disturbed"), prepend=os.pathsep)
         yield tmp_path_factory.mktemp("quick")
 
@@ -305,8 +308,9 @@ def run_problems(path, folder, references=REFERENCES):
     return number_problems(path, figures, references)
 
 
+# The longest first, so that none ends alone.
 @pytest.mark.notebooks
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(NOTEBOOKS, key=LENGTH), ids=lambda path: path.stem)
 def test_quick_run(path, quick):
     problems = run_problems(path, quick / path.stem)
     copy = f"if that is meant, copy the tables from build/quick/figures to {REFERENCES}"
