@@ -87,7 +87,7 @@ from vidsindy_lite.study import (
 # %%
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
-systems = tuple(SYSTEMS) if full else ("SprottF", "Lorenz")
+systems = tuple(SYSTEMS) if full else ("SprottF",)
 frames = 1500 if full else 300
 trials = range(seed, seed + (5 if full else 1))
 
