@@ -352,7 +352,7 @@ robustness("study_methods_sprottf", caption, sprott)
 
 # %%
 def other(figure_id, name):
-    if name in systems:
+    if name in compared:
         caption = f"{name}: error and wrong terms, medians and middle half of the trials."
         shown = (by_level.system == name) & by_level.method.isin([*both, "PySINDy"])
         robustness(figure_id, caption, by_level[shown])

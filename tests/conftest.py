@@ -4,7 +4,6 @@ import os
 import signal
 from collections import Counter
 from functools import cache
-from pathlib import Path
 
 # Before numpy is imported: results then do not depend on the number of cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -47,14 +46,11 @@ def tracked_once():
         yield
 
 
-@pytest.fixture(scope="module")
-def undisplayed():
-    """Notebooks draw their figures on no paper, see `disturbed/undisplayed.py`."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("MPLBACKEND", "module://undisplayed")
-        folder = Path(__file__).parent / "disturbed"
-        patch.setenv("PYTHONPATH", str(folder), prepend=os.pathsep)
-        yield
+@pytest.fixture(scope="session")
+def shared_cache(tmp_path_factory):
+    """Where notebooks keep the results of sweeps: what one computes, no worker computes again."""
+    folder = tmp_path_factory.getbasetemp()
+    return (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "cache"
 
 
 @pytest.fixture

@@ -3,14 +3,13 @@
 import ast
 import io
 import json
-import os
 import re
 
 import jupytext
 import nbformat
-import papermill
 import pytest
 from disturbed.undisplayed import FigureCanvas
+from helpers import run_quickly
 from matplotlib.figure import Figure
 
 from vidsindy_lite.companion.artifacts import (
@@ -22,7 +21,7 @@ from vidsindy_lite.companion.artifacts import (
     write_index,
 )
 from vidsindy_lite.companion.compare import differences
-from vidsindy_lite.companion.run import NotebookError, execute, find_notebooks, tidy
+from vidsindy_lite.companion.run import find_notebooks, tidy
 from vidsindy_lite.repository import PACKAGE
 
 ROOT = PACKAGE.parent
@@ -197,6 +196,8 @@ def number_problems(path, figures, references=REFERENCES):
 
     By more than the tolerance that a table states for a column, or else by a thousandth.
     """
+    if not figures.exists():
+        return []
     records = read_records(figures) | read_records(references)
     found = differences(references, figures, path.stem)
     return [f"{name}: {place}" for name, place in found.items() if "rows" in records[name]]
@@ -278,41 +279,28 @@ def test_records_are_of_our_notebooks_and_hold_no_hash(folder):
     assert folder == REFERENCES or folder_problems(folder) == []
 
 
-@pytest.fixture(scope="module")
-def quick(tmp_path_factory, undisplayed):
-    """Where quick runs go; what one of them has computed, no worker computes again.
+def run_problems(path, folder, cache, references=REFERENCES, seed=None):
+    """What is wrong with a quick run of a notebook, also with what it made before it failed."""
+    failed = run_quickly(path, folder / "figures", {}, cache, seed)
+    problems = number_problems(path, folder / "figures", references)
+    if failed:
+        return [*(problem for problem in problems if "only committed" not in problem), failed]
+    return problems
+
+
+@pytest.mark.notebooks
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in (2, 3))]
+)
+@pytest.mark.parametrize("path", sorted(NOTEBOOKS, key=LENGTH), ids=lambda path: path.stem)
+def test_quick_run(path, seed, tmp_path, shared_cache):
+    """No sentence holds by a hair.
 
     Every track and trajectory is disturbed by a relative 1e-9, see `test_disturbed`, and the tables
-    are compared with those of a run that nothing disturbs: no sentence may hold by a hair.
+    are compared with those of a run that nothing disturbs. The longest begin, so that none ends
+    alone.
     """
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VIDSINDY_DISTURB", "1e-9:1")
-        folder = tmp_path_factory.getbasetemp()
-        folder = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
-        patch.setenv("VIDSINDY_CACHE", str(folder / "cache"))
-        patch.setenv("PYTHONPATH", str(ROOT / "tests" / "disturbed"), prepend=os.pathsep)
-        yield tmp_path_factory.mktemp("quick")
-
-
-def run_problems(path, folder, references=REFERENCES):
-    """What is wrong with a quick run of a notebook, also with what it made before it failed."""
-    figures = folder / "figures"
-    places = {"VIDSINDY_FIGURES": str(figures), "VIDSINDY_NOTEBOOK": path.stem}
-    # The cores are busy with other tests: a sweep works in the kernel itself.
-    alone = {"jobs": 1} if "jobs" in papermill.inspect_notebook(jupytext.read(path)) else {}
-    try:
-        execute(path, {"profile": "quick", **alone}, folder, environment=places)
-    except NotebookError as error:
-        made = number_problems(path, figures, references) if figures.exists() else []
-        return [*(problem for problem in made if "only committed" not in problem), str(error)]
-    return number_problems(path, figures, references)
-
-
-# The longest first, so that none ends alone.
-@pytest.mark.notebooks
-@pytest.mark.parametrize("path", sorted(NOTEBOOKS, key=LENGTH), ids=lambda path: path.stem)
-def test_quick_run(path, quick):
-    problems = run_problems(path, quick / path.stem)
+    problems = run_problems(path, tmp_path, shared_cache, seed=seed)
     copy = f"if that is meant, copy the tables from build/quick/figures to {REFERENCES}"
     assert not problems, "\n".join([*problems, copy])
 
@@ -542,7 +530,7 @@ artifacts.save_table("found", [{"system": "Lorenz", "value": value}], caption="A
     path = tiny.write("01_first", save, f"assert {claim}")
     (tmp_path / "references").mkdir()
     write_table(tmp_path / "references", "found", "01_first", {"system": "Lorenz", "value": 1.0})
-    problems = run_problems(path, tmp_path / "run", tmp_path / "references")
+    problems = run_problems(path, tmp_path / "run", tmp_path, tmp_path / "references")
     assert len(problems) == names
     assert problems[0].startswith("found: row 0 (Lorenz), column value: 1.0 committed, 1.01")
 
