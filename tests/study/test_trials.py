@@ -50,8 +50,9 @@ def simulated(task):
 
 
 @pytest.fixture(autouse=True)
-def no_path_of_another_test():
+def nothing_of_another_test(tmp_path, monkeypatch):
     experiments._path.cache_clear()
+    monkeypatch.setenv("VIDSINDY_CACHE", str(tmp_path))
 
 
 @pytest.fixture
