@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 # As many processes as cores; `tests/conftest.py` says what goes together to one of them.
-SPREAD := -n auto --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
+SPREAD := -n auto --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
 
 .DEFAULT_GOAL := help

@@ -13,6 +13,7 @@ os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
 import pytest
 from helpers import TinyRepository
 from hypothesis import settings
+from xdist.scheduler import LoadScopeScheduling
 
 from vidsindy_lite import pipeline
 
@@ -22,20 +23,22 @@ settings.load_profile("repeatable")
 
 
 def pytest_collection_modifyitems(items):
-    """Spread notebooks and other files over the workers, those that take long first.
-
-    A file of tests goes to one worker, so that what its tests share is made once; notebooks go
-    each to any.
-    """
+    """Begin with notebooks and the files of long tests, so that no worker ends with one alone."""
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
-    items.sort(key=lambda item: (not is_notebook(item), -slow[item.path]))
-    for item in items:
-        group = item.name if is_notebook(item) else item.path
-        item.add_marker(pytest.mark.xdist_group(f"{group}"))
+    items.sort(key=lambda item: (not item.get_closest_marker("notebooks"), -slow[item.path]))
 
 
-def is_notebook(item):
-    return item.get_closest_marker("notebooks") is not None
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    return Spread(config, log)
+
+
+class Spread(LoadScopeScheduling):
+    """A file of tests goes to one worker, where what they share is made once; notebooks to any."""
+
+    def _split_scope(self, nodeid):
+        alone = ("::test_quick_run[", "::test_solutions_are_right[")
+        return nodeid if any(name in nodeid for name in alone) else nodeid.partition("::")[0]
 
 
 @pytest.fixture(scope="module")
