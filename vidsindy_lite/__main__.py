@@ -318,6 +318,12 @@ class _Parser(argparse.ArgumentParser):
     """A parser that refuses as the package does: argument, rule and value in one line."""
 
     def error(self, message: str) -> NoReturn:
+        told = re.fullmatch(r"(.*)invalid choice: (.*) \(choose from (.*)\)", message)
+        if told:
+            known = told[3].replace("'", "")
+            message = f"{told[1]}must be one of {known}, got {told[2]}"
+        for kind, rule in (("int", "an integer"), ("float", "a number")):
+            message = message.replace(f"invalid {kind} value: ", f"must be {rule}, got ")
         raise ValueError(message.removeprefix("argument ").removeprefix("--"))
 
 
