@@ -19,8 +19,7 @@ Four things the paper leaves open and what is done here:
   same group (F. Sun, Y. Liu, H. Sun, "Physics-informed Spline Learning for Nonlinear Dynamics
   Discovery", IJCAI 2021), in its Lorenz example.
 
-Gradients are written out, which takes a quarter of what automatic differentiation does; a test
-holds them against differences of the losses.
+Gradients are written out; a test holds them against differences of the losses.
 """
 
 import time
