@@ -3,10 +3,8 @@
 VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
-# As many processes as cores. A file of tests goes to one of them, so that what its tests share is
-# made once, the longest files first. The notebooks, one after the other, take as long as a quarter
-# of all tests: more than four processes would wait for them.
-SPREAD := -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+# As many processes as cores; `tests/conftest.py` says what goes together to one of them.
+SPREAD := -n auto --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
 
 .DEFAULT_GOAL := help

@@ -111,9 +111,10 @@ save_figure("videos_runge_kutta", fig, caption=caption, numbers={"t": periods, *
 # %%
 def growth(system):
     t, start = system.times(3901, 100), np.array(system.x0)
-    spread = system.simulate(t, start).std(axis=0).max()
-    paths = [system.simulate(t, start + off) for off in (0, 1e-7 * spread / np.sqrt(3))]
-    return np.linalg.norm(paths[1] - paths[0], axis=1).max() / spread
+    one = system.simulate(t, start)
+    spread = one.std(axis=0).max()
+    other = system.simulate(t, start + 1e-7 * spread / np.sqrt(3))
+    return np.linalg.norm(other - one, axis=1).max() / spread
 
 
 largest = {name: growth(system) for name, system in SYSTEMS.items()}

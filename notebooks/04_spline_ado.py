@@ -529,7 +529,6 @@ def compare(noise):
     return results
 
 
-spline_ado.spline_ado(t[:99], clean[:99], pretraining=1, epochs=1)  # so that PyTorch's start is not timed
 runs = {noise: compare(noise) for noise in ((0, level) if full else (level,))}
 
 

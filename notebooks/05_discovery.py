@@ -79,7 +79,7 @@ from vidsindy_lite.study import (
 # %%
 plt.style.use("vidsindy_lite.study.plots.vidsindy")
 full = profile == "full"
-names = tuple(SYSTEMS) if full else ("SprottF", "Lorenz")
+names = tuple(SYSTEMS) if full else ("Lorenz",)
 frames = 1500 if full else 300
 trials = range(seed, seed + (5 if full else 1))
 

@@ -4,7 +4,6 @@ import os
 import signal
 from collections import Counter
 from functools import cache
-from pathlib import Path
 
 # Before numpy is imported: results then do not depend on the number of cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -14,6 +13,7 @@ os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
 import pytest
 from helpers import TinyRepository
 from hypothesis import settings
+from xdist.scheduler import LoadScopeScheduling
 
 from vidsindy_lite import pipeline
 
@@ -23,12 +23,22 @@ settings.load_profile("repeatable")
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with the files of long tests, so that no worker ends with one of them, alone."""
-    marked = [
-        Counter(item.path for item in items if item.get_closest_marker(mark))
-        for mark in ("notebooks", "slow")
-    ]
-    items.sort(key=lambda item: [-count[item.path] for count in marked])
+    """Begin with notebooks and the files of long tests, so that no worker ends with one alone."""
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: (not item.get_closest_marker("notebooks"), -slow[item.path]))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    return Spread(config, log)
+
+
+class Spread(LoadScopeScheduling):
+    """A file of tests goes to one worker, where what they share is made once; notebooks to any."""
+
+    def _split_scope(self, nodeid):
+        alone = ("::test_quick_run[", "::test_solutions_are_right[")
+        return nodeid if any(name in nodeid for name in alone) else nodeid.partition("::")[0]
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +49,11 @@ def tracked_once():
         yield
 
 
-@pytest.fixture(scope="module")
-def undisplayed():
-    """Notebooks draw their figures on no paper, see `disturbed/undisplayed.py`."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("MPLBACKEND", "module://undisplayed")
-        folder = Path(__file__).parent / "disturbed"
-        patch.setenv("PYTHONPATH", str(folder), prepend=os.pathsep)
-        yield
+@pytest.fixture(scope="session")
+def shared_cache(tmp_path_factory):
+    """Where notebooks keep the results of sweeps: what one computes, no worker computes again."""
+    folder = tmp_path_factory.getbasetemp()
+    return (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "cache"
 
 
 @pytest.fixture

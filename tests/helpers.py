@@ -1,5 +1,9 @@
-"""Random curves, rigs and their tracks, a posed problem, and a repository of tiny notebooks."""
+"""Random curves, rigs and their tracks, a posed problem, and notebooks: tiny ones, quick runs."""
 
+import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -174,6 +178,29 @@ def one_a_frame(places, qualities):
     colour = np.tile([30.0, 30, 200], (n, 1))
     return Candidates(np.arange(n), places, places, box, np.full(n, 60.0), colour,
                       np.full((n, 3), 100.0), np.asarray(qualities, float))  # fmt: skip
+
+
+HARNESS = Path(__file__).parent / "disturbed"
+SIZE = 1e-9  # of what disturbs tracks and trajectories, relatively
+
+
+def python(*arguments, cache, seed=None):
+    """Run Python with the harness at hand, which disturbs if a seed is given."""
+    paths = os.pathsep.join(map(str, (HARNESS, Path(vl.__file__).parents[1])))
+    settings = {"PYTHONPATH": paths, "VIDSINDY_CACHE": str(cache), "PYTHONHASHSEED": "0"}
+    if seed is not None:
+        settings["VIDSINDY_DISTURB"] = f"{SIZE}:{seed}"
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        env=os.environ | settings, capture_output=True, text=True,
+    )  # fmt: skip
+
+
+def run_quickly(path, figures, settings, cache, seed=None):
+    """What a notebook fails with in its quick profile, with these settings; empty if it ends."""
+    asked = HARNESS / "execute.py", figures, path, json.dumps(settings)
+    ran = python(*asked, cache=cache, seed=seed)
+    return ran.stderr[-3000:] if ran.returncode else ""
 
 
 class TinyRepository:

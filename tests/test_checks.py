@@ -23,39 +23,61 @@ from vidsindy_lite.checks import (
     check_vector,
 )
 
-
-@pytest.mark.parametrize("value", [-1, 1.5, 2.0, True, "2", None, np.nan, [1]])
-def test_integers(value):
-    assert check_integer("seed", np.int64(3)) == 3
-    with pytest.raises(ValueError, match="seed: must be an integer of at least 0, got "):
-        check_integer("seed", value)
+INTEGER, NUMBER = "n: must be an integer of at least 0, got", "n: must be a finite number, got"
+ARRAY, VECTOR = "n: must be an array of real numbers, got ", "n: must be 2 finite numbers, got "
+SIZE = "image_size: must be two integers of at least 64, got "
 
 
-@pytest.mark.parametrize("value", [np.nan, -np.inf, True, "1", 1j, None, np.ones(1)])
-def test_numbers(value):
-    assert check_number("angle", np.float32(-0.5)) == -0.5
-    assert check_number("fps", Fraction(30000, 1001)) == 30000 / 1001
-    with pytest.raises(ValueError, match="angle: must be a finite number, got "):
-        check_number("angle", value)
-
-
-@pytest.mark.parametrize("value", [0, -1e-9])
-def test_positive_numbers(value):
-    assert check_positive("scale", 2) == 2.0
-    with pytest.raises(ValueError, match=f"scale: must be positive, got {value}"):
-        check_positive("scale", value)
+def refused(check, values, message):
+    return [(check, value, message) for value in values]
 
 
 @pytest.mark.parametrize(
-    "values",
+    ("check", "value", "message"),
     [
-        "abc", ["1", "2"], [1j], [[1], [1, 2]], np.arange(3).astype("datetime64[s]"), object(),
-        np.array([1, 2j], dtype=object),
+        *refused(check_integer, [-1, 1.5, 2.0, True, "2", None, np.nan, [1]], INTEGER),
+        *refused(check_number, [np.nan, -np.inf, True, "1", 1j, None, np.ones(1)], NUMBER),
+        *refused(check_positive, [0, -1e-9], "n: must be positive, got "),
+        *refused(check_array, ["abc", ["1", "2"], [1j], [[1], [1, 2]], object()], ARRAY),
+        *refused(check_array, [np.arange(3).astype("datetime64[s]")], ARRAY),
+        *refused(check_array, [np.array([1, 2j], dtype=object)], ARRAY),
+        *refused(lambda n, x: check_vector(n, x, 2), [[1, 2, 3], [1, np.nan], [[1, 2]]], VECTOR),
+        *refused(lambda _, t: check_times(t), [[], 3.0], "t: must hold at least one time"),
+        (lambda _, t: check_times(t), [0, np.inf], "t: must be finite, got inf"),
+        (lambda _, t: check_times(t), np.ma.masked_array([0, 1, 2], [0, 1, 0]),
+         "t: must be finite, got nan"),
+        (lambda _, t: check_times(t), [0, 2, 2], "t: must increase, got t[1] = 2 before t[2] = 2"),
+        *refused(lambda _, size: check_image_size(size, least=64),
+                 [512, None, "ab", (512,), (512.0, 512), (True, True), (512, 63)], SIZE),
+        *refused(lambda _, size: check_image_size(size), [(32769, 64), (64, 10_000_000)],
+                 "image_size: must be at most 32768 a side, got "),
+        *refused(check_path, [None, 5, ["a.mkv"]], "n: must be the name of a file, got "),
+        (lambda n, x: check_instance(n, x, dict), "rig.toml",
+         "n: must be of type dict, got 'rig.toml'"),
+        *[(lambda n, x: check_rows(n, x, 2), x, f"n: must have shape (n, 2), got {np.shape(x)}")
+          for x in (np.zeros(3), np.zeros((3, 3)), np.zeros((1, 3, 2)), 1.0)],
+        (lambda n, x: check_rows(n, x, 2), [[0, np.inf]],
+         "n: must be finite or NaN, got 1 infinite values"),
     ],
 )  # fmt: skip
-def test_what_is_no_array_of_real_numbers(values):
-    with pytest.raises(ValueError, match="x: must be an array of real numbers, got "):
-        check_array("x", values)
+def test_what_is_none_is_refused(check, value, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        check("n", value)
+
+
+def test_what_is_one_is_given_back():
+    given = np.array([1.0, 2.0])
+    check_vector("offset", given, 2)[0] = 9
+    assert given[0] == 1  # it is a copy
+    np.testing.assert_array_equal(check_rows("x", [[1, 2], [np.nan, 0]], 2), [[1, 2], [np.nan, 0]])
+    check_instance("name", "rig.toml", str)
+    assert check_integer("seed", np.int64(3)) == 3
+    assert check_number("angle", np.float32(-0.5)) == -0.5
+    assert check_number("fps", Fraction(30000, 1001)) == 30000 / 1001
+    assert check_positive("scale", 2) == 2.0
+    assert check_image_size([64, 80], least=64) == (64, 80)
+    assert check_image_size((32768, 32768)) == (32768, 32768)
+    assert check_path("path", "a.mkv") == Path("a.mkv")
 
 
 @pytest.mark.parametrize("dtype", [int, float])
@@ -65,68 +87,6 @@ def test_masked_entries_are_missing(dtype):
     assert type(values) is np.ndarray
     np.testing.assert_array_equal(values, [0, 1, np.nan, 3])
     assert masked.data.tolist() == [0, 1, 2, 3]
-
-
-def test_vectors_are_copied():
-    given = np.array([1.0, 2.0])
-    check_vector("offset", given, 2)[0] = 9
-    assert given[0] == 1
-    for bad in ([1, 2, 3], [1, np.nan], [[1, 2]]):
-        with pytest.raises(ValueError, match="offset: must be 2 finite numbers, got "):
-            check_vector("offset", bad, 2)
-
-
-@pytest.mark.parametrize(
-    ("t", "message"),
-    [
-        ([], "t: must hold at least one time"),
-        (3.0, "t: must hold at least one time"),
-        ([0, np.inf], "t: must be finite, got inf"),
-        (np.ma.masked_array([0, 1, 2], [0, 1, 0]), "t: must be finite, got nan"),
-        ([0, 2, 2], "t: must increase, got t[1] = 2 before t[2] = 2"),
-    ],
-)
-def test_times(t, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
-        check_times(t)
-
-
-@pytest.mark.parametrize("size", [512, None, "ab", (512,), (512.0, 512), (True, True), (512, 63)])
-def test_image_sizes(size):
-    assert check_image_size([64, 80], least=64) == (64, 80)
-    with pytest.raises(ValueError, match="image_size: must be two integers of at least 64, got "):
-        check_image_size(size, least=64)
-
-
-@pytest.mark.parametrize("size", [(32769, 64), (64, 10_000_000)])
-def test_absurd_image_sizes(size):
-    assert check_image_size((32768, 32768)) == (32768, 32768)
-    with pytest.raises(ValueError, match="image_size: must be at most 32768 a side, got "):
-        check_image_size(size)
-
-
-def test_paths():
-    assert check_path("path", "a.mkv") == Path("a.mkv")
-    for value in (None, 5, ["a.mkv"]):
-        with pytest.raises(ValueError, match="path: must be the name of a file, got "):
-            check_path("path", value)
-
-
-def test_instances():
-    check_instance("name", "rig.toml", str)
-    with pytest.raises(ValueError, match="rig: must be of type dict, got 'rig.toml'"):
-        check_instance("rig", "rig.toml", dict)
-
-
-@pytest.mark.parametrize("values", [np.zeros(3), np.zeros((3, 3)), np.zeros((1, 3, 2)), 1.0])
-def test_rows_of_a_wrong_shape(values):
-    rows = check_rows("x", [[1, 2], [np.nan, 0]], 2)
-    np.testing.assert_array_equal(rows, [[1, 2], [np.nan, 0]])
-    shape = re.escape(str(np.shape(values)))
-    with pytest.raises(ValueError, match=rf"x: must have shape \(n, 2\), got {shape}"):
-        check_rows("x", values, 2)
-    with pytest.raises(ValueError, match="x: must be finite or NaN, got 1 infinite values"):
-        check_rows("x", [[0, np.inf]], 2)
 
 
 def test_a_value_is_shown_in_one_line():

@@ -13,68 +13,11 @@ Each run of all tests disturbs the quick notebooks once, see `test_notebooks`; `
 does it twice more.
 """
 
-import functools
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-from vidsindy_lite.companion.compare import differences
-from vidsindy_lite.companion.run import find_notebooks
-from vidsindy_lite.repository import PACKAGE
-
-ROOT = PACKAGE.parent
-HARNESS = Path(__file__).parent / "disturbed"
-REFERENCES = Path(__file__).parent / "quick"  # tables of a quick run
-SIZE = 1e-9
-
-
-def python(*arguments, cache, seed=None):
-    """Run Python with the harness at hand, which disturbs if a seed is given."""
-    paths = os.pathsep.join(map(str, (HARNESS, ROOT)))
-    settings = {"PYTHONPATH": paths, "VIDSINDY_CACHE": str(cache), "PYTHONHASHSEED": "0"}
-    if seed is not None:
-        settings["VIDSINDY_DISTURB"] = f"{SIZE}:{seed}"
-    return subprocess.run(
-        [sys.executable, *map(str, arguments)],
-        env=os.environ | settings, capture_output=True, text=True,
-    )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture(scope="module")
-def disturbed(tmp_path_factory, cache):
-    """The numbers of a quick run of all notebooks, by the seed of its disturbance."""
-
-    @functools.cache
-    def numbers(seed):
-        figures = tmp_path_factory.mktemp("figures")
-        notebooks = find_notebooks(ROOT)
-        ran = python(HARNESS / "execute.py", figures, *notebooks, cache=cache, seed=seed)
-        assert ran.returncode == 0, ran.stderr[-3000:]
-        return figures
-
-    return numbers
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("seed", [2, 3])
-def test_every_notebook_says_the_same_when_disturbed(disturbed, seed):
-    # The committed tables of a quick run are those of one that nothing disturbs.
-    committed = {file.stem for file in REFERENCES.glob("*.json")}
-    found = differences(REFERENCES, disturbed(seed))
-    assert {name: place for name, place in found.items() if name in committed} == {}
-
-
-# --------------------------------------------------------------------------- the harness can fail
+from helpers import SIZE, python, run_quickly
 
 SHOW = """\
 import json, sys
@@ -96,10 +39,10 @@ print(json.dumps({
 
 
 @pytest.fixture(scope="module")
-def shown(tmp_path_factory, cache):
+def shown(tmp_path_factory, shared_cache):
     """What the functions return, undisturbed and by two seeds."""
     video = tmp_path_factory.mktemp("shown") / "one.mov"
-    ran = [python("-c", SHOW, video, cache=cache, seed=seed) for seed in (None, 1, 2)]
+    ran = [python("-c", SHOW, video, cache=shared_cache, seed=seed) for seed in (None, 1, 2)]
     assert all(r.returncode == 0 for r in ran), [r.stderr for r in ran]
     return [json.loads(r.stdout) for r in ran]
 
@@ -123,20 +66,22 @@ assert profile == "quick"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "failures"), [(None, 0), (1, 1)])
-def test_what_holds_by_a_hair_fails(tmp_path, cache, seed, failures):
-    (tmp_path / "hair.py").write_text(HAIR)
-    sound = tmp_path / "sound.py"
-    sound.write_text(HAIR.replace("1e-12", "1e-6"))
-    hair = tmp_path / "hair.py"
-    ran = python(HARNESS / "execute.py", tmp_path, hair, sound, cache=cache, seed=seed)
-    assert ran.returncode == failures, ran.stderr
+@pytest.mark.parametrize(
+    ("seed", "hair", "fails"), [(None, 12, False), (1, 12, True), (1, 6, False)]
+)
+def test_what_holds_by_a_hair_fails(tmp_path, shared_cache, seed, hair, fails):
+    (tmp_path / "hair.py").write_text(HAIR.replace("1e-12", f"1e-{hair}"))
+    failed = run_quickly(tmp_path / "hair.py", tmp_path, {}, shared_cache, seed)
+    assert ("AssertionError" in failed) == bool(failed) == fails
+    assert "colour: must be" in run_quickly(
+        tmp_path / "hair.py", tmp_path, {"colour": 1}, shared_cache
+    )
 
 
 @pytest.mark.slow
-def test_disturbed_sweeps_find_no_results_of_others(cache):
+def test_disturbed_sweeps_find_no_results_of_others(shared_cache):
     show = "import os; print(os.environ['VIDSINDY_CACHE'])"
     twice = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {show!r}])"
-    folders = {python("-c", show, cache=cache, seed=seed).stdout for seed in (None, 1, 2)}
+    folders = {python("-c", show, cache=shared_cache, seed=seed).stdout for seed in (None, 1, 2)}
     assert len(folders) == 3
-    assert python("-c", twice, cache=cache, seed=1).stdout in folders
+    assert python("-c", twice, cache=shared_cache, seed=1).stdout in folders

@@ -108,16 +108,8 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
         (["--rig", "a.avi"], "rig: must be a TOML file in UTF-8, got 'a.avi', which is none"),
         (["--rig", "rig.toml", "--lag", "0,7"], "lag: must be 3 finite numbers"),
         (
-            ["--rig", "rig.toml", "--lag", "0,9999,0"],
-            "in common with the first (220 frames), got 9999 for b.avi (208 frames)",
-        ),
-        (
             ["--rig", "rig.toml", "--lag=0,0,-210"],
             "in common with the first (220 frames), got -210 for c.avi (210 frames)",
-        ),
-        (  # one frame in common
-            ["--rig", "rig.toml", "--lag", "0,219,0"],
-            "lag: every video must have half of the shorter of the two in common with the first",
         ),
         (["--rig", "none.toml", "--detector", "none.onnx"], "detector: no such file, got"),
         (["--rig", "rig.toml", "--fps", "0"], "fps: must be positive, got 0"),
@@ -127,7 +119,6 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
         (["--rig", "rig.toml", "--seed", "x"], "seed: must be an integer, got 'x'"),
         (["--rig", "rig.toml", "--order", "3"], "order: must be one of 1, 2, auto, got '3'"),
         (["--rig", "rig.toml", "--loud"], "unrecognized arguments: --loud"),
-        (["--rig", "rig.toml", "--degree", "0"], "degree: must be an integer of at least 1"),
         (
             ["--rig", "rig.toml", "--degree", "2", "--library", "fourier(1)"],
             "degree: must not be given with a library, got 2 and fourier(1)",
@@ -136,7 +127,6 @@ def test_a_bad_file_gives_one_error_and_no_report(here, capsys, spoil, message):
             ["--rig", "rig.toml", "--library", "polynomial(1); x: q = 0"],
             "library: 'q' is no term of the equation of x, which has 1, x, y, z",
         ),
-        (["--rig", "rig.toml", "--seed", "-1"], "seed: must be an integer of at least 0"),
         (["--rig", "rig.toml", "--out", "\udcff"], r"must be made of characters, got '\udcff'"),
     ],
 )
@@ -163,38 +153,27 @@ def test_one_rate_is_not_given_for_files_that_state_others(here, capsys, fps):
     assert "track:" not in shown
 
 
-def test_a_size_that_is_none(capsys):
-    assert main(["rig-template", "--size", "640"]) == 2
-    message = "error: size: must be two integers like 1920x1080, got '640'\n"
-    assert capsys.readouterr().err == message
-
-
-def test_a_size_that_no_camera_has(capsys):
-    assert main(["rig-template", "--size", "10000000x64"]) == 2
-    message = "error: size: must be at most 32768 a side, got (10000000, 64)"
-    assert message in capsys.readouterr().err
-
-
-def test_what_is_no_command_is_one_line(capsys):
-    assert main(["discver"]) == 2
-    shown = capsys.readouterr().err
-    assert shown.startswith("error: COMMAND: invalid choice: 'discver'")
-    assert shown.count("\n") == 1
-
-
-def test_a_film_of_one_frame_is_none(capsys):
-    assert main(["demo", "--frames", "1"]) == 2
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (["rig-template", "--size", "640"], "size: must be two integers like 1920x1080, got '640'"),
+        (["rig-template", "--size", "10000000x64"], "size: must be at most 32768 a side, got"),
+        (["rig-template", "--cameras", "1"], "cameras: must be an integer of at least 2, got 1"),
+        (["discver"], "COMMAND: must be one of discover, pick, "),
+        (["demo", "--frames", "1"], "frames: must be an integer of at least 2, got 1"),
+        (["rig-import", "none.toml"], "files: no such calibration file, got 'none.toml'"),
+        (["pick", "none.mkv"], "videos: no such video file"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line_that_names_what_was_typed(
+    tmp_path, monkeypatch, capsys, command, message
+):
+    monkeypatch.chdir(tmp_path)
+    assert main(command) == 2
     shown = capsys.readouterr()
-    assert shown.err == "error: frames: must be an integer of at least 2, got 1\n"
+    assert shown.err.startswith(f"error: {message}")
+    assert shown.err.count("\n") == 1
     assert not shown.out
-
-
-def test_messages_name_what_was_typed(tmp_path, capsys):
-    missing = str(tmp_path / "none.toml")
-    assert main(["rig-import", missing]) == 2
-    assert capsys.readouterr().err.startswith("error: files: no such calibration file, got '")
-    assert main(["pick", missing, "--out", str(tmp_path / "pick.html")]) == 2
-    assert capsys.readouterr().err.startswith("error: videos: no such video file")
 
 
 def test_the_help_helps(capsys):
@@ -211,8 +190,6 @@ def test_a_template_to_fill_in(tmp_path, capsys):
     rig = vl.Rig.load(tmp_path / "rig.toml")
     assert len(rig.cameras) == 4
     assert rig.cameras[0].image_size == (640, 480)
-    assert main(["rig-template", "--cameras", "1"]) == 2
-    assert "cameras: must be an integer of at least 2" in capsys.readouterr().err
 
 
 # ------------------------------------------------------------------ tracks, refusals, interruptions

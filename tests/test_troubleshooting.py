@@ -39,9 +39,9 @@ class Studio:
         return vl.write_video(self.folder / name, render(track, scene))
 
     def says(self, paths=None, cameras=None, **options):
-        """The error or the warnings of a discovery."""
+        """The error or the warnings of what is observed."""
         rig = vl.Rig(cameras) if cameras else self.rig
-        return told(vl.discover_from_videos, paths or self.paths, rig, degree=1, **options)
+        return told(vl.observe, paths or self.paths, rig, **options)
 
     def without_last(self, path):
         return self.says([*self.paths[:2], path])

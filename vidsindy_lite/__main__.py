@@ -110,24 +110,22 @@ def _discover(options: argparse.Namespace) -> int:
             rule = f"must be given with {'several videos' if alone else 'one video alone'}"
             raise ValueError(f"{name}: {rule}, got {value}")
     rig, videos = Rig.load(options.rig) if options.rig else None, options.videos or None
-    told = {"seed": options.seed, "order": options.order}
     if alone:
         asked = ("degree", *_OF_ONE_VIDEO)
-        told |= {name: value for name in asked if (value := getattr(options, name)) is not None}
+        told = {name: value for name in asked if (value := getattr(options, name)) is not None}
     else:
-        library = check_library(options.degree, options.library)
-        told |= {
+        told = {
             "rig file": options.rig or "none",
-            "library": str(library),
-            "origin": options.origin,
-        }
-        told |= {"orientation": options.orientation}
-        told |= {"lags": "learned" if options.lag is None else options.lag}
+            "library": str(check_library(options.degree, options.library)),
+            "origin": options.origin, "orientation": options.orientation,
+            "lags": "learned" if options.lag is None else options.lag,
+        }  # fmt: skip
         told |= {"targets": options.targets} if options.targets != 1 else {}
+    told = {"seed": options.seed, "order": options.order} | told
     told |= {"detector": options.detector} if videos else {"tracks": ", ".join(options.tracks)}
     told |= {} if options.fps is None else {"frames in a unit of time": options.fps}
     try:
-        found = _found_in_plane(options) if alone else _found(options, rig)
+        found = _found(options, rig, alone)
     except (Refused, Stopped) as refused:
         if isinstance(refused, Stopped) and not videos:  # its tracks are there already
             raise KeyboardInterrupt from None
@@ -147,43 +145,34 @@ def _discover(options: argparse.Namespace) -> int:
     return 0 if found.status == "ok" else 1
 
 
-def _found_in_plane(options: argparse.Namespace) -> Any:
-    """The law of a motion in a plane, in the film of one camera."""
-    from .checks import check_vector
-    from .plane import discover_from_video
-    from .vision import Hint
-
-    names = (*_OF_ONE_VIDEO, "fps", "detector", "degree", "seed")
-    given = {name: getattr(options, name) for name in names}
-    given |= {"order": "auto" if options.order == "auto" else int(options.order)}
-    if options.hint is not None:
-        frame, *box = check_vector("hint", options.hint, 5)
-        given["hint"] = Hint(frame=int(frame), box=tuple(box))
-    return discover_from_video(options.videos[0], progress=True, **given)
-
-
-def _found(options: argparse.Namespace, rig: Any) -> Any:
-    """The law that videos or tracks obey."""
-    from .checks import check_positive
+def _found(options: argparse.Namespace, rig: Any, alone: bool) -> Any:
+    """The law that videos or tracks obey, or a motion in a plane in the film of one camera."""
+    from .checks import check_positive, check_vector
     from .pipeline import discover_from_tracks, discover_from_videos
-    from .vision import frame_clock, load_hints
+    from .plane import discover_from_video
+    from .vision import Hint, frame_clock, load_hints
 
-    shared = {name: getattr(options, name) for name in ("degree", "library", "origin", "seed")}
-    shared |= {"orientation": options.orientation}
+    def given(*names: str) -> dict[str, Any]:
+        return {name: getattr(options, name) for name in names}
+
+    shared = given("degree", "seed") | {"progress": True}
     shared |= {"order": "auto" if options.order == "auto" else int(options.order)}
-    shared |= {"lags": options.lag, "progress": True}
+    if alone:
+        shared |= given("fps", "detector", *_OF_ONE_VIDEO)
+        if options.hint is not None:
+            frame, *box = check_vector("hint", options.hint, 5)
+            shared["hint"] = Hint(frame=int(frame), box=tuple(box))
+        return discover_from_video(options.videos[0], **shared)
+    shared |= given("library", "origin", "orientation") | {"lags": options.lag}
     if options.tracks:
-        shared |= {"individual": options.individual, "fps": options.fps}
-        return discover_from_tracks(options.tracks, rig, **shared)
+        return discover_from_tracks(options.tracks, rig, **shared, **given("individual", "fps"))
     t = None
     if options.fps is not None:
         t = frame_clock(options.videos[0]) / check_positive("fps", options.fps)
-    shared |= {
-        "detector": options.detector,
-        "hints": load_hints(options.rig) if options.rig else None,
-    }
-    shared |= {"targets": options.targets}
-    return discover_from_videos(options.videos, rig, t, **shared)
+    hints = load_hints(options.rig) if options.rig else None
+    return discover_from_videos(
+        options.videos, rig, t, hints=hints, **shared, **given("detector", "targets")
+    )
 
 
 def _pick(options: argparse.Namespace) -> int:
@@ -329,6 +318,12 @@ class _Parser(argparse.ArgumentParser):
     """A parser that refuses as the package does: argument, rule and value in one line."""
 
     def error(self, message: str) -> NoReturn:
+        told = re.fullmatch(r"(.*)invalid choice: (.*) \(choose from (.*)\)", message)
+        if told:
+            known = told[3].replace("'", "")
+            message = f"{told[1]}must be one of {known}, got {told[2]}"
+        for kind, rule in (("int", "an integer"), ("float", "a number")):
+            message = message.replace(f"invalid {kind} value: ", f"must be {rule}, got ")
         raise ValueError(message.removeprefix("argument ").removeprefix("--"))
 
 
@@ -363,32 +358,14 @@ def _as_size(text: str) -> tuple[int, int]:
         ) from None
 
 
-def _as_number(kind: type, rule: str) -> Callable[[str], Any]:
-    """What makes a number of an option's text."""
-
-    def number(text: str) -> Any:
-        try:
-            return kind(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"must be {rule}, got {text!r:.60}") from None
-
-    return number
-
-
 def _choice(default: str, known: Sequence[str], what: str) -> dict[str, Any]:
     """An option that has one of a few values."""
-
-    def one(text: str) -> str:
-        if text not in known:
-            raise argparse.ArgumentTypeError(f"must be one of {', '.join(known)}, got {text!r:.60}")
-        return text
-
-    return {"default": default, "type": one, "metavar": f"{{{','.join(known)}}}", "help": what}
+    return {"default": default, "choices": known, "help": what}
 
 
 def _count(default: int | None, what: str) -> dict[str, Any]:
     """An option that is an integer."""
-    return {"default": default, "type": _as_number(int, "an integer"), "help": what}
+    return {"default": default, "type": int, "help": what}
 
 
 def _words(metavar: str, what: str, **more: object) -> dict[str, Any]:
@@ -439,7 +416,7 @@ COMMANDS = {
         ),
         "--length-error": _words(
             "SHARE", "standard error of that length, as a share of it (default: 0.01)",
-            type=_as_number(float, "a number"), default=0.01
+            type=float, default=0.01
         ),
         "--up": _words(
             "DU,DV", "of one video: the vertical in the picture, a direction or two marks, the "
@@ -462,7 +439,7 @@ COMMANDS = {
         ),
         "--fps": _words(
             "RATE", "frames of each video in one unit of time of the equations (default: as the "
-            "files say, which makes it a second of video)", type=_as_number(float, "a number")
+            "files say, which makes it a second of video)", type=float
         ),
         "--degree": _count(None, "highest degree of the polynomials (default: 3)"),
         "--library": _words(

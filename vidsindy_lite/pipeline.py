@@ -22,7 +22,6 @@ from .cameras import (
     GROSS,
     AffineCamera,
     Clock,
-    Factorised,
     Lags,
     PerspectiveCamera,
     Rig,
@@ -296,16 +295,18 @@ def _observed(
     if not rig.is_measured:
         with refusing("cameras", raw, names):
             far = factorised(raw, rig, clock.rates, clock.uneven, lags)
-            if far is not None and far.moving == 1:  # a line tells of no lens
-                return _from_afar(raw, far, clock, doubts)
-            most = GROSS if far is None else min(GROSS, ALIKE * far.lags.residual)
-            at_once = align(raw, begun, clock.rates, clock.uneven)
-            try:
-                rig = posed(at_once, rig, lags is not None, most)
-            except ValueError:
-                if far is None:
-                    raise
-                return _from_afar(raw, far, clock, doubts)
+            if far is None or far.moving > 1:  # a line tells of no lens
+                most = GROSS if far is None else min(GROSS, ALIKE * far.lags.residual)
+                at_once = align(raw, begun, clock.rates, clock.uneven)
+                try:
+                    rig, far = posed(at_once, rig, lags is not None, most), None
+                except ValueError:
+                    if far is None:
+                        raise
+            if far is not None:
+                tracks = align(raw, far.lags.frames, clock.rates, clock.uneven)
+                warnings = (*far.lags.warnings, *doubts)
+                return _concluded(tracks, far.rig, far.lags, clock, [], warnings, far.moving)
             doubts = (*rig.warnings, *doubts)
     first: list[str] = []
     start = lags
@@ -322,8 +323,11 @@ def _observed(
         else:
             uneven = clock.uneven
             best = learn_lags(raw, rig, clock.rates, start=start, clocks=uneven, progress=progress)
-        if lags is not None:
-            _refuse_wrong(lags, best)
+        if lags is not None and _apart(lags, best, _WRONG_LAG):
+            raise ValueError(
+                f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
+                f"({list_lags(best.frames)}) do: leave them out, or check them"
+            )
     used = best.frames if lags is None else lags
     tracks = align(raw, used, best.rates, clock.uneven)
     with refusing("cameras", raw, names):
@@ -332,43 +336,29 @@ def _observed(
     told = best
     if lags is not None:
         told = replace(best, frames=lags, errors=0 * lags, residual=max(missed), warnings=())
-    x = reconstruct(tracks, learned)
-    learning = systematic_errors(raw, rig, learned, told)
-    motion = [_smoothed(clock.times, track) for track in tracks]
-    trails = trailing_errors(tracks, learned, motion)
-    return Observation(
-        tracks=tracks,
-        rig=learned,
-        lags=told,
-        t=clock.times,
-        x=x,
-        systematic=np.concatenate((learning, trails)),
-        warnings=(
-            *first,
-            *_rig_warnings(missed, tracks, rig, learned, names, used, best),
-            *learned.warnings,
-            *doubts,
-            *told.warnings,
-        ),
-    )
+    modes = systematic_errors(raw, rig, learned, told)
+    disagreeing = _rig_warnings(missed, tracks, rig, learned, names, used, best)
+    warnings = (*first, *disagreeing, *learned.warnings, *doubts, *told.warnings)
+    return _concluded(tracks, learned, told, clock, modes, warnings)
 
 
-def _from_afar(
-    raw: Sequence[Floats], found: Factorised, clock: Clock, doubts: Sequence[str]
+def _concluded(
+    tracks: tuple[Floats, ...],
+    rig: Rig,
+    lags: Lags,
+    clock: Clock,
+    modes: Iterable[Floats],
+    warnings: tuple[str, ...],
+    moving: int = 3,
 ) -> Observation:
-    """What far cameras of which nothing is known tell of a path."""
-    tracks = align(raw, found.lags.frames, clock.rates, clock.uneven)
+    """The path that cameras have seen which are known now, along so many axes.
+
+    Its errors are the modes and what every smooth path trails behind with.
+    """
     motion = [_smoothed(clock.times, track) for track in tracks]
-    moves = np.arange(3) < found.moving
-    return Observation(
-        tracks=tracks,
-        rig=found.rig,
-        lags=found.lags,
-        t=clock.times,
-        x=reconstruct(tracks, found.rig) * moves,
-        systematic=trailing_errors(tracks, found.rig, motion) * moves,
-        warnings=(*found.lags.warnings, *doubts),
-    )
+    errors, moves = np.stack([*modes, *trailing_errors(tracks, rig, motion)]), np.arange(3) < moving
+    x = reconstruct(tracks, rig) * moves
+    return Observation(tracks, rig, lags, clock.times, x, errors * moves, warnings)
 
 
 def _several_observed(
@@ -522,15 +512,6 @@ def check_found(tracks: Sequence[Floats], names: Sequence[str], targets: int) ->
                 "track",
                 tracks,
             )
-
-
-def _refuse_wrong(lags: Floats, learned: Lags) -> None:
-    """Refuse given lags if others are clearly those of the tracks."""
-    if _apart(lags, learned, _WRONG_LAG):
-        raise ValueError(
-            f"lags: must make the views agree, got ({list_lags(lags)}) frames where "
-            f"({list_lags(learned.frames)}) do: leave them out, or check them"
-        )
 
 
 def _apart(lags: Floats, learned: Lags, limit: float) -> bool:
@@ -816,12 +797,12 @@ def _read(
     first = min((track.start for track in read), default=0)
     for i, (one, camera) in enumerate(zip(read, rig.cameras, strict=False)):
         read[i] = replace(one, pixels=one.downwards(camera.image_size[1]))
-    return [replace(track, pixels=_later(track.pixels, track.start - first)) for track in read]
-
-
-def _later(pixels: Floats, frames: int) -> Floats:
-    """A track after so many frames without a target."""
-    return np.pad(pixels, ((frames, 0), (0, 0)), constant_values=np.nan)
+    return [
+        replace(
+            one, pixels=np.pad(one.pixels, ((one.start - first, 0), (0, 0)), constant_values=np.nan)
+        )
+        for one in read
+    ]
 
 
 def _times(
@@ -832,28 +813,23 @@ def _times(
         raise ValueError(f"fps: must not be given with t, got {shown(fps)}")
     if t is not None:
         return t, []
-    if fps is not None:
-        rate = check_positive("fps", fps)
-        return [np.arange(len(track.pixels)) / rate for track in read], _contradicted(read, rate)
-    stated = [track.t for track in read if track.t is not None]
-    if len(stated) < len(read):
-        silent = next(track.name for track in read if track.t is None)
-        raise ValueError(f"t: must be given, or fps, as {silent} states no times")
-    return stated, []
-
-
-def _contradicted(read: Sequence[TrackFile], fps: float) -> list[str]:
-    """Which files state other frames in a unit of time than the given ones."""
-    stated = [
-        (track.name, 1 / np.median(np.diff(track.t)))
-        for track in read
-        if track.t is not None and len(track.t) > 1
-    ]
-    return [
-        f"fps: {fps:g} frames in a unit of time are taken as given, though {name} states {rate:.4g}"
-        for name, rate in stated
-        if abs(rate / fps - 1) > _OTHER_CLOCK
-    ]
+    if fps is None:
+        stated = []
+        for track in read:
+            if track.t is None:
+                raise ValueError(f"t: must be given, or fps, as {track.name} states no times")
+            stated.append(track.t)
+        return stated, []
+    given, doubts = check_positive("fps", fps), []
+    for track in read:
+        if track.t is not None and len(track.t) > 1:
+            rate = 1 / np.median(np.diff(track.t))
+            if abs(rate / given - 1) > _OTHER_CLOCK:
+                doubts.append(
+                    f"fps: {given:g} frames in a unit of time are taken as given, though "
+                    f"{track.name} states {rate:.4g}"
+                )
+    return [np.arange(len(track.pixels)) / given for track in read], doubts
 
 
 def _with_law(

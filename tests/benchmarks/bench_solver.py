@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pysindy
 import pytest
-import torch
 
 from vidsindy_lite.dynamics import PolynomialSystem, discover
 from vidsindy_lite.study import (
@@ -32,7 +31,6 @@ ROWS: list[dict[str, object]] = []
 @pytest.fixture(scope="module", autouse=True)
 def table():
     """Collect the rows of all benchmarks, then print and save them."""
-    torch.set_num_threads(1)
     yield
     columns = ["benchmark", "case", "value", "unit", "bar"]
     TABLE.parent.mkdir(parents=True, exist_ok=True)

@@ -127,6 +127,12 @@ def test_the_data_are_those_of_the_law(page, case):
     assert {path.name for path in page.parent.iterdir()} == set(FILES)
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Reports without pictures: for tests of their files."""
+    monkeypatch.setattr(report, "_figures", lambda *_: iter(()))
+
+
 OLD = "<title>Law of a moving target</title> old"
 
 
@@ -145,7 +151,7 @@ def assert_old(folder):
     assert sorted(path.name for path in folder.iterdir()) == ["report.html", "thesis.tex"]
 
 
-def test_an_earlier_report_is_replaced_and_nothing_else(case, old):
+def test_an_earlier_report_is_replaced_and_nothing_else(case, old, undrawn):
     inode = old.stat().st_ino
     write_report(case[0], None, old)
     assert {path.name for path in old.iterdir()} == {*FILES, "thesis.tex"}
@@ -163,20 +169,20 @@ def test_a_report_that_fails_leaves_what_was_there(case, old):
 
 
 @pytest.mark.parametrize("call", ["write_bytes", "replace"])
-def test_a_full_disk_leaves_what_was_there(case, old, tmp_path, monkeypatch, call):
+def test_a_full_disk_leaves_what_was_there(case, old, tmp_path, undrawn, monkeypatch, call):
     def full(path, *rest):
         raise OSError(28, "No space left on device", str(path))
 
-    monkeypatch.setattr(Path, call, full)
-    for folder in (old, tmp_path / "new"):
-        with pytest.raises(OSError, match="No space left on device"):
-            write_report(case[0], None, folder)
-    monkeypatch.undo()
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, call, full)
+        for folder in (old, tmp_path / "new"):
+            with pytest.raises(OSError, match="No space left on device"):
+                write_report(case[0], None, folder)
     assert_old(old)
     assert not (tmp_path / "new").exists()
 
 
-def test_what_a_killed_run_has_left_is_cleared_by_the_next(case, old):
+def test_what_a_killed_run_has_left_is_cleared_by_the_next(case, old, undrawn):
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     for name in FILES:

@@ -1,45 +1,30 @@
-"""Execute the quick profile of notebooks as plain Python, in one process and without pictures.
+"""Execute a notebook as plain Python, in its quick profile or with other settings, on no paper.
 
-    python tests/disturbed/execute.py OUTPUT notebooks/03_camera_learning.py ...
+    python tests/disturbed/execute.py FIGURES notebooks/03_camera_learning.py '{"seed": 1}'
 
-The numbers of figures and tables go to OUTPUT, as from a run through papermill, in a small part of
-its time. A notebook that fails does not stop the others; the exit status is the number of failures.
+Its figures are laid out and drawn, see `undisplayed.py`, its tables go to FIGURES, as from a run
+through papermill, in a part of its time. Sweeps work in this very process: the cores are busy.
 """
 
+import json
 import os
+import re
 import sys
-import traceback
 from pathlib import Path
 
 import matplotlib as mpl
-import matplotlib.pyplot as plt
-from PIL import Image
-
-
-def save_nothing(figure, file, **_):
-    """In place of `Figure.savefig`, which takes most of the time: one pixel."""
-    Image.new("RGB", (1, 1)).save(file, "PNG")
-
-
-def execute(path):
-    """Run the source half of one notebook; whether it got to its end."""
-    source = path.read_text("utf-8").replace('profile: str = "full"', 'profile: str = "quick"')
-    source = source.replace("jobs: int = 2", "jobs: int = 1")
-    os.environ["VIDSINDY_NOTEBOOK"] = path.stem
-    os.chdir(path.parent)
-    try:
-        exec(compile(source, str(path), "exec"), {"__name__": path.stem})
-    except Exception:
-        traceback.print_exc()
-        return False
-    finally:
-        plt.close("all")
-    return True
-
 
 if __name__ == "__main__":
-    folder, *paths = (Path(argument).resolve() for argument in sys.argv[1:])
-    os.environ["VIDSINDY_FIGURES"] = str(folder)
-    mpl.use("agg")
-    mpl.figure.Figure.savefig = save_nothing
-    sys.exit(sum(not execute(path) for path in paths))
+    figures, notebook = (Path(argument).resolve() for argument in sys.argv[1:3])
+    settings = {"profile": "quick", "jobs": 1} | json.loads((*sys.argv, "{}")[3])
+    source = notebook.read_text("utf-8")
+    for name, value in settings.items():
+        source, there = re.subn(
+            rf"^({name}: \w+ = ).*?(?=  #)", rf"\g<1>{value!r}", source, count=1, flags=re.MULTILINE
+        )
+        if not there and name != "jobs":
+            sys.exit(f"{name}: must be a parameter of {notebook.stem}")
+    os.environ |= {"VIDSINDY_FIGURES": str(figures), "VIDSINDY_NOTEBOOK": notebook.stem}
+    os.chdir(notebook.parent)
+    mpl.use("module://undisplayed")
+    exec(compile(source, str(notebook), "exec"), {"__name__": notebook.stem})

@@ -213,19 +213,19 @@ def test_a_process_has_one_thread(clone):
 
 
 @pytest.mark.parametrize(
-    ("file", "old", "new", "again"),
+    ("edits", "again"),
     [
-        ("vidsindy_lite/toy.py", "power(task.number)", "1 * power(task.number)", True),
-        ("vidsindy_lite/powers.py", "number**2", "number * number", True),
-        ("vidsindy_lite/companion/pages.py", "1", "2", False),
-        ("vidsindy_lite/toy.py", "# a comment", "# another", False),
+        ({"toy.py": ("power(task.number)", "1 * power(task.number)")}, True),
+        ({"powers.py": ("number**2", "number * number")}, True),
+        ({"toy.py": ("# a comment", "# another"), "companion/pages.py": ("1", "2")}, False),
     ],
 )
-def test_other_code_finds_no_results(swept, file, old, new, again):
+def test_other_code_finds_no_results(swept, edits, again):
     clone, results = swept
-    path = clone.root / file
-    assert old in path.read_text()
-    path.write_text(path.read_text().replace(old, new))
+    for file, (old, new) in edits.items():
+        path = clone.package / file
+        assert old in path.read_text()
+        path.write_text(path.read_text().replace(old, new))
     assert clone.sweep(TASKS) == results
     assert clone.called() == [number for number, _ in TASKS if again]
 

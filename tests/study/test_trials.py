@@ -9,17 +9,15 @@ import pytest
 from vidsindy_lite import discover
 from vidsindy_lite.pipeline import Observation
 from vidsindy_lite.refusal import Refused
-from vidsindy_lite.study import score, spline_ado
+from vidsindy_lite.study import score
 from vidsindy_lite.study import trials as experiments
 from vidsindy_lite.study.films import FilmResult, FilmTask, detect_near, film, run_film
 from vidsindy_lite.study.paper import REFERENCE_OFFSET, SYSTEMS
 from vidsindy_lite.study.trials import (
     SOURCES,
-    Comparison,
     Trial,
     by_condition,
     grid,
-    run_comparison,
     run_trial,
     run_trials,
     significant,
@@ -49,6 +47,12 @@ def simulated(task):
         seconds=0.0,
         detected=(),
     )
+
+
+@pytest.fixture(autouse=True)
+def nothing_of_another_test(tmp_path, monkeypatch):
+    experiments._path.cache_clear()
+    monkeypatch.setenv("VIDSINDY_CACHE", str(tmp_path))
 
 
 @pytest.fixture
@@ -150,7 +154,7 @@ def test_where_cameras_cannot_be_learned_no_method_has_a_law(this_film, monkeypa
 
     monkeypatch.setattr(experiments, "observe_tracks", refuse)
     trials = grid(["SprottE"], {"clean": (0,)}, [1], experiments.METHODS, 200)
-    results = run_comparison(Comparison(tuple(trials)))
+    results = [run_trial(trial) for trial in trials]
     assert {result.verdict for result in results} == {"wrong, refused"}
     assert {result.score.missing for result in results} == {8}
     assert results[0].warnings == ("tracks: the motion must determine the cameras",)
@@ -193,43 +197,33 @@ def test_data_depend_on_system_condition_level_and_number_alone(condition, level
 
 
 @pytest.mark.parametrize(("condition", "level"), CORRUPT)
-def test_every_method_gets_the_same_data(condition, level, no_videos, monkeypatch):
+def test_every_method_gets_the_same_data_and_the_number_as_its_seed(
+    condition, level, no_videos, monkeypatch
+):
     seen = {}
 
     def watch(method, t, x, systematic, seed):
-        seen[method] = (t, x)
+        seen[method] = (t, x, seed)
         return SYSTEMS["Lorenz"]
 
-    def watch_all(t, records, seeds):
-        seen["spline-ADO"] = (t, records[0])
-        return [SimpleNamespace(system=SYSTEMS["Lorenz"]) for _ in records]
-
     monkeypatch.setattr(experiments, "find_law", watch)
-    monkeypatch.setattr(spline_ado, "spline_ado_batch", watch_all)
     trial = Trial("Lorenz", condition, level, 1, source="truth", frames=FRAMES)
     methods = [replace(trial, method=method) for method in experiments.METHODS]
-    results = run_comparison(Comparison(tuple(methods)))
-    assert [result.trial for result in results] == methods
-    t, x = seen["Gauss-Newton"]
+    assert [result.trial for result in run_trials(methods, jobs=1)] == methods
+    t, x, _ = seen["Gauss-Newton"]
     assert set(seen) == set(experiments.METHODS)
-    for other_t, other_x in seen.values():
+    for other_t, other_x, seed in seen.values():
         np.testing.assert_array_equal(other_t, t)
         np.testing.assert_array_equal(other_x, x)
+        assert seed == 1
 
 
-def test_spline_ado_takes_all_draws_at_once_and_each_by_its_own_seed(no_videos, monkeypatch):
+def test_spline_ado_takes_the_number_as_its_seed(monkeypatch):
     given = []
-
-    def watch(t, records, seeds):
-        given.append((len(records), list(seeds)))
-        return [SimpleNamespace(system=SYSTEMS["Lorenz"]) for _ in records]
-
-    monkeypatch.setattr(spline_ado, "spline_ado_batch", watch)
-    levels = {"noise": (0, 0.1)}
-    trials = grid(["Lorenz"], levels, (4, 2), ["spline-ADO"], FRAMES, "truth")
-    results = run_trials(trials, jobs=1)
-    assert given == [(2, [4, 2])] * 2
-    assert [result.trial for result in results] == trials
+    law = SimpleNamespace(system=SYSTEMS["Lorenz"])
+    monkeypatch.setattr(experiments, "spline_ado", lambda t, x, *rest: given.append(rest) or law)
+    assert experiments.find_law("spline-ADO", None, None, None, 4) is law.system
+    assert given == [(3, 4)]
 
 
 # ----------------------------------------------------------------------------------------- results

@@ -11,6 +11,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ TIMES = "seconds"  # what is called so differs from run to run, and counts nowhe
 _PAGE_MARK = '<meta name="generator" content="vidsindy_lite compare">'
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
 _ERROR = re.compile(r"(?:±|\+-) ?$")
+_WITH_ERROR = re.compile(rf" ?(?:±|\+-) ?({_NUMBER.pattern})", re.IGNORECASE)
 _SAVES = re.compile(r"\bsave_(?:figure|slider|animation|table)\(")
 
 
@@ -205,30 +207,27 @@ def same_text(one: str, other: str, printed: bool = False) -> bool:
         Numbers may also differ by one in the last digit of the longer one.
     """
     one, other = " ".join(one.split()), " ".join(other.split())
-    ours, theirs = list(_NUMBER.finditer(one)), list(_NUMBER.finditer(other))
     if _NUMBER.sub("#", one) != _NUMBER.sub("#", other):
         return False
-    for k, (a, b) in enumerate(zip(ours, theirs, strict=True)):
-        first, second = a[0], b[0]
-        if first == second:
-            continue
-        digits = [re.fullmatch(r"[-+]?\d+(?:\.(\d+))?(?:e(.+))?", n, re.I) for n in (first, second)]
-        places = [(d[1] or "", int(d[2] or 0)) if d else ("", 0) for d in digits]
-        if places == [("", 0)] * 2:  # integers
-            return False
-        near, room = TOLERANCE, 0.0
-        if _ERROR.search(one[: a.start()]):
-            near = ERROR_BAR
-        elif k + 1 < len(ours) and re.fullmatch(
-            r" ?(?:±|\+-) ?", one[a.end() : ours[k + 1].start()]
-        ):
-            near, room = 0.0, abs(float(ours[k + 1][0]))
-        if printed:
-            last = min(e - len(decimals) for decimals, e in places if decimals or e)
-            room = max(room, 1.01 * float(f"1e{last}"))
-        if not math.isclose(float(first), float(second), rel_tol=near, abs_tol=room):
-            return False
-    return True
+    return all(
+        _same_number(a[0], b[0], one[: a.start()], one[a.end() :], printed)
+        for a, b in zip(_NUMBER.finditer(one), _NUMBER.finditer(other), strict=True)
+    )
+
+
+def _same_number(one: str, other: str, before: str, after: str, printed: bool) -> bool:
+    """Whether two numbers are nearly the same, the first of which stands in a text."""
+    if one == other or not re.search(r"[.e]", one + other, re.IGNORECASE):  # or integers
+        return one == other
+    near, room = TOLERANCE, 0.0
+    if _ERROR.search(before):
+        near = ERROR_BAR
+    elif error := _WITH_ERROR.match(after):
+        near, room = 0.0, abs(float(error[1]))
+    if printed:
+        last = min(int(Decimal(number).as_tuple().exponent) for number in (one, other))
+        room = max(room, 1.01 * 10.0**last)
+    return math.isclose(float(one), float(other), rel_tol=near, abs_tol=room)
 
 
 def looks_the_same(one: bytes, other: bytes) -> bool:
@@ -238,29 +237,26 @@ def looks_the_same(one: bytes, other: bytes) -> bool:
     not.
     """
     try:
-        return _look_the_same(one, other)
+        images = [Image.open(io.BytesIO(picture)) for picture in (one, other)]
+        a, b = map(_squares, images)
     except (OSError, ValueError):
         return False
+    same = images[0].size == images[1].size and a.shape == b.shape
+    return same and max(_strange(a, b), _strange(b, a)) <= FEW
 
 
-def _look_the_same(one: bytes, other: bytes) -> bool:
-    images = [Image.open(io.BytesIO(picture)) for picture in (one, other)]
-    if images[0].size != images[1].size:
-        return False
-    frames = [
-        [np.asarray(f.convert("RGB").reduce(SQUARE), float) for f in ImageSequence.Iterator(image)]
-        for image in images
-    ]
-    return len(frames[0]) == len(frames[1]) and all(
-        max(_strange(a, b), _strange(b, a)) <= FEW for a, b in zip(*frames, strict=True)
-    )
+def _squares(image: Image.Image) -> np.ndarray:
+    """Mean colours of the squares of all frames, shape (n, height, width, 3)."""
+    frames = ImageSequence.Iterator(image)
+    return np.array([np.asarray(frame.convert("RGB").reduce(SQUARE), float) for frame in frames])
 
 
 def _strange(one: np.ndarray, other: np.ndarray) -> float:
-    """Share of the squares of a picture whose colour is nowhere near them in another."""
-    size = (NEAR, NEAR, 1)
+    """Largest share of the squares of a frame whose colour is nowhere near them in another."""
+    size = (1, NEAR, NEAR, 1)
     low, high = minimum_filter(other, size), maximum_filter(other, size)
-    return float(((one < low - VISIBLE) | (one > high + VISIBLE)).any(axis=-1).mean())
+    seen = ((one < low - VISIBLE) | (one > high + VISIBLE)).any(axis=-1)
+    return float(seen.mean(axis=(1, 2)).max())
 
 
 # ------------------------------------------------------------------------------------------ details

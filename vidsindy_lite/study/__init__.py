@@ -17,8 +17,7 @@
 * `plots`: figures that several notebooks or the report have, and the look of all.
 
 The names below are at hand at once. Modules that need large libraries are imported by name, as in
-``from vidsindy_lite.study import baselines, plots``: `baselines` needs pysindy, `spline_ado` torch,
-`plots` matplotlib.
+``from vidsindy_lite.study import baselines, plots``: `baselines` needs pysindy, `plots` matplotlib.
 """
 
 from .corruption import add_noise, drop_blocks, drop_fibers

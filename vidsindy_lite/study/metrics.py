@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..checks import check_array, shown
-from ..dynamics import Discovery, PolynomialSystem
+from ..dynamics import Discovery, PolynomialSystem, runge_kutta_4
 
 SUBSTEPS = 8
 """Runge-Kutta steps between two measurements."""
@@ -294,25 +293,15 @@ def _sensitivities(
     system: PolynomialSystem, t: Floats, x: Floats, equations: Ints, terms: Ints
 ) -> tuple[Floats, Floats]:
     """Derivatives of each next state with respect to the state (d, d) and coefficients (d, p)."""
-    d, count = system.d, len(terms)
-    state = x[:-1]
-    sensitivity = np.zeros((len(state), d, d + count))
-    sensitivity[:, :, :d] = np.eye(d)
-    width = np.diff(t)[:, None] / SUBSTEPS
+    d, width = system.d, np.diff(t)[:, None]
 
-    def rates(state: Floats, sensitivity: Floats) -> tuple[Floats, Floats]:
+    def rates(both: Floats) -> Floats:
+        state, sensitivity = both[:, :d], both[:, d:].reshape(len(both), d, -1)
         growth = system.gradient(state) @ sensitivity
-        growth[:, equations, d + np.arange(count)] += system.library(state)[:, terms]
-        return system(state), growth
+        growth[:, equations, d + np.arange(len(terms))] += system.library(state)[:, terms]
+        return np.asarray(width * np.hstack([system(state), growth.reshape(len(both), -1)]))
 
-    def moved(rate: Sequence[Floats], share: float) -> tuple[Floats, Floats]:
-        return state + share * width * rate[0], sensitivity + share * width[:, :, None] * rate[1]
-
-    for _ in range(SUBSTEPS):
-        k1 = rates(state, sensitivity)
-        k2 = rates(*moved(k1, 0.5))
-        k3 = rates(*moved(k2, 0.5))
-        k4 = rates(*moved(k3, 1.0))
-        mean = [(a + 2 * b + 2 * c + e) / 6 for a, b, c, e in zip(k1, k2, k3, k4, strict=True)]
-        state, sensitivity = moved(mean, 1.0)
+    begin = np.tile(np.eye(d, d + len(terms)).ravel(), (len(x) - 1, 1))
+    end = runge_kutta_4(rates, np.array([0.0, 1.0]), np.hstack([x[:-1], begin]), SUBSTEPS)[1]
+    sensitivity = end[:, d:].reshape(len(end), d, -1)
     return sensitivity[:, :, :d], sensitivity[:, :, d:]

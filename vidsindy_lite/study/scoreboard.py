@@ -587,22 +587,14 @@ def ablation_table(results: Iterable[tuple[str, Outcome]]) -> DataFrame:
     """
     import pandas
 
-    found: dict[str, dict[Contest, Outcome]] = {}
-    for without, outcome in results:
-        found.setdefault(without, {})[outcome.contest] = outcome
-    whole = found[NOTHING]
-    rows = []
-    for without, outcomes in found.items():
-        pairs = [(one.exact, whole[contest].exact) for contest, one in outcomes.items()]
-        rows.append(
-            {
-                "without": without,
-                "cases": len(pairs),
-                "exact": sum(exact for exact, _ in pairs),
-                "lost": pairs.count((False, True)),
-                "gained": pairs.count((True, False)),
-                "wrong, ok": sum(not o.exact and o.status == "ok" for o in outcomes.values()),
-                "seconds": sum(one.seconds for one in outcomes.values()),
-            }
-        )
-    return pandas.DataFrame(rows).set_index("without")
+    table = pandas.DataFrame([
+        {
+            "without": without, "contest": one.contest, "cases": 1, "exact": one.exact,
+            "wrong, ok": not one.exact and one.status == "ok", "seconds": one.seconds,
+        }
+        for without, one in results
+    ])  # fmt: skip
+    whole = table.contest.map(table[table.without == NOTHING].set_index("contest").exact)
+    table["lost"], table["gained"] = whole & ~table.exact, ~whole & table.exact
+    columns = ["cases", "exact", "lost", "gained", "wrong, ok", "seconds"]
+    return table.groupby("without", sort=False)[columns].sum()

@@ -18,6 +18,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -32,6 +33,7 @@ from .corruption import add_noise, drop_blocks, drop_fibers
 from .films import FilmTask, film_result
 from .metrics import Score, pulls, score
 from .paper import REFERENCE_OFFSET, SYSTEMS
+from .spline_ado import held_out_misfit, spline_ado
 from .sweeps import sweep
 
 if TYPE_CHECKING:  # pandas is imported where a frame is made
@@ -46,8 +48,6 @@ CORRUPTIONS: dict[str, Callable[[Floats, float, np.random.Generator], Floats]] =
 CONDITIONS = ("clean", *CORRUPTIONS)
 METHODS = ("Gauss-Newton", "spline-ADO", "PySINDy", "E-SINDy", "WeakSINDy", "Model-A")
 """`dynamics.discover`, the paper's own optimiser (`spline_ado`), and `baselines.BASELINES`."""
-RANDOM_METHODS = ("E-SINDy", "WeakSINDy", "Model-A")
-"""The baselines that draw random numbers: the number of the trial is their seed."""
 SOURCES = ("detector", "sub-pixel", "path", "truth")
 """Where a path comes from, and what a condition is done to: tracks of the learned detector in
 whole pixels (the paper's regime), and tracks of the background model, before cameras are learned
@@ -137,7 +137,7 @@ class TrialResult:
     score : Score
         Of the law.
     seconds : float
-        Of processor time from path to law, the mean of the draws that were run together.
+        Of processor time from path to law.
     status : str or None
         ``"ok"`` or ``"suspect"``, as `discover_from_tracks` says; None for the methods that do not
         say; ``"refused"`` for all of them where the cameras could not be learned.
@@ -170,82 +170,40 @@ class TrialResult:
         return f"{'exact' if self.score.exact else 'wrong'}, {self.status}"
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Trials of one system in one condition: several methods and draws, all on the same data.
-
-    Parameters
-    ----------
-    trials : tuple of Trial
-        They differ in method and number alone.
-    """
-
-    trials: tuple[Trial, ...]
-
-
 def run_trials(
     trials: Iterable[Trial], *, jobs: int = 2, desc: str = "trials"
 ) -> list[TrialResult]:
-    """Run many trials, each condition of a system as one task of a `sweep`.
-
-    Parameters
-    ----------
-    trials : iterable of Trial
-    jobs, desc
-        See `sweep`.
-
-    Returns
-    -------
-    list of TrialResult
-        In the order of the trials.
-    """
-    trials = list(trials)
-    groups: dict[Trial, list[Trial]] = {}
-    for trial in trials:
-        groups.setdefault(replace(trial, trial=0, method=METHODS[0]), []).append(trial)
-    tasks = [Comparison(tuple(dict.fromkeys(group))) for group in groups.values()]
-    found = {
-        result.trial: result
-        for results in sweep(run_comparison, tasks, jobs=jobs, desc=desc)
-        for result in results
-    }
-    return [found[trial] for trial in trials]
+    """Run many trials in a `sweep`, see there."""
+    return sweep(run_trial, trials, jobs=jobs, desc=desc)
 
 
 def run_trial(trial: Trial) -> TrialResult:
-    """Corrupt what was seen of a film and let a method find its law; see `run_trials`."""
-    return run_comparison(Comparison((trial,)))[0]
+    """Corrupt what was seen of a film and let a method find its law.
 
-
-def run_comparison(comparison: Comparison) -> list[TrialResult]:
-    """Make the data of each draw once, and let each method find the laws in all of them.
-
-    Parameters
-    ----------
-    comparison : Comparison
-
-    Returns
-    -------
-    list of TrialResult
-        One a trial. All draws of spline-ADO are one computation, whose time they share.
+    Without cameras there is no path, and no method has a law: one without any term.
     """
-    data = {trial.trial: trial_path(trial) for trial in comparison.trials}
-    results: dict[Trial, TrialResult] = {}
-    for method in dict.fromkeys(trial.method for trial in comparison.trials):
-        mine = [trial for trial in comparison.trials if trial.method == method]
-        able = [trial for trial in mine if np.isfinite(data[trial.trial].x).any()]
-        results |= {
-            trial: _refused(trial, data[trial.trial].warnings)
-            for trial in mine
-            if trial not in able
-        }
-        draws = [data[trial.trial] for trial in able]
-        began = time.process_time()
-        laws = _laws(method, draws, [trial.trial for trial in able])
-        seconds = (time.process_time() - began) / max(len(able), 1)
-        for trial, draw, law in zip(able, draws, laws, strict=True):
-            results[trial] = _result(trial, law, seconds, draw.warnings)
-    return [results[trial] for trial in comparison.trials]
+    t, x, systematic, doubts = trial_path(trial)
+    truth = SYSTEMS[trial.system].shift(REFERENCE_OFFSET)
+    if not np.isfinite(x).any():
+        nothing = replace(truth, coefficients=np.zeros_like(truth.coefficients))
+        return TrialResult(trial, nothing, score(nothing, truth), 0.0, "refused", doubts)
+    began = time.process_time()
+    found = find_law(trial.method, t, x, systematic, trial.trial)
+    seconds = time.process_time() - began
+    if isinstance(found, PolynomialSystem):
+        return TrialResult(trial, found, score(found, truth), seconds)
+    promised = np.linalg.norm(found.standard_errors) / np.linalg.norm(truth.coefficients)
+    warnings = (*doubts, *found.warnings)
+    return TrialResult(
+        trial,
+        found.system,
+        score(found, truth),
+        seconds,
+        status="suspect" if warnings else "ok",
+        warnings=warnings,
+        promised_l2=float(promised),
+        pulls=pulls(found, truth),
+    )
 
 
 class TrialPath(NamedTuple):
@@ -271,6 +229,12 @@ def trial_path(trial: Trial) -> TrialPath:
         the cameras cannot be learned from the tracks, all rows are missing and the warning says
         why.
     """
+    return _path(replace(trial, method=METHODS[0]))
+
+
+@lru_cache(maxsize=8)
+def _path(trial: Trial) -> TrialPath:
+    """The same data for one method after the other."""
     filmed = film_result(trial.film)
     if trial.source == "truth":
         path = filmed.truth.simulate(filmed.t, np.array(filmed.truth.x0))
@@ -288,50 +252,6 @@ def trial_path(trial: Trial) -> TrialPath:
     return TrialPath(seen.t, seen.x, seen.systematic, seen.warnings)
 
 
-def _refused(trial: Trial, warnings: tuple[str, ...]) -> TrialResult:
-    """Without cameras there is no path, and no method has a law: one without any term."""
-    truth = SYSTEMS[trial.system].shift(REFERENCE_OFFSET)
-    nothing = replace(truth, coefficients=np.zeros_like(truth.coefficients))
-    return TrialResult(trial, nothing, score(nothing, truth), 0.0, "refused", warnings)
-
-
-def _result(
-    trial: Trial, found: Discovery | PolynomialSystem, seconds: float, doubts: tuple[str, ...]
-) -> TrialResult:
-    truth = SYSTEMS[trial.system].shift(REFERENCE_OFFSET)
-    if isinstance(found, PolynomialSystem):
-        return TrialResult(trial, found, score(found, truth), seconds)
-    promised = np.linalg.norm(found.standard_errors) / np.linalg.norm(truth.coefficients)
-    warnings = (*doubts, *found.warnings)
-    return TrialResult(
-        trial,
-        found.system,
-        score(found, truth),
-        seconds,
-        status="suspect" if warnings else "ok",
-        warnings=warnings,
-        promised_l2=float(promised),
-        pulls=pulls(found, truth),
-    )
-
-
-def _laws(
-    method: str, draws: Sequence[TrialPath], seeds: Sequence[int]
-) -> Sequence[Discovery | PolynomialSystem]:
-    """The law that a method finds in each draw; spline-ADO takes them all at once."""
-    if method != "spline-ADO":
-        return [
-            find_law(method, t, x, systematic, seed)
-            for (t, x, systematic, _), seed in zip(draws, seeds, strict=True)
-        ]
-    if not draws:
-        return []
-    from .spline_ado import spline_ado_batch  # torch takes seconds to import
-
-    found = spline_ado_batch(draws[0].t, [draw.x for draw in draws], seeds=seeds)
-    return [law.system for law in found]
-
-
 def find_law(
     method: str,
     t: Floats,
@@ -341,7 +261,7 @@ def find_law(
     degree: int = 3,
     origin: str = "learn",
 ) -> Discovery | PolynomialSystem:
-    """What Gauss-Newton or one of the baselines finds in one record.
+    """What a method finds in one record.
 
     Only Gauss-Newton can use what is known of systematic errors, and looks for the law's origin,
     which it can be told.
@@ -351,10 +271,12 @@ def find_law(
             t, x, degree=degree, systematic=systematic, order=1, origin=origin,
             time_limit=None,  # or results would depend on what else the machine does
         )  # fmt: skip
+    if method == "spline-ADO":
+        return spline_ado(t, x, degree, seed).system
     from .baselines import BASELINES  # pysindy takes seconds to import
 
-    options = {"seed": seed} if method in RANDOM_METHODS else {}
-    return BASELINES[method](t, x, degree, **options)
+    drawn = {} if method == "PySINDy" else {"seed": seed}
+    return BASELINES[method](t, x, degree, **drawn)
 
 
 @dataclass(frozen=True)
@@ -373,15 +295,12 @@ class Weights:
 
 
 def run_weights(weights: Weights) -> list[float]:
-    """The misfit of held-out samples with each pair, see `spline_ado.held_out_misfits`."""
-    from .spline_ado import held_out_misfits
-
-    path, number = trial_path(weights.trial), len(weights.pairs)
-    alphas, betas = zip(*weights.pairs, strict=True)
-    seeds = [weights.trial.trial] * number
-    return held_out_misfits(
-        path.t, [path.x] * number, seeds, physics_weight=alphas, sparsity_weight=betas
-    )
+    """The misfit of held-out samples with each pair, see `spline_ado.held_out_misfit`."""
+    path, seed = trial_path(weights.trial), weights.trial.trial
+    return [
+        held_out_misfit(path.t, path.x, seed, physics_weight=alpha, sparsity_weight=beta)
+        for alpha, beta in weights.pairs
+    ]
 
 
 def grid(
