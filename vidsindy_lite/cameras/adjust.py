@@ -39,7 +39,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
@@ -172,15 +173,6 @@ class NearCamera(OrthographicCamera):
         return np.append(-away, 1 + away @ self.about)
 
 
-def units(width: float, image: float) -> Floats:
-    """Sizes of changes that matter about equally, for a scene and an image of these widths."""
-    sizes = np.ones(SIZE)
-    sizes[PARTS["position"]] = width
-    sizes[PARTS["principal point"]] = image
-    sizes[PARTS["nearness"]] = 1 / width
-    return sizes
-
-
 def changed(camera: Camera, change: Floats) -> Camera:
     """A calibrated camera after a change; lag and drift are none of its own."""
     part = {name: change[place] for name, place in PARTS.items()}
@@ -209,58 +201,176 @@ def changed(camera: Camera, change: Floats) -> Camera:
     return moved
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Adjustment:
-    """Cameras and clocks of the smallest errors, and what is known of them near by.
+    """Cameras, clocks and path after some change, and what is known of them near by.
 
     Parameters
     ----------
-    cameras : tuple of Camera
-    footage : Footage
-        With its lags and rates.
+    given : Footage
+    start : tuple of Camera
     errors : ndarray, shape (m, SIZE)
-        As they were given.
+        Of the start: zero what is exactly known, infinite what is not at all.
     change : ndarray, shape (m, SIZE)
         Of each camera and its clock, from the start.
     points : ndarray, shape (n, 3)
         NaN where none is found.
-    misses : ndarray, shape (n, 2 m)
-        Residuals, pixels; NaN where nothing is seen or no point is found.
-    weights : ndarray, shape (n,)
-    noise : float
-        sigma, pixels.
-    slopes : ndarray, shape (n, 2 m, p)
-        Of the residuals in the free changes, the points following; zero where nothing is seen.
-    path_slopes : ndarray, shape (n, 3, p)
-        Of the points.
+    reach : float
+        Size of the path, scene units.
     settled : bool
         Whether the search came to its end, after so many ...
     steps : int
     """
 
-    cameras: tuple[Camera, ...]
-    footage: Footage
+    given: Footage
+    start: tuple[Camera, ...]
     errors: Floats
     change: Floats
     points: Floats
-    misses: Floats
-    weights: Floats
-    noise: float
-    slopes: Floats
-    path_slopes: Floats
-    settled: bool
-    steps: int
+    reach: float = 1.0
+    settled: bool = False
+    steps: int = 0
+
+    @cached_property
+    def cameras(self) -> tuple[Camera, ...]:
+        """After the change."""
+        return tuple(map(changed, self.start, self.change))
+
+    @cached_property
+    def footage(self) -> Footage:
+        """With its lags and rates."""
+        lag, drift = self.change[:, LAG], self.change[:, DRIFT]
+        return self.given.later(lag, drift) if lag.any() or drift.any() else self.given
+
+    @cached_property
+    def misses(self) -> Floats:
+        """Residuals, pixels, (n, 2 m); NaN where nothing is seen or no point is found."""
+        pairs = zip(self.cameras, self.footage.aligned, strict=True)
+        missed = np.stack([_missed(camera, track, self.points) for camera, track in pairs], axis=1)
+        seen = np.isfinite(missed).all(axis=-1)
+        missed[~seen | (seen.sum(axis=1) < 2)[:, None]] = np.nan  # one view has no say
+        return missed.reshape(len(missed), -1)
+
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of the errors of the tracks, if most residuals are those of noise.
+
+        Of the 2 m numbers of a frame its point takes three, and leaves the squared length of the
+        others, whose median is that of chi-squared. Numbers one by one would not do: two views err
+        along their epipolar lines without a residual.
+        """
+        freedom = np.isfinite(self.misses).sum(axis=1) - 3
+        squares = np.nansum(self.misses**2, axis=1)[freedom > 0]
+        if not squares.size:
+            return _FINEST
+        expected = 2 * gammaincinv(freedom[freedom > 0] / 2, 0.5)
+        return max(float(np.sqrt(np.median(squares / expected))), _FINEST)
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Of each frame, (n,): one, unless nothing is seen, it is missed by far, ..."""
+        worst = np.nanmax(np.abs(self.misses), axis=1, initial=0.0)
+        weights = np.minimum(1.0, _OUTLIER * self.noise / np.maximum(worst, 1e-300)) ** 2
+        if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
+            weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
+        return np.where(np.isfinite(self.misses).any(axis=1), weights, 0.0)
+
+    @property
+    def free(self) -> Bools:
+        """What may change, (m, SIZE)."""
+        return self.errors > 0
 
     @property
     def prior(self) -> Floats:
         """Information of the measurements on the free changes, (p,)."""
-        return self.errors[self.errors > 0] ** -2.0
+        return self.errors[self.free] ** -2.0
+
+    @property
+    def timed(self) -> bool:
+        """Whether a clock is unknown."""
+        return bool(self.free[:, [LAG, DRIFT]].any())
+
+    @cached_property
+    def unit(self) -> Floats:
+        """Sizes of changes that matter about equally, (m, SIZE)."""
+        sizes = np.ones(self.errors.shape)
+        sizes[:, PARTS["position"]] = self.reach
+        sizes[:, PARTS["principal point"]] = [[camera.image_size[0]] for camera in self.start]
+        sizes[:, PARTS["nearness"]] = 1 / self.reach
+        return sizes
+
+    @cached_property
+    def reduced(self) -> _Reduced:
+        """Misses and their slopes in the free changes, with the points taken out by QR."""
+        seen = np.isfinite(self.misses)[..., None]
+        in_change, in_points = (
+            np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes()
+        )
+        q, r = np.linalg.qr(in_points)
+        pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
+        told = pivots.min(axis=1, initial=np.inf) > _FLAT * pivots.max(axis=1, initial=0)
+        q, r = np.where(told[:, None, None], q, 0.0), np.where(told[:, None, None], r, np.eye(3))
+        missed = np.nan_to_num(self.misses)[..., None]
+        of_change, of_misses = (q.swapaxes(1, 2) @ part for part in (in_change, missed))
+        return _Reduced(
+            in_change - q @ of_change,
+            (missed - q @ of_misses)[..., 0],
+            -np.linalg.solve(r, of_misses)[..., 0],
+            -np.linalg.solve(r, of_change),
+            of_misses[..., 0],
+        )
+
+    def _slopes(self) -> tuple[Floats, Floats]:
+        """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
+        free = np.argwhere(self.free)
+        in_change = np.zeros((*self.misses.shape, len(free)))
+        for k, (i, part) in enumerate(free):
+            columns = slice(2 * i, 2 * i + 2)
+            if part in (LAG, DRIFT):
+                in_change[:, columns, k] = self.footage.slopes(i)[int(part == DRIFT)]
+                continue
+            step = _PROBE * self.unit[i, part] * np.eye(SIZE)[part]
+            ends = [changed(self.start[i], self.change[i] + sign * step) for sign in (1, -1)]
+            high, low = (_missed(c, self.footage.aligned[i], self.points) for c in ends)
+            in_change[:, columns, k] = (high - low) / (2 * step[part])
+        probe = _PROBE * self.reach
+        in_points = np.stack([
+            np.hstack([c.image(self.points - e) - c.image(self.points + e) for c in self.cameras])
+            / (2 * probe)
+            for e in probe * np.eye(3)
+        ], axis=-1)  # fmt: skip
+        return in_change, in_points
 
     @property
     def weighed(self) -> tuple[Floats, Floats]:
         """Residuals and slopes times the roots of the weights, zero where nothing is seen."""
         root = np.sqrt(self.weights)[:, None]
-        return root * np.nan_to_num(self.misses), root[..., None] * self.slopes
+        return root * np.nan_to_num(self.misses), root[..., None] * self.reduced.slopes
+
+    @property
+    def factor(self) -> Floats:
+        """`fitted_factor` of the free changes."""
+        return fitted_factor(*self.weighed, self.prior, self.noise)
+
+
+class _Reduced(NamedTuple):
+    """Slopes, (n, 2 m, p), and misses, (n, 2 m), with the points taken out.
+
+    The points move by `own`, (n, 3), to where they are missed least, and with the changes by
+    `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
+    misses they take up.
+    """
+
+    slopes: Floats
+    misses: Floats
+    own: Floats
+    follow: Floats
+    along: Floats
+
+
+def _missed(camera: Camera, track: Floats, points: Floats) -> Floats:
+    """By how much the images of points miss a track, (n, 2)."""
+    return camera.steadied(track) - camera.image(points)
 
 
 def adjust(
@@ -286,169 +396,32 @@ def adjust(
         Steps; with none, what is known near cameras that were adjusted before.
     """
     change = np.zeros(errors.shape) if begin is None else begin
-    problem, state = _Problem.of(footage, start, errors, change)
-    noise = _noise(state.misses)
+    state = Adjustment(footage, tuple(start), errors, change, np.zeros((0, 3)))
+    points, _ = intersect(state.cameras, at_once(state.cameras, state.footage.aligned))
+    seen = points[np.isfinite(points).all(axis=1)]
+    reach = (float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else 1.0) or 1.0
+    state = replace(state, points=points, reach=reach)
     settled, steps, earlier = False, 0, np.full(errors.shape, np.inf)
     while not settled and steps < most:
-        moved, step = _downhill(problem, state, noise)
+        moved, step = _downhill(state)
         steps += 1
         if moved is None:  # rounding is all that is left, or points ran out of numbers
             settled = step == 0
             break
         # A frame at the end of a video may come and go with a lag, for ever.
-        back = (np.abs(moved.change - earlier) <= _PROBE * problem.unit).all()
-        earlier, state, before = state.change, moved, noise
-        noise = _noise(state.misses)
-        enough = max(_SETTLED, (_IN_TIME if problem.timed else _ENOUGH) * noise)
-        still = step <= enough or bool(problem.timed and back)
-        settled = still and noise >= before * (1 - 1e-3)
-    reduced = _Reduced.of(*problem.slopes(state), state.misses)
-    return Adjustment(
-        state.cameras, state.footage, errors, state.change, state.points, state.misses,
-        problem.weights(state, noise), noise, reduced.slopes, reduced.follow, settled, steps,
-    )  # fmt: skip
+        back = (np.abs(moved.change - earlier) <= _PROBE * state.unit).all()
+        enough = max(_SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
+        still = step <= enough or (state.timed and back)
+        settled = bool(still and moved.noise >= state.noise * (1 - 1e-3))
+        earlier, state = state.change, moved
+    return replace(state, settled=settled, steps=steps)
 
 
-@dataclass(frozen=True)
-class _State:
-    """Changes, (m, SIZE), points, (n, 3), cameras, clocks, and by how much they miss the tracks."""
-
-    change: Floats
-    points: Floats
-    cameras: tuple[Camera, ...]
-    footage: Footage
-    misses: Floats
-
-
-@dataclass(frozen=True)
-class _Problem:
-    """What was filmed, the start, and what is free of it."""
-
-    footage: Footage
-    start: tuple[Camera, ...]
-    errors: Floats
-    unit: Floats  # of each change, (m, SIZE), and ...
-    reach: float  # ... of points
-
-    @classmethod
-    def of(
-        cls, footage: Footage, start: Sequence[Camera], errors: Floats, change: Floats
-    ) -> tuple[_Problem, _State]:
-        """Units from the size of the path, and the first state."""
-        blank = cls(footage, tuple(start), errors, errors, 1.0)
-        cameras, moved = blank.changed(change)
-        points, _ = intersect(cameras, at_once(cameras, moved.aligned))
-        seen = points[np.isfinite(points).all(axis=1)]
-        reach = (float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else 1.0) or 1.0
-        sizes = np.array([units(reach, float(camera.image_size[0])) for camera in start])
-        problem = replace(blank, unit=sizes, reach=reach)
-        return problem, problem.at(change, points)
-
-    @property
-    def free(self) -> Bools:
-        """What may change, (m, SIZE)."""
-        return self.errors > 0
-
-    @property
-    def prior(self) -> Floats:
-        """The inverse of the errors of what is free, (p,)."""
-        return 1 / self.errors[self.free]
-
-    @property
-    def timed(self) -> bool:
-        """Whether a clock is unknown."""
-        return bool(self.errors[:, [LAG, DRIFT]].any())
-
-    def changed(self, change: Floats) -> tuple[tuple[Camera, ...], Footage]:
-        """Cameras and clocks after changes."""
-        pairs = zip(self.start, change, strict=True)
-        moved = self.footage
-        if change[:, [LAG, DRIFT]].any():
-            moved = moved.later(change[:, LAG], change[:, DRIFT])
-        return tuple(changed(camera, part) for camera, part in pairs), moved
-
-    def at(self, change: Floats, points: Floats) -> _State:
-        """What the cameras miss after a change."""
-        cameras, footage = self.changed(change)
-        pairs = zip(cameras, footage.aligned, strict=True)
-        missed = np.stack([c.steadied(track) - c.image(points) for c, track in pairs], axis=1)
-        seen = np.isfinite(missed).all(axis=-1)
-        missed[~seen | (seen.sum(axis=1) < 2)[:, None]] = np.nan  # one view has no say
-        return _State(change, points, cameras, footage, missed.reshape(len(points), -1))
-
-    def weights(self, state: _State, noise: float) -> Floats:
-        """Of each frame, (n,): one, unless nothing is seen, it is missed by far, ..."""
-        worst = np.nanmax(np.abs(state.misses), axis=1, initial=0.0)
-        weights = np.minimum(1.0, _OUTLIER * noise / np.maximum(worst, 1e-300)) ** 2
-        if self.timed and len(weights):  # ... or is beside one, as interpolation carries a part
-            weights = minimum_filter1d(weights, 2 * _BESIDE + 1)
-        return np.where(np.isfinite(state.misses).any(axis=1), weights, 0.0)
-
-    def slopes(self, state: _State) -> tuple[Floats, Floats]:
-        """Slopes of the misses in the free changes, (n, 2 m, p), and in the points, (n, 2 m, 3)."""
-        free = np.argwhere(self.free)
-        in_change = np.zeros((*state.misses.shape, len(free)))
-        for k, (i, part) in enumerate(free):
-            columns = slice(2 * i, 2 * i + 2)
-            if part in (LAG, DRIFT):
-                in_change[:, columns, k] = state.footage.slopes(i)[int(part == DRIFT)]
-                continue
-            step = np.zeros(SIZE)
-            step[part] = _PROBE * self.unit[i, part]
-            ends = [changed(self.start[i], state.change[i] + sign * step) for sign in (1, -1)]
-            track = state.footage.aligned[i]
-            high, low = (c.steadied(track) - c.image(state.points) for c in ends)
-            in_change[:, columns, k] = (high - low) / (2 * step[part])
-        probe = _PROBE * self.reach
-        in_points = np.stack([
-            np.hstack([c.image(state.points - e) - c.image(state.points + e)
-                       for c in state.cameras]) / (2 * probe)
-            for e in probe * np.eye(3)
-        ], axis=-1)  # fmt: skip
-        seen = np.isfinite(state.misses)[..., None]
-        in_change, in_points = np.nan_to_num(in_change), np.nan_to_num(in_points)
-        return np.where(seen, in_change, 0.0), np.where(seen, in_points, 0.0)
-
-
-@dataclass(frozen=True)
-class _Reduced:
-    """Slopes, (n, 2 m, p), and misses, (n, 2 m), with the points taken out.
-
-    The points move by `own`, (n, 3), to where they are missed least, and with the changes by
-    `follow`, (n, 3, p); a point that its views do not tell stays. `along`, (n, 3), is what of the
-    misses they take up.
-    """
-
-    slopes: Floats
-    misses: Floats
-    own: Floats
-    follow: Floats
-    along: Floats
-
-    @classmethod
-    def of(cls, in_change: Floats, in_points: Floats, misses: Floats) -> _Reduced:
-        """By QR, frame by frame."""
-        q, r = np.linalg.qr(in_points)
-        pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
-        told = pivots.min(axis=1, initial=np.inf) > _FLAT * pivots.max(axis=1, initial=0)
-        q, r = np.where(told[:, None, None], q, 0.0), np.where(told[:, None, None], r, np.eye(3))
-        across = q.swapaxes(1, 2)
-        missed = np.nan_to_num(misses)[..., None]
-        of_change, of_misses = across @ in_change, across @ missed
-        return cls(
-            in_change - q @ of_change,
-            (missed - q @ of_misses)[..., 0],
-            -np.linalg.solve(r, of_misses)[..., 0],
-            -np.linalg.solve(r, of_change),
-            of_misses[..., 0],
-        )
-
-
-def _downhill(problem: _Problem, state: _State, noise: float) -> tuple[_State | None, float]:
+def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
     """The state after a step that lessens the errors, and how far it moved images, pixels."""
-    weights, sigma = problem.weights(state, noise), max(noise, _PRIOR_NOISE)
-    reduced = _Reduced.of(*problem.slopes(state), state.misses)
-    root, prior, free = np.sqrt(weights)[:, None] / sigma, problem.prior, problem.free
+    weights, sigma, reduced = state.weights, max(state.noise, _PRIOR_NOISE), state.reduced
+    free, prior = state.free, np.sqrt(state.prior)
+    root = np.sqrt(weights)[:, None] / sigma
     rows = np.vstack(((root[..., None] * reduced.slopes).reshape(-1, len(prior)), np.diag(prior)))
     target = -np.append((root * reduced.misses).ravel(), prior * state.change[free])
     size = np.sqrt(np.sum(rows**2, axis=0))
@@ -460,10 +433,10 @@ def _downhill(problem: _Problem, state: _State, noise: float) -> tuple[_State | 
     lags = np.argwhere(free)[:, 1] == LAG
     seen = np.isfinite(state.misses)
 
-    def cost(other: _State) -> float:
+    def cost(other: Adjustment) -> float:
         """What is to be smallest; infinite if points that were seen before would not be."""
         lost = ~np.isfinite(other.misses[seen])
-        if lost.any() and lost.mean() > (_LOST if problem.timed else 0.0):
+        if lost.any() and lost.mean() > (_LOST if state.timed else 0.0):
             return np.inf
         squares = np.nansum(np.where(seen, other.misses, 0.0) ** 2, axis=1)
         off = prior * other.change[free]
@@ -474,27 +447,12 @@ def _downhill(problem: _Problem, state: _State, noise: float) -> tuple[_State | 
         damped = np.vstack((triangle, np.sqrt(damping) * np.eye(len(size))))
         step = np.linalg.lstsq(damped, aim, rcond=1e-13)[0] / size
         step /= max(np.abs(step[lags]).max(initial=0) / _LONGEST, 1.0)
-        change = state.change.copy()
+        change, points = state.change.copy(), state.points + reduced.own + reduced.follow @ step
         change[free] += step
-        moved = problem.at(change, state.points + reduced.own + reduced.follow @ step)
+        moved = replace(state, change=change, points=points)
         if cost(moved) <= here * (1 + 1e-12) + 1e-18:
             told = seen.any(axis=1)
             shift = np.sqrt(np.mean((reduced.slopes[told] @ step) ** 2)) if told.any() else 0.0
-            late = noise * np.abs(step[lags]).max(initial=0)
+            late = state.noise * np.abs(step[lags]).max(initial=0)
             return moved, float(max(shift, late, np.abs(reduced.along).max(initial=0)))
     return None, 0.0
-
-
-def _noise(misses: Floats) -> float:
-    """Standard deviation of the errors of the tracks, if most residuals are those of noise.
-
-    Of the 2 m numbers of a frame its point takes three, and leaves the squared length of the
-    others, whose median is that of chi-squared. Numbers one by one would not do: two views err
-    along their epipolar lines without a residual.
-    """
-    freedom = np.isfinite(misses).sum(axis=1) - 3
-    squares = np.nansum(misses**2, axis=1)[freedom > 0]
-    if not squares.size:
-        return _FINEST
-    expected = 2 * gammaincinv(freedom[freedom > 0] / 2, 0.5)
-    return max(float(np.sqrt(np.median(squares / expected))), _FINEST)

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Floats
-from .adjust import PARTS, adjust, fitted_factor, known_to
+from .adjust import PARTS, adjust, known_to
 from .clocks import Curve, Footage, Lags, check_clocks
 from .eq4 import Unknowns, check_learnable, closed_form
 from .rig import Rig, check_calibrated, check_seen, check_views
@@ -181,8 +181,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     curves = tuple(map(Curve, tracks, clocks))
     footage = Footage(curves, clocks[0], lags.frames, lags.rates)
     near = adjust(footage, learned.cameras, errors, most=0)
-    factor = fitted_factor(*near.weighed, near.prior, near.noise)
-    modes = np.einsum("ik,nji->knj", factor, near.path_slopes)
+    modes = np.einsum("ik,nji->knj", near.factor, near.reduced.follow)
     if not rig.note:
         return modes
     still = at_once(learned.cameras, footage.aligned)

@@ -34,7 +34,7 @@ from tqdm import tqdm
 
 from ..arrays import Bools, Floats
 from ..progress import bar
-from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, fitted_factor, known_to
+from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
 from .clocks import (
     INSTANTS,
     OVERLAP,
@@ -172,10 +172,8 @@ def pair_missed(
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """What was fitted, and to what."""
+    """What was fitted, and what that tells of the lags."""
 
-    footage: Footage
-    cameras: tuple[Camera, ...]
     fit: Adjustment
 
     @classmethod
@@ -191,7 +189,7 @@ class Timing:
         """None if the views have too little in common."""
         fit = adjust(footage, cameras, errors, begin=begin, most=most)
         told = np.isfinite(fit.misses).any(axis=1).sum()
-        return cls(footage, cameras, fit) if 3 * told > np.isinf(errors[:, _TIMES]).sum() else None
+        return cls(fit) if 3 * told > np.isinf(errors[:, _TIMES]).sum() else None
 
     @property
     def lags(self) -> Floats:
@@ -206,7 +204,7 @@ class Timing:
     @property
     def missed(self) -> Floats:
         """Residuals, (m, n, 2)."""
-        return np.stack(np.split(self.fit.misses, len(self.cameras), axis=1))
+        return np.stack(np.split(self.fit.misses, len(self.fit.cameras), axis=1))
 
     @property
     def residual(self) -> float:
@@ -244,8 +242,8 @@ class Timing:
         between two frames that are two apart.
         """
         fit, used = self.fit, self.used
-        slopes = fit.slopes[used].reshape(-1, fit.slopes.shape[-1])
-        parts = np.argwhere(fit.errors > 0)[:, 1]
+        slopes = fit.reduced.slopes[used].reshape(-1, len(fit.prior))
+        parts = np.argwhere(fit.free)[:, 1]
         lags, others = slopes[:, parts == LAG], slopes[:, ~np.isin(parts, _TIMES)]
         lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
         # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
@@ -260,10 +258,8 @@ class Timing:
     @property
     def covariance(self) -> Floats:
         """Of lags and drifts, if that of cameras is known as well as the tracks tell it."""
-        fit = self.fit
-        factor = fitted_factor(*fit.weighed, fit.prior, fit.noise)
-        covariance = factor @ factor.T
-        cameras, parts = np.argwhere(fit.errors > 0).T
+        covariance = self.fit.factor @ self.fit.factor.T
+        cameras, parts = np.argwhere(self.fit.free).T
         order = np.concatenate([np.flatnonzero(parts == part) for part in _TIMES])
         # Slopes that are noise add to the information, but mend nothing.
         share = np.append(1.0, np.maximum(self.shares, _LEAST))[cameras[order]]
@@ -271,9 +267,9 @@ class Timing:
 
     def drifted(self) -> Timing:
         """The same with drifts of clocks, if any are clear and large enough to matter."""
-        errors, change = self.fit.errors.copy(), self.fit.change
+        fit, errors = self.fit, self.fit.errors.copy()
         errors[1:, DRIFT] = np.inf
-        free = Timing.of(self.footage, self.cameras, errors, begin=change)
+        free = Timing.of(fit.given, fit.start, errors, begin=fit.change)
         if free is None:
             return self
         drift, off = free.fit.change[:, DRIFT], np.zeros(len(errors))
@@ -283,7 +279,7 @@ class Timing:
             return self
         errors[~clear, DRIFT] = 0.0
         begin = np.where(errors > 0, free.fit.change, 0.0)
-        return Timing.of(self.footage, self.cameras, errors, begin=begin) or self
+        return Timing.of(fit.given, fit.start, errors, begin=begin) or self
 
 
 def learn_lags(
