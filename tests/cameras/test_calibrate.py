@@ -17,10 +17,8 @@ from vidsindy_lite.cameras import (
     calibrate,
     calibration_errors,
     check_learnable,
-    eq4,
     learn_cameras,
     learn_cameras_eq4,
-    learn_cameras_lbfgs,
     reconstruct,
     residuals,
     synchronise,
@@ -399,7 +397,7 @@ class TestBadTracks:
         start = rig.uncalibrated()
         one = [track[:1] for track in tracks]
         with pytest.raises(
-            ValueError, match=r"at least 4 equations .* of cameras\[1\] and .* got 3"
+            ValueError, match=r"at least 2 equations .* of cameras\[1\] and .* got 1"
         ):
             learn_cameras(one, start)
         tracks[0][20:] = np.nan
@@ -409,7 +407,7 @@ class TestBadTracks:
             learn_cameras(tracks, start)
 
     @pytest.mark.parametrize("noise", [0, 0.3, 3])
-    @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4, learn_cameras_lbfgs])
+    @pytest.mark.parametrize("learn", [learn_cameras, learn_cameras_eq4])
     def test_static_target(self, small, noise, learn):
         _, rig, tracks, rng = small
         still = [track[:1] + noise * rng.normal(size=track.shape) for track in tracks]
@@ -558,13 +556,14 @@ def test_a_search_for_cameras_that_ran_out_of_steps(monkeypatch, kind):
     assert "the search for the cameras did not converge in 1 evaluations" in warning
 
 
-def test_outliers_that_cannot_be_told(monkeypatch):
+@pytest.mark.parametrize("every", [9, 4])
+def test_many_outliers_are_told_from_the_others(every):
     rig, tracks = filmed()
-    tracks[0][::9] += 100
-    assert vl.learn_cameras(tracks, rig.uncalibrated()).warnings == ()
-    monkeypatch.setattr(eq4, "_ROUNDS", 1)
-    (warning,) = vl.learn_cameras(tracks, rig.uncalibrated()).warnings
-    assert "which frames hold outliers of a track cannot be told" in warning
+    clean = vl.learn_cameras(tracks, rig.uncalibrated())
+    tracks[0][::every] += 100
+    found = vl.learn_cameras(tracks, rig.uncalibrated())
+    assert found.warnings == ()
+    assert np.abs(calibration_errors(found, clean)).max() < 3e-3
 
 
 def test_points_that_did_not_settle(monkeypatch):

@@ -17,7 +17,6 @@ from vidsindy_lite.cameras import Lags, align, disagreement, learn_lags, list_la
 from vidsindy_lite.cameras import synchronise as synchrony
 from vidsindy_lite.cameras.adjust import PARTS, SIZE
 from vidsindy_lite.cameras.clocks import Curve, Footage
-from vidsindy_lite.cameras.eq4 import Unknowns
 from vidsindy_lite.cameras.synchronise import Timing
 
 NOISE = 0.05  # pixels
@@ -329,8 +328,7 @@ def test_a_rig_is_doubted_if_it_leaves_more_than_the_tracks_do(motion, tilt, noi
     turned = replace(second, normal=second.normal + tilt * second.rows[0])
     tracks = filmed(motion, (80,) * 3, (0, 2, 0), noise=noise)
     curves = tuple(Curve(track, np.arange(80.0)) for track in tracks)
-    unknowns = Unknowns.of(vl.Rig([first, turned, third]))
-    videos = synchrony._Videos(curves, unknowns, np.ones(3), tqdm(disable=True))
+    videos = synchrony._Videos(curves, (first, turned, third), np.ones(3), tqdm(disable=True))
     loose, (best, *_) = synchrony._searched(videos, np.zeros(3))
     assert loose is doubted
     assert best.score < max(1, 2 * noise)

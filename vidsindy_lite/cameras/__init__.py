@@ -8,7 +8,6 @@
     files         rigs from the files of other tools
     clocks        tracks at the same instants, whatever the lags, rates and clocks of the videos
     adjust        bundle adjustment: cameras, clocks and path together, and their covariance
-    eq4           cameras by linear equations, as the paper writes them
     unmeasured    rigs of which nothing is known: where they stand, or a path up to an affine map
  1. synchronise   tracks -> when each camera started (`Lags`)
  2. calibrate     tracks -> the same `Rig`, with nothing unknown, and its systematic errors
@@ -19,10 +18,10 @@
 The other rooms import from here alone.
 """
 
-from .calibrate import calibration_errors, learn_cameras, systematic_errors, trailing_errors
+from .calibrate import calibration_errors, check_learnable, learn_cameras, learn_cameras_eq4
+from .calibrate import systematic_errors, trailing_errors
 from .causes import explain, find_mistake, smooth
 from .clocks import Clock, Lags, align, list_lags
-from .eq4 import check_learnable, learn_cameras_eq4, learn_cameras_lbfgs
 from .files import read_calibration
 from .models import AffineCamera, Camera, OrthographicCamera, PerspectiveCamera
 from .models import plane_projection, plane_through, rodrigues, rotation_to_z, signed_distance

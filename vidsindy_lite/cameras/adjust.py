@@ -303,9 +303,7 @@ class Adjustment:
     def reduced(self) -> _Reduced:
         """Misses and their slopes in the free changes, with the points taken out by QR."""
         seen = np.isfinite(self.misses)[..., None]
-        in_change, in_points = (
-            np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes()
-        )
+        in_change, in_points = (np.where(seen, np.nan_to_num(part), 0.0) for part in self._slopes())
         q, r = np.linalg.qr(in_points)
         pivots = np.abs(np.diagonal(r, axis1=1, axis2=2))
         told = pivots.min(axis=1, initial=np.inf) > _FLAT * pivots.max(axis=1, initial=0)

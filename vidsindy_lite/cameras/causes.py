@@ -40,10 +40,9 @@ from .adjust import (
 )
 from .calibrate import learn_cameras
 from .clocks import Curve, Footage, Lags, align
-from .eq4 import Unknowns
 from .models import Camera, OrthographicCamera
 from .rig import DISAGREEMENT, FINE, GROSS, Rig, check_views, disagreement, residuals
-from .synchronise import lag_misses, learn_lags, nearest
+from .synchronise import first_known, lag_misses, learn_lags, nearest
 from .triangulate import TRIMMED, epipolar_lines, epipolar_rows, intersect, trimmed
 
 RATES = ((25, 30), (30, 25), (24, 30), (30, 24), (24, 25), (25, 24), (30, 60), (60, 30))
@@ -256,14 +255,14 @@ class Mistake:
             "right here: do so in what is given"
         )
 
-    def paired(self, unknowns: Unknowns) -> tuple[float, Floats]:
+    def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
         curves = tuple(map(Curve, self.tracks, self.clocks))
         least, lags = [], []
-        for tried, misses in lag_misses(curves, self.rates, unknowns, _INSTANTS, (False,)):
+        for tried, misses in lag_misses(curves, self.rates, cameras, _INSTANTS, (False,)):
             least.append(misses[0].min())
             lags.append(tried[misses[0].argmin()])
-        behind = np.insert(lags, unknowns.known, 0.0)
+        behind = np.insert(lags, first_known(cameras), 0.0)
         return float(np.linalg.norm(least)), behind - behind[0]
 
     def left(self, rig: Rig, lags: Floats) -> float:
@@ -300,14 +299,13 @@ def _found(none: Mistake, rig: Rig, start: Floats, names: Sequence[str]) -> Mist
     """The same, where the tracks can be compared."""
     if none.left(rig, start) <= 2 * DISAGREEMENT:
         return None
-    unknowns = Unknowns.of(rig)
-    _, lags = none.paired(unknowns)
+    _, lags = none.paired(rig.cameras)
     left = none.left(rig, lags)
     if left <= 2 * DISAGREEMENT:
         return None
     for kind in (_views, _rates, _dropped):
         # Two views of which a scale is unknown agree mirrored as well: they rank, and refuse none.
-        ranked = [(*one.paired(unknowns), one) for one in kind(none, rig, unknowns, names)]
+        ranked = [(*one.paired(rig.cameras), one) for one in kind(none, rig, names)]
         ranked = sorted(ranked, key=lambda one: one[0])[:_MISTAKES]
         tried = [(one.left(rig, best), best, one) for _, best, one in ranked]
         for now, best, one in sorted(tried, key=lambda one: one[0]):
@@ -318,7 +316,7 @@ def _found(none: Mistake, rig: Rig, start: Floats, names: Sequence[str]) -> Mist
     return None
 
 
-def _views(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterator[Mistake]:
+def _views(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
     """All that change whole views: their order, and their axes."""
     count, sizes = len(names), [camera.image_size for camera in rig.cameras]
     for moved, order in _orders(count):
@@ -358,7 +356,7 @@ def _orders(count: int) -> Iterator[tuple[tuple[int, ...], list[int]]]:
                 yield tuple(sorted(ring)), order
 
 
-def _rates(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterator[Mistake]:
+def _rates(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
     """Frame rates that are taken for each other."""
     count = len(names)
     for i in range(count):
@@ -368,9 +366,7 @@ def _rates(none: Mistake, rig: Rig, _: Unknowns, names: Sequence[str]) -> Iterat
             yield replace(none, what=what, rates=rates / rates[0])
 
 
-def _dropped(
-    none: Mistake, rig: Rig, unknowns: Unknowns, names: Sequence[str]
-) -> Iterator[Mistake]:
+def _dropped(none: Mistake, rig: Rig, names: Sequence[str]) -> Iterator[Mistake]:
     """Videos of which frames were dropped, each with the clock by which it agrees all the time."""
     shares = ((0.0, _PART), (1 - _PART, 1.0))  # of a video, in one of which none is dropped, maybe
     for low, high in shares:
@@ -378,7 +374,7 @@ def _dropped(
         tracks = tuple(t[part] for t, part in zip(none.tracks, rows, strict=True))
         clocks = tuple(c[part] for c, part in zip(none.clocks, rows, strict=True))
         part = replace(none, tracks=tracks, clocks=clocks)
-        _, lags = part.paired(unknowns)
+        _, lags = part.paired(rig.cameras)
         try:
             learned = learn_cameras(align(tracks, lags, none.rates, clocks), rig)
         except ValueError:

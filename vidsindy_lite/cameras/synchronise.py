@@ -35,6 +35,7 @@ from tqdm import tqdm
 from ..arrays import Bools, Floats
 from ..progress import bar
 from .adjust import DRIFT, LAG, PARTS, STEPS, Adjustment, adjust, known_to
+from .calibrate import check_learnable, closed_form
 from .clocks import (
     INSTANTS,
     OVERLAP,
@@ -47,7 +48,6 @@ from .clocks import (
     check_rates,
     list_lags,
 )
-from .eq4 import Unknowns, check_learnable, closed_form
 from .models import Camera
 from .rig import ALIKE, DISAGREEMENT, FINE, GROSS, Rig, check_seen
 from .triangulate import TRIMMED, at_once, epipolar_lines, epipolar_rows, trimmed
@@ -74,11 +74,12 @@ _LOOSE = 0.05  # of tilts, log scales and angles that a hand measured: three deg
 _BETTER = 1.25  # times smaller residuals are a reason to doubt what was measured
 
 
-def promising_lags(curves: Sequence[Curve], rates: Floats, unknowns: Unknowns) -> list[list[float]]:
+def promising_lags(
+    curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera]
+) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    known = unknowns.known
-    found = []
-    for lags, missed in lag_misses(curves, rates, unknowns):
+    known, found = first_known(cameras), []
+    for lags, missed in lag_misses(curves, rates, cameras):
         choices = [_dips(lags, part)[:_PROMISING] for part in missed]
         found.append(_apart(np.concatenate(choices)).tolist() or [0.0])
     return [*found[:known], [0.0], *found[known:]]
@@ -87,7 +88,7 @@ def promising_lags(curves: Sequence[Curve], rates: Floats, unknowns: Unknowns) -
 def lag_misses(
     curves: Sequence[Curve],
     rates: Floats,
-    unknowns: Unknowns,
+    cameras: Sequence[Camera],
     most: int = INSTANTS,
     shifts: Sequence[bool] = (False, True),
 ) -> Iterator[tuple[Floats, Floats]]:
@@ -95,7 +96,7 @@ def lag_misses(
 
     The misses are those without and with a shift, at so many instants at most.
     """
-    known = unknowns.known
+    known = first_known(cameras)
     frames = curves[known].clock
     frames = frames[:: max(1, len(frames) // most)]
     ends = np.array([curve.clock[-1] + 1 for curve in curves]) / rates  # on the first one's clock
@@ -104,7 +105,7 @@ def lag_misses(
             continue
         margin = OVERLAP * min(ends[known], ends[other])
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
-        first, second = unknowns.cameras[known], unknowns.cameras[other]
+        first, second = cameras[known], cameras[other]
         placed = first.is_placed and second.is_placed
         near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
         lines = epipolar_lines(near, curves[known].at(frames), far)
@@ -114,6 +115,11 @@ def lag_misses(
             theirs = curves[other].at((instants - block[:, None]) * rate)
             missed.append([pair_missed(second, placed, lines, theirs, shift) for shift in shifts])
         yield lags, np.concatenate(missed, axis=1)
+
+
+def first_known(cameras: Sequence[Camera]) -> int:
+    """The first calibrated camera."""
+    return next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
 
 
 def _dips(lags: Floats, missed: Floats) -> Floats:
@@ -352,7 +358,7 @@ class _Videos:
     """The tracks as functions of time, what is known of the cameras, and a bar to move."""
 
     curves: tuple[Curve, ...]
-    unknowns: Unknowns
+    known: tuple[Camera, ...]
     rates: Floats
     bar: tqdm
 
@@ -367,9 +373,9 @@ class _Videos:
     ) -> _Videos:
         """Of tracks as they are given."""
         still = at_once(rig.cameras, tracks)
-        instant = Rig(tuple(replace(camera, readout=0.0) for camera in rig.cameras))
+        instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
         curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
-        return cls(curves, Unknowns.of(instant), rates, bar)
+        return cls(curves, instant, rates, bar)
 
     def footage(self, lags: Floats, rough: bool = False) -> Footage:
         """All instants, or some."""
@@ -382,13 +388,13 @@ class _Videos:
         if not all(np.isfinite(track).any() for track in tracks):
             return None
         try:
-            return closed_form(tracks, self.unknowns, checked=False)[0]
+            return closed_form(tracks, self.known, checked=False)
         except ValueError:
             return None
 
     def errors(self, rough: bool = False, loose: bool = False) -> Floats:
         """What is known of cameras, and of all lags but the first one's nothing."""
-        errors = np.array([known_to(camera) for camera in self.unknowns.cameras])
+        errors = np.array([known_to(camera) for camera in self.known])
         if (
             rough and len(self.curves[0].clock) > INSTANTS
         ):  # which are too few to tell where the target was between two
@@ -450,7 +456,7 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
 
 def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Timing]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
-    promising = promising_lags(videos.curves, videos.rates, videos.unknowns)
+    promising = promising_lags(videos.curves, videos.rates, videos.known)
     exact = _climbed(videos, promising, first, False)
     if not exact or exact[0].score <= FINE:
         return False, exact
