@@ -259,9 +259,9 @@ class Mistake:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
         curves = tuple(map(Curve, self.tracks, self.clocks))
         least, lags = [], []
-        for tried, misses in lag_misses(curves, self.rates, cameras, _INSTANTS, (False,)):
-            least.append(misses[0].min())
-            lags.append(tried[misses[0].argmin()])
+        for tried, missed in lag_misses(curves, self.rates, cameras, _INSTANTS):
+            least.append(missed.min())
+            lags.append(tried[missed.argmin()])
         behind = np.insert(lags, first_known(cameras), 0.0)
         return float(np.linalg.norm(least)), behind - behind[0]
 

@@ -55,7 +55,7 @@ from .triangulate import missed as missed_by
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
-_PROMISING = 4  # lags of each camera, with and without a shift
+_PROMISING = 6  # lags of each camera
 _NEAR = 4.0  # frames
 _BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
@@ -78,11 +78,10 @@ def promising_lags(
     curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera]
 ) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    known, found = first_known(cameras), []
-    for lags, missed in lag_misses(curves, rates, cameras):
-        choices = [_dips(lags, part)[:_PROMISING] for part in missed]
-        found.append(_apart(np.concatenate(choices)).tolist() or [0.0])
-    return [*found[:known], [0.0], *found[known:]]
+    misses = lag_misses(curves, rates, cameras, shift=True)
+    found = [_dips(lags, missed)[:_PROMISING].tolist() or [0.0] for lags, missed in misses]
+    found.insert(first_known(cameras), [0.0])
+    return found
 
 
 def lag_misses(
@@ -90,11 +89,11 @@ def lag_misses(
     rates: Floats,
     cameras: Sequence[Camera],
     most: int = INSTANTS,
-    shifts: Sequence[bool] = (False, True),
+    shift: bool = False,
 ) -> Iterator[tuple[Floats, Floats]]:
     """Of each camera but the first calibrated one, all whole lags (k,) and `pair_missed` at these.
 
-    The misses are those without and with a shift, at so many instants at most.
+    The misses are at so many instants at most.
     """
     known = first_known(cameras)
     frames = curves[known].clock
@@ -113,8 +112,8 @@ def lag_misses(
         missed = []
         for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
             theirs = curves[other].at((instants - block[:, None]) * rate)
-            missed.append([pair_missed(second, placed, lines, theirs, shift) for shift in shifts])
-        yield lags, np.concatenate(missed, axis=1)
+            missed.append(pair_missed(second, placed, lines, theirs, shift))
+        yield lags, np.concatenate(missed)
 
 
 def first_known(cameras: Sequence[Camera]) -> int:
