@@ -31,6 +31,17 @@ with weights w that fall linearly to zero over as many frames as the residuals d
 From few frames S is often too small by chance, and W never is but for such errors: so in every
 direction the larger of both counts.
 
+**Why views do not agree.** `explain` frees one thing at a time. Residuals of a right rig are the
+errors of the tracks. A wrong normal, lens or clock leaves more, which follows the motion; how large
+it may be without a word depends on these errors, and not on a fixed number of pixels. For each
+cause, with slopes C of the residuals r in it (all that is free anyway projected out), the score g =
+C'r is compared with its covariance, in which residuals that depend on their neighbours count for
+what they are worth:
+
+    T = g' Omega^-1 g,      Omega of the residuals that the cause leaves.
+
+A cause that stands out is tried: cameras and path are adjusted with it free.
+
 Newey and West 1987, Econometrica 55; Andrews 1991, Econometrica 59 (the number of frames);
 Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 """
@@ -38,18 +49,29 @@ Triggs et al. 2000, "Bundle adjustment: a modern synthesis".
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
-from scipy.special import gammaincinv
+from scipy.special import fdtri, gammaincinv
 
 from ..arrays import Bools, Floats
 from .clocks import Footage
 from .models import USUAL, Camera, OrthographicCamera, PerspectiveCamera, frozen
-from .triangulate import at_once, intersect
+from .rig import (
+    FINE,
+    GROSS,
+    TRIMMED,
+    Rig,
+    at_once,
+    check_views,
+    disagreement,
+    intersect,
+    residuals,
+    trimmed,
+)
 
 _UNTOLD = 1e-15  # of the largest information of any direction: rounding
 PARTS = {
@@ -84,6 +106,11 @@ _BESIDE = 2  # frames around an outlier into which interpolation carries a part 
 _FLAT = 1e-9  # of the largest pivot; smaller ones leave a point where it is
 # Tried in turn, until a step leads downhill: fine where focal length and distance hardly differ.
 _DAMPING = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2)
+_CHANCE = 1e-6  # of a T that large without a cause
+_TRIED = 5  # of the causes that stand out most
+_DEGENERATE = 1e-3  # share of a slope that nothing else explains; less tells nothing
+_SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
+_ROUNDING = 1e-9  # pixels
 LAG, DRIFT = PARTS["lag"].start, PARTS["drift"].start
 
 
@@ -454,3 +481,175 @@ def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
             late = state.noise * np.abs(step[lags]).max(initial=0)
             return moved, float(max(shift, late, np.abs(reduced.along).max(initial=0)))
     return None, 0.0
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Something that may be wrong of some cameras: which components of their changes."""
+
+    what: str
+    cameras: tuple[int, ...]
+    parts: tuple[int, ...]
+
+    def mask(self, count: int) -> Bools:
+        """The freed components, (m, SIZE)."""
+        freed = np.zeros((count, SIZE), bool)
+        freed[np.ix_(self.cameras, self.parts)] = True
+        return freed
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A cause, and the cameras that it leads to."""
+
+    cause: Cause
+    found: Adjustment
+
+    @property
+    def left(self) -> float:
+        """`disagreement` of the worst camera of these, pixels."""
+        return max(map(trimmed, np.split(self.found.misses, len(self.found.cameras), axis=1)))
+
+    def text(self, names: Sequence[str]) -> str:
+        """What would explain the residuals best, with its value."""
+        i, what = self.cause.cameras[0], self.cause.what
+        camera, change = self.found.cameras[i], self.found.change[i]
+        one = f"cameras[{i}] ({names[i]})"
+        whose = one if len(self.cause.cameras) == 1 else "all cameras"
+        parts = {
+            "normal": f"the normal ({_list(camera.normal)}) of {whose}",
+            "position": f"the position ({_list(np.asarray(camera.position))}) of {whose}",
+            "scale": f"a scale {100 * np.expm1(change[PARTS['scale']][0]):+.2g} % off of {whose}",
+            "distortion": f"a distortion of the lens of {whose}, for {one} k1 off "
+            f"by {change[PARTS['distortion']][0]:.2g},",
+            "readout": f"a rolling shutter of {whose}, for {one} a readout of {camera.readout:.2g} "
+            "frames,",
+            "lag": f"a lag of {names[i]} that is off by {change[PARTS['lag']][0]:.2f} frames",
+            "drift": f"another clock of {names[i]}, {abs(change[PARTS['drift']][0]):.2g} frames "
+            f"{'slow' if change[PARTS['drift']][0] > 0 else 'fast'} over the whole video,",
+            "nearness": "perspective, where the cameras are taken as orthographic, for "
+            f"{one} a distance of {1 / max(abs(change[PARTS['nearness']][0]), 1e-12):.3g},",
+        }
+        return parts[what]
+
+
+def explain(tracks: Sequence[Floats], given: Rig, learned: Rig) -> Explanation | None:
+    """The one thing that explains best what the views leave; None if nothing stands out.
+
+    Parameters
+    ----------
+    tracks : sequence of ndarray, shape (n, 2)
+        One per camera, at the same instants.
+    given, learned : Rig
+        Before and after `learn_cameras`.
+    """
+    views = check_views(tracks, learned)
+    errors = np.array([known_to(camera) for camera in given.cameras])
+    points, _ = intersect(learned.cameras, views)
+    seen = np.isfinite(points).all(axis=1)
+    if not seen.any():
+        return None
+    far = smooth(tracks, learned) and max(disagreement(tracks, learned)) > GROSS
+    start = [_near(camera, points[seen].mean(axis=0)) for camera in learned.cameras]
+    causes = [c for c in _causes(start) if (c.mask(len(start)) & (errors == 0)).any()]
+    footage = Footage.of(tracks)
+    near = adjust(footage, start, np.where(errors > 0, errors, np.inf), most=0)
+    sizes = [_sizes(near, errors, cause) for cause in causes]
+    # Where views are far apart, and no noise makes it, no test is needed.
+    rank = [explained if far else evidence for evidence, explained in sizes]
+    tried = [causes[k] for k in np.argsort(rank)[::-1][:_TRIED] if rank[k] > (0 if far else 1)]
+    best: tuple[float, Explanation] | None = None
+    for cause in tried:
+        freed = cause.mask(len(start))
+        found = adjust(footage, start, np.where(freed, np.inf, errors))
+        used = np.isfinite(found.misses)
+        left = float(np.sum((np.sqrt(found.weights)[:, None] * found.misses)[used] ** 2))
+        count = used.sum()
+        price = count * np.log(max(left, _ROUNDING)) + freed.sum() * np.log(count)
+        if best is None or price < best[0]:
+            best = price, Explanation(cause, found)
+    return None if best is None else best[1]
+
+
+def smooth(tracks: Sequence[Floats], learned: Rig) -> bool:
+    """Whether residuals follow the motion, which noise of the tracks does not."""
+    missed = np.hstack(residuals(tracks, learned))
+    both = np.isfinite(missed[1:]) & np.isfinite(missed[:-1])
+    limit = np.nanquantile(np.abs(missed), TRIMMED) if both.any() else 0.0
+    before, after = (np.clip(part[both], -limit, limit) for part in (missed[:-1], missed[1:]))
+    return bool(before @ after > _SMOOTH * np.sqrt((before @ before) * (after @ after)))
+
+
+def _causes(cameras: Sequence[Camera]) -> list[Cause]:
+    """All that is tried; a lens and a shutter of one camera, and of all as of one make."""
+    every = tuple(range(len(cameras)))
+    flat = tuple(i for i in every if isinstance(cameras[i], OrthographicCamera))
+    pinholes = tuple(i for i in every if i not in flat)
+    found = [
+        Cause(what, (i,), _components(what)[: 2 if i in flat else None])
+        for what in ("normal", "position", "scale", "readout", "lag", "drift")
+        for i in every
+    ]
+    lens = _components("distortion")[:2]  # k1 and k2: few motions tell more
+    found += [Cause("distortion", (i,), lens) for i in pinholes]
+    found.append(Cause("readout", every, _components("readout")))
+    if pinholes:
+        found.append(Cause("distortion", pinholes, lens))
+    if flat:  # the scale is then that of another distance
+        found.append(Cause("nearness", flat, _components("nearness") + _components("scale")))
+    return found
+
+
+def _components(what: str) -> tuple[int, ...]:
+    """Places in the vector of changes."""
+    return tuple(range(SIZE)[PARTS[what]])
+
+
+def _near(camera: Camera, about: Floats) -> Camera:
+    """The same camera, ready to be not infinitely far if it is orthographic."""
+    if not isinstance(camera, OrthographicCamera):
+        return camera
+    values = {part.name: getattr(camera, part.name) for part in fields(camera)}
+    return NearCamera(about=about, **values)
+
+
+def _sizes(near: Adjustment, errors: Floats, cause: Cause) -> tuple[float, float]:
+    """T over what chance may make it, zero if it would not matter; pixels that it explains."""
+    missed, slopes = near.weighed
+    free, wanted = errors[near.errors > 0] > 0, cause.mask(len(errors))[near.errors > 0]
+    own = slopes[..., wanted & ~free]
+    flat, target = own.reshape(-1, own.shape[-1]), missed.ravel()
+    size = np.sqrt(np.sum(flat**2, axis=0))
+    flat, size = flat[:, size > 0], size[size > 0]
+    if not size.size:
+        return 0.0, 0.0
+    prior = near.noise / errors[near.errors > 0][free]
+    others = np.vstack((slopes[..., free].reshape(len(flat), -1), np.diag(prior)))
+    padded = np.vstack((flat / size, np.zeros((len(prior), len(size)))))
+    if free.any():
+        solved = np.linalg.lstsq(others, padded, rcond=1e-10)[0]
+        padded = padded - others @ solved
+    left, singular, _ = np.linalg.svd(padded, full_matrices=False)
+    left = left[: len(flat), singular > _DEGENERATE]
+    if not left.shape[1]:
+        return 0.0, 0.0
+    score = left.T @ target
+    rest = (target - left @ score).reshape(missed.shape)
+    each = np.einsum("nmk,nm->nk", left.reshape(*missed.shape, -1), rest)
+    covariance = long_run_covariance(each) * len(each)
+    covariance += _ROUNDING**2 * np.eye(len(covariance))
+    explained = float(np.linalg.norm(score) / np.sqrt(np.isfinite(near.misses).sum()))
+    # Bartlett's weights of that width leave as many degrees of freedom (2/3 is their square's
+    # integral) to estimate Omega with: Hotelling's T.
+    degrees = 1.5 * len(each) / (bandwidth(each) + 1)
+    rest_degrees = degrees - len(score) + 1
+    if explained < FINE or rest_degrees <= 0:
+        return 0.0, explained
+    chance = float(fdtri(len(score), rest_degrees, 1 - _CHANCE))
+    limit = chance * len(score) * degrees / rest_degrees
+    return float(score @ np.linalg.solve(covariance, score)) / limit, explained
+
+
+def _list(values: Floats) -> str:
+    """Three decimals of each."""
+    return ", ".join(f"{value:.3f}" for value in values)

@@ -33,8 +33,17 @@ from ..checks import check_instance
 from .adjust import PARTS, adjust, known_to
 from .clocks import Curve, Footage, Lags, check_clocks
 from .models import Camera, all_orthographic, independent
-from .rig import Rig, check_calibrated, check_seen, check_views
-from .triangulate import at_once, epipolar_lines, epipolar_rows, intersect, missed
+from .rig import (
+    Rig,
+    at_once,
+    check_calibrated,
+    check_seen,
+    check_views,
+    epipolar_lines,
+    epipolar_rows,
+    intersect,
+    missed,
+)
 from .unmeasured import posed
 
 _TOO_FAR = 5.0  # standard errors that a measurement may be off

@@ -41,8 +41,7 @@ from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to
 from .clocks import OVERLAP, Curve, Footage, Lags, check_clocks
 from .models import AffineCamera, PerspectiveCamera
-from .rig import ALIKE, FINE, GROSS, Rig, check_views
-from .triangulate import at_once, missed
+from .rig import ALIKE, FINE, GROSS, Rig, at_once, check_views, missed
 
 _FEWEST = 8  # frames in common of a pair
 _UNKNOWN = 45.0  # degrees
