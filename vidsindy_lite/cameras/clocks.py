@@ -24,6 +24,7 @@ INSTANTS = 300
 """At which views are compared before all frames are."""
 OVERLAP = 0.5
 """Share of the shorter of two videos that both must show."""
+_NEAR = 4.0  # frames within which a search for lags goes to the best
 _FARTHEST = 1e9  # frames by which a video may start later; and ...
 _FASTEST = 1e6  # ... times as many frames that one may take: more is no lag and no rate
 _WIDEST = 2.5  # frames between two that a track is interpolated from: one of them may be dropped
@@ -125,6 +126,17 @@ def align(
 def list_lags(lags: Sequence[float] | Floats) -> str:
     """Lags as text, to a hundredth of a frame, e.g. ``0, 7, -12.5``."""
     return ", ".join(f"{round(lag, 2) + 0.0:g}" for lag in lags)
+
+
+def dips(lags: Floats, missed: Floats) -> list[float]:
+    """Lags at which less is missed than at their neighbours and near by, the lowest first."""
+    padded = np.pad(missed, 1, constant_values=np.inf)
+    low = (missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed)
+    kept: list[float] = []
+    for lag in lags[low][np.argsort(missed[low])]:
+        if all(abs(lag - other) >= _NEAR for other in kept):
+            kept.append(float(lag))
+    return kept
 
 
 @dataclass(frozen=True, eq=False)

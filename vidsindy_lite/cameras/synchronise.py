@@ -5,9 +5,8 @@ each other, and no camera can mend it. So the lags are those of the smallest rep
 are found in three steps:
 
 1. pair by pair, with a calibrated camera: the epipolar equation (`triangulate.epipolar_lines`) is
-   linear in what is unknown of the other camera, and is solved at all whole lags at once. It is
-   solved a second time with a shift of the other image, which takes up most of what a badly
-   measured normal or position does;
+   linear in what is unknown of the other camera, and is solved at all whole lags at once, with a
+   shift of the other image, which takes up most of what a badly measured normal or position does;
 2. all cameras together (`adjust`), in some of the frames, from the most promising whole lags;
 3. from the best of these, in all frames.
 
@@ -53,6 +52,7 @@ from .clocks import (
     check_clocks,
     check_lags,
     check_rates,
+    dips,
     list_lags,
 )
 from .models import Camera
@@ -74,7 +74,6 @@ from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
 _PROMISING = 6  # lags of each camera
-_NEAR = 4.0  # frames
 _BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
@@ -108,7 +107,7 @@ def promising_lags(
 ) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
     misses = lag_misses(curves, rates, cameras, shift=True)
-    found = [_dips(lags, missed)[:_PROMISING].tolist() or [0.0] for lags, missed in misses]
+    found = [dips(lags, missed)[:_PROMISING] or [0.0] for lags, missed in misses]
     found.insert(first_known(cameras), [0.0])
     return found
 
@@ -148,22 +147,6 @@ def lag_misses(
 def first_known(cameras: Sequence[Camera]) -> int:
     """The first calibrated camera."""
     return next(i for i, camera in enumerate(cameras) if camera.is_calibrated)
-
-
-def _dips(lags: Floats, missed: Floats) -> Floats:
-    """The lags of the minima, the lowest first."""
-    padded = np.concatenate(([np.inf], missed, [np.inf]))
-    dips = np.flatnonzero((missed <= padded[:-2]) & (missed <= padded[2:]) & np.isfinite(missed))
-    return _apart(lags[dips[np.argsort(missed[dips])]])
-
-
-def _apart(lags: Floats) -> Floats:
-    """Those that no earlier one is close to: a search goes to the best within a few frames."""
-    kept: list[float] = []
-    for lag in lags:
-        if all(abs(lag - other) >= _NEAR for other in kept):
-            kept.append(lag)
-    return np.array(kept)
 
 
 def pair_missed(
@@ -376,19 +359,18 @@ def nearest(
     clocks: Sequence[ArrayLike] | None,
 ) -> float:
     """Residual in pixels at the best lags near given ones."""
-    with tqdm(disable=True) as bar:
-        found = _Videos.of(tracks, rig, rates, clocks, bar).fitted(lags, rough=True)
+    found = _Videos.of(tracks, rig, rates, clocks).fitted(lags, rough=True)
     return np.inf if found is None else found.residual
 
 
 @dataclass(frozen=True, eq=False)
 class _Videos:
-    """The tracks as functions of time, what is known of the cameras, and a bar to move."""
+    """The tracks as functions of time, what is known of the cameras, and a bar to move, if any."""
 
     curves: tuple[Curve, ...]
     known: tuple[Camera, ...]
     rates: Floats
-    bar: tqdm
+    shown: tqdm | None = None
 
     @classmethod
     def of(
@@ -397,13 +379,13 @@ class _Videos:
         rig: Rig,
         rates: Floats,
         clocks: Sequence[ArrayLike] | None,
-        bar: tqdm,
+        shown: tqdm | None = None,
     ) -> _Videos:
         """Of tracks as they are given."""
         still = at_once(rig.cameras, tracks)
         instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
         curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
-        return cls(curves, instant, rates, bar)
+        return cls(curves, instant, rates, shown)
 
     def footage(self, lags: Floats, rough: bool = False) -> Footage:
         """All instants, or some."""
@@ -437,7 +419,8 @@ class _Videos:
 
     def fitted(self, lags: Floats, rough: bool = False, loose: bool = False) -> Timing | None:
         """The best lags near given ones, or better ones than these; None if nothing fits."""
-        self.bar.update()
+        if self.shown is not None:
+            self.shown.update()
         footage = self.footage(lags, rough)
         cameras = self.cameras(footage)
         if cameras is None:
