@@ -31,7 +31,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..checks import check_instance
 from .adjust import PARTS, adjust, known_to
-from .clocks import Curve, Footage, Lags, check_clocks
+from .clocks import Footage, Lags, check_clocks
 from .models import Camera, all_orthographic, independent
 from .rig import (
     Rig,
@@ -434,8 +434,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     moving = (lags.errors > 0) & np.isfinite(lags.errors)
     errors[moving, PARTS["lag"]] = errors[lags.rate_errors > 0, PARTS["drift"]] = np.inf
     clocks = check_clocks(lags.clocks or None, tracks)
-    curves = tuple(map(Curve, tracks, clocks))
-    footage = Footage(curves, clocks[0], lags.frames, lags.rates)
+    footage = Footage.of(tracks, lags.frames, lags.rates, clocks)
     near = adjust(footage, learned.cameras, errors, most=0)
     modes = np.einsum("ik,nji->knj", near.factor, near.reduced.follow)
     if not rig.note:

@@ -102,19 +102,16 @@ _MANY = 6  # cameras, of which only two are taken for each other
 _ROUNDING = 1e-9  # pixels
 
 
-def promising_lags(
-    curves: Sequence[Curve], rates: Floats, cameras: Sequence[Camera]
-) -> list[list[float]]:
+def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    misses = lag_misses(curves, rates, cameras, shift=True)
+    misses = lag_misses(footage, cameras, shift=True)
     found = [dips(lags, missed)[:_PROMISING] or [0.0] for lags, missed in misses]
     found.insert(first_known(cameras), [0.0])
     return found
 
 
 def lag_misses(
-    curves: Sequence[Curve],
-    rates: Floats,
+    footage: Footage,
     cameras: Sequence[Camera],
     most: int = INSTANTS,
     shift: bool = False,
@@ -123,10 +120,9 @@ def lag_misses(
 
     The misses are at so many instants at most.
     """
-    known = first_known(cameras)
+    known, curves, ends = first_known(cameras), footage.curves, footage.lengths
     frames = curves[known].clock
     frames = frames[:: max(1, len(frames) // most)]
-    ends = np.array([curve.clock[-1] + 1 for curve in curves]) / rates  # on the first one's clock
     for other in range(len(curves)):
         if other == known:
             continue
@@ -136,7 +132,7 @@ def lag_misses(
         placed = first.is_placed and second.is_placed
         near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
         lines = epipolar_lines(near, curves[known].at(frames), far)
-        instants, rate = frames / rates[known], rates[other]
+        instants, rate = frames / footage.rates[known], footage.rates[other]
         missed = []
         for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
             theirs = curves[other].at((instants - block[:, None]) * rate)
@@ -348,28 +344,15 @@ def learn_lags(
     with bar(progress, "synchronise", unit="fit") as shown:
         videos = _Videos.of(tracks, rig, given, clocks, shown)
         found = _learned(videos, first)
-    return found if clocks is None else replace(found, clocks=tuple(c.clock for c in videos.curves))
-
-
-def nearest(
-    tracks: Sequence[Floats],
-    rig: Rig,
-    rates: Floats,
-    lags: Floats,
-    clocks: Sequence[ArrayLike] | None,
-) -> float:
-    """Residual in pixels at the best lags near given ones."""
-    found = _Videos.of(tracks, rig, rates, clocks).fitted(lags, rough=True)
-    return np.inf if found is None else found.residual
+    return found if clocks is None else replace(found, clocks=videos.given.clocks)
 
 
 @dataclass(frozen=True, eq=False)
 class _Videos:
     """The tracks as functions of time, what is known of the cameras, and a bar to move, if any."""
 
-    curves: tuple[Curve, ...]
+    given: Footage
     known: tuple[Camera, ...]
-    rates: Floats
     shown: tqdm | None = None
 
     @classmethod
@@ -384,12 +367,12 @@ class _Videos:
         """Of tracks as they are given."""
         still = at_once(rig.cameras, tracks)
         instant = tuple(replace(camera, readout=0.0) for camera in rig.cameras)
-        curves = tuple(map(Curve, still, check_clocks(clocks, tracks)))
-        return cls(curves, instant, rates, shown)
+        footage = Footage.of(still, None, rates, check_clocks(clocks, tracks))
+        return cls(footage, instant, shown)
 
     def footage(self, lags: Floats, rough: bool = False) -> Footage:
         """All instants, or some."""
-        every = Footage(self.curves, self.curves[0].clock, lags, self.rates)
+        every = replace(self.given, lags=lags)
         return every.some if rough else every
 
     def cameras(self, footage: Footage) -> tuple[Camera, ...] | None:
@@ -406,7 +389,7 @@ class _Videos:
         """What is known of cameras, and of all lags but the first one's nothing."""
         errors = np.array([known_to(camera) for camera in self.known])
         if (
-            rough and len(self.curves[0].clock) > INSTANTS
+            rough and len(self.given.instants) > INSTANTS
         ):  # which are too few to tell where the target was between two
             errors[:, PARTS["readout"]] = 0.0
         errors[1:, LAG] = np.inf
@@ -467,7 +450,7 @@ def _learned(videos: _Videos, first: Floats) -> Lags:
 
 def _searched(videos: _Videos, first: Floats) -> tuple[bool, list[Timing]]:
     """Whether cameras should be loose, and fits to some of the instants, the best first."""
-    promising = promising_lags(videos.curves, videos.rates, videos.known)
+    promising = promising_lags(videos.given, videos.known)
     exact = _climbed(videos, promising, first, False)
     if not exact or exact[0].score <= FINE:
         return False, exact
@@ -570,7 +553,7 @@ def _untold(videos: _Videos, lags: Floats, agree: bool) -> Lags:
             f"no lags of the videos make the views agree: ({list_lags(lags)}) frames were taken, "
             f"which {left}; check the rig, or give the lags if you know them"
         ]
-    return Lags(lags, videos.rates, errors, residual, tuple(warnings))
+    return Lags(lags, videos.given.rates, errors, residual, tuple(warnings))
 
 
 def _blurred(i: int, lags: Floats) -> str:
@@ -603,9 +586,9 @@ class Mistake:
 
     def paired(self, cameras: Sequence[Camera]) -> tuple[float, Floats]:
         """By how much two views disagree at their best lags, all pairs; and these lags."""
-        curves = tuple(map(Curve, self.tracks, self.clocks))
+        footage = Footage.of(self.tracks, None, self.rates, self.clocks)
         least, lags = [], []
-        for tried, missed in lag_misses(curves, self.rates, cameras, _INSTANTS):
+        for tried, missed in lag_misses(footage, cameras, _INSTANTS):
             least.append(missed.min())
             lags.append(tried[missed.argmin()])
         behind = np.insert(lags, first_known(cameras), 0.0)
@@ -613,7 +596,9 @@ class Mistake:
 
     def left(self, rig: Rig, lags: Floats) -> float:
         """Pixels by which the worst view disagrees near these lags."""
-        return nearest(self.tracks, rig, self.rates, lags, self.clocks)
+        videos = _Videos.of(self.tracks, rig, self.rates, self.clocks)
+        found = videos.fitted(lags, rough=True)
+        return np.inf if found is None else found.residual
 
 
 def find_mistake(
@@ -633,8 +618,7 @@ def find_mistake(
     names : sequence of str
         What the videos are called.
     """
-    even = [np.arange(len(track), dtype=float) for track in tracks]
-    none = Mistake("", tuple(tracks), rates, tuple(even if clocks is None else clocks))
+    none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
     try:
         return _found(none, rig, start, names)
     except ValueError:  # what cannot be compared at all is told where cameras and lags are learned

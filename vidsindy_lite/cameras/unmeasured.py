@@ -39,7 +39,7 @@ from scipy.optimize import least_squares
 
 from ..arrays import Floats
 from .adjust import PARTS, Adjustment, adjust, known_to
-from .clocks import OVERLAP, Curve, Footage, Lags, check_clocks, dips
+from .clocks import OVERLAP, Footage, Lags, check_clocks, dips
 from .models import AffineCamera, PerspectiveCamera
 from .rig import ALIKE, FINE, GROSS, Rig, at_once, check_views, missed
 
@@ -322,8 +322,7 @@ def factorised(
     rates, clocks, lags
         See `align`; lags are found if they are not given.
     """
-    ticks = check_clocks(clocks, tracks)
-    films = Footage(tuple(map(Curve, tracks, ticks)), ticks[0], np.zeros(len(tracks)), rates)
+    films = Footage.of(tracks, None, rates, check_clocks(clocks, tracks))
     views = _Views(films.some)
     ranks = range(1, 4)
     found = [
@@ -357,7 +356,7 @@ def factorised(
     doubts = () if left <= GROSS else (
         f"views agree on one motion but for {left:.2g} pixels of noise: look at the tracks",
     )  # fmt: skip
-    told = Lags(best, rates, errors, left, doubts, clocks=() if clocks is None else ticks)
+    told = Lags(best, rates, errors, left, doubts, clocks=films.clocks if clocks else ())
     return Factorised(Rig(tuple(cameras), note=_NOTE), told, rank)
 
 
@@ -368,15 +367,9 @@ class _Views:
     footage: Footage
 
     @cached_property
-    def lengths(self) -> Floats:
-        """Of all videos, in frames of the first."""
-        frames = [np.ptp(curve.clock) + 1 for curve in self.footage.curves]
-        return np.array(frames) / self.footage.rates
-
-    @cached_property
     def least(self) -> float:
         """Frames of the first video that all must show."""
-        return OVERLAP * float(self.lengths.min())
+        return OVERLAP * float(self.footage.lengths.min())
 
     def left(self, lags: Floats, places: Sequence[int], rank: int) -> float:
         """Noise of the pixels that is left beyond a rank; infinite of too few common frames."""
@@ -394,7 +387,7 @@ class _Views:
         tried together, and further views one by one. Of those that leave about as little, the
         shortest count.
         """
-        count = len(self.lengths)
+        count = len(self.footage.curves)
         lags = np.zeros(count)
         promising = [self._promising(i, rank)[:_PROMISING] for i in range(1, count)]
         for last in range(3, count + 1):
@@ -412,9 +405,9 @@ class _Views:
 
     def _promising(self, i: int, rank: int) -> list[float]:
         """Whole lags of a view at which less is left than at their neighbours, the best first."""
-        first, last = self.least - self.lengths[i], self.lengths[0] - self.least
-        tried = np.arange(np.ceil(first), last + 1)
-        every = np.zeros((len(tried), len(self.lengths)))
+        lengths = self.footage.lengths
+        tried = np.arange(np.ceil(self.least - lengths[i]), lengths[0] - self.least + 1)
+        every = np.zeros((len(tried), len(lengths)))
         every[:, i] = tried
         return dips(tried, np.array([self.left(lags, (0, i), rank) for lags in every]))
 
