@@ -228,7 +228,7 @@ def changed(camera: Camera, change: Floats) -> Camera:
     return moved
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Adjustment:
     """Cameras, clocks and path after some change, and what is known of them near by.
 
@@ -277,6 +277,10 @@ class Adjustment:
         seen = np.isfinite(missed).all(axis=-1)
         missed[~seen | (seen.sum(axis=1) < 2)[:, None]] = np.nan  # one view has no say
         return missed.reshape(len(missed), -1)
+
+    def left(self, share: float = TRIMMED) -> float:
+        """The worst camera's residual that one frame in ten exceeds, pixels; see `trimmed`."""
+        return max(trimmed(part, share) for part in np.split(self.misses, len(self.start), axis=1))
 
     @cached_property
     def noise(self) -> float:
@@ -426,20 +430,19 @@ def adjust(
     seen = points[np.isfinite(points).all(axis=1)]
     reach = (float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else 1.0) or 1.0
     state = replace(state, points=points, reach=reach)
-    settled, steps, earlier = False, 0, np.full(errors.shape, np.inf)
-    while not settled and steps < most:
+    earlier = np.full(errors.shape, np.inf)
+    while not state.settled and state.steps < most:
         moved, step = _downhill(state)
-        steps += 1
         if moved is None:  # rounding is all that is left, or points ran out of numbers
-            settled = step == 0
+            state.settled, state.steps = step == 0, state.steps + 1
             break
         # A frame at the end of a video may come and go with a lag, for ever.
         back = (np.abs(moved.change - earlier) <= _PROBE * state.unit).all()
         enough = max(_SETTLED, (_IN_TIME if state.timed else _ENOUGH) * moved.noise)
         still = step <= enough or (state.timed and back)
-        settled = bool(still and moved.noise >= state.noise * (1 - 1e-3))
-        earlier, state = state.change, moved
-    return replace(state, settled=settled, steps=steps)
+        moved.settled = bool(still and moved.noise >= state.noise * (1 - 1e-3))
+        moved.steps, earlier, state = state.steps + 1, state.change, moved
+    return state
 
 
 def _downhill(state: Adjustment) -> tuple[Adjustment | None, float]:
@@ -508,7 +511,7 @@ class Explanation:
     @property
     def left(self) -> float:
         """`disagreement` of the worst camera of these, pixels."""
-        return max(map(trimmed, np.split(self.found.misses, len(self.found.cameras), axis=1)))
+        return self.found.left()
 
     def text(self, names: Sequence[str]) -> str:
         """What would explain the residuals best, with its value."""

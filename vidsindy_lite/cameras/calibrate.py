@@ -77,10 +77,10 @@ def _epipolar(tracks: Sequence[Floats], cameras: Sequence[Camera], i: int) -> Eq
     others = [j for j, known in enumerate(cameras) if known.is_calibrated and j != i]
     loose = [j for j in others if not cameras[j].is_placed]
     free = [not camera.is_calibrated] * 2 + [not camera.is_placed] * 2 + [True] * len(loose)
-    values = np.append(_turned(camera), np.zeros(2 + len(loose)))
+    values = np.append(camera.scaled_turn, np.zeros(2 + len(loose)))
     parts = [(np.zeros((0, len(free))), np.zeros(0), np.zeros(0, int))]
     for j in others:
-        lines = epipolar_lines(_somewhere(cameras[j]), tracks[j], _somewhere(camera))
+        lines = epipolar_lines(cameras[j].somewhere, tracks[j], camera.somewhere)
         design, target = epipolar_rows(lines, camera, tracks[i])
         constants = np.tile(np.equal(loose, j), (len(design), 1))
         moves = np.hstack((lines[0][:, ::-1] * [-1, 1], constants))
@@ -89,19 +89,6 @@ def _epipolar(tracks: Sequence[Floats], cameras: Sequence[Camera], i: int) -> Eq
         parts.append((design[told], (target - design @ values)[told], told))
     design, target, frames = map(np.concatenate, zip(*parts, strict=True))
     return Equations(design[:, free], target, frames)
-
-
-def _somewhere(camera: Camera) -> Camera:
-    """A camera with a position: its own, or any."""
-    return camera if camera.is_placed else camera.placed(np.zeros(2))
-
-
-def _turned(camera: Camera) -> Floats:
-    """(s cos theta, s sin theta); zero if they are unknown."""
-    if not camera.is_calibrated:
-        return np.zeros(2)
-    scale, angle = camera.calibration
-    return scale * np.array([np.cos(angle), np.sin(angle)])
 
 
 def _without_outliers(every: Equations, scale: float) -> Equations:

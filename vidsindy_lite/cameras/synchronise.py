@@ -130,8 +130,7 @@ def lag_misses(
         lags = np.arange(np.ceil(margin - ends[other]), ends[known] - margin + 1)
         first, second = cameras[known], cameras[other]
         placed = first.is_placed and second.is_placed
-        near, far = (c if c.is_placed else c.placed(np.zeros(2)) for c in (first, second))
-        lines = epipolar_lines(near, curves[known].at(frames), far)
+        lines = epipolar_lines(first.somewhere, curves[known].at(frames), second.somewhere)
         instants, rate = frames / footage.rates[known], footage.rates[other]
         missed = []
         for block in np.array_split(lags, int(np.ceil(lags.size * frames.size / _BLOCK))):
@@ -154,12 +153,8 @@ def pair_missed(
     instant in ten is left out. Infinite where too few are left.
     """
     design, target = epipolar_rows(lines, other, theirs)
-    if other.is_calibrated:
-        scale, angle = other.calibration
-        design, target = (
-            design[..., :0],
-            target - design @ [scale * np.cos(angle), scale * np.sin(angle)],
-        )
+    target = target - design @ other.scaled_turn
+    design = design[..., : 0 if other.is_calibrated else 2]
     extra = lines[0] if shift else np.ones((len(lines[0]), 1)) if not placed else lines[0][:, :0]
     extra = np.broadcast_to(extra, (*target.shape, extra.shape[1]))
     design = np.concatenate((design, extra), axis=-1)
@@ -190,19 +185,10 @@ class Timing:
     fit: Adjustment
 
     @classmethod
-    def of(
-        cls,
-        footage: Footage,
-        cameras: tuple[Camera, ...],
-        errors: Floats,
-        *,
-        begin: Floats | None = None,
-        most: int = STEPS,
-    ) -> Timing | None:
+    def of(cls, fit: Adjustment) -> Timing | None:
         """None if the views have too little in common."""
-        fit = adjust(footage, cameras, errors, begin=begin, most=most)
         told = np.isfinite(fit.misses).any(axis=1).sum()
-        return cls(fit) if 3 * told > np.isinf(errors[:, _TIMES]).sum() else None
+        return cls(fit) if 3 * told > np.isinf(fit.errors[:, _TIMES]).sum() else None
 
     @property
     def lags(self) -> Floats:
@@ -215,19 +201,9 @@ class Timing:
         return self.fit.weights > _USED
 
     @property
-    def missed(self) -> Floats:
-        """Residuals, (m, n, 2)."""
-        return np.stack(np.split(self.fit.misses, len(self.fit.cameras), axis=1))
-
-    @property
-    def residual(self) -> float:
-        """The worst camera's, pixels."""
-        return max(map(trimmed, self.missed))
-
-    @property
     def score(self) -> float:
-        """The same, if errors are normal but for some outliers: from the better part of them."""
-        return max(trimmed(part, _BETTER_PART) for part in self.missed)
+        """What is left, if errors are normal but for some outliers: by the better part of them."""
+        return self.fit.left(_BETTER_PART)
 
     @property
     def agrees(self) -> bool:
@@ -260,7 +236,7 @@ class Timing:
         lags, others = slopes[:, parts == LAG], slopes[:, ~np.isin(parts, _TIMES)]
         lags = lags - others @ np.linalg.lstsq(others, lags)[0] if others.size else lags
         # Of the two numbers of each of k views, the point leaves 2 - 3 / k.
-        seen = np.isfinite(self.missed[:, used, 0])
+        seen = np.isfinite(self.fit.misses[used, ::2].T)
         views = np.maximum(seen.sum(axis=0), 2)
         freedom = np.maximum((seen * (2 - 3 / views)).sum(axis=1)[1:], 1e-9)
         speeds = fit.footage.rates[1:]
@@ -282,7 +258,7 @@ class Timing:
         """The same with drifts of clocks, if any are clear and large enough to matter."""
         fit, errors = self.fit, self.fit.errors.copy()
         errors[1:, DRIFT] = np.inf
-        free = Timing.of(fit.given, fit.start, errors, begin=fit.change)
+        free = Timing.of(adjust(fit.given, fit.start, errors, begin=fit.change))
         if free is None:
             return self
         drift, off = free.fit.change[:, DRIFT], np.zeros(len(errors))
@@ -292,7 +268,7 @@ class Timing:
             return self
         errors[~clear, DRIFT] = 0.0
         begin = np.where(errors > 0, free.fit.change, 0.0)
-        return Timing.of(fit.given, fit.start, errors, begin=begin) or self
+        return Timing.of(adjust(fit.given, fit.start, errors, begin=begin)) or self
 
 
 def learn_lags(
@@ -408,8 +384,8 @@ class _Videos:
         cameras = self.cameras(footage)
         if cameras is None:
             return None
-        errors = self.errors(rough, loose)
-        return Timing.of(footage, cameras, errors, most=_ROUGH_STEPS if rough else STEPS)
+        most = _ROUGH_STEPS if rough else STEPS
+        return Timing.of(adjust(footage, cameras, self.errors(rough, loose), most=most))
 
 
 # ------------------------------------------------------------------------------------- the search
@@ -480,7 +456,7 @@ def _climbed(
         if key not in tried:
             tried[key] = videos.fitted(np.array(key), True, loose)
         found = tried[key]
-        return np.inf if found is None else found.residual
+        return np.inf if found is None else found.fit.left()
 
     best = np.array([lags[0] for lags in promising])
     fits(first)
@@ -534,7 +510,7 @@ def _told(videos: _Videos, found: Timing, first: Floats) -> Lags:
             "the lags if you know them"
         )
     return Lags(
-        lags, fit.footage.rates, errors, found.residual, tuple(warnings), rate_errors=rate_errors
+        lags, fit.footage.rates, errors, found.fit.left(), tuple(warnings), rate_errors=rate_errors
     )
 
 
@@ -598,7 +574,7 @@ class Mistake:
         """Pixels by which the worst view disagrees near these lags."""
         videos = _Videos.of(self.tracks, rig, self.rates, self.clocks)
         found = videos.fitted(lags, rough=True)
-        return np.inf if found is None else found.residual
+        return np.inf if found is None else found.fit.left()
 
 
 def find_mistake(
@@ -741,8 +717,7 @@ def _jumps(
     lines = epipolar_lines(cameras[0], curves[0].at(frames), cameras[j])
     theirs = curves[j].at((frames - tried[:, None]) * rates[j])
     design, target = epipolar_rows(lines, cameras[j], theirs)
-    scale, angle = cameras[j].calibration
-    missed = np.abs(target - design @ [scale * np.cos(angle), scale * np.sin(angle)])
+    missed = np.abs(target - design @ cameras[j].scaled_turn)
     usual = missed[_LONGEST][np.isfinite(missed[_LONGEST])]
     if not usual.size:
         return []
