@@ -7,7 +7,7 @@ import pytest
 from helpers import aligned_error, room, walk
 
 import vidsindy_lite as vl
-from vidsindy_lite.cameras import AffineCamera, factorised, learn_cameras_eq4, posed, unmeasured
+from vidsindy_lite.cameras import AffineCamera, factorised, learn_cameras_eq4, posed
 from vidsindy_lite.pipeline import observe_tracks
 from vidsindy_lite.study import SYSTEMS
 
@@ -35,8 +35,7 @@ def filmed(rng, rig, late=(0.0,) * 5, noise=0.5):
     return [track + noise * rng.normal(size=track.shape) for track in tracks]
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("cameras", [3, 4])
+@pytest.mark.parametrize(("seed", "cameras"), [(0, 3), (1, 4)])
 def test_the_path_is_found_but_for_a_similarity(seed, cameras):
     rng = np.random.default_rng([seed, cameras])
     rig = room(rng, cameras)
@@ -221,15 +220,6 @@ def test_what_is_no_rig_of_lenses():
         learn_cameras_eq4([walk(np.arange(20))[:, :2]] * 3, vl.Rig([lens] * 3))
     with pytest.raises(ValueError, match="camera: position must be known"):
         lens.project(np.zeros((1, 3)))
-
-
-def test_of_exact_tracks_some_start_is_exact():
-    """What two cameras see tells where any other one stands; as if from far away, only about."""
-    rng = np.random.default_rng(9)
-    rig = room(rng, 4)
-    starts = unmeasured._starts(filmed(rng, rig, noise=0.0), lenses(rng, rig, off=0.0))
-    missed = sorted(miss for miss, _ in starts)
-    assert missed[0] < 1e-3 < 1 < missed[-1]
 
 
 LAGS = np.array([0.0, 17.4, -8.0, 5.5])
