@@ -5,8 +5,9 @@ each other, and no camera can mend it. So the lags are those of the smallest rep
 are found in three steps:
 
 1. pair by pair, with a calibrated camera: the epipolar equation (`triangulate.epipolar_lines`) is
-   linear in what is unknown of the other camera, and is solved at all whole lags at once, with a
-   shift of the other image, which takes up most of what a badly measured normal or position does;
+   linear in what is unknown of the other camera, and is solved at all whole lags at once. It is
+   solved a second time with a shift of the other image, which takes up most of what a badly
+   measured normal or position does;
 2. all cameras together (`adjust`), in some of the frames, from the most promising whole lags;
 3. from the best of these, in all frames.
 
@@ -73,7 +74,7 @@ from .rig import missed as missed_by
 from .unmeasured import posed
 
 _BLOCK = 200_000  # pairs of a lag and an instant at a time
-_PROMISING = 6  # lags of each camera
+_PROMISING = 4  # lags of each camera, with and without a shift
 _BETTER_PART = 0.7  # of all frames or equations, in which there is no outlier
 _APART = 1.0  # frames; lags closer than that are one and the same
 _PERSISTENT = 0.5  # correlation of a residual with the next frame's that is no tracker's noise
@@ -104,8 +105,11 @@ _ROUNDING = 1e-9  # pixels
 
 def promising_lags(footage: Footage, cameras: Sequence[Camera]) -> list[list[float]]:
     """Whole lags of each camera behind the first calibrated one, the most promising first."""
-    misses = lag_misses(footage, cameras, shift=True)
-    found = [dips(lags, missed)[:_PROMISING] or [0.0] for lags, missed in misses]
+    both = (lag_misses(footage, cameras, shift=shift) for shift in (False, True))
+    found = []
+    for without, shifted in zip(*both, strict=True):
+        choices = [lag for misses in (without, shifted) for lag in dips(*misses)[:_PROMISING]]
+        found.append([*dict.fromkeys(choices)] or [0.0])
     found.insert(first_known(cameras), [0.0])
     return found
 

@@ -389,7 +389,7 @@ class _Views:
         """
         count = len(self.footage.curves)
         lags = np.zeros(count)
-        promising = [self._promising(i, rank)[:_PROMISING] for i in range(1, count)]
+        promising = [self._promising(i, rank)[:_PROMISING] or [0.0] for i in range(1, count)]
         for last in range(3, count + 1):
             tried = []
             for new in product(*promising[:2]) if last == 3 else product(promising[last - 2]):
