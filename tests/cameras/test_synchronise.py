@@ -542,7 +542,7 @@ def test_lags_and_rolling_shutters_are_told_apart(known):
     np.testing.assert_allclose(found.frames, lags, atol=0.05 if known else 0.1)
 
 
-LAG, DRIFT = PARTS["lag"].start, PARTS["drift"].start
+LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
 def fitted(motion, lags=(0, 0, 0), frames=120, rates=(1, 1, 1), **more):

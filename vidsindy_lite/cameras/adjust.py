@@ -67,6 +67,7 @@ from .rig import (
     Rig,
     at_once,
     check_views,
+    decimals,
     disagreement,
     intersect,
     residuals,
@@ -75,16 +76,16 @@ from .rig import (
 
 _UNTOLD = 1e-15  # of the largest information of any direction: rounding
 PARTS = {
-    "normal": slice(0, 2),
-    "angle": slice(2, 3),
-    "scale": slice(3, 4),
-    "position": slice(4, 7),
-    "principal point": slice(7, 9),
-    "distortion": slice(9, 13),
-    "readout": slice(13, 14),
-    "lag": slice(14, 15),
-    "drift": slice(15, 16),
-    "nearness": slice(16, 17),
+    "normal": [0, 1],
+    "angle": [2],
+    "scale": [3],
+    "position": [4, 5, 6],
+    "principal point": [7, 8],
+    "distortion": [9, 10, 11, 12],
+    "readout": [13],
+    "lag": [14],
+    "drift": [15],
+    "nearness": [16],
 }
 """Which components of the vector belong to what."""
 
@@ -111,7 +112,7 @@ _TRIED = 5  # of the causes that stand out most
 _DEGENERATE = 1e-3  # share of a slope that nothing else explains; less tells nothing
 _SMOOTH = 0.3  # correlation of a residual with the next; that of noise is zero
 _ROUNDING = 1e-9  # pixels
-LAG, DRIFT = PARTS["lag"].start, PARTS["drift"].start
+LAG, DRIFT = PARTS["lag"][0], PARTS["drift"][0]
 
 
 def fitted_factor(missed: Floats, slopes: Floats, prior: Floats, noise: float) -> Floats:
@@ -177,7 +178,7 @@ def known_to(given: Camera) -> Floats:
     errors[PARTS["scale"]] = given.scale_error if given.is_calibrated else np.inf
     errors[PARTS["position"]] = given.position_error if given.is_placed else np.inf
     if isinstance(given, OrthographicCamera):
-        errors[PARTS["position"]][2] = 0.0  # it sees the same from anywhere on its axis
+        errors[PARTS["position"][2]] = 0.0  # it sees the same from anywhere on its axis
     errors[PARTS["principal point"]] = given.principal_point_error
     if isinstance(given, PerspectiveCamera):
         errors[PARTS["distortion"]] = given.distortion_error * np.array(
@@ -492,7 +493,7 @@ class Cause:
 
     what: str
     cameras: tuple[int, ...]
-    parts: tuple[int, ...]
+    parts: Sequence[int]
 
     def mask(self, count: int) -> Bools:
         """The freed components, (m, SIZE)."""
@@ -520,8 +521,8 @@ class Explanation:
         one = f"cameras[{i}] ({names[i]})"
         whose = one if len(self.cause.cameras) == 1 else "all cameras"
         parts = {
-            "normal": f"the normal ({_list(camera.normal)}) of {whose}",
-            "position": f"the position ({_list(np.asarray(camera.position))}) of {whose}",
+            "normal": f"the normal ({decimals(camera.normal)}) of {whose}",
+            "position": f"the position ({decimals(np.asarray(camera.position))}) of {whose}",
             "scale": f"a scale {100 * np.expm1(change[PARTS['scale']][0]):+.2g} % off of {whose}",
             "distortion": f"a distortion of the lens of {whose}, for {one} k1 off "
             f"by {change[PARTS['distortion']][0]:.2g},",
@@ -589,23 +590,18 @@ def _causes(cameras: Sequence[Camera]) -> list[Cause]:
     flat = tuple(i for i in every if isinstance(cameras[i], OrthographicCamera))
     pinholes = tuple(i for i in every if i not in flat)
     found = [
-        Cause(what, (i,), _components(what)[: 2 if i in flat else None])
+        Cause(what, (i,), PARTS[what][: 2 if i in flat else None])
         for what in ("normal", "position", "scale", "readout", "lag", "drift")
         for i in every
     ]
-    lens = _components("distortion")[:2]  # k1 and k2: few motions tell more
+    lens = PARTS["distortion"][:2]  # k1 and k2: few motions tell more
     found += [Cause("distortion", (i,), lens) for i in pinholes]
-    found.append(Cause("readout", every, _components("readout")))
+    found.append(Cause("readout", every, PARTS["readout"]))
     if pinholes:
         found.append(Cause("distortion", pinholes, lens))
     if flat:  # the scale is then that of another distance
-        found.append(Cause("nearness", flat, _components("nearness") + _components("scale")))
+        found.append(Cause("nearness", flat, PARTS["nearness"] + PARTS["scale"]))
     return found
-
-
-def _components(what: str) -> tuple[int, ...]:
-    """Places in the vector of changes."""
-    return tuple(range(SIZE)[PARTS[what]])
 
 
 def _near(camera: Camera, about: Floats) -> Camera:
@@ -651,8 +647,3 @@ def _sizes(near: Adjustment, errors: Floats, cause: Cause) -> tuple[float, float
     chance = float(fdtri(len(score), rest_degrees, 1 - _CHANCE))
     limit = chance * len(score) * degrees / rest_degrees
     return float(score @ np.linalg.solve(covariance, score)) / limit, explained
-
-
-def _list(values: Floats) -> str:
-    """Three decimals of each."""
-    return ", ".join(f"{value:.3f}" for value in values)

@@ -30,7 +30,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..checks import check_instance
-from .adjust import PARTS, adjust, known_to
+from .adjust import DRIFT, LAG, PARTS, adjust, known_to
 from .clocks import Footage, Lags, check_clocks
 from .models import Camera, all_orthographic, independent
 from .rig import (
@@ -353,7 +353,7 @@ def learn_cameras(tracks: Sequence[Floats], rig: Rig) -> Rig:
     off = np.where(measured, np.abs(found.change) / np.where(measured, errors, 1.0), 0.0)
     if off.max() > _TOO_FAR:
         i, part = np.unravel_index(off.argmax(), off.shape)
-        what = next(name for name, place in PARTS.items() if place.start <= part < place.stop)
+        what = next(name for name, place in PARTS.items() if part in place)
         doubts += (
             f"the {what} of cameras[{i}] is {off.max():.0f} times its error from what was "
             "measured: check it, and how the others were measured",
@@ -419,7 +419,7 @@ def systematic_errors(tracks: Sequence[Floats], rig: Rig, learned: Rig, lags: La
     """
     errors = np.array([known_to(camera) for camera in rig.cameras])
     moving = (lags.errors > 0) & np.isfinite(lags.errors)
-    errors[moving, PARTS["lag"]] = errors[lags.rate_errors > 0, PARTS["drift"]] = np.inf
+    errors[moving, LAG] = errors[lags.rate_errors > 0, DRIFT] = np.inf
     clocks = check_clocks(lags.clocks or None, tracks)
     footage = Footage.of(tracks, lags.frames, lags.rates, clocks)
     near = adjust(footage, learned.cameras, errors, most=0)

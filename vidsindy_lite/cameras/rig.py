@@ -643,11 +643,11 @@ def rig_template(
         # Of two cameras, one is a third of a turn from the other: face to face both see the same.
         azimuth = 2 * np.pi * i / max(cameras, 3) + np.deg2rad(20)
         normal, upright = _looking_down(azimuth, np.deg2rad(20))
-        place, size = f"position = {_vector(3 * normal)}", f"image_size = [{width}, {height}]"
+        place, size = f"position = [{decimals(3 * normal)}]", f"image_size = [{width}, {height}]"
         if flat:
             lines = [
                 f"{place}    # of the camera, or a landmark in the middle of its image",
-                f"normal = {_vector(normal)}    # from the scene to the camera; any length",
+                f"normal = [{decimals(normal)}]    # from the scene to the camera; any length",
                 size,
                 *((_SCALE, _ANGLE.format(angle=upright)) if i == 0 else ()),
             ]
@@ -691,9 +691,9 @@ def _by_hand(table: dict[str, Any], model: str) -> dict[str, Any]:
     return known
 
 
-def _vector(values: Floats) -> str:
-    """Three decimals of each number, as TOML."""
-    return f"[{', '.join(f'{value:.3f}' for value in values)}]"
+def decimals(values: Floats) -> str:
+    """Three decimals of each number."""
+    return ", ".join(f"{value:.3f}" for value in values)
 
 
 def _to_table(camera: Camera) -> dict[str, object]:

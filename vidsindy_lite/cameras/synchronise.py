@@ -32,6 +32,7 @@ dropped where the best lag of two views jumps.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -599,10 +600,9 @@ def find_mistake(
         What the videos are called.
     """
     none = Mistake("", tuple(tracks), rates, check_clocks(clocks, tracks))
-    try:
+    with suppress(ValueError):  # what cannot be compared is told where cameras and lags are learned
         return _found(none, rig, start, names)
-    except ValueError:  # what cannot be compared at all is told where cameras and lags are learned
-        return None
+    return None
 
 
 def _found(none: Mistake, rig: Rig, start: Floats, names: Sequence[str]) -> Mistake | None:
